@@ -1,0 +1,199 @@
+//! A device moved by a script: reach, press, trace, wait. It closes the loop through the force it is given.
+//!
+//! Takes moves in world space. Gives readings as a hand would, and what was felt when a move ends. Never sees the tooth.
+
+use super::{Device, Gone, Hand, HandModel, Output, Reading, Spec};
+use crate::frame::{Pose, Quat, Vec3};
+use crate::tick::TICK_S;
+use std::collections::VecDeque;
+
+/// One thing a hand does. Positions in world space, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Move {
+    /// Straight to a place, in free space.
+    Reach { to: Vec3, speed: f32 },
+    /// From here along a direction until the force is met, then holds it for a while.
+    ///
+    /// Gives up after `reach` mm without meeting it.
+    Press { along: Vec3, force: f32, hold: f32, reach: f32, speed: f32 },
+    /// Along a path while pressing sideways along a direction with a force.
+    Trace { path: Vec<Vec3>, along: Vec3, force: f32, speed: f32 },
+    /// Holds still for so many seconds.
+    Wait { seconds: f32 },
+}
+
+/// What was felt during a move.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Felt {
+    /// Where the first resistance was met.
+    pub touched_at: Option<Vec3>,
+    /// Greatest force along the pressing direction, N.
+    pub force: f32,
+    /// How far beyond first touch the hand was when the move ended, along the pressing direction, mm.
+    pub depth: f32,
+    /// Spring felt while pressing on: slope of force over depth between a third of the force and all of it, N/mm.
+    pub stiffness: Option<f32>,
+}
+
+/// Force from which a hand notices that it touches, N (perceptual threshold of the finger, about 0.05–0.1).
+const NOTICE: f32 = 0.06;
+
+/// How eagerly pressing corrects its force, mm/s per N. Above 30 it overshoots on enamel.
+const PRESS_GAIN: f32 = 15.0;
+
+/// Deepest a pressing hand goes beyond the path it follows, mm.
+const PRESS_DEPTH_MAX: f32 = 6.0;
+
+/// The scripted device.
+#[derive(Clone, Debug)]
+pub struct Scripted {
+    spec: Spec,
+    hand: Hand,
+    orientation: Quat,
+    moves: VecDeque<Move>,
+    now: Progress,
+    felt: Option<Felt>,
+}
+
+/// How far the current move has come.
+#[derive(Clone, Copy, Debug, Default)]
+struct Progress {
+    seconds: f32,
+    /// mm along the path or the pressing direction.
+    travelled: f32,
+    /// Correction beyond the path, mm along the pressing direction.
+    lean: f32,
+    started_at: Vec3,
+    begun: bool,
+    met: bool,
+    felt: Felt,
+    third: Option<(f32, f32)>,
+}
+
+impl Scripted {
+    pub fn new(spec: Spec, model: HandModel, start: Vec3) -> Scripted {
+        Scripted {
+            spec,
+            hand: Hand::resting_at(model, start),
+            orientation: Quat::IDENTITY,
+            moves: VecDeque::new(),
+            now: Progress::default(),
+            felt: None,
+        }
+    }
+
+    pub fn push(&mut self, next: Move) {
+        self.moves.push_back(next);
+    }
+
+    pub fn is_idle(&self) -> bool {
+        self.moves.is_empty()
+    }
+
+    /// Drops what was still to be done.
+    pub fn stop(&mut self) {
+        self.moves.clear();
+        self.now = Progress::default();
+        self.hand.goal = self.hand.position();
+    }
+
+    /// What the last finished move felt; given once.
+    pub fn take_felt(&mut self) -> Option<Felt> {
+        self.felt.take()
+    }
+
+    /// Where the hand is, world space.
+    pub fn position(&self) -> Vec3 {
+        self.hand.position()
+    }
+
+    fn advance(&mut self, force: Vec3) {
+        let Some(current) = self.moves.front() else { return };
+        if !self.now.begun {
+            self.now = Progress { begun: true, started_at: self.hand.goal, ..Progress::default() };
+        }
+        let dt = TICK_S as f32;
+        let now = &mut self.now;
+        now.seconds += dt;
+        let done = match current {
+            Move::Reach { to, speed } => {
+                let way = *to - now.started_at;
+                now.travelled = (now.travelled + speed * dt).min(way.length());
+                self.hand.goal = now.started_at + way.normalize_or_zero() * now.travelled;
+                now.travelled >= way.length() && self.hand.position().distance(*to) < 0.3 || now.seconds > 20.0
+            }
+            Move::Press { along, force: wanted, hold, reach, speed } => {
+                let resistance = now.feel(force, *along, self.hand.position(), *wanted);
+                let lack = wanted - resistance;
+                let step = if now.felt.touched_at.is_some() { (lack * PRESS_GAIN).min(*speed) } else { *speed };
+                now.lean += step * dt;
+                self.hand.goal = now.started_at + *along * now.lean;
+                if lack < 0.1 * wanted && !now.met {
+                    (now.met, now.seconds) = (true, 0.0);
+                }
+                (now.met && now.seconds >= *hold) || now.lean > *reach
+            }
+            Move::Trace { path, along, force: wanted, speed } => {
+                let resistance = now.feel(force, *along, self.hand.position(), *wanted);
+                now.lean += (wanted - resistance) * PRESS_GAIN * dt;
+                now.lean = now.lean.clamp(-1.0, PRESS_DEPTH_MAX);
+                now.travelled += speed * dt;
+                let (on_path, at_end) = point_along(path, now.travelled);
+                self.hand.goal = on_path + *along * now.lean;
+                at_end
+            }
+            Move::Wait { seconds } => now.seconds >= *seconds,
+        };
+        if done {
+            self.felt = Some(self.now.felt);
+            self.moves.pop_front();
+            self.now = Progress::default();
+        }
+    }
+}
+
+impl Progress {
+    /// Notes what pressing along a direction meets; returns the resistance in N.
+    fn feel(&mut self, force: Vec3, along: Vec3, at: Vec3, wanted: f32) -> f32 {
+        let resistance = -force.dot(along);
+        if resistance > NOTICE && self.felt.touched_at.is_none() {
+            self.felt.touched_at = Some(at);
+        }
+        if let Some(touched) = self.felt.touched_at {
+            self.felt.depth = (at - touched).dot(along);
+            if self.third.is_none() && resistance > wanted / 3.0 {
+                self.third = Some((resistance, self.felt.depth));
+            }
+            if let Some((f, d)) = self.third.filter(|(_, d)| self.felt.depth - d > 0.05 && !self.met) {
+                self.felt.stiffness = Some((resistance - f) / (self.felt.depth - d));
+            }
+        }
+        self.felt.force = self.felt.force.max(resistance);
+        resistance
+    }
+}
+
+/// The point `travelled` mm along a polyline, and whether that is its end.
+fn point_along(path: &[Vec3], travelled: f32) -> (Vec3, bool) {
+    let mut left = travelled;
+    for pair in path.windows(2) {
+        let length = pair[0].distance(pair[1]);
+        if left < length {
+            return (pair[0].lerp(pair[1], left / length), false);
+        }
+        left -= length;
+    }
+    (path.last().copied().unwrap_or(Vec3::ZERO), true)
+}
+
+impl Device for Scripted {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
+        self.advance(output.force);
+        let reading = self.hand.turn(output);
+        Ok(Reading { pose: Pose { orientation: self.orientation, ..reading.pose }, ..reading })
+    }
+}

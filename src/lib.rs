@@ -1,0 +1,27 @@
+//! Typodont: an open haptic simulator and assessment platform for dental training.
+//!
+//! What the author **wrote** is in [`scenario`]; what the hand **felt** is in [`touch`] and [`sim`]; what
+//! **happened** is in [`session`] and [`record`]; what it **means** is in [`score`]; how it **looks** is in
+//! [`report`]. Millimetres, newtons and seconds everywhere.
+//!
+//! The modules stand in reading order, lowest first: each may use only those above it
+//! (`ARCHITECTURE.md` has the table, `tests/architecture.rs` holds it).
+
+#![forbid(unsafe_code)]
+
+pub mod tick;
+pub mod frame;
+pub mod mesh;
+pub mod diagnostic;
+pub mod volume;
+pub mod anatomy;
+pub mod touch;
+pub mod device;
+pub mod content;
+pub mod sim;
+pub mod scenario;
+pub mod session;
+pub mod record;
+pub mod score;
+pub mod report;
+pub mod cli;

@@ -1,0 +1,236 @@
+//! The world of one session, turned one tick at a time.
+//!
+//! Takes readings, gives forces and edits: live session, headless run, replay, tests and benchmarks all turn the same
+//! [`Simulation::step`]. Never reads a clock, draws an unseeded number, knows a scenario, or allocates in a step.
+
+use crate::device::{Reading, Spec};
+use crate::frame::{Pose, Vec3};
+use crate::tick::Tick;
+use crate::touch::{
+    Carver, Carving, Contact, ForceLimit, Gate, Instrument, Law, Materials, Matter, Press, Proxy, SpringLimit,
+    Vibration,
+};
+use crate::volume::{Edit, Label, Volume};
+
+/// Everything a simulation is made of.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    pub matter: Matter,
+    pub materials: Materials,
+    /// In the order in which [`Command::Take`] counts them; the first is in the hand at start.
+    pub instruments: Vec<Instrument>,
+    pub carving: Carving,
+    pub vibration: Vibration,
+    pub world_from_tooth: Pose,
+    pub device: Spec,
+}
+
+/// What the session may change between two ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Command {
+    /// Takes another instrument into the hand.
+    Take { instrument: usize },
+    /// Gives a tissue another stiffness coefficient (0–1).
+    SetStiffness { label: Label, stiffness: f32 },
+    /// Lets burs run, or stops them.
+    RunBur { running: bool },
+}
+
+/// What one tick came to. Positions and forces in world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    pub tick: Tick,
+    /// To be rendered by the device, N.
+    pub force: Vec3,
+    /// Where the hand is, mm; the last trusted place when the reading was refused.
+    pub hand: Vec3,
+    /// Where the working end is, mm.
+    pub tip: Vec3,
+    pub touch: Option<Touch>,
+    /// Matter fell, or would have within this tick's limits.
+    pub cutting: bool,
+    /// Voxels that became air.
+    pub removed: u32,
+    /// Index of the instrument in the hand.
+    pub instrument: usize,
+}
+
+/// What the working end touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// Tissue that carries most of the push.
+    pub label: Label,
+    /// The spring's part of the force, N.
+    pub spring: f32,
+    /// Unit, out of the matter, world space.
+    pub normal: Vec3,
+}
+
+/// The state of one session's world.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    matter: Matter,
+    materials: Materials,
+    instruments: Vec<Instrument>,
+    vibration: Vibration,
+    world_from_tooth: Pose,
+    tooth_from_world: Pose,
+    force_limit: ForceLimit,
+    tick: Tick,
+    instrument: usize,
+    bur_runs: bool,
+    /// False until the working end has been out of matter once: whoever starts or changes instruments inside a tooth
+    /// feels nothing until then, instead of being thrown out.
+    is_out: bool,
+    hand: Pose,
+    proxy: Proxy,
+    law: Law,
+    carver: Carver,
+    gate: Gate,
+}
+
+impl Simulation {
+    /// A world at rest with the first instrument in the hand and the bur running.
+    ///
+    /// # Panics
+    /// Without any instrument: a scenario that resolved has one.
+    pub fn new(setup: Setup) -> Simulation {
+        let Setup { matter, materials, instruments, carving, vibration, world_from_tooth, device } = setup;
+        assert!(!instruments.is_empty(), "a hand holds something");
+        let spring = SpringLimit {
+            max_stiffness: device.max_stiffness,
+            max_damping: device.max_damping,
+            resolution: device.resolution,
+        };
+        let tooth_from_world = world_from_tooth.inverse();
+        let proxy = Proxy::new(&matter, &instruments, tooth_from_world * Vec3::ZERO);
+        Simulation {
+            matter,
+            materials,
+            instruments,
+            vibration,
+            world_from_tooth,
+            tooth_from_world,
+            force_limit: ForceLimit { max_force: device.max_force },
+            tick: Tick::ZERO,
+            instrument: 0,
+            bur_runs: true,
+            is_out: false,
+            hand: Pose::IDENTITY,
+            proxy,
+            law: Law::new(spring),
+            carver: Carver::new(carving),
+            gate: Gate::default(),
+        }
+    }
+
+    /// Turns the world by one tick.
+    ///
+    /// A reading that cannot be trusted (not finite, no orientation) gives zero force and leaves the world as it was.
+    pub fn step(&mut self, reading: &Reading) -> Step {
+        let tick = self.tick;
+        self.tick = tick.next();
+        let Some(pose) = self.gate.admit(&reading.pose) else {
+            self.is_out = false;
+            return self.let_go(tick);
+        };
+        self.hand = pose;
+        let hand = self.tooth_from_world * pose.position;
+        let instrument = &self.instruments[self.instrument];
+        if !self.is_out {
+            self.is_out = Proxy::is_free_at(&self.matter, instrument, hand);
+            return self.let_go(tick);
+        }
+        self.proxy.follow(&self.matter, instrument, &self.materials, hand);
+        let tip = self.proxy.tip();
+        let contact = self.proxy.contact().copied();
+        let pull = self.law.pull(hand, tip, contact.as_ref());
+        let cutting = match contact {
+            Some(_) if instrument.cuts && self.bur_runs => {
+                let press = Press { tip, hand, pull };
+                self.carver.cut(&mut self.matter.volume, instrument, &self.materials, &press)
+            }
+            _ => {
+                self.carver.rest();
+                false
+            }
+        };
+        let tremble = if cutting { self.vibration.force(tick) } else { Vec3::ZERO };
+        let force = self.gate.emit(self.world_from_tooth.turn(pull.force) + tremble, &self.force_limit);
+        let touch = contact.map(|Contact { label, normal, .. }| Touch {
+            label,
+            spring: pull.spring,
+            normal: self.world_from_tooth.turn(normal),
+        });
+        Step {
+            tick,
+            force,
+            hand: pose.position,
+            tip: self.world_from_tooth * tip,
+            touch,
+            cutting,
+            removed: self.carver.edits().iter().filter(|e| e.removes()).count() as u32,
+            instrument: self.instrument,
+        }
+    }
+
+    /// Zero force, nothing touched, nothing cut.
+    fn let_go(&mut self, tick: Tick) -> Step {
+        self.carver.rest();
+        self.law.forget();
+        self.proxy.let_go(self.tooth_from_world * self.hand.position);
+        Step {
+            tick,
+            force: Vec3::ZERO,
+            hand: self.hand.position,
+            tip: self.hand.position,
+            touch: None,
+            cutting: false,
+            removed: 0,
+            instrument: self.instrument,
+        }
+    }
+
+    /// Carries out a command before the next tick. Unknown instruments are ignored: the hand keeps what it holds.
+    pub fn apply(&mut self, command: &Command) {
+        match *command {
+            Command::Take { instrument } if instrument < self.instruments.len() => {
+                self.instrument = instrument;
+                self.is_out = false;
+            }
+            Command::Take { .. } => {}
+            Command::SetStiffness { label, stiffness } => {
+                let mut material = *self.materials.get(label);
+                material.stiffness = stiffness.clamp(0.0, 1.0);
+                self.materials.set(label, material);
+            }
+            Command::RunBur { running } => self.bur_runs = running,
+        }
+    }
+
+    /// The last tick's changed voxels, in the order they changed.
+    pub fn edits(&self) -> &[Edit] {
+        self.carver.edits()
+    }
+
+    pub fn volume(&self) -> &Volume {
+        &self.matter.volume
+    }
+
+    pub fn matter(&self) -> &Matter {
+        &self.matter
+    }
+
+    pub fn materials(&self) -> &Materials {
+        &self.materials
+    }
+
+    pub fn world_from_tooth(&self) -> &Pose {
+        &self.world_from_tooth
+    }
+
+    /// What the gates for numbers had to change so far.
+    pub fn gate(&self) -> &Gate {
+        &self.gate
+    }
+}

@@ -1,0 +1,48 @@
+//! Time as a count of constant ticks.
+//!
+//! Takes and gives whole ticks. Never reads a clock: seconds are derived, so two machines agree on every instant.
+
+/// Length of one tick, s. The haptic servo turns at 1 kHz, the rate below which stiff walls buzz.
+pub const TICK_S: f64 = 0.001;
+
+/// An instant of a session: the number of ticks turned since its start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Tick(pub u64);
+
+impl Tick {
+    pub const ZERO: Tick = Tick(0);
+
+    /// Seconds since the session's start.
+    pub fn seconds(self) -> f64 {
+        self.0 as f64 * TICK_S
+    }
+
+    /// The tick nearest to a duration in seconds; negative and non-finite durations give zero.
+    pub fn from_seconds(seconds: f64) -> Tick {
+        Tick((seconds / TICK_S).round().max(0.0) as u64)
+    }
+
+    pub fn next(self) -> Tick {
+        Tick(self.0 + 1)
+    }
+
+    /// Seconds from an earlier tick to this one; zero when `earlier` is not earlier.
+    pub fn seconds_since(self, earlier: Tick) -> f64 {
+        Tick(self.0.saturating_sub(earlier.0)).seconds()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_and_ticks_agree() {
+        // Aim: a time limit written in seconds ends on exactly the tick a reader expects.
+        assert_eq!(Tick::from_seconds(300.0), Tick(300_000));
+        assert_eq!(Tick(300_000).seconds(), 300.0);
+        assert_eq!(Tick::from_seconds(-1.0), Tick::ZERO);
+        assert_eq!(Tick::from_seconds(f64::NAN), Tick::ZERO);
+        assert_eq!(Tick(1500).seconds_since(Tick(500)), 1.0);
+    }
+}

@@ -1,0 +1,260 @@
+//! What a bur takes away in one tick.
+//!
+//! Takes the bur's tip, the hand's pull and the tissues' thresholds. Gives the changed voxels, in order.
+//!
+//! The law is the thesis's (5.3), made smooth: where the spring force exceeds a tissue's threshold, the bur advances
+//! into that tissue until the force is back at the threshold; after resting on one spot for a while a third of the
+//! threshold suffices, because the bur rotates. The thesis set whole voxels to zero; here the bur's surface is cut into
+//! the density itself, so what falls does not depend on the voxels' size. Neither does how much: the advance per tick
+//! is limited in millimetres, never in voxels.
+
+use super::instrument::Instrument;
+use super::law::Pull;
+use super::material::Materials;
+use crate::frame::Vec3;
+use crate::tick::TICK_S;
+use crate::volume::{Density, Edit, Volume, Voxel, ramp};
+
+/// The carving law's numbers, from the scenario.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Carving {
+    /// Time on one spot after which less force suffices, s.
+    pub dwell: f32,
+    /// Share of the threshold that suffices then. The thesis: 1/3.
+    pub dwell_share: f32,
+    /// Fastest advance into matter, mm/s: what a bur can clear away.
+    pub max_feed: f32,
+}
+
+/// A hand that has moved less than this rests, mm: it neither wanders nor tries to push in.
+const SPOT_RADIUS: f32 = 0.2;
+
+/// How much wider than itself a rotating bur cuts, mm: handpieces run out by 0.01–0.03. Without it a bur would jam in
+/// the very groove it has cut.
+const RUN_OUT: f32 = 0.01;
+
+/// How far behind its centre a bur still clears its sides, as a share of its radius.
+const BEHIND: f32 = 0.2;
+
+/// A bite is carried out over this many ticks, every so many-th row of voxels in each: a bur at full contact changes
+/// thousands of fine voxels, and no single tick should bear them all. Rows interleave, so the surface sinks evenly.
+const SHARES: u32 = 3;
+
+/// Voxels that one tick may change. At 512×512×322 a third of what a bur of 1.2 mm radius changes is about 7 000.
+const EDITS_MAX: usize = 1 << 15;
+
+/// The bur's memory of where the hand rests, and scratch for this tick's edits.
+#[derive(Clone, Debug)]
+pub struct Carver {
+    carving: Carving,
+    spot: Vec3,
+    rested_ticks: u32,
+    /// The bite being carried out, and how many shares of it are done.
+    biting: Option<(Bite, u32)>,
+    /// Where the last bite should have let the tip go.
+    owed: Option<Vec3>,
+    edits: Vec<Edit>,
+    /// How far the bur advances into each tissue in this bite, mm.
+    advance: [f32; 256],
+}
+
+impl Carver {
+    pub fn new(carving: Carving) -> Carver {
+        Carver {
+            carving,
+            spot: Vec3::ZERO,
+            rested_ticks: 0,
+            biting: None,
+            owed: None,
+            edits: Vec::with_capacity(EDITS_MAX),
+            advance: [0.0; 256],
+        }
+    }
+
+    /// This tick's changes, in the order they were made.
+    pub fn edits(&self) -> &[Edit] {
+        &self.edits
+    }
+
+    /// A tick in which nothing is touched.
+    pub fn rest(&mut self) {
+        self.edits.clear();
+        self.rested_ticks = 0;
+        self.biting = None;
+        self.owed = None;
+    }
+
+    /// Cuts with a tip in contact. True while matter is being cut.
+    pub fn cut(&mut self, volume: &mut Volume, instrument: &Instrument, materials: &Materials, press: &Press) -> bool {
+        self.edits.clear();
+        let share = self.threshold_share(press.hand);
+        let planned = self.biting.or_else(|| Some((self.plan(volume, instrument, materials, press, share)?, 0)));
+        let Some((bite, done)) = planned else { return false };
+        self.carve(volume, &bite, done);
+        self.biting = (done + 1 < SHARES).then_some((bite, done + 1));
+        true
+    }
+
+    /// The next bite, if the force suffices for any tissue.
+    fn plan(
+        &mut self,
+        volume: &Volume,
+        instrument: &Instrument,
+        materials: &Materials,
+        press: &Press,
+        share: f32,
+    ) -> Option<Bite> {
+        let Press { tip, hand, pull } = *press;
+        let deepest = self.plan_advance(materials, &pull, share);
+        if deepest <= 0.0 {
+            self.owed = None;
+            return None;
+        }
+        let way = (hand - tip).normalize_or_zero() * deepest + self.arrears(tip, volume.band());
+        self.owed = Some(tip + way);
+        Some(Bite { tip, way, deepest, radius: instrument.radius() + RUN_OUT })
+    }
+
+    /// What the last bite owes to the tip: the part of its way that was too short to change a stored density.
+    ///
+    /// Without it a bur that is mostly dragged sideways would never sink into coarse voxels.
+    fn arrears(&self, tip: Vec3, band: f32) -> Vec3 {
+        let quantum = 2.0 * band / f32::from(u8::MAX);
+        self.owed.map_or(Vec3::ZERO, |owed| (owed - tip).clamp_length_max(2.0 * quantum))
+    }
+
+    /// 1, or the dwell's share when the hand has rested long enough.
+    fn threshold_share(&mut self, hand: Vec3) -> f32 {
+        if self.rested_ticks == 0 || hand.distance(self.spot) > SPOT_RADIUS {
+            self.spot = hand;
+            self.rested_ticks = 0;
+        }
+        self.rested_ticks += 1;
+        let rested = self.rested_ticks as f32 * TICK_S as f32;
+        if rested > self.carving.dwell { self.carving.dwell_share } else { 1.0 }
+    }
+
+    /// Fills `advance` for every tissue; returns the greatest.
+    fn plan_advance(&mut self, materials: &Materials, pull: &Pull, share: f32) -> f32 {
+        let most = self.carving.max_feed * TICK_S as f32 * SHARES as f32;
+        let stiffness = pull.stiffness.max(1e-6);
+        let mut deepest = 0.0;
+        for (label, material) in materials.known() {
+            let over = material.cut_force.map_or(0.0, |threshold| pull.spring - threshold * share);
+            let advance = (over / stiffness).clamp(0.0, most);
+            self.advance[usize::from(label.0)] = advance;
+            deepest = f32::max(deepest, advance);
+        }
+        deepest
+    }
+
+    /// Carries out one share of a bite.
+    fn carve(&mut self, volume: &mut Volume, bite: &Bite, share: u32) {
+        let Bite { tip, way, radius, .. } = *bite;
+        let (grid, band) = (*volume.grid(), volume.band());
+        let centre = tip + way;
+        let reach = Vec3::splat(radius + band);
+        let [xs, ys, zs] = grid.cells_within(centre - reach, centre + reach);
+        let to_steps = grid.spacing.x.recip();
+        let ahead = way.normalize_or_zero();
+        for z in zs {
+            for y in ys.clone().filter(|y| (y + z) % SHARES == share) {
+                // From the bur's advanced centre to the row's first voxel.
+                let first = grid.centre([xs.start, y, z]) - centre;
+                let aside_squared = first.y * first.y + first.z * first.z;
+                let half_squared = reach.x * reach.x - aside_squared;
+                if half_squared <= 0.0 {
+                    continue;
+                }
+                let half = half_squared.sqrt();
+                let (mut low, mut high) = (-half, half);
+                // The bur has been where it is: what lies well behind it is not new to it.
+                let behind = -BEHIND * radius - first.y * ahead.y - first.z * ahead.z;
+                match ahead.x {
+                    x if x > 1e-3 => low = low.max(behind / x),
+                    x if x < -1e-3 => high = high.min(behind / x),
+                    _ if behind > 0.0 => continue,
+                    _ => {}
+                }
+                if low >= high {
+                    continue;
+                }
+                let step_at = |x: f32| (((x - first.x) * to_steps).max(-1.0) + 1.0) as u32;
+                let row = Row { cell: [xs.start, y, z], first_x: first.x, aside_squared };
+                self.carve_run(volume, bite, &row, step_at(low)..step_at(high).min(xs.len() as u32));
+            }
+        }
+    }
+
+    /// Carves a part of a row, given in steps from the row's first voxel.
+    fn carve_run(&mut self, volume: &mut Volume, bite: &Bite, row: &Row, steps: std::ops::Range<u32>) {
+        let (spacing, band) = (volume.grid().spacing.x, volume.band());
+        let [x, y, z] = row.cell;
+        let start = volume.grid().index(row.cell);
+        let run = &volume.densities()[start + steps.start as usize..start + steps.end as usize];
+        if run.iter().all(|&d| d == Density::EMPTY) {
+            return;
+        }
+        // A voxel loses something when the bur's surface leaves less than it has: nearer than a distance that its
+        // density names. Squared, so that most voxels cost no root. Half a quantum is the rounding of densities.
+        let (base, rise) = (bite.radius - band * (1.0 + 1.0 / f32::from(u8::MAX)), 2.0 * band / f32::from(u8::MAX));
+        for step in steps {
+            let density = volume.densities()[start + step as usize].bits();
+            let along = row.first_x + step as f32 * spacing;
+            let squared = along * along + row.aside_squared;
+            let nearer_than = (base + rise * f32::from(density)).max(0.0);
+            if density > 0 && squared < nearer_than * nearer_than {
+                self.carve_voxel(volume, bite, [x + step, y, z], squared.sqrt());
+            }
+        }
+    }
+
+    /// `distance`: of the voxel's centre from the bur's, at full advance.
+    fn carve_voxel(&mut self, volume: &mut Volume, bite: &Bite, cell: [u32; 3], distance: f32) {
+        let before = volume.voxel(volume.grid().index(cell));
+        let advance = self.advance[usize::from(before.label.0)];
+        let distance = match advance {
+            0.0 => return,
+            a if a == bite.deepest => distance,
+            // Into a harder tissue the bur goes less far.
+            a => (volume.grid().centre(cell) - bite.tip - bite.way * (a / bite.deepest)).length(),
+        };
+        let left = ramp(bite.radius - distance, volume.band());
+        if left < before.density && self.edits.len() < EDITS_MAX {
+            self.edits.push(volume.set_cell(cell, Voxel { density: left, ..before }));
+        }
+    }
+}
+
+/// How the hand presses the bur in a tick; positions in tooth space, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Press {
+    /// The bur's centre.
+    pub tip: Vec3,
+    /// Where the hand is, inside matter: the bur advances toward it.
+    pub hand: Vec3,
+    pub pull: Pull,
+}
+
+/// A row of voxels along x, seen from the bur's advanced centre.
+#[derive(Clone, Copy)]
+struct Row {
+    /// Its first voxel.
+    cell: [u32; 3],
+    /// Where that voxel's centre lies along x, mm.
+    first_x: f32,
+    /// Squared distance of the row from the centre, mm².
+    aside_squared: f32,
+}
+
+/// What is to be cut away: everything within the bur when it has gone its way.
+#[derive(Clone, Copy, Debug)]
+struct Bite {
+    tip: Vec3,
+    /// Into the softest tissue, mm; into harder ones a share of it.
+    way: Vec3,
+    /// Length of that way as the law gave it, mm.
+    deepest: f32,
+    /// mm
+    radius: f32,
+}

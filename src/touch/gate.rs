@@ -1,0 +1,73 @@
+//! The two gates for numbers: what may come in from a hand, and what may go out to it.
+//!
+//! Takes poses and forces. Gives safe ones and counts what it had to change. Failing means letting go: anything that is
+//! not a number becomes zero force.
+
+use crate::frame::{Pose, Vec3};
+
+/// What a device may be asked to output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ForceLimit {
+    /// N
+    pub max_force: f32,
+}
+
+/// The gates' counters. Faults are never silent: they reach the report.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Gate {
+    /// Readings refused because a number was not finite or a quaternion not of unit length.
+    pub refused_readings: u64,
+    /// Forces shortened to the device's limit.
+    pub clamped_forces: u64,
+    /// Forces that were not finite and became zero.
+    pub zeroed_forces: u64,
+}
+
+impl Gate {
+    /// The pose if it can be trusted.
+    pub fn admit(&mut self, pose: &Pose) -> Option<Pose> {
+        if pose.is_sound() {
+            return Some(Pose { orientation: pose.orientation.normalize(), ..*pose });
+        }
+        self.refused_readings += 1;
+        None
+    }
+
+    /// A force that the device can and may render.
+    pub fn emit(&mut self, force: Vec3, limit: &ForceLimit) -> Vec3 {
+        let length = force.length();
+        if !length.is_finite() {
+            self.zeroed_forces += 1;
+            return Vec3::ZERO;
+        }
+        if length > limit.max_force {
+            self.clamped_forces += 1;
+            return force * (limit.max_force / length);
+        }
+        force
+    }
+
+    /// Everything the gates had to change so far.
+    pub fn faults(&self) -> u64 {
+        self.refused_readings + self.zeroed_forces
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_unsafe_passes() {
+        let mut gate = Gate::default();
+        let limit = ForceLimit { max_force: 3.3 };
+        assert_eq!(gate.emit(Vec3::new(f32::NAN, 0.0, 0.0), &limit), Vec3::ZERO);
+        assert_eq!(gate.emit(Vec3::new(f32::INFINITY, 0.0, 0.0), &limit), Vec3::ZERO);
+        assert_eq!(gate.emit(Vec3::splat(f32::MAX), &limit), Vec3::ZERO, "a length that overflows is not a force");
+        assert!((gate.emit(Vec3::new(0.0, 9.0, 0.0), &limit).length() - 3.3).abs() < 1e-5);
+        assert_eq!(gate.emit(Vec3::X, &limit), Vec3::X);
+        assert!(gate.admit(&Pose::at(Vec3::new(0.0, f32::NAN, 0.0))).is_none());
+        assert!(gate.admit(&Pose::IDENTITY).is_some());
+        assert_eq!(gate, Gate { refused_readings: 1, clamped_forces: 1, zeroed_forces: 3 });
+    }
+}

@@ -1,0 +1,87 @@
+//! What the hand holds.
+
+use crate::frame::Vec3;
+
+/// An instrument as touch knows it: the shape of its working end, and whether that end cuts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instrument {
+    pub end: WorkingEnd,
+    /// A rotating bur removes matter; an explorer never does.
+    pub cuts: bool,
+    /// Directions from the end's centre in which its surface is watched, unit vectors.
+    feelers: Vec<Vec3>,
+}
+
+/// The part that touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum WorkingEnd {
+    /// The tip of an explorer.
+    Point,
+    /// A spherical bur; its centre is where the device's tip is. Radius in mm.
+    Ball { radius: f32 },
+}
+
+/// How far a ball may bulge past the surface between two feelers, mm. Well below what a hand resolves.
+pub(super) const FEELER_SAG: f32 = 0.012;
+
+impl Instrument {
+    pub fn new(end: WorkingEnd, cuts: bool) -> Instrument {
+        let feelers = match end {
+            WorkingEnd::Point => vec![Vec3::ZERO],
+            WorkingEnd::Ball { radius } => spread_over_sphere(feelers_for(radius)),
+        };
+        Instrument { end, cuts, feelers }
+    }
+
+    /// mm; zero for a point.
+    pub fn radius(&self) -> f32 {
+        match self.end {
+            WorkingEnd::Point => 0.0,
+            WorkingEnd::Ball { radius } => radius,
+        }
+    }
+
+    pub(super) fn feelers(&self) -> &[Vec3] {
+        &self.feelers
+    }
+}
+
+/// Points needed so that no place on the ball is farther from one than a cap of height [`FEELER_SAG`] is wide.
+///
+/// A cap of height h on radius r spans a circle of radius √(2rh); Fibonacci points cover the sphere with circles of
+/// about 1.9 times their share of the area.
+fn feelers_for(radius: f32) -> usize {
+    let cap_squared = 2.0 * radius * FEELER_SAG;
+    (1.9 * 4.0 * radius * radius / cap_squared).ceil().clamp(32.0, 512.0) as usize
+}
+
+/// Fibonacci lattice: even, deterministic, any count.
+fn spread_over_sphere(count: usize) -> Vec<Vec3> {
+    let golden_angle = core::f32::consts::PI * (3.0 - 5.0f32.sqrt());
+    (0..count)
+        .map(|i| {
+            let z = 1.0 - 2.0 * (i as f32 + 0.5) / count as f32;
+            let ring = (1.0 - z * z).max(0.0).sqrt();
+            let turn = golden_angle * i as f32;
+            Vec3::new(ring * libm::cosf(turn), ring * libm::sinf(turn), z)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn feelers_leave_no_gap_wider_than_promised() {
+        // Aim: a spike between feelers enters by at most FEELER_SAG. Method: many directions, nearest feeler to each.
+        for radius in [0.25, 0.7, 1.15] {
+            let instrument = Instrument::new(WorkingEnd::Ball { radius }, true);
+            for direction in spread_over_sphere(5000) {
+                let nearest = instrument.feelers().iter().map(|f| f.dot(direction)).fold(-1.0, f32::max);
+                let sag = radius * (1.0 - nearest);
+                assert!(sag < 1.6 * FEELER_SAG, "radius {radius}: {sag} mm with {}", instrument.feelers().len());
+            }
+        }
+    }
+}

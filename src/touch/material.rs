@@ -1,0 +1,111 @@
+//! How each tissue answers a touch.
+
+use crate::volume::Label;
+
+/// A tissue's answer, as the four coefficients of the thesis (Table 2.4) and its carving threshold (5.3).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Spring stiffness as a share (0–1) of the stiffest the device can render.
+    pub stiffness: f32,
+    /// Damping as a share (0–1) of the most the device can render.
+    pub damping: f32,
+    /// Coulomb coefficient that must be exceeded to start sliding, 0–2.
+    pub static_friction: f32,
+    /// Coulomb coefficient while sliding, 0–2.
+    pub dynamic_friction: f32,
+    /// Spring force from which a rotating bur takes this tissue away, N; `None`: it cannot be cut.
+    pub cut_force: Option<f32>,
+}
+
+impl Material {
+    /// Feels like nothing.
+    pub const NOTHING: Material =
+        Material { stiffness: 0.0, damping: 0.0, static_friction: 0.0, dynamic_friction: 0.0, cut_force: None };
+
+    fn weighted(self, weight: f32) -> Material {
+        Material {
+            stiffness: self.stiffness * weight,
+            damping: self.damping * weight,
+            static_friction: self.static_friction * weight,
+            dynamic_friction: self.dynamic_friction * weight,
+            cut_force: None,
+        }
+    }
+
+    fn plus(self, other: Material) -> Material {
+        Material {
+            stiffness: self.stiffness + other.stiffness,
+            damping: self.damping + other.damping,
+            static_friction: self.static_friction + other.static_friction,
+            dynamic_friction: self.dynamic_friction + other.dynamic_friction,
+            cut_force: None,
+        }
+    }
+}
+
+/// A running weighted mean of materials. The carving threshold is not mixed: each voxel keeps its own.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Blend {
+    sum: Material,
+    weight: f32,
+}
+
+impl Blend {
+    pub fn none() -> Blend {
+        Blend { sum: Material::NOTHING, weight: 0.0 }
+    }
+
+    pub fn add(&mut self, material: Material, weight: f32) {
+        self.sum = self.sum.plus(material.weighted(weight));
+        self.weight += weight;
+    }
+
+    /// The mean; `None` when nothing was added.
+    pub fn mean(&self) -> Option<Material> {
+        (self.weight > 1e-6).then(|| self.sum.weighted(1.0 / self.weight))
+    }
+}
+
+/// The material of every label.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Materials {
+    of_label: [Material; 256],
+    /// Labels that were given a material, in ascending order.
+    known: Vec<Label>,
+}
+
+impl Materials {
+    /// Every label feels like nothing until told otherwise.
+    pub fn new() -> Materials {
+        Materials { of_label: [Material::NOTHING; 256], known: Vec::new() }
+    }
+
+    #[inline]
+    pub fn get(&self, label: Label) -> &Material {
+        &self.of_label[usize::from(label.0)]
+    }
+
+    /// The labels that were given a material, with it.
+    pub fn known(&self) -> impl Iterator<Item = (Label, &Material)> {
+        self.known.iter().map(|&label| (label, self.get(label)))
+    }
+
+    /// Gives a label its material. Allocates only for a label not known before.
+    pub fn set(&mut self, label: Label, material: Material) {
+        self.of_label[usize::from(label.0)] = material;
+        if let Err(place) = self.known.binary_search(&label) {
+            self.known.insert(place, label);
+        }
+    }
+
+    pub fn with(mut self, label: Label, material: Material) -> Materials {
+        self.set(label, material);
+        self
+    }
+}
+
+impl Default for Materials {
+    fn default() -> Self {
+        Materials::new()
+    }
+}

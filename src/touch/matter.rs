@@ -1,0 +1,131 @@
+//! Everything that can be touched: the voxel tooth, and plain shapes around it that are never carved.
+
+use crate::frame::{Pose, Vec3};
+use crate::volume::{Label, Volume};
+
+/// The touchable world, in tooth space.
+#[derive(Clone, Debug)]
+pub struct Matter {
+    pub volume: Volume,
+    /// Gum, neighbours and the like.
+    pub around: Vec<Shape>,
+}
+
+/// A solid described by a formula.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shape {
+    pub label: Label,
+    pub tooth_from_shape: Pose,
+    pub form: Form,
+}
+
+/// What a [`Shape`] looks like about its own origin; lengths in mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    Ball {
+        radius: f32,
+    },
+    /// A box with rounded edges; `half` includes the rounding.
+    RoundBox {
+        half: Vec3,
+        rounding: f32,
+    },
+    /// Along z, from -`half_length` to +`half_length` between the centres of its round ends.
+    Capsule {
+        half_length: f32,
+        radius: f32,
+    },
+}
+
+impl Shape {
+    /// Signed distance in mm (negative inside) of a point of tooth space from the shape's surface.
+    pub fn distance(&self, point_in_tooth: Vec3) -> f32 {
+        let p = self.tooth_from_shape.inverse() * point_in_tooth;
+        match self.form {
+            Form::Ball { radius } => p.length() - radius,
+            Form::RoundBox { half, rounding } => {
+                let q = p.abs() - (half - rounding);
+                q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - rounding
+            }
+            Form::Capsule { half_length, radius } => {
+                (p - Vec3::Z * p.z.clamp(-half_length, half_length)).length() - radius
+            }
+        }
+    }
+
+    /// Distance as [`Shape::distance`], and the outward unit normal there.
+    pub fn distance_and_normal(&self, point_in_tooth: Vec3) -> (f32, Vec3) {
+        /// Small against every shape we model, large against f32 rounding at 100 mm.
+        const STEP: f32 = 0.01;
+        let along =
+            |axis: Vec3| self.distance(point_in_tooth + axis * STEP) - self.distance(point_in_tooth - axis * STEP);
+        let slope = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
+        (self.distance(point_in_tooth), slope.try_normalize().unwrap_or(Vec3::Z))
+    }
+}
+
+impl Matter {
+    /// A radius in mm around a point of tooth space that surely holds no matter; 0 where matter may be near.
+    ///
+    /// The bound is coarse and costs one look-up: it is the test that keeps empty space cheap.
+    pub fn clear_radius(&self, point_in_tooth: Vec3) -> f32 {
+        let around = self.around.iter().map(|s| s.distance(point_in_tooth)).fold(f32::INFINITY, f32::min);
+        self.clear_of_volume(point_in_tooth).min(around).max(0.0)
+    }
+
+    fn clear_of_volume(&self, point_in_tooth: Vec3) -> f32 {
+        let grid = self.volume.grid();
+        let [low, high] = grid.extent();
+        let nearest_inside = point_in_tooth.clamp(low, high);
+        let outside = nearest_inside.distance(point_in_tooth);
+        if outside > 0.0 {
+            // Interpolation reaches one voxel beyond the last centre.
+            return (outside - grid.spacing.max_element()).max(0.0);
+        }
+        match grid.nearest(point_in_tooth) {
+            Some(cell) => {
+                // One step less: the point may be half a voxel off the cell's centre, the surface half a cell nearer.
+                let steps = self.volume.bricks().clear_steps(cell).saturating_sub(1);
+                steps as f32 * grid.spacing.min_element()
+            }
+            None => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::volume::phantom;
+
+    #[test]
+    fn shapes_know_their_distances() {
+        let at = Pose::at(Vec3::new(1.0, 0.0, 0.0));
+        let shape = |form| Shape { label: Label(1), tooth_from_shape: at, form };
+        let check = |form, p: Vec3, expected: f32| {
+            let (distance, normal) = shape(form).distance_and_normal(p);
+            assert!((distance - expected).abs() < 1e-4, "{form:?} at {p}: {distance}");
+            assert!((normal.length() - 1.0).abs() < 1e-4);
+        };
+        check(Form::Ball { radius: 2.0 }, Vec3::new(6.0, 0.0, 0.0), 3.0);
+        check(Form::RoundBox { half: Vec3::new(1.0, 2.0, 3.0), rounding: 0.5 }, Vec3::new(4.0, 0.0, 0.0), 2.0);
+        check(Form::RoundBox { half: Vec3::ONE, rounding: 0.2 }, Vec3::new(1.0, 0.0, 0.1), -0.9);
+        check(Form::Capsule { half_length: 4.0, radius: 1.0 }, Vec3::new(1.0, 0.0, 7.0), 2.0);
+    }
+
+    #[test]
+    fn a_clear_radius_holds_no_matter() {
+        let volume = phantom::ball([120, 120, 120], Vec3::splat(0.1), 2.0);
+        let matter = Matter { volume, around: Vec::new() };
+        let mut useful = 0;
+        for i in 0..400 {
+            let t = i as f32;
+            let p = Vec3::new((t * 0.7).sin() * 9.0, (t * 1.3).cos() * 9.0, (t * 0.31).sin() * 9.0);
+            let clear = matter.clear_radius(p);
+            // The ball's density reaches one band beyond its surface.
+            assert!(clear <= (p.length() - 2.2).max(0.0) + 1e-4, "{p}: {clear}");
+            useful += usize::from(clear > 0.5);
+        }
+        assert!(useful > 100);
+    }
+}

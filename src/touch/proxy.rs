@@ -1,0 +1,264 @@
+//! The god object: an instrument's tip that follows the hand but never enters matter.
+//!
+//! Takes matter, an instrument and the hand's position. Gives the nearest allowed tip and what it touches there.
+//! After Zilles & Salisbury (1995), for a volume: instead of polygons, each place where the working end's surface comes
+//! near matter gives a wall, and the tip goes to the point nearest to the hand that the walls allow.
+
+use super::instrument::Instrument;
+use super::material::{Blend, Material, Materials};
+use super::matter::Matter;
+use super::planes::{Held, Plane, Touched, nearest_allowed};
+use super::walls;
+use crate::frame::Vec3;
+use crate::volume::{ISO, Label, Volume};
+
+/// Moves of the tip per tick. Two or three settle it; the rest let a fast hand be followed near matter.
+const MOVES_MAX: usize = 10;
+
+/// The tip has arrived when a move is shorter than this, mm: 2 mN on the stiffest wall. The next tick starts from there.
+const ARRIVED: f32 = 2e-3;
+
+/// Longest move between two looks at the walls, mm; shorter where the density ramp is narrower and shows them later.
+const REACH: f32 = 0.12;
+
+/// Most that the stretch between hand and tip may change within one tick unless the hand itself moved more, mm. Where an
+/// edge lets go of a bur a massless tip would snap to its new place and the force with it; a real tool takes some ticks.
+/// 0.02–0.05 is smooth without feeling sluggish.
+const SNAP: f32 = 0.03;
+
+/// Time in which the friction coefficient falls from sticking to sliding, as ticks of exponential decay. Real
+/// stick–slip takes milliseconds; an instant fall would be a step in the force. 5–20 feels alike.
+const SLIP_TICKS: f32 = 10.0;
+
+/// Distance around a contact over which tissues are mixed, mm. About the contact width of an explorer's tip.
+const MIX_RADIUS: f32 = 0.1;
+
+/// What the tip touches, in tooth space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Tissue that carries most of the push.
+    pub label: Label,
+    /// Mean of the touched tissues' materials, weighted by what each carries.
+    pub material: Material,
+    /// Unit, from matter to the tip: the direction of the push without friction.
+    pub normal: Vec3,
+}
+
+/// An instrument's tip and its state of friction. Positions in tooth space, mm.
+#[derive(Clone, Debug)]
+pub struct Proxy {
+    tip: Vec3,
+    /// Where the hand was in the last tick.
+    hand: Vec3,
+    contact: Option<Contact>,
+    /// 1 while sticking, falling to 0 after sliding has begun.
+    grip: f32,
+    /// Scratch: walls found in this move.
+    planes: Vec<Plane>,
+}
+
+impl Proxy {
+    /// A free tip. `matter` and `instruments` are those it will meet: they tell how much scratch is needed.
+    pub fn new(matter: &Matter, instruments: &[Instrument], tip: Vec3) -> Proxy {
+        let feelers = instruments.iter().map(|i| i.feelers().len()).max().unwrap_or(1);
+        Proxy {
+            tip,
+            hand: tip,
+            contact: None,
+            grip: 1.0,
+            planes: Vec::with_capacity(feelers + 1 + matter.around.len()),
+        }
+    }
+
+    /// Where the tip (a ball's centre) may be.
+    pub fn tip(&self) -> Vec3 {
+        self.tip
+    }
+
+    pub fn contact(&self) -> Option<&Contact> {
+        self.contact.as_ref()
+    }
+
+    /// Puts the tip at the hand, out of contact.
+    pub fn let_go(&mut self, hand_in_tooth: Vec3) {
+        self.tip = hand_in_tooth;
+        self.hand = hand_in_tooth;
+        self.contact = None;
+        self.grip = 1.0;
+    }
+
+    /// True when the instrument could be at a place without entering matter.
+    pub fn is_free_at(matter: &Matter, instrument: &Instrument, place: Vec3) -> bool {
+        let radius = instrument.radius();
+        matter.clear_radius(place) > radius
+            || instrument.feelers().iter().all(|&f| matter.volume.density_at(place + f * radius) < ISO)
+                && matter.volume.density_at(place) < ISO
+                && matter.around.iter().all(|s| s.distance(place) > radius)
+    }
+
+    /// Moves the tip as near to the hand as matter and friction allow.
+    ///
+    /// A hand that is free is reached exactly. Near matter the tip follows up to about 0.5 m/s without lag.
+    pub fn follow(&mut self, matter: &Matter, instrument: &Instrument, materials: &Materials, hand: Vec3) {
+        if self.contact.is_none() && is_free_way(matter, instrument, self.tip, hand) {
+            self.let_go(hand);
+            return;
+        }
+        let goal = self.goal_with_friction(hand);
+        let held = self.slide(matter, instrument, goal, hand);
+        self.hand = hand;
+        if let Some(contact) = self.read_contact(matter, materials, &held) {
+            self.contact = Some(contact);
+        } else if self.tip.distance(hand) < ARRIVED {
+            self.let_go(hand);
+        }
+        // Otherwise nothing holds the tip, but it still catches up with the hand: what it last touched fades out.
+    }
+
+    /// Slides toward the goal; returns the walls that hold the tip at last (indices into `self.planes`).
+    fn slide(&mut self, matter: &Matter, instrument: &Instrument, goal: Vec3, hand: Vec3) -> Held {
+        let mut held = Held::default();
+        // Walls come into view one band away; a longer move could pass through one unseen.
+        let reach = (0.75 * matter.volume.band()).min(REACH);
+        let leash = Leash { centre: self.tip + (hand - self.hand), length: SNAP.max(hand.distance(self.hand)) };
+        let on_leash = self.contact.is_some();
+        let mut last_length = f32::INFINITY;
+        for _ in 0..MOVES_MAX {
+            walls::find(&mut self.planes, matter, instrument, walls::Look { tip: self.tip, goal, reach });
+            let allowed;
+            (allowed, held) = nearest_allowed(&self.planes, goal);
+            let way = allowed - self.tip;
+            let length = way.length();
+            let is_whole = length <= reach;
+            let next = if is_whole { allowed } else { self.tip + way * (reach / length) };
+            if on_leash && leash.ends_before(next) {
+                self.tip = leash.end(self.tip, next);
+                break;
+            }
+            self.tip = next;
+            // In a hollow as narrow as the bur the walls' noise sends the tip to and fro: better is not to be had.
+            let is_restless = length > 0.7 * last_length;
+            if is_whole && (held.is_empty() || length < ARRIVED || is_restless) {
+                break;
+            }
+            last_length = if is_whole { length } else { f32::INFINITY };
+        }
+        held
+    }
+
+    /// Where the tip wants to go: toward the hand, but held back within the cone of friction about the contact's normal
+    /// (Harwin & Melder 2002).
+    fn goal_with_friction(&mut self, hand: Vec3) -> Vec3 {
+        let Some(Contact { normal, material, .. }) = self.contact else { return hand };
+        let pull = self.tip - hand;
+        let depth = pull.dot(normal).max(0.0);
+        let aside = pull - normal * pull.dot(normal);
+        let dragged = aside.length();
+        let coefficient =
+            material.dynamic_friction + (material.static_friction - material.dynamic_friction) * self.grip;
+        let holds = coefficient * depth;
+        if dragged <= holds {
+            self.grip += (1.0 - self.grip) / SLIP_TICKS;
+            return hand + aside;
+        }
+        self.grip -= self.grip / SLIP_TICKS;
+        hand + aside * (holds / dragged)
+    }
+
+    fn read_contact(&self, matter: &Matter, materials: &Materials, held: &Held) -> Option<Contact> {
+        if held.is_empty() {
+            return None;
+        }
+        let mut blend = Blend::none();
+        let mut push = Vec3::ZERO;
+        let (mut most, mut label) = (0.0, Label::AIR);
+        for (index, share) in held.iter() {
+            let plane = &self.planes[index];
+            push += plane.normal * share;
+            let touched = match plane.touched {
+                Touched::Shape(shape) => {
+                    let label = matter.around[shape].label;
+                    blend.add(*materials.get(label), share);
+                    label
+                }
+                Touched::Volume => mix_tissues(&mut blend, &matter.volume, materials, plane, share),
+            };
+            if share > most {
+                (most, label) = (share, touched);
+            }
+        }
+        let normal = push.try_normalize()?;
+        let material = blend.mean().or_else(|| self.contact.map(|c| c.material))?;
+        Some(Contact { label, material, normal })
+    }
+}
+
+/// The ball that the tip may not leave within one tick: around where it would be had it moved exactly like the hand.
+#[derive(Clone, Copy)]
+struct Leash {
+    centre: Vec3,
+    length: f32,
+}
+
+impl Leash {
+    fn ends_before(&self, place: Vec3) -> bool {
+        place.distance_squared(self.centre) > self.length * self.length
+    }
+
+    /// The last place on the way from a place on the leash to one beyond it.
+    fn end(&self, from: Vec3, to: Vec3) -> Vec3 {
+        let (way, out) = (to - from, from - self.centre);
+        let (a, b, c) = (way.length_squared(), way.dot(out), out.length_squared() - self.length * self.length);
+        let root = (b * b - a * c).max(0.0).sqrt();
+        from + way * ((root - b) / a.max(1e-12)).clamp(0.0, 1.0)
+    }
+}
+
+/// True when the straight way from tip to hand surely meets no matter.
+fn is_free_way(matter: &Matter, instrument: &Instrument, tip: Vec3, hand: Vec3) -> bool {
+    // A clear ball around either end that holds the other end holds the whole way.
+    let needed = tip.distance(hand) + instrument.radius();
+    needed < matter.clear_radius(hand) || needed < matter.clear_radius(tip)
+}
+
+/// Adds the tissues around a contact to the blend; returns the one right under it.
+fn mix_tissues(blend: &mut Blend, volume: &Volume, materials: &Materials, plane: &Plane, share: f32) -> Label {
+    let under = plane.at - plane.normal * MIX_RADIUS;
+    let side = plane.normal.any_orthonormal_vector();
+    let across = plane.normal.cross(side);
+    let mut main = Label::AIR;
+    let mut heaviest = 0.0;
+    for (offset, part) in [(Vec3::ZERO, 2.0), (side, 1.0), (-side, 1.0), (across, 1.0), (-across, 1.0)] {
+        for (label, weight) in tissue_weights(volume, under + offset * MIX_RADIUS) {
+            if label != Label::AIR {
+                blend.add(*materials.get(label), share * part * weight);
+                if part * weight > heaviest {
+                    (heaviest, main) = (part * weight, label);
+                }
+            }
+        }
+    }
+    main
+}
+
+/// The eight labels around a point with their trilinear weights.
+fn tissue_weights(volume: &Volume, point_in_tooth: Vec3) -> [(Label, f32); 8] {
+    let grid = volume.grid();
+    let at = grid.from_tooth(point_in_tooth);
+    let [nx, ny, nz] = grid.dims;
+    let is_inside =
+        at.cmpge(Vec3::ZERO).all() && at.x < (nx - 1) as f32 && at.y < (ny - 1) as f32 && at.z < (nz - 1) as f32;
+    if !is_inside {
+        return [(Label::AIR, 0.0); 8];
+    }
+    let [x, y, z] = [at.x as u32, at.y as u32, at.z as u32];
+    let f = at - Vec3::new(x as f32, y as f32, z as f32);
+    let corner = grid.index([x, y, z]);
+    let (row, slice) = (nx as usize, nx as usize * ny as usize);
+    let share = |t: f32, far: usize| if far == 1 { t } else { 1.0 - t };
+    std::array::from_fn(|c| {
+        let [i, j, k] = [c & 1, c >> 1 & 1, c >> 2];
+        let label = volume.labels()[corner + i + j * row + k * slice];
+        (label, share(f.x, i) * share(f.y, j) * share(f.z, k))
+    })
+}

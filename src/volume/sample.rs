@@ -1,0 +1,169 @@
+//! Density between voxel centres: trilinear value, and a gradient smooth enough to be felt.
+
+use super::{Density, Volume};
+use crate::frame::Vec3;
+
+impl Volume {
+    /// Trilinear density (0–1) at a point of tooth space; empty outside the grid.
+    #[inline]
+    pub fn density_at(&self, point_in_tooth: Vec3) -> f32 {
+        self.density_in_grid(self.grid().from_tooth(point_in_tooth))
+    }
+
+    /// The same for a point given in voxel steps.
+    #[inline]
+    pub fn density_in_grid(&self, at: Vec3) -> f32 {
+        let [nx, ny, nz] = self.grid().dims;
+        // Written so that a NaN falls through to "outside".
+        let inside = at.x >= 0.0
+            && at.y >= 0.0
+            && at.z >= 0.0
+            && at.x < (nx - 1) as f32
+            && at.y < (ny - 1) as f32
+            && at.z < (nz - 1) as f32;
+        if !inside {
+            return self.density_at_edge(at);
+        }
+        let (x, y, z) = (at.x as usize, at.y as usize, at.z as usize);
+        let (fx, fy, fz) = (at.x - x as f32, at.y - y as f32, at.z - z as f32);
+        let (row, slice) = (nx as usize, nx as usize * ny as usize);
+        let corner = z * slice + y * row + x;
+        let cube = &self.densities()[corner..corner + slice + row + 2];
+        let along_x = |i: usize| mix(f32::from(cube[i].bits()), f32::from(cube[i + 1].bits()), fx);
+        let near = mix(along_x(0), along_x(row), fy);
+        let far = mix(along_x(slice), along_x(slice + row), fy);
+        mix(near, far, fz) * (1.0 / 255.0)
+    }
+
+    /// Density and its gradient (per mm) at a point of tooth space.
+    ///
+    /// The gradient is the trilinear interpolation of central differences: unlike the exact derivative of the
+    /// trilinear density it has no steps at voxel borders, which a hand would feel.
+    pub fn density_and_gradient_at(&self, point_in_tooth: Vec3) -> (f32, Vec3) {
+        let at = self.grid().from_tooth(point_in_tooth);
+        let [nx, ny, nz] = self.grid().dims;
+        let inside = at.x >= 1.0
+            && at.y >= 1.0
+            && at.z >= 1.0
+            && at.x < (nx - 2) as f32
+            && at.y < (ny - 2) as f32
+            && at.z < (nz - 2) as f32;
+        if !inside {
+            return self.density_and_gradient_at_edge(at);
+        }
+        let (x, y, z) = (at.x as usize, at.y as usize, at.z as usize);
+        let f = at - Vec3::new(x as f32, y as f32, z as f32);
+        let (row, slice) = (nx as usize, nx as usize * ny as usize);
+        let corner = (z - 1) * slice + (y - 1) * row + x - 1;
+        let block = &self.densities()[corner..corner + 3 * slice + 3 * row + 4];
+        // Along x: what lies between the two middle voxels of a row, and how it rises there.
+        let level = |j: usize, k: usize| {
+            let pair = &block[j * row + k * slice + 1..][..2];
+            mix(f32::from(pair[0].bits()), f32::from(pair[1].bits()), f.x)
+        };
+        let rise = |j: usize, k: usize| {
+            let run = &block[j * row + k * slice..][..4];
+            let [a, b, c, d] = [run[0], run[1], run[2], run[3]].map(|d| f32::from(d.bits()));
+            mix(c - a, d - b, f.x)
+        };
+        let near = [level(0, 1), level(1, 1), level(2, 1), level(3, 1)];
+        let far = [level(0, 2), level(1, 2), level(2, 2), level(3, 2)];
+        let front = [level(1, 0), level(2, 0)];
+        let back = [level(1, 3), level(2, 3)];
+        let value = mix(mix(near[1], near[2], f.y), mix(far[1], far[2], f.y), f.z);
+        let along_x = mix(mix(rise(1, 1), rise(2, 1), f.y), mix(rise(1, 2), rise(2, 2), f.y), f.z);
+        let along_y =
+            mix(mix(near[2] - near[0], near[3] - near[1], f.y), mix(far[2] - far[0], far[3] - far[1], f.y), f.z);
+        let along_z = mix(
+            mix(far[1], far[2], f.y) - mix(front[0], front[1], f.y),
+            mix(back[0], back[1], f.y) - mix(near[1], near[2], f.y),
+            f.z,
+        );
+        let unit = 1.0 / 255.0;
+        (value * unit, Vec3::new(along_x, along_y, along_z) * (0.5 * unit) / self.grid().spacing)
+    }
+
+    /// The same where part of the surroundings may lie outside the grid: central differences of the density itself.
+    #[cold]
+    fn density_and_gradient_at_edge(&self, at: Vec3) -> (f32, Vec3) {
+        let along = |axis: Vec3| 0.5 * (self.density_in_grid(at + axis) - self.density_in_grid(at - axis));
+        let slope = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
+        (self.density_in_grid(at), slope / self.grid().spacing)
+    }
+
+    /// Density of the voxel at whole steps; empty outside the grid.
+    fn density_of(&self, steps: Vec3) -> Density {
+        let [nx, ny, nz] = self.grid().dims.map(|n| n as f32);
+        let inside = steps.x >= 0.0 && steps.y >= 0.0 && steps.z >= 0.0 && steps.x < nx && steps.y < ny && steps.z < nz;
+        match inside {
+            true => self.densities()[self.grid().index([steps.x as u32, steps.y as u32, steps.z as u32])],
+            false => Density::EMPTY,
+        }
+    }
+
+    /// Trilinear density where part of the cell may lie outside the grid.
+    #[cold]
+    fn density_at_edge(&self, at: Vec3) -> f32 {
+        let base = at.floor();
+        let f = at - base;
+        let corner = |x: f32, y: f32, z: f32| self.density_of(base + Vec3::new(x, y, z)).unit();
+        let along_x = |y: f32, z: f32| mix(corner(0.0, y, z), corner(1.0, y, z), f.x);
+        let value =
+            mix(mix(along_x(0.0, 0.0), along_x(1.0, 0.0), f.y), mix(along_x(0.0, 1.0), along_x(1.0, 1.0), f.y), f.z);
+        if value.is_finite() { value } else { 0.0 }
+    }
+}
+
+#[inline]
+fn mix(a: f32, b: f32, t: f32) -> f32 {
+    a + (b - a) * t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::phantom;
+    use super::*;
+
+    #[test]
+    fn the_surface_of_a_ball_is_where_geometry_says() {
+        // Aim: iso crossing within 2 % of a voxel, normal within half a degree. Method: a ball with unequal spacings.
+        let spacing = Vec3::new(0.1, 0.15, 0.12);
+        let volume = phantom::ball([100, 70, 90], spacing, 3.0);
+        let mut worst_angle = 0.0f32;
+        for i in 0..500 {
+            let (u, v) = (i as f32 * 0.618034 % 1.0, (i as f32 + 0.5) / 500.0);
+            let (z, turn) = (1.0 - 2.0 * v, u * std::f32::consts::TAU);
+            let direction = Vec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z);
+            let (density, gradient) = volume.density_and_gradient_at(direction * 3.0);
+            let off = (density - 0.5) / gradient.length();
+            assert!(off.abs() < 0.005, "surface off by {off} mm at {direction}");
+            worst_angle = worst_angle.max(gradient.angle_between(-direction).to_degrees());
+        }
+        assert!(worst_angle < 0.6, "{worst_angle}°");
+    }
+
+    #[test]
+    fn outside_the_grid_is_empty_and_the_border_is_continuous() {
+        let mut volume = phantom::ball([8, 8, 8], Vec3::ONE, 1.0);
+        for index in 0..volume.grid().len() {
+            volume.set(index, super::super::Voxel { density: Density::FULL, label: super::super::Label(1) });
+        }
+        for (x, expected) in [(-1.0, 0.0), (-0.5, 0.5), (0.0, 1.0), (7.0, 1.0), (7.25, 0.75), (8.0, 0.0), (1e9, 0.0)] {
+            let density = volume.density_in_grid(Vec3::new(x, 3.5, 3.5));
+            assert!((density - expected).abs() < 1e-6, "x {x}: {density}");
+        }
+        assert_eq!(volume.density_in_grid(Vec3::new(f32::NAN, 1.0, 1.0)), 0.0);
+    }
+
+    #[test]
+    fn both_ways_of_sampling_agree() {
+        let volume = phantom::ball([30, 30, 30], Vec3::splat(0.2), 2.0);
+        for i in 0..2000 {
+            let t = i as f32;
+            let p = Vec3::new((t * 0.37).sin(), (t * 0.73).cos(), (t * 0.11).sin()) * 3.2;
+            let plain = volume.density_at(p);
+            let (value, _) = volume.density_and_gradient_at(p);
+            assert!((plain - value).abs() < 1e-5, "{p}: {plain} {value}");
+        }
+    }
+}
