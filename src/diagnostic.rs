@@ -1,1 +1,175 @@
-//! x
+//! A complaint about something a person wrote: what, where, and what would be right.
+//!
+//! Takes a source text and places in it. Gives lines that a person or a program can read. Never prints.
+
+use annotate_snippets::{AnnotationKind, Level, Renderer, Snippet};
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// A text that was read, with the name by which its reader knows it.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Source {
+    /// Path as given by the user.
+    pub name: String,
+    /// Empty for a file that is not text.
+    pub text: String,
+}
+
+impl Source {
+    pub fn new(name: impl Into<String>, text: impl Into<String>) -> Arc<Source> {
+        Arc::new(Source { name: name.into(), text: text.into() })
+    }
+
+    /// Line and column of a byte offset, both from 1; columns count characters.
+    pub fn line_and_column(&self, offset: usize) -> (usize, usize) {
+        let before = &self.text[..self.text.floor_char_boundary(offset)];
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+    }
+}
+
+/// One complaint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnostic {
+    /// Stable name of the rule that was broken, in kebab case.
+    pub code: &'static str,
+    pub source: Arc<Source>,
+    /// Bytes of the source that the complaint is about; `None` when it is about the file as a whole.
+    pub span: Option<Range<usize>>,
+    /// JSON pointer to the value, such as `/stages/0/title`; empty for the file as a whole.
+    pub path: String,
+    /// What is wrong: a lower-case phrase.
+    pub message: String,
+    /// What would be right.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    /// A complaint about a whole file, for readers of files that are not text.
+    pub fn about_file(name: &str, code: &'static str, message: impl fmt::Display, help: Option<String>) -> Diagnostic {
+        let message = message.to_string();
+        Diagnostic { code, source: Source::new(name, ""), span: None, path: String::new(), message, help }
+    }
+
+    /// Line and column from 1; `None` for a complaint about a whole file.
+    pub fn line_and_column(&self) -> Option<(usize, usize)> {
+        self.span.as_ref().map(|span| self.source.line_and_column(span.start))
+    }
+
+    /// The complaint in one line: `file:line:column: code: path: message`.
+    pub fn headline(&self) -> String {
+        let mut line = self.source.name.clone();
+        if let Some((row, column)) = self.line_and_column() {
+            line += &format!(":{row}:{column}");
+        }
+        line += &format!(": {}: ", self.code);
+        if !self.path.is_empty() {
+            line += &format!("{}: ", self.path);
+        }
+        // A message may quote what was written; it must not break the line.
+        line + &one_line(&self.message)
+    }
+}
+
+/// The headline, the place in the text, and the help.
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        writeln!(f, "{}", self.headline())?;
+        if let Some(span) = self.span.clone().filter(|s| s.end <= self.source.text.len()) {
+            let (text, first_line, span) = excerpt(&self.source, span);
+            let snippet = Snippet::source(text).line_start(first_line).annotation(AnnotationKind::Primary.span(span));
+            let rendered = Renderer::plain().render(&[Level::ERROR.primary_title("").element(snippet)]);
+            // The first line would repeat the headline.
+            for line in rendered.lines().skip(1) {
+                writeln!(f, "{}", line.trim_end())?;
+            }
+        }
+        if let Some(help) = &self.help {
+            writeln!(f, "  = help: {}", one_line(help))?;
+        }
+        Ok(())
+    }
+}
+
+/// The lines around a span, the number of the first, and the span within them.
+///
+/// Keeps a complaint about a value of many lines to its first, and one about a very long line to what surrounds it.
+fn excerpt(source: &Source, span: Range<usize>) -> (String, usize, Range<usize>) {
+    const AROUND: usize = 160;
+    let text = &source.text;
+    let line_start = text[..span.start].rfind('\n').map_or(0, |i| i + 1);
+    let line_end = text[span.start..].find('\n').map_or(text.len(), |i| span.start + i);
+    let start = text.floor_char_boundary(line_start.max(span.start.saturating_sub(AROUND)));
+    let end = text.floor_char_boundary(line_end.min(span.start + AROUND));
+    let (line, _) = source.line_and_column(span.start);
+    (text[start..end].to_string(), line, span.start - start..span.end.min(end).max(span.start) - start)
+}
+
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// The known word nearest to one that was written, if any is near enough to have been meant.
+pub fn nearest<'a>(written: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let written = written.to_lowercase();
+    known
+        .into_iter()
+        .map(|word| (strsim::damerau_levenshtein(&written, &word.to_lowercase()), word))
+        .filter(|(distance, word)| *distance <= 1 + word.len().max(written.len()) / 3)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, word)| word)
+}
+
+/// "did you mean …? known: …", for a word that is not among the known ones.
+pub fn did_you_mean<'a>(written: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
+    let listed = known.clone().into_iter().collect::<Vec<_>>().join(", ");
+    match nearest(written, known) {
+        Some(word) => format!("did you mean \"{word}\"? known: {listed}"),
+        None => format!("known: {listed}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn complaint(text: &str, span: Range<usize>) -> Diagnostic {
+        Diagnostic {
+            code: "unknown-tissue",
+            source: Source::new("a.json", text),
+            span: Some(span),
+            path: "/target/tissue".into(),
+            message: "no tissue is named \"dentin\"".into(),
+            help: Some(did_you_mean("dentin", ["enamel", "dentine", "pulp"])),
+        }
+    }
+
+    #[test]
+    fn a_complaint_points_at_the_place() {
+        let text = "{\n  \"tissue\": \"dentin\"\n}";
+        let start = text.find("\"dentin\"").unwrap();
+        let shown = complaint(text, start..start + 8).to_string();
+        assert_eq!(
+            shown,
+            "a.json:2:13: unknown-tissue: /target/tissue: no tissue is named \"dentin\"\n  |\n2 |   \"tissue\": \"dentin\"\n  \
+             |             ^^^^^^^^\n  = help: did you mean \"dentine\"? known: enamel, dentine, pulp\n"
+        );
+    }
+
+    #[test]
+    fn long_lines_and_odd_characters_do_no_harm() {
+        let text = format!("[\"{}\", \"ü\u{202e}\u{0}\"]", "x".repeat(100_000));
+        let start = text.find('ü').unwrap();
+        let shown = complaint(&text, start..start + 2).to_string();
+        assert!(shown.len() < 2000, "{}", shown.len());
+        assert!(!complaint("a", 0..1).to_string().contains('\u{0}'));
+    }
+
+    #[test]
+    fn only_near_words_are_suggested() {
+        assert_eq!(nearest("Dentin", ["enamel", "dentine"]), Some("dentine"));
+        assert_eq!(nearest("amalgam", ["enamel", "dentine"]), None);
+        assert_eq!(nearest("x", []), None);
+    }
+}

@@ -1,1 +1,5 @@
-fn main() {}
+//! The `typodont` program.
+
+fn main() -> std::process::ExitCode {
+    typodont::cli::main()
+}

@@ -1,1 +1,28 @@
-//! x
+//! Teeth: grown from tables of measurements, or won from scans.
+//!
+//! Takes forms in mm, CT values or label maps, and a grid. Gives volumes of enamel, dentine and pulp, crown up.
+//! Never reads a file, never knows a label's name, never rolls dice.
+
+mod track;
+mod blend;
+pub mod form;
+mod section;
+mod relief;
+mod pulp;
+mod shape;
+mod grow;
+pub mod molar;
+mod pieces;
+
+pub use form::Form;
+pub use grow::{grid_fitting, grid_of_spacing, grow};
+
+use crate::volume::Label;
+
+/// The labels that a tooth's three tissues have in the caller's table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tissues {
+    pub enamel: Label,
+    pub dentine: Label,
+    pub pulp: Label,
+}

@@ -1,1 +1,144 @@
-//! x
+//! The command line.
+//!
+//! Takes arguments. Gives files, lines and an exit status: 0 done, 1 the input is wrong or the check fails, 2 misuse. Never
+//! decides anything a library call could not.
+
+mod bench;
+mod check;
+mod cohort;
+mod demo;
+mod devices;
+mod import;
+mod preview;
+mod run;
+mod score;
+mod verify;
+
+use crate::diagnostic::Diagnostic;
+use clap::{Parser, Subcommand};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// The open haptic simulator and assessment platform for dental training.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run an exercise and write its bundle; prints the bundle's path last
+    Run(run::Arguments),
+    /// Run the five shipped exercises by a scripted operator, then report on them
+    Demo(demo::Arguments),
+    /// Check scenario files and folders: every complaint with file, line and column
+    Check(check::Arguments),
+    /// Print the JSON Schema of scenarios, for editors
+    Schema,
+    /// Draw what the trainee of an exercise will see, decay marked
+    Preview(preview::Arguments),
+    /// List the devices that can be used
+    Devices,
+    /// Turn a bundle's recording again and compare everything
+    Verify(verify::Arguments),
+    /// Score a bundle again from its recording alone
+    Score(score::Arguments),
+    /// Put many bundles into one table
+    Cohort(cohort::Arguments),
+    /// Turn a scan into a labelled volume
+    Import(import::Arguments),
+    /// Measure the program's own speed and memory
+    Bench(bench::Arguments),
+}
+
+/// Why a command failed.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Complaints about what a person wrote.
+    Complaints(Vec<Diagnostic>),
+    /// Anything else that is wrong with the input, as lines.
+    Wrong(String),
+    /// It was said already; only the status is left.
+    Told,
+}
+
+impl From<Vec<Diagnostic>> for Failure {
+    fn from(found: Vec<Diagnostic>) -> Failure {
+        Failure::Complaints(found)
+    }
+}
+
+impl From<Diagnostic> for Failure {
+    fn from(found: Diagnostic) -> Failure {
+        Failure::Complaints(vec![found])
+    }
+}
+
+impl Failure {
+    fn wrong(what: impl fmt::Display) -> Failure {
+        Failure::Wrong(what.to_string())
+    }
+
+    fn tell(&self) {
+        match self {
+            Failure::Complaints(found) => {
+                for diagnostic in found {
+                    eprint!("{diagnostic}");
+                }
+                if found.len() > 1 {
+                    eprintln!("{} complaints", found.len());
+                }
+            }
+            Failure::Wrong(what) => eprintln!("{what}"),
+            Failure::Told => {}
+        }
+    }
+}
+
+/// Parses the arguments, carries out the command, and says what went wrong.
+pub fn main() -> ExitCode {
+    let result = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
+        Command::Schema => {
+            print!("{}", crate::scenario::schema_text());
+            Ok(())
+        }
+        Command::Preview(arguments) => preview::run(&arguments),
+        Command::Devices => devices::run(),
+        Command::Verify(arguments) => verify::run(&arguments),
+        Command::Score(arguments) => score::run(&arguments),
+        Command::Cohort(arguments) => cohort::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.tell();
+            ExitCode::from(1)
+        }
+    }
+}
+
+/// Where finished bundles go unless told otherwise.
+const SESSIONS: &str = "reports/sessions";
+
+/// Templates of the folder `reports/templates` here, if there is one; otherwise those that ship with the program.
+fn templates() -> crate::report::Templates {
+    crate::report::Templates::in_folder(Path::new("reports/templates"))
+}
+
+/// Writes a file, or says why not.
+fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Failure> {
+    std::fs::write(path, bytes).map_err(|e| Failure::wrong(format!("{}: unwritable-file: {e}", path.display())))
+}
+
+/// The recording of a bundle, or a recording by itself.
+fn recording_in(bundle: &Path) -> PathBuf {
+    if bundle.is_dir() { bundle.join(crate::record::FILE_NAME) } else { bundle.to_path_buf() }
+}

@@ -1,1 +1,14 @@
-//! x
+//! What the program reads: tables, scans, and the texts that people wrote.
+//!
+//! Takes bytes by name. Gives checked values, or every complaint there is. Never changes a file it reads.
+
+pub mod json;
+pub mod nrrd;
+pub mod scan;
+mod library;
+mod tissues;
+mod instruments;
+
+pub use instruments::{InstrumentEntry, InstrumentTable};
+pub use library::{Library, read_file, read_text};
+pub use tissues::{Role, TissueEntry, TissueTable, parse_color};

@@ -9,7 +9,7 @@ mod scripted;
 
 pub use hand::{Hand, HandModel};
 pub use playback::Playback;
-pub use scripted::{Felt, Move, Scripted};
+pub use scripted::{Felt, Move, Scripted, Tremor};
 
 use crate::frame::{Pose, Vec3};
 use std::fmt;

@@ -12,12 +12,21 @@ use std::collections::VecDeque;
 pub enum Move {
     /// Straight to a place, in free space.
     Reach { to: Vec3, speed: f32 },
+    /// Straight up to a height (world y), from wherever the hand is.
+    Rise { to_height: f32, speed: f32 },
     /// From here along a direction until the force is met, then holds it for a while.
     ///
     /// Gives up after `reach` mm without meeting it.
     Press { along: Vec3, force: f32, hold: f32, reach: f32, speed: f32 },
-    /// Along a path while pressing sideways along a direction with a force.
-    Trace { path: Vec<Vec3>, along: Vec3, force: f32, speed: f32 },
+    /// Along a path while pressing along a direction with a force.
+    ///
+    /// The hand leans beyond the path by as much as the force asks, within `lean` (least, most; mm); it starts at the least.
+    Trace { path: Vec<Vec3>, along: Vec3, force: f32, speed: f32, lean: [f32; 2] },
+    /// Guides the tip that is seen on the screen along a path, leaning toward where it lags behind.
+    ///
+    /// The hand leans up to `lean` mm beyond the path and no harder than `force` N; where the tip does not follow it waits
+    /// for up to `patience` s before it goes on.
+    Guide { path: Vec<Vec3>, speed: f32, lean: f32, force: f32, patience: f32 },
     /// Holds still for so many seconds.
     Wait { seconds: f32 },
 }
@@ -41,8 +50,14 @@ const NOTICE: f32 = 0.06;
 /// How eagerly pressing corrects its force, mm/s per N. Above 30 it overshoots on enamel.
 const PRESS_GAIN: f32 = 15.0;
 
-/// Deepest a pressing hand goes beyond the path it follows, mm.
-const PRESS_DEPTH_MAX: f32 = 6.0;
+/// How eagerly a guiding hand leans toward where the tip should be, 1/s. From 20 on it overshoots in soft decay.
+const GUIDE_GAIN: f32 = 12.0;
+
+/// How far the tip may lag behind before a guiding hand waits for it, mm.
+const GUIDE_SLACK: f32 = 0.15;
+
+/// A reach that takes longer than this is given up, s: something is in the way.
+const REACH_PATIENCE: f32 = 10.0;
 
 /// The scripted device.
 #[derive(Clone, Debug)]
@@ -50,9 +65,46 @@ pub struct Scripted {
     spec: Spec,
     hand: Hand,
     orientation: Quat,
+    tremor: Tremor,
+    /// Where the tip is on the screen.
+    seen: Vec3,
     moves: VecDeque<Move>,
     now: Progress,
     felt: Option<Felt>,
+}
+
+/// The fine shaking of a hand: sines of 8 to 12 Hz, the band of physiological tremor.
+#[derive(Clone, Debug)]
+pub struct Tremor {
+    /// mm
+    amplitude: f32,
+    /// One per axis and sine, radians.
+    phases: [Vec3; 3],
+    tick: u64,
+}
+
+impl Tremor {
+    /// `amplitude`: typical excursion in mm; a steady hand has 0.02–0.05. The seed sets the phases.
+    pub fn new(amplitude: f32, seed: u64) -> Tremor {
+        let phase = |i: u64| {
+            let mixed = (seed ^ i.wrapping_mul(0x9e37_79b9_7f4a_7c15)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            (mixed >> 40) as f32 / (1u64 << 24) as f32 * core::f32::consts::TAU
+        };
+        let phases = std::array::from_fn(|i| Vec3::from_array(std::array::from_fn(|a| phase((3 * i + a) as u64 + 1))));
+        Tremor { amplitude, phases, tick: 0 }
+    }
+
+    fn next(&mut self) -> Vec3 {
+        /// Hz, without a common period.
+        const FREQUENCIES: [f32; 3] = [8.1, 9.7, 11.3];
+        let seconds = self.tick as f32 * TICK_S as f32;
+        self.tick += 1;
+        let sines = FREQUENCIES.iter().zip(&self.phases).map(|(frequency, phase)| {
+            let turn = core::f32::consts::TAU * (frequency * seconds).fract();
+            Vec3::new(libm::sinf(turn + phase.x), libm::sinf(turn + phase.y), libm::sinf(turn + phase.z))
+        });
+        sines.sum::<Vec3>() * (self.amplitude / 3.0)
+    }
 }
 
 /// How far the current move has come.
@@ -63,6 +115,10 @@ struct Progress {
     travelled: f32,
     /// Correction beyond the path, mm along the pressing direction.
     lean: f32,
+    /// The same in any direction, for guiding.
+    aside: Vec3,
+    /// Waited for the tip at this place, s.
+    waited: f32,
     started_at: Vec3,
     begun: bool,
     met: bool,
@@ -71,11 +127,13 @@ struct Progress {
 }
 
 impl Scripted {
-    pub fn new(spec: Spec, model: HandModel, start: Vec3) -> Scripted {
+    pub fn new(spec: Spec, model: HandModel, tremor: Tremor, start: Vec3) -> Scripted {
         Scripted {
             spec,
             hand: Hand::resting_at(model, start),
             orientation: Quat::IDENTITY,
+            tremor,
+            seen: start,
             moves: VecDeque::new(),
             now: Progress::default(),
             felt: None,
@@ -97,6 +155,11 @@ impl Scripted {
         self.hand.goal = self.hand.position();
     }
 
+    /// Looks at the screen: where the tip is, world space.
+    pub fn see(&mut self, tip: Vec3) {
+        self.seen = tip;
+    }
+
     /// What the last finished move felt; given once.
     pub fn take_felt(&mut self) -> Option<Felt> {
         self.felt.take()
@@ -110,7 +173,8 @@ impl Scripted {
     fn advance(&mut self, force: Vec3) {
         let Some(current) = self.moves.front() else { return };
         if !self.now.begun {
-            self.now = Progress { begun: true, started_at: self.hand.goal, ..Progress::default() };
+            let lean = if let Move::Trace { lean, .. } = current { lean[0] } else { 0.0 };
+            self.now = Progress { begun: true, started_at: self.hand.goal, lean, ..Progress::default() };
         }
         let dt = TICK_S as f32;
         let now = &mut self.now;
@@ -120,7 +184,13 @@ impl Scripted {
                 let way = *to - now.started_at;
                 now.travelled = (now.travelled + speed * dt).min(way.length());
                 self.hand.goal = now.started_at + way.normalize_or_zero() * now.travelled;
-                now.travelled >= way.length() && self.hand.position().distance(*to) < 0.3 || now.seconds > 20.0
+                now.travelled >= way.length() && self.hand.position().distance(*to) < 0.3
+                    || now.seconds > REACH_PATIENCE
+            }
+            Move::Rise { to_height, speed } => {
+                now.travelled += speed * dt;
+                self.hand.goal.y = (now.started_at.y + now.travelled).min(to_height.max(now.started_at.y));
+                self.hand.goal.y >= *to_height
             }
             Move::Press { along, force: wanted, hold, reach, speed } => {
                 let resistance = now.feel(force, *along, self.hand.position(), *wanted);
@@ -133,14 +203,31 @@ impl Scripted {
                 }
                 (now.met && now.seconds >= *hold) || now.lean > *reach
             }
-            Move::Trace { path, along, force: wanted, speed } => {
+            Move::Trace { path, along, force: wanted, speed, lean: [least, most] } => {
                 let resistance = now.feel(force, *along, self.hand.position(), *wanted);
                 now.lean += (wanted - resistance) * PRESS_GAIN * dt;
-                now.lean = now.lean.clamp(-1.0, PRESS_DEPTH_MAX);
+                now.lean = now.lean.clamp(*least, *most);
                 now.travelled += speed * dt;
                 let (on_path, at_end) = point_along(path, now.travelled);
                 self.hand.goal = on_path + *along * now.lean;
                 at_end
+            }
+            Move::Guide { path, speed, lean, force: most, patience } => {
+                let (on_path, at_end) = point_along(path, now.travelled);
+                let lag = on_path - self.seen;
+                now.aside = (now.aside + lag * (GUIDE_GAIN * dt)).clamp_length_max(*lean);
+                if force.length() > *most {
+                    now.aside *= 1.0 - 5.0 * dt;
+                }
+                let is_waiting = lag.length() > GUIDE_SLACK && now.waited < *patience;
+                if is_waiting {
+                    now.waited += dt;
+                } else {
+                    now.travelled += speed * dt;
+                    now.waited = (now.waited - dt).max(0.0);
+                }
+                self.hand.goal = on_path + now.aside;
+                at_end && !is_waiting
             }
             Move::Wait { seconds } => now.seconds >= *seconds,
         };
@@ -193,7 +280,10 @@ impl Device for Scripted {
 
     fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
         self.advance(output.force);
+        let steady = self.hand.goal;
+        self.hand.goal += self.tremor.next();
         let reading = self.hand.turn(output);
+        self.hand.goal = steady;
         Ok(Reading { pose: Pose { orientation: self.orientation, ..reading.pose }, ..reading })
     }
 }

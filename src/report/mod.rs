@@ -1,1 +1,20 @@
-//! x
+//! How a session looks afterwards: bundles, pages, maps and tables.
+//!
+//! Takes scored recordings and finished bundles. Gives files. Never computes a measure: that is `score`.
+
+pub mod bundle;
+pub mod cohort;
+mod curves;
+mod glb;
+mod html;
+mod labelmap;
+mod pictures;
+mod session_file;
+mod words;
+
+pub use html::Templates;
+pub use pictures::preview_png;
+pub use session_file::{
+    AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
+    StageFile,
+};

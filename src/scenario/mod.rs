@@ -1,1 +1,256 @@
-//! x
+//! What the author wrote, and what it means.
+//!
+//! Takes a scenario's text and the files it names. Gives a complete, valid [`Scenario`], or every complaint there is; and
+//! the [`Workpiece`] a session starts from. Never runs anything.
+
+pub mod file;
+pub mod metric;
+mod questionnaire;
+mod resolve;
+mod schema;
+mod workpiece;
+
+pub use metric::Metric;
+pub use questionnaire::{Category, Item, Questionnaire};
+pub use resolve::{Forms, hex, resolve};
+pub use schema::schema_text;
+pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
+
+use crate::content::{InstrumentEntry, TissueTable};
+use crate::touch::{Carving, Vibration};
+use crate::volume::{Label, Volume};
+use file::{SurfaceFile, ZoneRole};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A complete, valid exercise. Beyond [`resolve`] nobody asks again whether something is there.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    pub id: String,
+    pub title: String,
+    pub summary: String,
+    /// The text it was read from.
+    pub text: Arc<str>,
+    /// SHA-256 of that text, hexadecimal.
+    pub sha256: String,
+    /// The tables and other files it was made from, by name: what a recording must hold to be scored again. Scans are not
+    /// among them; what became of a scan is in the recording's own volume.
+    pub files: BTreeMap<String, Arc<[u8]>>,
+    pub scene: Scene,
+    pub tissues: TissueTable,
+    pub carving: Carving,
+    pub vibration: Vibration,
+    /// The tray; stages and results refer to it by index.
+    pub instruments: Vec<InstrumentEntry>,
+    pub zones: Vec<Zone>,
+    pub stages: Vec<Stage>,
+    pub measures: Measures,
+    pub rubric: Option<Rubric>,
+    pub questionnaire: Option<Questionnaire>,
+}
+
+/// What there is to see and touch.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub layout: Layout,
+    /// One tooth, or two from left to right.
+    pub teeth: Vec<Tooth>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Layout {
+    Single,
+    /// Two teeth side by side, so many mm apart.
+    Pair {
+        gap: f32,
+    },
+    /// With gum and neighbours.
+    Jaw,
+}
+
+/// A tooth to be made.
+#[derive(Clone, Debug)]
+pub struct Tooth {
+    pub id: String,
+    pub fdi: u8,
+    pub form: Form,
+    pub decay: Vec<Decay>,
+}
+
+/// Where a tooth's shape comes from.
+#[derive(Clone, Debug)]
+pub enum Form {
+    /// Made by the program at a voxel size in mm.
+    Procedural { spacing: f32 },
+    /// Read from a file and made ready: enamel up, tissues labelled.
+    Given(Arc<Volume>),
+    /// To be found in a recording: nothing is made anew.
+    Recorded,
+}
+
+/// Decay to be put into a tooth; lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decay {
+    pub id: String,
+    pub label: Label,
+    /// Half axes: buccolingual, mesiodistal, occlusoapical.
+    pub radii: [f32; 3],
+    pub surface: SurfaceFile,
+    pub place: DecayPlace,
+    /// Of the centre below the surface.
+    pub depth: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DecayPlace {
+    Centre,
+    RandomQuadrant,
+    /// 1–4 as seen from above.
+    Quadrant(u8),
+    Offset([f32; 2]),
+}
+
+/// A named region.
+#[derive(Clone, Debug)]
+pub struct Zone {
+    pub id: String,
+    pub title: String,
+    pub role: ZoneRole,
+    pub region: Region,
+}
+
+/// Which voxels belong to a zone; points in tooth space, mm.
+#[derive(Clone, Debug)]
+pub enum Region {
+    Tissue(Label),
+    Around { label: Label, within: f32 },
+    Sphere { centre: [f32; 3], radius: f32 },
+    Box { min: [f32; 3], max: [f32; 3] },
+    Cylinder { from: [f32; 3], to: [f32; 3], radius: f32 },
+    Mask(Arc<Mask>),
+}
+
+/// Voxels of a label map, on the grid it was read with.
+#[derive(Clone, Debug)]
+pub struct Mask {
+    pub dims: [u32; 3],
+    pub is_inside: Vec<bool>,
+}
+
+/// One part of an exercise.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub id: String,
+    pub title: String,
+    pub instruction: String,
+    /// s
+    pub time_limit: Option<f64>,
+    /// Indices into [`Scenario::instruments`]; never empty.
+    pub instruments: Vec<usize>,
+    pub cutting: bool,
+    pub show_decay: bool,
+    pub steps: Option<StiffnessSteps>,
+    pub ask: Vec<Question>,
+    pub ends: Ends,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct StiffnessSteps {
+    pub label: Label,
+    /// Coefficients, one step after the other; never empty.
+    pub coefficients: Vec<f32>,
+    /// s
+    pub step_time: f64,
+}
+
+/// What ends a stage besides its time limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Ends {
+    pub answered: bool,
+    pub confirmed: bool,
+    /// %
+    pub cleared: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Question {
+    pub id: String,
+    pub text: String,
+    pub kind: QuestionKind,
+}
+
+/// What can be answered, and what is right.
+#[derive(Clone, Debug, PartialEq)]
+pub enum QuestionKind {
+    /// The tooth with the decay of this name.
+    ToothWith {
+        decay: String,
+    },
+    /// The quadrant of the decay of this name.
+    QuadrantOf {
+        decay: String,
+    },
+    Choice {
+        options: Vec<(String, String)>,
+        correct: Option<String>,
+    },
+    YesNo {
+        correct: Option<bool>,
+    },
+    Number {
+        unit: String,
+        correct: Option<f64>,
+        tolerance: f64,
+    },
+    Text,
+}
+
+/// Numbers that measures need, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measures {
+    pub near: f32,
+    pub leeway: f32,
+    pub tolerance: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rubric {
+    pub pass_points: f64,
+    pub items: Vec<RubricItem>,
+    pub hard_fails: Vec<HardFail>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct RubricItem {
+    pub title: String,
+    pub metric: Metric,
+    pub points: f64,
+    pub full_at: f64,
+    pub zero_at: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct HardFail {
+    pub title: String,
+    pub metric: Metric,
+    pub when: Limit,
+}
+
+/// When a measure fails an exercise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Limit {
+    Above(f64),
+    Below(f64),
+}
+
+impl Scenario {
+    /// The last stage in which burs run.
+    pub fn cutting_stage(&self) -> Option<usize> {
+        self.stages.iter().rposition(|s| s.cutting)
+    }
+
+    /// Every decay with the index of its tooth.
+    pub fn decay(&self) -> impl Iterator<Item = (usize, &Decay)> {
+        self.scene.teeth.iter().enumerate().flat_map(|(tooth, t)| t.decay.iter().map(move |d| (tooth, d)))
+    }
+}

@@ -213,6 +213,11 @@ impl Simulation {
         self.carver.edits()
     }
 
+    /// The tick that comes next.
+    pub fn tick(&self) -> Tick {
+        self.tick
+    }
+
     pub fn volume(&self) -> &Volume {
         &self.matter.volume
     }

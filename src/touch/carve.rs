@@ -191,8 +191,9 @@ impl Carver {
         let (spacing, band) = (volume.grid().spacing.x, volume.band());
         let [x, y, z] = row.cell;
         let start = volume.grid().index(row.cell);
-        let run = &volume.densities()[start + steps.start as usize..start + steps.end as usize];
-        if run.iter().all(|&d| d == Density::EMPTY) {
+        // A bur that only grazes the row leaves an empty or backward range: nothing to do.
+        let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
+        if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
             return;
         }
         // A voxel loses something when the bur's surface leaves less than it has: nearer than a distance that its

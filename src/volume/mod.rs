@@ -111,6 +111,17 @@ impl Volume {
         Volume { grid, band, density, label, bricks }
     }
 
+    /// A volume exactly as it was taken apart; `None` when a voxel with density lacks a label, or one without has one.
+    pub fn restored(grid: Grid, band: f32, density: Vec<Density>, label: Vec<Label>) -> Option<Volume> {
+        let is_whole = density.len() == grid.len() && label.len() == grid.len();
+        let is_labelled = |(d, l): (&Density, &Label)| (*d > Density::EMPTY) == (*l != Label::AIR);
+        if !is_whole || !density.iter().zip(&label).all(is_labelled) {
+            return None;
+        }
+        let bricks = Bricks::new(&grid, &density);
+        Some(Volume { grid, band, density, label, bricks })
+    }
+
     /// Fills a grid from a signed distance to the surface in mm (negative inside) and a label for what is inside.
     ///
     /// `at` is asked once per voxel, with the voxel's centre in tooth space.

@@ -1,0 +1,200 @@
+//! `typodont run`: one exercise, one bundle.
+
+use super::{Failure, SESSIONS, check};
+use crate::content::{self, Library, nrrd, scan};
+use crate::device::Spec;
+use crate::record::{self, EndFile, HeadFile, Recorder, ServoFile, SpecFile};
+use crate::report::bundle;
+use crate::scenario::{self, Form, Forms, Scenario, Workpiece, hex};
+use crate::session::{self, Operator, OperatorFile, Progress, Session};
+use crate::sim::Simulation;
+use crate::tick::{TICK_S, Tick};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// The exercise
+    scenario: PathBuf,
+    /// Run without a window, as fast as the machine can
+    #[arg(long)]
+    headless: bool,
+    /// Who plays the trainee: careful, expert, hasty, timid, or a file
+    #[arg(long, value_name = "NAME|FILE.json", default_value = "careful")]
+    operator: String,
+    /// The device the hand holds; see `typodont devices`
+    #[arg(long, value_name = "NAME", default_value = "scripted")]
+    device: String,
+    /// Decides what the exercise leaves to chance; drawn from the clock if left out
+    #[arg(long)]
+    seed: Option<u64>,
+    /// A CT volume (NRRD) to work on instead of the exercise's own tooth
+    #[arg(long, value_name = "VOLUME")]
+    tooth: Option<PathBuf>,
+    /// Distance between that volume's voxels, where its header lacks it
+    #[arg(long, value_name = "MM", requires = "tooth", value_parser = spacing)]
+    tooth_spacing_mm: Option<f32>,
+    /// A code for the trainee; never a name
+    #[arg(long, value_name = "CODE", default_value = "", value_parser = participant)]
+    participant: String,
+    /// Folder in which the bundle is made
+    #[arg(long, value_name = "DIR", default_value = SESSIONS)]
+    out: PathBuf,
+}
+
+fn spacing(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(mm) if (0.01..=2.0).contains(&mm) => Ok(mm),
+        _ => Err("a distance between voxels lies between 0.01 and 2 mm".into()),
+    }
+}
+
+fn participant(text: &str) -> Result<String, String> {
+    match text.chars().count() <= 10_000 {
+        true => Ok(text.to_string()),
+        false => Err("a code has at most 10 000 characters".into()),
+    }
+}
+
+/// What a run needs, whoever asks for it.
+pub struct Run<'a> {
+    pub scenario: Arc<Scenario>,
+    pub operator: OperatorFile,
+    pub seed: u64,
+    pub participant: &'a str,
+    pub out: &'a Path,
+    /// SHA-256 of files that the scenario does not name, by name.
+    pub digests: BTreeMap<String, String>,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if !arguments.headless {
+        return Err(Failure::wrong("no-window: this version runs exercises without a window only; add --headless"));
+    }
+    if arguments.device != "scripted" {
+        let what = format!("unknown-device: no device is named \"{}\"; see `typodont devices`", arguments.device);
+        return Err(Failure::Wrong(what));
+    }
+    let source = content::read_text(&arguments.scenario)?;
+    let library = check::library_for(&arguments.scenario);
+    let mut scenario = scenario::resolve(source, &library, Forms::Made)?;
+    let mut digests = BTreeMap::new();
+    if let Some(path) = &arguments.tooth {
+        digests.insert("tooth".to_string(), replace_teeth(&mut scenario, path, arguments.tooth_spacing_mm)?);
+    }
+    let operator = operator(&arguments.operator, &library)?;
+    let run = Run {
+        scenario: Arc::new(scenario),
+        operator,
+        seed: arguments.seed.unwrap_or_else(seed_from_clock),
+        participant: &arguments.participant,
+        out: &arguments.out,
+        digests,
+    };
+    println!("{}", perform(&run)?.display());
+    Ok(())
+}
+
+/// Puts a scan in the place of every tooth; returns the scan's SHA-256.
+fn replace_teeth(scenario: &mut Scenario, path: &Path, spacing: Option<f32>) -> Result<String, Failure> {
+    let wrong = |what: String| Failure::Wrong(format!("{}: wrong-volume: {what}", path.display()));
+    let bytes = content::read_file(path)?;
+    let image = nrrd::read(path).map_err(|e| wrong(e.to_string()))?;
+    let tissues = scenario::anatomy_tissues(&scenario.tissues);
+    let volume = scan::segmented(&image, spacing.map(|mm| [mm; 3]), &tissues).map_err(|e| wrong(e.to_string()))?;
+    let volume = Arc::new(volume);
+    for tooth in &mut scenario.scene.teeth {
+        tooth.form = Form::Given(volume.clone());
+    }
+    Ok(hex(&Sha256::digest(&bytes)))
+}
+
+/// An operator by name, or from a file.
+pub fn operator(name: &str, library: &Library) -> Result<OperatorFile, Failure> {
+    match Path::new(name).extension() {
+        Some(_) => Ok(content::json::read::<OperatorFile>(content::read_text(Path::new(name))?)?.value),
+        None => Ok(OperatorFile::read(library, name)?),
+    }
+}
+
+/// Runs, records, scores and reports; returns the bundle's path.
+pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
+    let Run { scenario, operator, seed, participant, out, digests } = run;
+    let workpiece = Workpiece::make(scenario, *seed)
+        .map_err(|e| Failure::Wrong(format!("{}: impossible-scene: {e}", scenario.id)))?;
+    let workpiece = Arc::new(workpiece);
+    let spec = Spec::phantom_omni();
+    let now = jiff::Timestamp::now();
+    let head = HeadFile {
+        version: record::VERSION,
+        typodont_version: env!("CARGO_PKG_VERSION").to_string(),
+        scenario_id: scenario.id.clone(),
+        scenario_sha256: scenario.sha256.clone(),
+        participant: participant.to_string(),
+        seed: *seed,
+        tick_s: TICK_S,
+        started: format!("{:.0}", now),
+        operator: Some(operator.id.clone()),
+        device: SpecFile::from(&spec),
+        digests: digests.clone(),
+    };
+    let name = bundle_name(&head, now);
+    let unfinished = bundle::Unfinished::begin(out, &name).map_err(Failure::wrong)?;
+    let mut recorder =
+        Recorder::create(&unfinished.recording(), &head, scenario, &workpiece.volume).map_err(Failure::wrong)?;
+    let mut session = Session::new(scenario.clone(), &workpiece);
+    let mut simulation = Simulation::new(session::setup(scenario, &workpiece, spec.clone()));
+    let mut trainee = Operator::new(operator.clone(), scenario.clone(), workpiece.clone(), spec, *seed);
+    let progress = session::run(&mut session, &mut simulation, &mut trainee, &mut recorder).map_err(Failure::wrong)?;
+    let reason = match progress {
+        Progress::Complete if session.outcome().aborted => "aborted".to_string(),
+        Progress::Complete => "complete".to_string(),
+        Progress::DeviceGone(gone) => gone.to_string(),
+    };
+    recorder.finish(&EndFile { reason, servo: servo(&simulation) }).map_err(Failure::wrong)?;
+    let bar = spinner("scoring and drawing");
+    let bundle = unfinished.complete(&super::templates()).map_err(Failure::wrong);
+    bar.finish_and_clear();
+    bundle
+}
+
+/// What the beat came to: a headless run has no clock to be late by.
+fn servo(simulation: &Simulation) -> ServoFile {
+    let gate = simulation.gate();
+    ServoFile {
+        ticks: simulation.tick().0,
+        faults: gate.faults(),
+        clamped: gate.clamped_forces,
+        ..ServoFile::default()
+    }
+}
+
+/// `exercise_time_digest`: sorts by exercise and time, and two sessions of one second differ. It names nobody.
+fn bundle_name(head: &HeadFile, now: jiff::Timestamp) -> String {
+    let mark = Sha256::digest(format!("{}/{}/{}/{now}", head.participant, head.seed, std::process::id()));
+    format!("{}_{}_{}", head.scenario_id, now.strftime("%Y%m%dT%H%M%SZ"), hex(&mark[..4]))
+}
+
+fn seed_from_clock() -> u64 {
+    let nanoseconds = jiff::Timestamp::now().as_nanosecond();
+    // Whole numbers up to 2⁵³ survive every JSON reader.
+    (nanoseconds as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11
+}
+
+/// A sign of life on a terminal; silent elsewhere.
+pub fn spinner(what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
+    let bar = ProgressBar::new_spinner().with_style(style).with_message(what);
+    bar.enable_steady_tick(std::time::Duration::from_millis(120));
+    bar
+}
+
+/// Ticks of a session as minutes and seconds, for people.
+pub fn length(ticks: u64) -> String {
+    let seconds = Tick(ticks).seconds() as u64;
+    format!("{}:{:02}", seconds / 60, seconds % 60)
+}

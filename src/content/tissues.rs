@@ -1,0 +1,166 @@
+//! The table of tissues: names, colours and how each feels.
+
+use super::Library;
+use super::json::{self, Places};
+use crate::diagnostic::Diagnostic;
+use crate::touch::{Material, Materials};
+use crate::volume::Label;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a tissue means to the score.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// Healthy tooth: taking it away costs.
+    Sound,
+    /// To be taken away.
+    Decay,
+    /// Never to be touched by a bur.
+    Vulnerable,
+    /// Gum and the like: not carved, hurts when drilled.
+    Soft,
+    /// Another tooth than the one worked on.
+    Neighbour,
+    /// A filling.
+    Material,
+}
+
+/// One line of `content/tissues.json`.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TissueEntry {
+    /// Number of the tissue in label maps, 1 to 255; 0 is air.
+    #[schemars(range(min = 1, max = 255))]
+    pub id: u8,
+    /// Name by which files refer to it, such as "enamel": small letters, digits, hyphens, underscores.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub name: String,
+    /// Name shown to people.
+    #[schemars(length(min = 1, max = 80))]
+    pub title: String,
+    /// What the tissue means to the score.
+    pub role: Role,
+    /// Colour for drawing, as "#rrggbb", for example "#6b4226".
+    #[schemars(regex(pattern = r"^#[0-9a-fA-F]{6}$"))]
+    pub color: String,
+    /// Share of the device's greatest stiffness, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub stiffness: f32,
+    /// Share of the device's greatest damping, 0 to 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub damping: f32,
+    /// Coulomb coefficient to be overcome before sliding, 0 to 2.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub static_friction: f32,
+    /// Coulomb coefficient while sliding, 0 to 2.
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub dynamic_friction: f32,
+    /// Spring force from which a bur takes the tissue away, N; null: it cannot be cut.
+    #[schemars(range(min = 0.01, max = 50.0))]
+    pub cut_force_n: Option<f32>,
+}
+
+impl TissueEntry {
+    pub fn label(&self) -> Label {
+        Label(self.id)
+    }
+
+    /// Colour as red, green, blue in 0–1.
+    pub fn rgb(&self) -> [f32; 3] {
+        parse_color(&self.color).unwrap_or([0.5; 3])
+    }
+
+    fn material(&self) -> Material {
+        Material {
+            stiffness: self.stiffness,
+            damping: self.damping,
+            static_friction: self.static_friction,
+            dynamic_friction: self.dynamic_friction,
+            cut_force: self.cut_force_n,
+        }
+    }
+}
+
+/// "#rrggbb" as red, green, blue in 0–1.
+pub fn parse_color(text: &str) -> Option<[f32; 3]> {
+    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.is_ascii())?;
+    let channel = |i: usize| u8::from_str_radix(&digits[i..i + 2], 16).ok().map(|v| f32::from(v) / 255.0);
+    Some([channel(0)?, channel(2)?, channel(4)?])
+}
+
+/// `content/tissues.json` as written.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct TissueFile {
+    #[schemars(length(min = 1, max = 255))]
+    tissues: Vec<TissueEntry>,
+}
+
+/// Every tissue a session knows.
+#[derive(Clone, Debug)]
+pub struct TissueTable {
+    entries: Vec<TissueEntry>,
+}
+
+impl TissueTable {
+    /// Name of the table in a [`Library`].
+    pub const NAME: &str = "content/tissues.json";
+
+    pub fn read(library: &Library) -> Result<TissueTable, Vec<Diagnostic>> {
+        let source = library.text(Self::NAME).map_err(|e| vec![e])?;
+        let read = json::read::<TissueFile>(source)?;
+        let mut table = TissueTable { entries: Vec::new() };
+        let mut found = Vec::new();
+        for (index, entry) in read.value.tissues.into_iter().enumerate() {
+            table.add(entry, &read.places, &format!("/tissues/{index}"), &mut found);
+        }
+        if found.is_empty() { Ok(table) } else { Err(found) }
+    }
+
+    /// Adds a tissue, with complaints if it clashes with one already there.
+    pub fn add(&mut self, entry: TissueEntry, places: &Places, path: &str, found: &mut Vec<Diagnostic>) {
+        let mut complain = |key: &str, code, message: String, help: String| {
+            found.push(places.complain(&format!("{path}/{key}"), code, message, Some(help)));
+        };
+        if let Some(other) = self.entries.iter().find(|e| e.id == entry.id) {
+            let message = format!("the number {} already belongs to \"{}\"", entry.id, other.name);
+            complain("id", "duplicate-id", message, "give each tissue its own number".into());
+        }
+        if self.entries.iter().any(|e| e.name == entry.name) {
+            let message = format!("there is already a tissue named \"{}\"", entry.name);
+            complain("name", "duplicate-id", message, "give each tissue its own name".into());
+        }
+        self.entries.push(entry);
+    }
+
+    pub fn entries(&self) -> &[TissueEntry] {
+        &self.entries
+    }
+
+    pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
+        self.entries.iter().map(|e| e.name.as_str())
+    }
+
+    pub fn by_name(&self, name: &str) -> Option<&TissueEntry> {
+        self.entries.iter().find(|e| e.name == name)
+    }
+
+    pub fn by_name_mut(&mut self, name: &str) -> Option<&mut TissueEntry> {
+        self.entries.iter_mut().find(|e| e.name == name)
+    }
+
+    pub fn by_label(&self, label: Label) -> Option<&TissueEntry> {
+        self.entries.iter().find(|e| e.label() == label)
+    }
+
+    /// What a label means to the score; `None` for air and unknown labels.
+    pub fn role(&self, label: Label) -> Option<Role> {
+        self.by_label(label).map(|e| e.role)
+    }
+
+    /// How each tissue feels.
+    pub fn materials(&self) -> Materials {
+        self.entries.iter().fold(Materials::new(), |all, e| all.with(e.label(), e.material()))
+    }
+}

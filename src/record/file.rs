@@ -1,0 +1,220 @@
+//! The parts of a recording that are text. Readers tolerate additions.
+
+use crate::device::Spec;
+use crate::frame::Vec3;
+use crate::session::{Answer, EndedBy, Input};
+use crate::sim::Command;
+use crate::volume::Label;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version of the recording's format. A reader refuses a newer one.
+pub const VERSION: u32 = 1;
+
+/// What is known before the first tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HeadFile {
+    pub version: u32,
+    pub typodont_version: String,
+    pub scenario_id: String,
+    pub scenario_sha256: String,
+    /// A code, never a name.
+    pub participant: String,
+    pub seed: u64,
+    /// Length of a tick, s.
+    pub tick_s: f64,
+    /// When the session began, RFC 3339; for people, not for the score.
+    pub started: String,
+    /// Who moved the hand, if it was a script.
+    pub operator: Option<String>,
+    pub device: SpecFile,
+    /// SHA-256 of what the session was made from, by name.
+    pub digests: BTreeMap<String, String>,
+}
+
+/// What is known after the last tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EndFile {
+    /// "complete", or why the session ended before its time.
+    pub reason: String,
+    pub servo: ServoFile,
+}
+
+/// How well the beat was kept. A headless run has no clock to be late by.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ServoFile {
+    pub ticks: u64,
+    pub late_p99_us: Option<f64>,
+    pub late_max_us: Option<f64>,
+    pub missed: u64,
+    pub dropped: u64,
+    /// Readings refused and forces that were not finite.
+    pub faults: u64,
+    /// Forces shortened to the device's limit.
+    pub clamped: u64,
+}
+
+/// A device's spec with its units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SpecFile {
+    pub name: String,
+    pub max_force_n: f32,
+    pub continuous_force_n: f32,
+    pub max_stiffness_n_per_mm: f32,
+    pub max_damping_n_s_per_mm: f32,
+    pub resolution_mm: f32,
+    pub workspace_half_mm: [f32; 3],
+    pub apparent_mass_kg: f32,
+}
+
+impl From<&Spec> for SpecFile {
+    fn from(spec: &Spec) -> SpecFile {
+        SpecFile {
+            name: spec.name.clone(),
+            max_force_n: spec.max_force,
+            continuous_force_n: spec.continuous_force,
+            max_stiffness_n_per_mm: spec.max_stiffness,
+            max_damping_n_s_per_mm: spec.max_damping,
+            resolution_mm: spec.resolution,
+            workspace_half_mm: spec.workspace_half.to_array(),
+            apparent_mass_kg: spec.apparent_mass,
+        }
+    }
+}
+
+impl From<&SpecFile> for Spec {
+    fn from(file: &SpecFile) -> Spec {
+        Spec {
+            name: file.name.clone(),
+            max_force: file.max_force_n,
+            continuous_force: file.continuous_force_n,
+            max_stiffness: file.max_stiffness_n_per_mm,
+            max_damping: file.max_damping_n_s_per_mm,
+            resolution: file.resolution_mm,
+            workspace_half: Vec3::from_array(file.workspace_half_mm),
+            apparent_mass: file.apparent_mass_kg,
+        }
+    }
+}
+
+/// A message on `/event`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EventFile {
+    /// Before the step of this tick.
+    pub tick: u64,
+    #[serde(flatten)]
+    pub what: WhatFile,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WhatFile {
+    /// What a person did.
+    Input(InputFile),
+    /// What the simulation was told.
+    Command(CommandFile),
+    StageStarted {
+        stage: String,
+    },
+    StageEnded {
+        stage: String,
+        by: String,
+    },
+    StagesOver {},
+    /// An input that did not fit.
+    Refused {
+        why: String,
+    },
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InputFile {
+    Take { instrument: usize },
+    AnswerWord { question: String, value: String },
+    AnswerQuadrant { question: String, value: u8 },
+    AnswerYesNo { question: String, value: bool },
+    AnswerNumber { question: String, value: f64 },
+    Confirm {},
+    Rate { item: String, value: u8 },
+    Abort {},
+}
+
+impl From<&Input> for InputFile {
+    fn from(input: &Input) -> InputFile {
+        match input.clone() {
+            Input::Take { instrument } => InputFile::Take { instrument },
+            Input::Answer { question, value } => match value {
+                Answer::Word(value) => InputFile::AnswerWord { question, value },
+                Answer::Quadrant(value) => InputFile::AnswerQuadrant { question, value },
+                Answer::YesNo(value) => InputFile::AnswerYesNo { question, value },
+                Answer::Number(value) => InputFile::AnswerNumber { question, value },
+            },
+            Input::Confirm => InputFile::Confirm {},
+            Input::Rate { item, value } => InputFile::Rate { item, value },
+            Input::Abort => InputFile::Abort {},
+        }
+    }
+}
+
+impl From<InputFile> for Input {
+    fn from(file: InputFile) -> Input {
+        match file {
+            InputFile::Take { instrument } => Input::Take { instrument },
+            InputFile::AnswerWord { question, value } => Input::Answer { question, value: Answer::Word(value) },
+            InputFile::AnswerQuadrant { question, value } => Input::Answer { question, value: Answer::Quadrant(value) },
+            InputFile::AnswerYesNo { question, value } => Input::Answer { question, value: Answer::YesNo(value) },
+            InputFile::AnswerNumber { question, value } => Input::Answer { question, value: Answer::Number(value) },
+            InputFile::Confirm {} => Input::Confirm,
+            InputFile::Rate { item, value } => Input::Rate { item, value },
+            InputFile::Abort {} => Input::Abort,
+        }
+    }
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandFile {
+    Take { instrument: usize },
+    SetStiffness { label: u8, stiffness: f32 },
+    RunBur { running: bool },
+}
+
+impl From<&Command> for CommandFile {
+    fn from(command: &Command) -> CommandFile {
+        match *command {
+            Command::Take { instrument } => CommandFile::Take { instrument },
+            Command::SetStiffness { label, stiffness } => CommandFile::SetStiffness { label: label.0, stiffness },
+            Command::RunBur { running } => CommandFile::RunBur { running },
+        }
+    }
+}
+
+impl From<&CommandFile> for Command {
+    fn from(file: &CommandFile) -> Command {
+        match *file {
+            CommandFile::Take { instrument } => Command::Take { instrument },
+            CommandFile::SetStiffness { label, stiffness } => Command::SetStiffness { label: Label(label), stiffness },
+            CommandFile::RunBur { running } => Command::RunBur { running },
+        }
+    }
+}
+
+/// A message on `/digest`: everything up to this tick in one number.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DigestFile {
+    pub tick: u64,
+    /// SHA-256 over all readings and forces, all events and all changed voxels so far, hexadecimal.
+    pub sha256: String,
+}
+
+/// The name of an end in results.
+pub fn ended_by_name(by: EndedBy) -> &'static str {
+    match by {
+        EndedBy::Time => "time",
+        EndedBy::Answer => "answer",
+        EndedBy::Confirmation => "confirmation",
+        EndedBy::Cleared => "cleared",
+        EndedBy::Abort => "abort",
+    }
+}

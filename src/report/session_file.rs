@@ -1,0 +1,332 @@
+//! `session.json`: the result of a session as other programs read it. Its names are a contract.
+
+use crate::device::Spec;
+use crate::record::{Recording, ServoFile, SpecFile, ended_by_name};
+use crate::scenario::{Limit, QuestionKind, Questionnaire};
+use crate::score::{Grade, SCORER_VERSION, Scored};
+use crate::session::{Answer, Given};
+use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
+use std::collections::BTreeMap;
+
+/// Version of this file's format.
+pub const VERSION: u32 = 1;
+
+pub type DeviceFile = SpecFile;
+
+/// A session's result. Sessions entered by hand may leave out all but the scenario and the metrics.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SessionFile {
+    pub version: u32,
+    #[serde(default)]
+    pub typodont_version: String,
+    /// Version of the formulae; 0 for values entered by hand.
+    #[serde(default)]
+    pub scorer_version: u32,
+    pub scenario: ScenarioRef,
+    #[serde(default)]
+    pub participant: String,
+    #[serde(default)]
+    pub seed: u64,
+    /// When the session began, RFC 3339.
+    #[serde(default)]
+    pub started: String,
+    /// "complete", or why the session ended before its time.
+    #[serde(default)]
+    pub ended_because: String,
+    /// Who moved the hand, if it was a script.
+    #[serde(default)]
+    pub operator: Option<String>,
+    #[serde(default)]
+    pub device: Option<DeviceFile>,
+    #[serde(default)]
+    pub stages: Vec<StageFile>,
+    pub metrics: BTreeMap<String, Option<f64>>,
+    /// Where and when some of the metrics arose.
+    #[serde(default)]
+    pub evidence: BTreeMap<String, EvidenceFile>,
+    /// Absent without a rubric.
+    #[serde(default)]
+    pub grade: Option<GradeFile>,
+    /// Absent without a questionnaire.
+    #[serde(default)]
+    pub questionnaire: Option<QuestionnaireFile>,
+    #[serde(default)]
+    pub servo: ServoFile,
+    /// SHA-256 of the template that the page was made from.
+    #[serde(default)]
+    pub template_sha256: String,
+    /// SHA-256 of the bundle's other files, by name.
+    #[serde(default)]
+    pub digests: BTreeMap<String, String>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ScenarioRef {
+    pub id: String,
+    #[serde(default)]
+    pub title: String,
+    #[serde(default)]
+    pub sha256: String,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StageFile {
+    pub id: String,
+    #[serde(default)]
+    pub title: String,
+    pub started_s: f64,
+    pub ended_s: f64,
+    pub ended_by: String,
+    pub answers: Vec<AnswerFile>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AnswerFile {
+    pub question: String,
+    #[serde(default)]
+    pub text: String,
+    /// A text, a number or true/false.
+    pub value: Json,
+    pub at_s: f64,
+    /// Whether it was right; null where nothing is right or wrong.
+    pub right: Option<bool>,
+    /// The right answer, where there is one.
+    #[serde(default)]
+    pub truth: Json,
+    /// Stiffness coefficient in force, where the stage has steps.
+    #[serde(default)]
+    pub level: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EvidenceFile {
+    /// When it arose, s.
+    pub at_s: Option<f64>,
+    /// Where, in tooth space, mm: buccal, distal, occlusal from the crown's middle at the neck.
+    pub place_mm: [f64; 3],
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GradeFile {
+    pub points: f64,
+    pub max_points: f64,
+    pub pass_points: f64,
+    pub passed: bool,
+    /// Titles of what failed the session outright.
+    pub hard_fails: Vec<String>,
+    #[serde(default)]
+    pub items: Vec<ItemFile>,
+    /// Everything that could fail it, with its value.
+    #[serde(default)]
+    pub hard_fail_checks: Vec<HardFailFile>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ItemFile {
+    pub title: String,
+    pub metric: String,
+    pub value: Option<f64>,
+    pub points: f64,
+    pub max_points: f64,
+    pub full_at: f64,
+    pub zero_at: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HardFailFile {
+    pub title: String,
+    pub metric: String,
+    pub value: Option<f64>,
+    #[serde(default)]
+    pub above: Option<f64>,
+    #[serde(default)]
+    pub below: Option<f64>,
+    pub failed: bool,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct QuestionnaireFile {
+    pub id: String,
+    pub items: Vec<RatingFile>,
+    /// Mean of each category, negative statements mirrored; null where nothing was answered.
+    pub categories: BTreeMap<String, Option<f64>>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RatingFile {
+    pub id: String,
+    pub category: String,
+    /// As given; null where not answered.
+    pub value: Option<f64>,
+    /// As counted: mirrored for statements against the system.
+    pub counted: Option<f64>,
+}
+
+impl SessionFile {
+    /// The result of a scored recording; the digests of the other files come later.
+    pub fn of(recording: &Recording, scored: &Scored) -> SessionFile {
+        let head = &recording.head;
+        let scenario = &recording.scenario;
+        let metrics = scored.measures.all.iter().map(|m| (m.metric.name(), m.value.map(tidy)));
+        let evidence = scored.measures.all.iter().filter_map(|m| {
+            let evidence = m.evidence?;
+            let place_mm = evidence.place.to_array().map(|v| tidy(f64::from(v)));
+            Some((m.metric.name(), EvidenceFile { at_s: evidence.at.map(|t| t.seconds()), place_mm }))
+        });
+        let ended = match &recording.end {
+            Some(end) => end.reason.clone(),
+            None => "the recording breaks off".to_string(),
+        };
+        let ticks = ServoFile { ticks: recording.len() as u64, ..ServoFile::default() };
+        SessionFile {
+            version: VERSION,
+            typodont_version: head.typodont_version.clone(),
+            scorer_version: SCORER_VERSION,
+            scenario: ScenarioRef {
+                id: scenario.id.clone(),
+                title: scenario.title.clone(),
+                sha256: scenario.sha256.clone(),
+            },
+            participant: head.participant.clone(),
+            seed: head.seed,
+            started: head.started.clone(),
+            ended_because: ended,
+            operator: head.operator.clone(),
+            device: Some(DeviceFile::from(&Spec::from(&head.device))),
+            stages: stages(recording, scored),
+            metrics: metrics.collect(),
+            evidence: evidence.collect(),
+            grade: scored.grade.as_ref().map(grade),
+            questionnaire: scenario.questionnaire.as_ref().map(|q| questionnaire(q, &scored.replay.outcome.ratings)),
+            servo: recording.end.as_ref().map_or(ticks, |end| end.servo.clone()),
+            template_sha256: String::new(),
+            digests: BTreeMap::new(),
+        }
+    }
+
+    /// The file's text.
+    pub fn text(&self) -> String {
+        // Numbers are finite and keys are texts: writing cannot fail.
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    /// A metric's value.
+    pub fn metric(&self, name: &str) -> Option<f64> {
+        self.metrics.get(name).copied().flatten()
+    }
+}
+
+/// Nine decimals: below what any measure means, above what rounding leaves.
+fn tidy(value: f64) -> f64 {
+    let rounded = (value * 1e9).round() / 1e9;
+    if rounded.is_finite() { rounded + 0.0 } else { value }
+}
+
+fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
+    let results = recording.scenario.stages.iter().zip(&scored.replay.outcome.stages);
+    let stage = |(stage, result): (&crate::scenario::Stage, &crate::session::StageResult)| {
+        let answers = stage.ask.iter().zip(&result.answers).filter_map(|(question, given)| {
+            let Given { value, at, right, step } = given.as_ref()?;
+            Some(AnswerFile {
+                question: question.id.clone(),
+                text: question.text.clone(),
+                value: answer_value(value),
+                at_s: at.seconds(),
+                right: *right,
+                truth: truth(&question.kind, scored),
+                level: step.map(|(level, _)| (f64::from(level) * 1e6).round() / 1e6),
+            })
+        });
+        StageFile {
+            id: stage.id.clone(),
+            title: stage.title.clone(),
+            started_s: result.started.seconds(),
+            ended_s: result.ended.seconds(),
+            ended_by: ended_by_name(result.ended_by).to_string(),
+            answers: answers.collect(),
+        }
+    };
+    results.map(stage).collect()
+}
+
+fn answer_value(value: &Answer) -> Json {
+    match value {
+        Answer::Word(word) => Json::from(word.as_str()),
+        Answer::Quadrant(quadrant) => Json::from(*quadrant),
+        Answer::YesNo(yes) => Json::from(*yes),
+        Answer::Number(number) => Json::from(*number),
+    }
+}
+
+fn truth(kind: &QuestionKind, scored: &Scored) -> Json {
+    let workpiece = &scored.replay.workpiece;
+    let lesion = |name: &str| workpiece.lesions.iter().find(|l| l.id == name);
+    match kind {
+        QuestionKind::ToothWith { decay } => {
+            lesion(decay).map_or(Json::Null, |l| Json::from(workpiece.teeth[l.tooth].id.as_str()))
+        }
+        QuestionKind::QuadrantOf { decay } => lesion(decay).map_or(Json::Null, |l| Json::from(l.quadrant)),
+        QuestionKind::Choice { correct, .. } => correct.as_deref().map_or(Json::Null, Json::from),
+        QuestionKind::YesNo { correct } => correct.map_or(Json::Null, Json::from),
+        QuestionKind::Number { correct, .. } => correct.map_or(Json::Null, Json::from),
+        QuestionKind::Text => Json::Null,
+    }
+}
+
+fn grade(grade: &Grade) -> GradeFile {
+    GradeFile {
+        points: tidy(grade.points),
+        max_points: tidy(grade.max_points),
+        pass_points: grade.pass_points,
+        passed: grade.passed,
+        hard_fails: grade.hard_fails.iter().filter(|f| f.failed).map(|f| f.title.clone()).collect(),
+        items: grade
+            .items
+            .iter()
+            .map(|item| ItemFile {
+                title: item.title.clone(),
+                metric: item.metric.clone(),
+                value: item.value.map(tidy),
+                points: tidy(item.points),
+                max_points: item.max_points,
+                full_at: item.full_at,
+                zero_at: item.zero_at,
+            })
+            .collect(),
+        hard_fail_checks: grade
+            .hard_fails
+            .iter()
+            .map(|fail| {
+                let (above, below) = match fail.limit {
+                    Limit::Above(limit) => (Some(limit), None),
+                    Limit::Below(limit) => (None, Some(limit)),
+                };
+                let (title, metric) = (fail.title.clone(), fail.metric.clone());
+                HardFailFile { title, metric, value: fail.value.map(tidy), above, below, failed: fail.failed }
+            })
+            .collect(),
+    }
+}
+
+fn questionnaire(questionnaire: &Questionnaire, ratings: &[Option<u8>]) -> QuestionnaireFile {
+    let in_category = questionnaire.categories.iter().flat_map(|c| c.items.iter().map(move |i| (c, i)));
+    let items: Vec<RatingFile> = in_category
+        .zip(ratings)
+        .map(|((category, item), rating)| RatingFile {
+            id: item.id.clone(),
+            category: category.id.clone(),
+            value: rating.map(f64::from),
+            counted: rating.map(|r| f64::from(questionnaire.counted(item, r))),
+        })
+        .collect();
+    let mean = |category: &str| mean(items.iter().filter(|i| i.category == category).filter_map(|i| i.counted));
+    let categories = questionnaire.categories.iter().map(|c| (c.id.clone(), mean(&c.id).map(tidy))).collect();
+    QuestionnaireFile { id: questionnaire.id.clone(), items, categories }
+}
+
+/// The mean of numbers; `None` of none.
+pub fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0u32), |(sum, count), v| (sum + v, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
+}

@@ -1,0 +1,82 @@
+//! Numbers as people read them.
+
+use crate::scenario::Metric;
+
+/// A duration as minutes and seconds, `4:14.4`; under a minute as seconds, `9.5 s`.
+pub fn duration(seconds: f64) -> String {
+    let tenths = (seconds.max(0.0) * 10.0).round() as u64;
+    match tenths {
+        0..600 => format!("{}.{} s", tenths / 10, tenths % 10),
+        _ => format!("{}:{:02}.{}", tenths / 600, tenths / 10 % 60, tenths % 10),
+    }
+}
+
+/// A number with as many decimals as its size deserves.
+pub fn number(value: f64) -> String {
+    let decimals = match value.abs() {
+        v if v >= 100.0 => 1,
+        v if v >= 1.0 => 2,
+        _ => 3,
+    };
+    let text = format!("{value:.decimals$}");
+    // A number that rounds to nothing is nothing, without a sign.
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".into() } else { text }
+}
+
+/// A measure's value with its unit; "—" where there is none.
+pub fn measure(name: &str, value: Option<f64>) -> String {
+    let Some(value) = value else { return "—".into() };
+    let about = Metric::parse(name).map(|m| m.about);
+    let unit = about.map_or("", |a| a.unit);
+    match (name, unit) {
+        ("pulp_exposed", _) => yes_no(value != 0.0).into(),
+        ("detect_tooth" | "detect_quadrant", _) => (if value != 0.0 { "right" } else { "wrong" }).into(),
+        (_, "s") => duration(value),
+        (_, "") => number(value),
+        (_, "%") => format!("{} %", number(value)),
+        (_, unit) => format!("{} {unit}", number(value)),
+    }
+}
+
+/// A number as it was written: 70, not 70.00.
+pub fn plain(value: f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    rounded.to_string()
+}
+
+pub fn yes_no(yes: bool) -> &'static str {
+    if yes { "yes" } else { "no" }
+}
+
+/// What a measure is called; its own name when it is none of ours.
+pub fn title(name: &str) -> String {
+    match Metric::parse(name) {
+        Ok(Metric { about, argument: None }) => about.title.into(),
+        Ok(Metric { about, argument: Some(argument) }) => match argument {
+            crate::scenario::metric::Argument::Zone(zone) => format!("{}: {zone}", about.title),
+            crate::scenario::metric::Argument::ToleranceMm(mm) => format!("{} within {mm} mm", about.title),
+        },
+        Err(_) => name.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn durations_read_as_the_thesis_writes_them() {
+        for (seconds, text) in
+            [(0.0, "0.0 s"), (59.94, "59.9 s"), (59.96, "1:00.0"), (254.4, "4:14.4"), (300.0, "5:00.0")]
+        {
+            assert_eq!(duration(seconds), text);
+        }
+    }
+
+    #[test]
+    fn numbers_keep_what_matters() {
+        for (value, text) in [(95.194, "95.19"), (1234.5, "1234.5"), (0.0123, "0.012"), (-0.0001, "0"), (0.0, "0")] {
+            assert_eq!(number(value), text);
+        }
+    }
+}

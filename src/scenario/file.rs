@@ -1,0 +1,703 @@
+//! A scenario exactly as an author writes it.
+//!
+//! Every key, unit and range here is the contract with authors: the JSON Schema for editors and the reader's complaints
+//! both come from these types. What the keys mean together is decided in [`super::resolve`].
+
+use crate::content::TissueEntry;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// An exercise: what is on the screen, what the trainee is asked to do, and how it is scored.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScenarioFile {
+    /// Where an editor finds the description of this kind of file; "scenario.schema.json" beside the shipped ones.
+    #[serde(default, rename = "$schema")]
+    pub schema: Option<String>,
+    /// Short name for file names and tables: small letters a–z, digits, hyphens and underscores.
+    #[schemars(length(min = 1, max = 60), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// Title shown to trainees.
+    #[schemars(length(min = 1, max = 120))]
+    pub title: String,
+    /// What the exercise is for, in a sentence or two.
+    #[serde(default)]
+    #[schemars(length(max = 2000))]
+    pub summary: String,
+    /// What there is to see and touch.
+    pub scene: SceneFile,
+    /// Changes to tissues of the table in `content/tissues.json`, by name.
+    #[serde(default)]
+    pub tissues: BTreeMap<String, TissueChange>,
+    /// Tissues that the table does not have.
+    #[serde(default)]
+    #[schemars(length(max = 100))]
+    pub new_tissues: Vec<TissueEntry>,
+    /// Sets one tissue's stiffness as a fraction of another's.
+    #[serde(default)]
+    pub stiffness_ratio: Option<StiffnessRatio>,
+    /// How a bur takes matter away.
+    #[serde(default)]
+    pub carving: CarvingFile,
+    /// How a bur trembles while it cuts.
+    #[serde(default)]
+    pub vibration: VibrationFile,
+    /// Instruments on the tray, by the ids of `content/instruments.json`; the first is in the hand at the start.
+    #[schemars(length(min = 1, max = 50))]
+    pub instruments: Vec<String>,
+    /// Named regions of the tooth that measures can refer to.
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub zones: Vec<ZoneFile>,
+    /// The parts of the exercise, in order.
+    #[schemars(length(min = 1, max = 50))]
+    pub stages: Vec<StageFile>,
+    /// Numbers that measures need.
+    #[serde(default)]
+    pub measures: MeasuresFile,
+    /// How points are given; without it the exercise is measured but not graded.
+    #[serde(default)]
+    pub rubric: Option<RubricFile>,
+    /// Name of a questionnaire in `content/questionnaires/`, asked at the end: small letters, digits, hyphens, underscores.
+    #[serde(default)]
+    #[schemars(regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub questionnaire: Option<String>,
+}
+
+/// What there is to see and touch.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SceneFile {
+    /// One tooth alone.
+    Tooth(ToothFile),
+    /// Two teeth side by side, to be compared.
+    Pair(PairFile),
+    /// One tooth in its jaw, with gum and neighbours.
+    Jaw(JawFile),
+}
+
+/// Two teeth side by side.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PairFile {
+    /// The tooth on the left as the trainee sees it.
+    pub left: ToothFile,
+    /// The tooth on the right.
+    pub right: ToothFile,
+    /// Space between the two, mm: 0.5 to 30.
+    #[serde(default = "four_mm")]
+    #[schemars(range(min = 0.5, max = 30.0))]
+    pub gap_mm: f32,
+}
+
+fn four_mm() -> f32 {
+    4.0
+}
+
+/// A tooth in its jaw.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct JawFile {
+    /// The tooth that is worked on.
+    pub tooth: ToothFile,
+}
+
+/// A tooth made of voxels.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ToothFile {
+    /// Name by which questions and results refer to the tooth: small letters, digits, hyphens, underscores.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// Number of the tooth by ISO 3950 (FDI), such as 36.
+    #[schemars(range(min = 11, max = 48))]
+    pub fdi: u8,
+    /// Where the tooth's shape comes from.
+    pub form: FormFile,
+    /// Decay in this tooth.
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub decay: Vec<DecayFile>,
+}
+
+/// Where a tooth's shape comes from.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FormFile {
+    /// Made by the program from the average measures of its kind.
+    Procedural(ProceduralFile),
+    /// A CT scan of one tooth, divided into enamel, dentine and pulp by the program.
+    Ct(ScanFile),
+    /// A volume in which every voxel is labelled already.
+    Labels(LabelsFile),
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProceduralFile {
+    /// Size of a voxel, mm: 0.04 (fine) to 0.4 (coarse).
+    #[serde(default = "tenth_of_mm")]
+    #[schemars(range(min = 0.04, max = 0.4))]
+    pub spacing_mm: f32,
+}
+
+fn tenth_of_mm() -> f32 {
+    0.1
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScanFile {
+    /// NRRD file, relative to the scenario's folder.
+    #[schemars(length(min = 1, max = 500))]
+    pub file: String,
+    /// Distance between voxels along x, y and z, mm, where the file's own is missing or wrong.
+    #[serde(default)]
+    pub spacing_mm: Option<[SpacingFile; 3]>,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LabelsFile {
+    /// NRRD file of labels (such as 3D Slicer's .seg.nrrd), relative to the scenario's folder.
+    #[schemars(length(min = 1, max = 500))]
+    pub file: String,
+    /// Distance between voxels along x, y and z, mm, where the file's own is missing or wrong.
+    #[serde(default)]
+    pub spacing_mm: Option<[SpacingFile; 3]>,
+    /// Which number in the file is which tissue: { "1": "enamel", "2": "dentine", "3": "pulp" }; numbers left out are air.
+    pub tissues: BTreeMap<String, String>,
+}
+
+/// Distance between voxels, mm: 0.01 to 2.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct SpacingFile(#[schemars(range(min = 0.01, max = 2.0))] pub f32);
+
+/// One decayed place.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DecayFile {
+    /// Name by which questions refer to the decay: small letters, digits, hyphens, underscores.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// Tissue of which the decay is made.
+    #[serde(default = "caries")]
+    pub tissue: String,
+    /// Shape of the decay; only its part within the tooth's hard tissue counts.
+    pub shape: DecayShapeFile,
+    /// Surface on which the decay lies.
+    #[serde(default)]
+    pub surface: SurfaceFile,
+    /// Where on that surface.
+    #[serde(default)]
+    pub at: DecayPlaceFile,
+    /// How deep the shape's centre lies under the surface, mm: -3 (above it) to 8.
+    #[serde(default)]
+    #[schemars(range(min = -3.0, max = 8.0))]
+    pub depth_mm: f32,
+}
+
+fn caries() -> String {
+    "caries".into()
+}
+
+/// Shape of a decay.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DecayShapeFile {
+    Sphere(SphereFile),
+    Ellipsoid(EllipsoidFile),
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereFile {
+    /// mm, 0.2 to 6.
+    #[schemars(range(min = 0.2, max = 6.0))]
+    pub radius_mm: f32,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EllipsoidFile {
+    /// Half axes: buccolingual, mesiodistal, occlusoapical.
+    pub radii_mm: [RadiusFile; 3],
+}
+
+/// Half an axis, mm: 0.2 to 6.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct RadiusFile(#[schemars(range(min = 0.2, max = 6.0))] pub f32);
+
+/// Surface of a tooth: mesial, occlusal, distal, buccal or lingual.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+pub enum SurfaceFile {
+    M,
+    #[default]
+    O,
+    D,
+    B,
+    L,
+}
+
+/// Where on a surface a decay lies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DecayPlaceFile {
+    /// In the middle of the surface.
+    #[default]
+    Centre,
+    /// In one of the four quadrants of the occlusal surface, drawn by the session's seed.
+    RandomQuadrant,
+    /// In a quadrant of the occlusal surface, counted as the trainee sees it from above: 1 upper left, 2 upper right,
+    /// 3 lower left, 4 lower right.
+    Quadrant(#[schemars(range(min = 1, max = 4))] u8),
+    /// At a distance from the middle of the surface: on the occlusal one buccal and distal, on the buccal and lingual ones
+    /// distal and occlusal, on the mesial and distal ones buccal and occlusal; mm.
+    OffsetMm([OffsetFile; 2]),
+}
+
+/// mm, -8 to 8.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct OffsetFile(#[schemars(range(min = -8.0, max = 8.0))] pub f32);
+
+/// New values for a tissue of the table; what is left out stays.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TissueChange {
+    /// Share of the device's greatest stiffness, 0 to 1.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub stiffness: Option<f32>,
+    /// Share of the device's greatest damping, 0 to 1.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub damping: Option<f32>,
+    /// Coulomb coefficient to be overcome before sliding, 0 to 2.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub static_friction: Option<f32>,
+    /// Coulomb coefficient while sliding, 0 to 2.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 2.0))]
+    pub dynamic_friction: Option<f32>,
+    /// Spring force from which a bur takes the tissue away, N: 0.01 to 50.
+    #[serde(default)]
+    #[schemars(range(min = 0.01, max = 50.0))]
+    pub cut_force_n: Option<f32>,
+}
+
+/// One tissue's stiffness as a fraction of another's.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StiffnessRatio {
+    /// The stiffer tissue, whose stiffness stays.
+    pub of: String,
+    /// The tissue whose stiffness is set.
+    pub to: String,
+    /// How many times stiffer the first is: 1 to 100. Measured between enamel and dentine: about 5.
+    #[schemars(range(min = 1.0, max = 100.0))]
+    pub ratio: f32,
+}
+
+/// How a bur takes matter away.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CarvingFile {
+    /// Time on one spot after which less force suffices, s: 0 to 60.
+    #[serde(default = "CarvingFile::dwell")]
+    #[schemars(range(min = 0.0, max = 60.0))]
+    pub dwell_s: f32,
+    /// Share of the cutting force that suffices then, 0 to 1.
+    #[serde(default = "CarvingFile::dwell_share")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub dwell_share: f32,
+    /// Fastest way of a bur into matter, mm/s: 0.1 to 100.
+    #[serde(default = "CarvingFile::max_feed")]
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub max_feed_mm_s: f32,
+}
+
+impl CarvingFile {
+    fn dwell() -> f32 {
+        0.5
+    }
+
+    fn dwell_share() -> f32 {
+        1.0 / 3.0
+    }
+
+    fn max_feed() -> f32 {
+        10.0
+    }
+}
+
+impl Default for CarvingFile {
+    fn default() -> Self {
+        CarvingFile { dwell_s: Self::dwell(), dwell_share: Self::dwell_share(), max_feed_mm_s: Self::max_feed() }
+    }
+}
+
+/// How a bur trembles while it cuts.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct VibrationFile {
+    /// Hz, 1 to 500.
+    #[serde(default = "VibrationFile::frequency")]
+    #[schemars(range(min = 1.0, max = 500.0))]
+    pub frequency_hz: f32,
+    /// N, 0 (none) to 1.
+    #[serde(default = "VibrationFile::amplitude")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub amplitude_n: f32,
+}
+
+impl VibrationFile {
+    fn frequency() -> f32 {
+        500.0
+    }
+
+    fn amplitude() -> f32 {
+        0.3
+    }
+}
+
+impl Default for VibrationFile {
+    fn default() -> Self {
+        VibrationFile { frequency_hz: Self::frequency(), amplitude_n: Self::amplitude() }
+    }
+}
+
+/// A named region of the tooth.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ZoneFile {
+    /// Name by which measures refer to the zone, as in "zone_removed_pct(target)": small letters, digits, hyphens, underscores.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// Name shown to people.
+    #[schemars(length(min = 1, max = 80))]
+    pub title: String,
+    /// What the zone means.
+    pub role: ZoneRole,
+    /// Which voxels belong to it.
+    pub region: RegionFile,
+}
+
+/// What a zone means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ZoneRole {
+    /// To be taken away: the reference preparation.
+    Target,
+    /// May be taken away without harm.
+    Leeway,
+    /// The sides or the bottom that must stay whole.
+    Container,
+    /// Must never be touched.
+    NeverRemove,
+}
+
+/// Which voxels belong to a zone. Points in tooth space: x buccal, y distal, z occlusal, from the crown's middle at the neck.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum RegionFile {
+    /// All voxels of a tissue.
+    Tissue(String),
+    /// Everything near a tissue, the tissue itself left out.
+    Around(AroundFile),
+    Sphere(SphereRegionFile),
+    Box(BoxRegionFile),
+    Cylinder(CylinderRegionFile),
+    /// The voxels with one number in a label map of the same size as the tooth.
+    Labels(LabelsRegionFile),
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AroundFile {
+    pub tissue: String,
+    /// mm, 0.01 to 10.
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub within_mm: f32,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SphereRegionFile {
+    pub centre_mm: [CoordinateFile; 3],
+    /// mm, 0.05 to 20.
+    #[schemars(range(min = 0.05, max = 20.0))]
+    pub radius_mm: f32,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BoxRegionFile {
+    pub min_mm: [CoordinateFile; 3],
+    pub max_mm: [CoordinateFile; 3],
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderRegionFile {
+    pub from_mm: [CoordinateFile; 3],
+    pub to_mm: [CoordinateFile; 3],
+    /// mm, 0.05 to 20.
+    #[schemars(range(min = 0.05, max = 20.0))]
+    pub radius_mm: f32,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LabelsRegionFile {
+    /// NRRD file, relative to the scenario's folder.
+    #[schemars(length(min = 1, max = 500))]
+    pub file: String,
+    /// 1 to 255.
+    #[schemars(range(min = 1, max = 255))]
+    pub value: u8,
+}
+
+/// mm, -60 to 60.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct CoordinateFile(#[schemars(range(min = -60.0, max = 60.0))] pub f32);
+
+/// One part of an exercise.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StageFile {
+    /// Name in results: small letters, digits, hyphens, underscores.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// Title shown to trainees.
+    #[schemars(length(min = 1, max = 120))]
+    pub title: String,
+    /// What the trainee is to do, in plain words.
+    #[schemars(length(min = 1, max = 2000))]
+    pub instruction: String,
+    /// Time after which the stage ends by itself, s: 1 to 7200; null: no limit.
+    #[serde(default)]
+    #[schemars(range(min = 1.0, max = 7200.0))]
+    pub time_limit_s: Option<f64>,
+    /// Instruments offered in this stage; without it all of the exercise's.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 50))]
+    pub instruments: Option<Vec<String>>,
+    /// Whether burs run.
+    #[serde(default)]
+    pub cutting: bool,
+    /// Whether decay is shown in its colour.
+    #[serde(default)]
+    pub show_decay: bool,
+    /// Stiffness that falls in steps until the trainee answers.
+    #[serde(default)]
+    pub stiffness_steps: Option<StiffnessStepsFile>,
+    /// What the trainee is asked; can be answered at any time during the stage.
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub ask: Vec<QuestionFile>,
+    /// What ends the stage besides its time limit; the first to happen counts.
+    #[serde(default)]
+    #[schemars(length(max = 10))]
+    pub ends_when: Vec<EndFile>,
+}
+
+/// Stiffness that falls in steps.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StiffnessStepsFile {
+    /// Tissue whose stiffness changes.
+    pub tissue: String,
+    /// Stiffness coefficients, one step after the other.
+    #[schemars(length(min = 1, max = 20))]
+    pub coefficients: Vec<CoefficientFile>,
+    /// How long each step lasts, s: 1 to 3600.
+    #[schemars(range(min = 1.0, max = 3600.0))]
+    pub step_time_s: f64,
+}
+
+/// 0 to 1.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct CoefficientFile(#[schemars(range(min = 0.0, max = 1.0))] pub f32);
+
+/// What ends a stage.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EndFile {
+    /// Every question of the stage is answered.
+    Answered,
+    /// The trainee says so.
+    Confirmed,
+    /// So much of the decay is gone, %.
+    ClearedPct(#[schemars(range(min = 1.0, max = 100.0))] f64),
+}
+
+/// A question to the trainee.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct QuestionFile {
+    /// Name in results: small letters, digits, hyphens, underscores.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// The question, as the trainee reads it.
+    #[schemars(length(min = 1, max = 500))]
+    pub text: String,
+    /// What can be answered, and what is right.
+    pub answer: AnswerFile,
+}
+
+/// What can be answered, and what is right.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AnswerFile {
+    /// Which tooth has the decay of a name.
+    ToothWith(String),
+    /// In which quadrant of the occlusal surface, seen from above, the decay of a name lies: 1 upper left, 2 upper right,
+    /// 3 lower left, 4 lower right.
+    QuadrantOf(String),
+    /// One of several texts.
+    Choice(ChoiceFile),
+    /// Yes or no; the value is the right one, null where none is.
+    YesNo(Option<bool>),
+    /// A number.
+    Number(NumberFile),
+    /// Free text, which is kept and not judged.
+    Text,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChoiceFile {
+    /// What can be chosen.
+    #[schemars(length(min = 2, max = 30))]
+    pub options: Vec<OptionFile>,
+    /// Id of the right option; null where none is.
+    #[serde(default)]
+    pub correct: Option<String>,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OptionFile {
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    #[schemars(length(min = 1, max = 200))]
+    pub text: String,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NumberFile {
+    /// Unit shown behind the number, such as "mm".
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub unit: String,
+    /// The right number; null where none is.
+    #[serde(default)]
+    pub correct: Option<f64>,
+    /// How far an answer may be from it and still be right.
+    #[serde(default)]
+    #[schemars(range(min = 0.0))]
+    pub tolerance: f64,
+}
+
+/// Numbers that measures need.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeasuresFile {
+    /// Distance from the pulp within which force and speed are measured apart, mm: 0.1 to 10.
+    #[serde(default = "MeasuresFile::near")]
+    #[schemars(range(min = 0.1, max = 10.0))]
+    pub near_mm: f32,
+    /// Sound tissue this near to decay may be taken away without harm, mm: 0 to 5.
+    #[serde(default = "MeasuresFile::leeway")]
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub leeway_mm: f32,
+    /// Distance at which two surfaces count as the same, mm: 0.01 to 5.
+    #[serde(default = "MeasuresFile::tolerance")]
+    #[schemars(range(min = 0.01, max = 5.0))]
+    pub tolerance_mm: f32,
+}
+
+impl MeasuresFile {
+    fn near() -> f32 {
+        1.0
+    }
+
+    fn leeway() -> f32 {
+        0.3
+    }
+
+    fn tolerance() -> f32 {
+        0.3
+    }
+}
+
+impl Default for MeasuresFile {
+    fn default() -> Self {
+        MeasuresFile { near_mm: Self::near(), leeway_mm: Self::leeway(), tolerance_mm: Self::tolerance() }
+    }
+}
+
+/// How points are given.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RubricFile {
+    /// Points from which the exercise is passed, if nothing fails it outright.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub pass_points: f64,
+    /// What earns points; the points of all items sum to 100.
+    #[schemars(length(min = 1, max = 50))]
+    pub items: Vec<RubricItemFile>,
+    /// What fails the exercise outright, whatever the points.
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub hard_fails: Vec<HardFailFile>,
+}
+
+/// One line of a rubric: full points at one value of a measure, none at another, in proportion between.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RubricItemFile {
+    /// Name shown in the report.
+    #[schemars(length(min = 1, max = 120))]
+    pub title: String,
+    /// The measure, such as "decay_cleared_pct".
+    pub metric: String,
+    /// Points for full marks, more than 0 to 100.
+    #[schemars(range(max = 100.0), extend("exclusiveMinimum" = 0.0))]
+    pub points: f64,
+    /// Value that earns all points.
+    pub full_at: f64,
+    /// Value that earns none.
+    pub zero_at: f64,
+}
+
+/// What fails an exercise outright.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HardFailFile {
+    /// Name shown in the report.
+    #[schemars(length(min = 1, max = 120))]
+    pub title: String,
+    /// The measure, such as "pulp_exposed".
+    pub metric: String,
+    /// When the measure fails.
+    pub when: FailFile,
+}
+
+/// When a measure fails an exercise.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FailFile {
+    /// The measure is more than this.
+    Above(f64),
+    /// The measure is less than this.
+    Below(f64),
+}

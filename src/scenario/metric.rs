@@ -1,0 +1,322 @@
+//! The measures that a rubric can refer to: their names, units and formulae.
+//!
+//! Names are a contract (`session.json`); what each is worth is computed in `score`, from a recording alone.
+
+use std::fmt;
+
+/// Which way a measure gets better.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Better {
+    Higher,
+    Lower,
+    /// It describes; more or less of it is neither good nor bad in itself.
+    Neither,
+}
+
+/// What there is to know of a measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct About {
+    pub name: &'static str,
+    pub title: &'static str,
+    /// Unit shown behind the value; empty for counts and ratios.
+    pub unit: &'static str,
+    pub better: Better,
+    /// How it is computed, with its rule for empty sets. R removed voxels, D decay at the start, T target zone.
+    pub formula: &'static str,
+}
+
+/// A measure: one of the table, with its argument where it takes one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metric {
+    pub about: &'static About,
+    pub argument: Option<Argument>,
+}
+
+/// What stands in the brackets of a measure's name.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Argument {
+    Zone(String),
+    ToleranceMm(f32),
+}
+
+use Better::{Higher, Lower, Neither};
+
+const fn about(
+    name: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    better: Better,
+    formula: &'static str,
+) -> About {
+    About { name, title, unit, better, formula }
+}
+
+/// Every measure that has no argument, in the order of reports.
+pub const PLAIN: &[About] = &[
+    about("decay_cleared_pct", "Decay removed", "%", Higher, "100·|R∩D| / |D|; none without decay"),
+    about(
+        "healthy_per_decay_pct",
+        "Sound tissue removed, per decay",
+        "%",
+        Lower,
+        "100·|R∖D| / |D|: the denominator is the decay at the start, so it may pass 100; none without decay",
+    ),
+    about(
+        "time_to_clear_s",
+        "Time of the cutting stage",
+        "s",
+        Lower,
+        "end − start of the last stage in which burs run",
+    ),
+    about(
+        "detect_tooth",
+        "Decayed tooth named",
+        "",
+        Higher,
+        "1 if the named tooth has the decay, else 0; none if not asked",
+    ),
+    about(
+        "detect_level",
+        "Stiffness at which decay was found",
+        "",
+        Higher,
+        "stiffness coefficient of decay in force at the answer; none if not asked or not answered",
+    ),
+    about(
+        "detect_level_time_s",
+        "Time to find the decayed tooth",
+        "s",
+        Lower,
+        "from the start of the step to the answer",
+    ),
+    about(
+        "detect_quadrant",
+        "Quadrant named",
+        "",
+        Higher,
+        "1 if the named quadrant has the decay, else 0; none if not asked",
+    ),
+    about(
+        "detect_quadrant_time_s",
+        "Time to name the quadrant",
+        "s",
+        Lower,
+        "from the start of the stage to the answer",
+    ),
+    about(
+        "questions_right_pct",
+        "Questions answered rightly",
+        "%",
+        Higher,
+        "100·right / judged questions; none if none is judged",
+    ),
+    about("dice", "Overlap with the target (Dice)", "", Higher, "2·|R∩T| / (|R|+|T|); both empty: 1"),
+    about("jaccard", "Overlap with the target (Jaccard)", "", Higher, "|R∩T| / |R∪T|; both empty: 1"),
+    about(
+        "precision",
+        "Share of the removed that was target",
+        "",
+        Higher,
+        "|R∩T| / |R|; nothing removed: 1 if T is empty, else 0",
+    ),
+    about("recall", "Share of the target that was removed", "", Higher, "|R∩T| / |T|; no target: 1"),
+    about(
+        "hausdorff_mm",
+        "Greatest distance between outlines",
+        "mm",
+        Lower,
+        "symmetric, between the borders of R and T; none if either is empty",
+    ),
+    about("hausdorff95_mm", "Distance between outlines, 95 %", "mm", Lower, "95th percentile of the same distances"),
+    about(
+        "overcut_depth_max_mm",
+        "Deepest cut into sound tissue",
+        "mm",
+        Lower,
+        "greatest distance from D of a removed sound voxel; none removed: 0",
+    ),
+    about(
+        "undercut_depth_max_mm",
+        "Deepest decay left",
+        "mm",
+        Lower,
+        "greatest distance from R of a remaining decay voxel; none left: 0; nothing removed: none",
+    ),
+    about(
+        "pulp_exposed",
+        "Pulp exposed",
+        "",
+        Lower,
+        "1 if a pulp voxel was removed or laid open by a removed neighbour, else 0",
+    ),
+    about(
+        "remaining_dentine_thickness_min_mm",
+        "Least distance of the cavity from the pulp",
+        "mm",
+        Higher,
+        "least distance between R and pulp; none if either is empty",
+    ),
+    about("force_max_n", "Greatest force", "N", Lower, "greatest force on the hand in contact; never in contact: 0"),
+    about("force_mean_n", "Mean force", "N", Lower, "mean force over ticks in contact; never in contact: none"),
+    about(
+        "speed_max_mm_s",
+        "Greatest speed in contact",
+        "mm/s",
+        Lower,
+        "of the tip over 20 ms; never in contact: none",
+    ),
+    about(
+        "force_max_near_pulp_n",
+        "Greatest force near the pulp",
+        "N",
+        Lower,
+        "within near_mm of the pulp at the start; never there: none",
+    ),
+    about(
+        "force_mean_near_pulp_n",
+        "Mean force near the pulp",
+        "N",
+        Lower,
+        "within near_mm of the pulp at the start; never there: none",
+    ),
+    about(
+        "speed_max_near_pulp_mm_s",
+        "Greatest speed near the pulp",
+        "mm/s",
+        Lower,
+        "within near_mm of the pulp at the start; never there: none",
+    ),
+    about("path_length_mm", "Way of the tip", "mm", Neither, "sum of the tip's steps over 20 ms"),
+    about("drilling_time_s", "Time cutting", "s", Neither, "ticks in which matter was being cut"),
+    about("contact_time_s", "Time in contact", "s", Neither, "ticks in which anything was touched"),
+    about(
+        "efficiency_pct_s",
+        "Decay removed per second of cutting",
+        "%/s",
+        Higher,
+        "decay_cleared_pct / drilling_time_s; never cut: none",
+    ),
+    about(
+        "jerk",
+        "Smoothness (log dimensionless jerk)",
+        "",
+        Higher,
+        "−ln(T⁵/L² · ∫|jerk|² dt) of the tip in contact, sampled at 50 Hz; under 1 s of contact: none",
+    ),
+    about(
+        "soft_tissue_drilled_s",
+        "Running bur on soft tissue",
+        "s",
+        Lower,
+        "ticks in which a running bur touched gum or the like",
+    ),
+    about(
+        "neighbour_drilled_s",
+        "Running bur on a neighbouring tooth",
+        "s",
+        Lower,
+        "ticks in which a running bur touched a neighbouring tooth",
+    ),
+    about("session_time_s", "Length of the session", "s", Neither, "all stages together"),
+];
+
+/// Measures with an argument in brackets.
+pub const WITH_ARGUMENT: &[About] = &[
+    about("zone_removed_pct", "Zone removed", "%", Neither, "100·|R∩Z| / |Z|; empty zone: none"),
+    about(
+        "surface_within_tol",
+        "Outlines that agree",
+        "",
+        Higher,
+        "share of the borders of R and T within the tolerance of each other; none if either is empty",
+    ),
+];
+
+/// Why a measure's name is not understood.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unknown {
+    /// No measure of that name.
+    Name(String),
+    /// The measure takes a zone or a tolerance in brackets, or none.
+    Argument(&'static str),
+}
+
+impl Metric {
+    /// Understands a name such as `dice`, `zone_removed_pct(target)` or `surface_within_tol(0.3)`.
+    pub fn parse(written: &str) -> Result<Metric, Unknown> {
+        let (name, inner) = match written.split_once('(') {
+            Some((name, rest)) => match rest.strip_suffix(')') {
+                Some(inner) => (name, Some(inner.trim())),
+                None => return Err(Unknown::Argument("the bracket is not closed")),
+            },
+            None => (written, None),
+        };
+        if let Some(about) = PLAIN.iter().find(|a| a.name == name) {
+            return match inner {
+                None => Ok(Metric { about, argument: None }),
+                Some(_) => Err(Unknown::Argument("this measure takes nothing in brackets")),
+            };
+        }
+        let about = WITH_ARGUMENT.iter().find(|a| a.name == name).ok_or_else(|| Unknown::Name(name.to_string()))?;
+        let argument = match (name, inner) {
+            ("zone_removed_pct", Some(zone)) if !zone.is_empty() => Argument::Zone(zone.to_string()),
+            ("zone_removed_pct", _) => {
+                return Err(Unknown::Argument("name a zone in brackets: zone_removed_pct(target)"));
+            }
+            (_, Some(number)) => match number.parse() {
+                Ok(mm) if mm > 0.0 && mm < 10.0 => Argument::ToleranceMm(mm),
+                _ => return Err(Unknown::Argument("give a tolerance in mm in brackets: surface_within_tol(0.3)")),
+            },
+            (_, None) => return Err(Unknown::Argument("give a tolerance in mm in brackets: surface_within_tol(0.3)")),
+        };
+        Ok(Metric { about, argument: Some(argument) })
+    }
+
+    /// The measure's full name, as [`Metric::parse`] takes it and `session.json` has it.
+    pub fn name(&self) -> String {
+        match &self.argument {
+            None => self.about.name.to_string(),
+            Some(Argument::Zone(zone)) => format!("{}({zone})", self.about.name),
+            Some(Argument::ToleranceMm(mm)) => format!("{}({mm})", self.about.name),
+        }
+    }
+
+    /// A measure without argument, by a name of the table.
+    pub fn plain(about: &'static About) -> Metric {
+        Metric { about, argument: None }
+    }
+}
+
+impl fmt::Display for Metric {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.name())
+    }
+}
+
+/// Every name that can be written, for complaints.
+pub fn names() -> impl Iterator<Item = &'static str> + Clone {
+    PLAIN.iter().chain(WITH_ARGUMENT).map(|a| a.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip() {
+        for name in ["dice", "zone_removed_pct(target)", "surface_within_tol(0.3)"] {
+            assert_eq!(Metric::parse(name).map(|m| m.name()), Ok(name.to_string()));
+        }
+        for about in PLAIN {
+            assert!(Metric::parse(about.name).is_ok(), "{}", about.name);
+        }
+    }
+
+    #[test]
+    fn wrong_names_say_what_is_missing() {
+        assert_eq!(Metric::parse("dise"), Err(Unknown::Name("dise".into())));
+        for name in ["zone_removed_pct", "zone_removed_pct()", "surface_within_tol(x)", "dice(1)", "dice("] {
+            assert!(matches!(Metric::parse(name), Err(Unknown::Argument(_))), "{name}");
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! The matter a session starts from, and what is true about it.
+//!
+//! Takes a scenario and a seed, or a scenario and the volume of an earlier session. Gives the volume with its decay, where
+//! each tooth and each lesion lies, and what stands around. The same inputs give the same voxels.
+
+use super::{Decay, DecayPlace, Form, Layout, Scenario, Tooth, file::SurfaceFile};
+use crate::anatomy;
+use crate::content::{Role, TissueTable};
+use crate::frame::{Pose, Quat, Vec3};
+use crate::touch::{self, Shape};
+use crate::volume::{Grid, ISO, Label, Volume};
+use std::fmt;
+
+/// What a session works on.
+#[derive(Clone, Debug)]
+pub struct Workpiece {
+    pub volume: Volume,
+    pub teeth: Vec<ToothPlace>,
+    pub lesions: Vec<Lesion>,
+    /// Gum and neighbours.
+    pub around: Vec<Shape>,
+    pub world_from_tooth: Pose,
+}
+
+/// Where a tooth lies, in tooth space, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToothPlace {
+    pub id: String,
+    pub fdi: u8,
+    /// Corners of the box around the whole tooth.
+    pub low: Vec3,
+    pub high: Vec3,
+    /// Corners of the box around its crown (its enamel).
+    pub crown_low: Vec3,
+    pub crown_high: Vec3,
+}
+
+/// Where a lesion lies, in tooth space, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lesion {
+    pub id: String,
+    /// Index of the tooth.
+    pub tooth: usize,
+    pub label: Label,
+    pub centre: Vec3,
+    pub radii: Vec3,
+    /// 1–4 as seen from above.
+    pub quadrant: u8,
+}
+
+/// Why a workpiece cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Unmakeable {
+    /// A decay holds no hard tissue: tooth and decay by index.
+    DecayOutside { tooth: usize, decay: usize },
+    /// Two teeth of a pair have different voxel sizes.
+    UnequalSpacing,
+    /// A tooth has no enamel, so its crown cannot be told.
+    NoEnamel { tooth: usize },
+    /// The volume would have too many voxels.
+    TooLarge { voxels: u64 },
+    /// The forms were not read: the volume is to be taken from the recording.
+    OnlyRecorded,
+}
+
+impl fmt::Display for Unmakeable {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Unmakeable::DecayOutside { .. } => f.write_str("the decay lies outside the tooth's hard tissue"),
+            Unmakeable::UnequalSpacing => f.write_str("the two teeth have different voxel sizes"),
+            Unmakeable::NoEnamel { .. } => f.write_str("the tooth has no enamel, so its crown cannot be told"),
+            Unmakeable::OnlyRecorded => f.write_str("the teeth's forms are in the recording only"),
+            Unmakeable::TooLarge { voxels } => write!(f, "the volume would have {voxels} voxels"),
+        }
+    }
+}
+
+/// Most voxels of a workpiece: 512×512×322 and half as much again, or about 1 GiB at work.
+const VOXELS_MAX: u64 = 130_000_000;
+
+impl Workpiece {
+    /// Makes the matter of a scenario; the seed decides what the scenario leaves to chance.
+    pub fn make(scenario: &Scenario, seed: u64) -> Result<Workpiece, Unmakeable> {
+        let mut parts = Vec::new();
+        for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
+            let mut volume = form_of(tooth, &scenario.tissues)?;
+            let place = place_of(tooth, &volume, &scenario.tissues).ok_or(Unmakeable::NoEnamel { tooth: index })?;
+            for (number, decay) in tooth.decay.iter().enumerate() {
+                let lesion = locate(decay, index, &place, &volume, seed);
+                if mark(&mut volume, &lesion, &scenario.tissues) == 0 {
+                    return Err(Unmakeable::DecayOutside { tooth: index, decay: number });
+                }
+            }
+            parts.push(volume);
+        }
+        let volume = match scenario.scene.layout {
+            Layout::Pair { gap } => side_by_side(&parts, gap)?,
+            Layout::Single | Layout::Jaw => parts.swap_remove(0),
+        };
+        Workpiece::of(scenario, volume, seed)
+    }
+
+    /// The workpiece of a session whose first volume is known: from a recording.
+    pub fn of(scenario: &Scenario, volume: Volume, seed: u64) -> Result<Workpiece, Unmakeable> {
+        let mut teeth = Vec::new();
+        let mut lesions = Vec::new();
+        for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
+            let side = Side::of(scenario.scene.layout, index);
+            let place = place_within(tooth, &volume, &scenario.tissues, side);
+            let place = place.ok_or(Unmakeable::NoEnamel { tooth: index })?;
+            lesions.extend(tooth.decay.iter().map(|decay| locate(decay, index, &place, &volume, seed)));
+            teeth.push(place);
+        }
+        let around = match scenario.scene.layout {
+            Layout::Jaw => surroundings(&teeth[0], &scenario.tissues),
+            Layout::Single | Layout::Pair { .. } => Vec::new(),
+        };
+        let low = teeth.iter().map(|t| t.crown_low).reduce(Vec3::min).unwrap_or_default();
+        let high = teeth.iter().map(|t| t.crown_high).reduce(Vec3::max).unwrap_or_default();
+        let world_from_tooth = world_above(Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z));
+        Ok(Workpiece { volume, teeth, lesions, around, world_from_tooth })
+    }
+
+    /// The quadrant (1–4, as seen from above) of a point of tooth space on a tooth.
+    pub fn quadrant(place: &ToothPlace, point_in_tooth: Vec3) -> u8 {
+        let from_middle = point_in_tooth - 0.5 * (place.crown_low + place.crown_high);
+        match (from_middle.x > 0.0, from_middle.y > 0.0) {
+            (true, true) => 1,
+            (true, false) => 2,
+            (false, true) => 3,
+            (false, false) => 4,
+        }
+    }
+}
+
+/// World space as the trainee sees it: the tooth stands upright, buccal side away, mesial side to the right, and the given
+/// point of tooth space is the middle of the device's workspace.
+fn world_above(origin_in_tooth: Vec3) -> Pose {
+    // x right = mesial (-y), y up = occlusal (z), z toward the user = lingual (-x).
+    let orientation = Quat::from_xyzw(-0.5, 0.5, 0.5, 0.5);
+    Pose { position: -(orientation * origin_in_tooth), orientation }
+}
+
+/// Which part of a shared volume belongs to a tooth.
+#[derive(Clone, Copy)]
+enum Side {
+    All,
+    /// y > 0: on the left as the trainee sees it.
+    Left,
+    Right,
+}
+
+impl Side {
+    fn of(layout: Layout, tooth: usize) -> Side {
+        match (layout, tooth) {
+            (Layout::Pair { .. }, 0) => Side::Left,
+            (Layout::Pair { .. }, _) => Side::Right,
+            _ => Side::All,
+        }
+    }
+
+    fn holds(self, point_in_tooth: Vec3) -> bool {
+        match self {
+            Side::All => true,
+            Side::Left => point_in_tooth.y > 0.0,
+            Side::Right => point_in_tooth.y <= 0.0,
+        }
+    }
+}
+
+fn form_of(tooth: &Tooth, tissues: &TissueTable) -> Result<Volume, Unmakeable> {
+    match &tooth.form {
+        Form::Given(volume) => Ok(volume.as_ref().clone()),
+        Form::Recorded => Err(Unmakeable::OnlyRecorded),
+        Form::Procedural { spacing } => Ok(anatomy::molar::lower_first(*spacing, &anatomy_tissues(tissues))),
+    }
+}
+
+/// The labels of the tissues that every tooth is made of.
+pub fn anatomy_tissues(tissues: &TissueTable) -> anatomy::Tissues {
+    let label = |name: &str, otherwise: u8| tissues.by_name(name).map_or(Label(otherwise), |e| e.label());
+    anatomy::Tissues { enamel: label("enamel", 1), dentine: label("dentine", 2), pulp: label("pulp", 3) }
+}
+
+fn place_of(tooth: &Tooth, volume: &Volume, tissues: &TissueTable) -> Option<ToothPlace> {
+    place_within(tooth, volume, tissues, Side::All)
+}
+
+fn place_within(tooth: &Tooth, volume: &Volume, tissues: &TissueTable, side: Side) -> Option<ToothPlace> {
+    let enamel = anatomy_tissues(tissues).enamel;
+    let grid = volume.grid();
+    let mut whole = Bounds::EMPTY;
+    let mut crown = Bounds::EMPTY;
+    for (index, label) in volume.tissues().enumerate().filter(|(_, l)| *l != Label::AIR) {
+        let point = grid.centre(grid.cell(index));
+        if side.holds(point) {
+            whole.add(point);
+            if label == enamel {
+                crown.add(point);
+            }
+        }
+    }
+    let Bounds { low, high } = whole;
+    let (crown_low, crown_high) = (crown.low, crown.high);
+    let place = ToothPlace { id: tooth.id.clone(), fdi: tooth.fdi, low, high, crown_low, crown_high };
+    crown_low.cmple(crown_high).all().then_some(place)
+}
+
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Bounds {
+    const EMPTY: Bounds = Bounds { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+
+    fn add(&mut self, point: Vec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+    }
+}
+
+/// Where a decay goes: on a surface of its tooth, in a place of that surface.
+fn locate(decay: &Decay, tooth: usize, place: &ToothPlace, volume: &Volume, seed: u64) -> Lesion {
+    /// Of half the crown: where the middle of a quadrant lies.
+    const INTO_QUADRANT: f32 = 0.42;
+    let (middle, half) = (0.5 * (place.crown_low + place.crown_high), 0.5 * (place.crown_high - place.crown_low));
+    // In from which side, and which ways the surface's own two axes go.
+    let (inward, u, v) = match decay.surface {
+        SurfaceFile::O => (Vec3::NEG_Z, Vec3::X, Vec3::Y),
+        SurfaceFile::B => (Vec3::NEG_X, Vec3::Y, Vec3::Z),
+        SurfaceFile::L => (Vec3::X, Vec3::Y, Vec3::Z),
+        SurfaceFile::D => (Vec3::NEG_Y, Vec3::X, Vec3::Z),
+        SurfaceFile::M => (Vec3::Y, Vec3::X, Vec3::Z),
+    };
+    let in_quadrant = |quadrant: u8| {
+        let buccal = if quadrant <= 2 { 1.0 } else { -1.0 };
+        let distal = if quadrant % 2 == 1 { 1.0 } else { -1.0 };
+        (Vec3::X * buccal + Vec3::Y * distal) * half * INTO_QUADRANT
+    };
+    let offset = match decay.place {
+        DecayPlace::Centre => Vec3::ZERO,
+        DecayPlace::Quadrant(quadrant) => in_quadrant(quadrant),
+        DecayPlace::RandomQuadrant => in_quadrant(1 + (draw(seed, &decay.id) % 4) as u8),
+        DecayPlace::Offset([a, b]) => u * a + v * b,
+    };
+    let outside = middle + offset - inward * (half.max_element() + 2.0);
+    let centre = surface_below(volume, outside, inward) + inward * decay.depth;
+    let quadrant = Workpiece::quadrant(place, centre);
+    Lesion { id: decay.id.clone(), tooth, label: decay.label, centre, radii: Vec3::from(decay.radii), quadrant }
+}
+
+/// Where a ray first meets matter; its far end when it meets none.
+fn surface_below(volume: &Volume, from: Vec3, along: Vec3) -> Vec3 {
+    let step = 0.5 * volume.grid().spacing.min_element();
+    let steps = (30.0 / step) as u32;
+    let point = |i: u32| from + along * (i as f32 * step);
+    (0..steps).map(point).find(|&p| volume.density_at(p) >= ISO).unwrap_or(point(steps))
+}
+
+/// A number from a seed and a name (SplitMix64 over the name's bytes): the same on every machine, for ever.
+fn draw(seed: u64, name: &str) -> u64 {
+    let mix = |mut z: u64| {
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    };
+    name.bytes().fold(mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15)), |state, byte| {
+        mix(state.wrapping_add(u64::from(byte)).wrapping_add(0x9e37_79b9_7f4a_7c15))
+    })
+}
+
+/// Turns the sound tissue within a lesion into decay; returns how many solid voxels that were.
+fn mark(volume: &mut Volume, lesion: &Lesion, tissues: &TissueTable) -> usize {
+    let grid = *volume.grid();
+    let densities: Vec<bool> = volume.densities().iter().map(|d| d.is_solid()).collect();
+    let mut count = 0;
+    volume.relabel(|index, label| {
+        let from_centre = (grid.centre(grid.cell(index)) - lesion.centre) / lesion.radii;
+        let is_hit = from_centre.length_squared() <= 1.0 && tissues.role(label) == Some(Role::Sound);
+        count += usize::from(is_hit && densities[index]);
+        if is_hit { lesion.label } else { label }
+    });
+    count
+}
+
+/// One volume with two teeth, the first on the left (y > 0), each `gap`/2 mm from the plane between them.
+fn side_by_side(teeth: &[Volume], gap: f32) -> Result<Volume, Unmakeable> {
+    let spacing = teeth[0].grid().spacing;
+    if teeth.iter().any(|t| (t.grid().spacing - spacing).abs().max_element() > 1e-6) {
+        return Err(Unmakeable::UnequalSpacing);
+    }
+    // Each tooth moves by whole voxels, so that its densities need no resampling.
+    let mut moves = Vec::new();
+    for (index, tooth) in teeth.iter().enumerate() {
+        let [low, high] = tight_extent(tooth);
+        let middle = 0.5 * (low + high);
+        let aside = if index == 0 { 0.5 * gap - low.y } else { -0.5 * gap - high.y };
+        let wanted = Vec3::new(-middle.x, aside, 0.0);
+        let origin = teeth[index].grid().origin;
+        // Grids meet when both origins are the same number of voxels from zero.
+        moves.push(((origin + wanted) / spacing).round() * spacing - origin);
+    }
+    let low = teeth.iter().zip(&moves).map(|(t, m)| tight_extent(t)[0] + *m).fold(Vec3::INFINITY, Vec3::min);
+    let high = teeth.iter().zip(&moves).map(|(t, m)| tight_extent(t)[1] + *m).fold(Vec3::NEG_INFINITY, Vec3::max);
+    let low = (low / spacing).round() * spacing;
+    let grid = Grid::covering(low, high, spacing, 4);
+    let voxels = grid.dims.iter().map(|&n| u64::from(n)).product();
+    if voxels > VOXELS_MAX {
+        return Err(Unmakeable::TooLarge { voxels });
+    }
+    let mut density = vec![Default::default(); grid.len()];
+    let mut label = vec![Label::AIR; grid.len()];
+    for (tooth, shift) in teeth.iter().zip(&moves) {
+        for (index, cell) in tooth.grid().cells().enumerate() {
+            let voxel = tooth.voxel(index);
+            if let Some(to) = grid.nearest(tooth.grid().centre(cell) + *shift).filter(|_| voxel.label != Label::AIR) {
+                density[grid.index(to)] = voxel.density;
+                label[grid.index(to)] = voxel.label;
+            }
+        }
+    }
+    Ok(Volume::new(grid, teeth[0].band(), density, label, Label(1)))
+}
+
+fn tight_extent(volume: &Volume) -> [Vec3; 2] {
+    match volume.tight_box() {
+        Some([low, high]) => [volume.grid().centre(low), volume.grid().centre(high)],
+        None => volume.grid().extent(),
+    }
+}
+
+/// Gum and two neighbours around a tooth, as plain shapes of average size.
+fn surroundings(tooth: &ToothPlace, tissues: &TissueTable) -> Vec<Shape> {
+    /// Distance between neighbouring crowns, mm: in contact, but for what a bur's run-out needs.
+    const CONTACT_GAP: f32 = 0.05;
+    let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
+    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let (neck, top) = (tooth.crown_low.z, tooth.crown_high.z);
+    // Second premolar and second molar: width along the arch and across it, mm (Wheeler's averages).
+    let neighbour = |y: f32, half: Vec3| Shape {
+        label: label("neighbour"),
+        tooth_from_shape: Pose::at(Vec3::new(middle.x, y, top - 0.3 - half.z)),
+        form: touch::Form::RoundBox { half, rounding: 1.8 },
+    };
+    let premolar = Vec3::new(4.0, 3.5, 4.5);
+    let molar = Vec3::new(5.0, 5.25, 4.5);
+    let gum_half = Vec3::new(6.5, 22.0, 8.0);
+    vec![
+        neighbour(tooth.crown_low.y - CONTACT_GAP - premolar.y, premolar),
+        neighbour(tooth.crown_high.y + CONTACT_GAP + molar.y, molar),
+        Shape {
+            label: label("gingiva"),
+            tooth_from_shape: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gum_half.z)),
+            form: touch::Form::RoundBox { half: gum_half, rounding: 4.0 },
+        },
+    ]
+}

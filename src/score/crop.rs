@@ -1,0 +1,43 @@
+//! A box cut out of a grid, so that distances cost what the cavity costs and not what the tooth does.
+
+use crate::volume::Grid;
+
+/// Part of a grid, with its own array.
+#[derive(Clone, Copy, Debug)]
+pub struct Crop {
+    whole: Grid,
+    low: [u32; 3],
+    pub grid: Grid,
+}
+
+impl Crop {
+    /// The smallest box around the voxels that are `wanted`, with a margin; `None` when none is.
+    pub fn around(whole: &Grid, margin: u32, wanted: impl Iterator<Item = usize>) -> Option<Crop> {
+        let (mut low, mut high) = ([u32::MAX; 3], [0; 3]);
+        for index in wanted {
+            for (axis, at) in whole.cell(index).into_iter().enumerate() {
+                low[axis] = low[axis].min(at);
+                high[axis] = high[axis].max(at);
+            }
+        }
+        if low[0] == u32::MAX {
+            return None;
+        }
+        let low = low.map(|v| v.saturating_sub(margin));
+        let dims = std::array::from_fn(|a| (high[a] + margin).min(whole.dims[a] - 1) + 1 - low[a]);
+        Some(Crop { whole: *whole, low, grid: Grid { dims, spacing: whole.spacing, origin: whole.centre(low) } })
+    }
+
+    /// Index in the whole grid of a voxel of the box.
+    pub fn whole_index(&self, index: usize) -> usize {
+        let cell = self.grid.cell(index);
+        self.whole.index(std::array::from_fn(|a| cell[a] + self.low[a]))
+    }
+
+    /// Index in the box of a voxel of the whole grid, if it lies there.
+    pub fn index_of(&self, whole_index: usize) -> Option<usize> {
+        let cell = self.whole.cell(whole_index);
+        let is_inside = |a: usize| cell[a] >= self.low[a] && cell[a] - self.low[a] < self.grid.dims[a];
+        (0..3).all(is_inside).then(|| self.grid.index(std::array::from_fn(|a| cell[a] - self.low[a])))
+    }
+}

@@ -1,0 +1,257 @@
+//! Every measure of a session, with its evidence.
+
+use super::process::{Moment, Seen};
+use super::shape::{Deepest, Shape};
+use crate::frame::Vec3;
+use crate::record::{Recording, Replay};
+use crate::scenario::metric::{About, Argument, PLAIN};
+use crate::scenario::{Metric, QuestionKind};
+use crate::session::{Given, StageResult};
+use crate::tick::{TICK_S, Tick};
+
+/// The measures of a session, in the order of the table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measures {
+    pub all: Vec<Measure>,
+}
+
+/// One measure, computed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measure {
+    pub metric: Metric,
+    /// `None` where the measure's own rule says there is none.
+    pub value: Option<f64>,
+    pub evidence: Option<Evidence>,
+}
+
+/// Where and when a value arose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    pub at: Option<Tick>,
+    /// Tooth space, mm.
+    pub place: Vec3,
+}
+
+impl Measures {
+    /// A measure's value by its full name; `None` when it has none or was not computed.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.get(name).and_then(|m| m.value)
+    }
+
+    pub fn get(&self, name: &str) -> Option<&Measure> {
+        self.all.iter().find(|m| m.metric.name() == name)
+    }
+}
+
+/// A value as it was found.
+#[derive(Clone, Copy, Debug, Default)]
+struct Found {
+    value: Option<f64>,
+    evidence: Option<Evidence>,
+}
+
+impl From<Option<f64>> for Found {
+    fn from(value: Option<f64>) -> Found {
+        Found { value, evidence: None }
+    }
+}
+
+impl From<f64> for Found {
+    fn from(value: f64) -> Found {
+        Found::from(Some(value))
+    }
+}
+
+impl From<Option<Moment>> for Found {
+    fn from(moment: Option<Moment>) -> Found {
+        let evidence = moment.map(|m| Evidence { at: Some(m.at), place: m.place });
+        Found { value: moment.map(|m| m.value), evidence }
+    }
+}
+
+/// Computes every measure of the table, and those with an argument that the scenario asks for.
+pub fn all(recording: &Recording, replay: &Replay, seen: &Seen, shape: &Shape) -> Measures {
+    let scenario = &recording.scenario;
+    let source = Source { recording, replay, seen, shape, outlines: shape.outline_distances() };
+    let mut metrics: Vec<Metric> = PLAIN.iter().map(Metric::plain).collect();
+    let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
+    let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
+    metrics.extend(zones.chain([tolerance]).flatten());
+    let asked = scenario
+        .rubric
+        .iter()
+        .flat_map(|r| r.items.iter().map(|i| &i.metric).chain(r.hard_fails.iter().map(|f| &f.metric)));
+    for metric in asked {
+        if !metrics.contains(metric) {
+            metrics.push(metric.clone());
+        }
+    }
+    let compute = |metric: Metric| {
+        let Found { value, evidence } = source.find(&metric);
+        Measure { metric, value, evidence }
+    };
+    Measures { all: metrics.into_iter().map(compute).collect() }
+}
+
+struct Source<'a> {
+    recording: &'a Recording,
+    replay: &'a Replay,
+    seen: &'a Seen,
+    shape: &'a Shape,
+    /// Distances between the borders of R and T, ascending.
+    outlines: Option<Vec<f32>>,
+}
+
+impl Source<'_> {
+    fn find(&self, metric: &Metric) -> Found {
+        let About { name, .. } = metric.about;
+        let (counts, seen) = (&self.shape.counts, self.seen);
+        let share = |part: usize, whole: usize| (whole > 0).then(|| part as f64 / whole as f64);
+        let (removed, target, both) = (counts.removed, counts.target, counts.removed_target);
+        match *name {
+            "decay_cleared_pct" => share(counts.removed_decay, counts.decay).map(|s| 100.0 * s).into(),
+            "healthy_per_decay_pct" => share(counts.removed_other, counts.decay).map(|s| 100.0 * s).into(),
+            "time_to_clear_s" => self.cutting_stage().map(|s| s.ended.seconds_since(s.started)).into(),
+            "detect_tooth" => self.search(is_tooth).map(|(_, given)| flag(given.right)).into(),
+            "detect_level" => self.search(is_tooth).and_then(|(_, g)| Some(f64::from(g.step?.0))).map(clean).into(),
+            "detect_level_time_s" => {
+                let since = |(stage, given): (&StageResult, &Given)| given.step.map_or(stage.started, |(_, at)| at);
+                self.search(is_tooth).map(|found| found.1.at.seconds_since(since(found))).into()
+            }
+            "detect_quadrant" => self.search(is_quadrant).map(|(_, given)| flag(given.right)).into(),
+            "detect_quadrant_time_s" => {
+                self.search(is_quadrant).map(|(stage, given)| given.at.seconds_since(stage.started)).into()
+            }
+            "questions_right_pct" => self.questions_right_pct().into(),
+            "dice" => share(2 * both, removed + target).unwrap_or(1.0).into(),
+            "jaccard" => share(both, removed + target - both).unwrap_or(1.0).into(),
+            "precision" => share(both, removed).unwrap_or(if target == 0 { 1.0 } else { 0.0 }).into(),
+            "recall" => share(both, target).unwrap_or(1.0).into(),
+            "hausdorff_mm" => self.outline_percentile(1.0).into(),
+            "hausdorff95_mm" => self.outline_percentile(0.95).into(),
+            "surface_within_tol" => match metric.argument {
+                Some(Argument::ToleranceMm(tolerance)) => self.outline_share(tolerance).into(),
+                _ => Found::default(),
+            },
+            "overcut_depth_max_mm" => self.overcut(),
+            "undercut_depth_max_mm" => self.undercut(),
+            "pulp_exposed" => {
+                let voxel = self.shape.exposed();
+                let evidence = voxel.map(|v| self.evidence_at(v));
+                Found { value: Some(if voxel.is_some() { 1.0 } else { 0.0 }), evidence }
+            }
+            "remaining_dentine_thickness_min_mm" => {
+                self.deepest(self.shape.nearest(|s| s.removed && !s.vulnerable, |s| s.vulnerable), None)
+            }
+            "force_max_n" => match seen.force.highest {
+                None => 0.0.into(),
+                highest => highest.into(),
+            },
+            "force_mean_n" => seen.force.mean().into(),
+            "speed_max_mm_s" => seen.speed.highest.into(),
+            "force_max_near_pulp_n" => seen.force_near.highest.into(),
+            "force_mean_near_pulp_n" => seen.force_near.mean().into(),
+            "speed_max_near_pulp_mm_s" => seen.speed_near.highest.into(),
+            "path_length_mm" => seen.path_mm.into(),
+            "drilling_time_s" => seconds(seen.drilling_ticks).into(),
+            "contact_time_s" => seconds(seen.contact_ticks).into(),
+            "efficiency_pct_s" => {
+                let cleared = share(counts.removed_decay, counts.decay).map(|s| 100.0 * s);
+                cleared.filter(|_| seen.drilling_ticks > 0).map(|c| c / seconds(seen.drilling_ticks)).into()
+            }
+            "jerk" => seen.smoothness.into(),
+            "soft_tissue_drilled_s" => seconds(seen.soft_ticks).into(),
+            "neighbour_drilled_s" => seconds(seen.neighbour_ticks).into(),
+            "session_time_s" => seconds(seen.ticks).into(),
+            "zone_removed_pct" => match &metric.argument {
+                Some(Argument::Zone(id)) => {
+                    let zone = self.recording.scenario.zones.iter().position(|z| z.id == *id);
+                    zone.and_then(|z| self.shape.zone_removed_pct(z)).into()
+                }
+                _ => Found::default(),
+            },
+            _ => Found::default(),
+        }
+    }
+
+    fn cutting_stage(&self) -> Option<&StageResult> {
+        self.replay.outcome.stages.get(self.recording.scenario.cutting_stage()?)
+    }
+
+    /// The last answered question of a kind, with its stage.
+    fn search(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<(&StageResult, &Given)> {
+        let stages = self.recording.scenario.stages.iter().zip(&self.replay.outcome.stages);
+        let answers = stages.flat_map(|(stage, result)| {
+            let questions = stage.ask.iter().zip(&result.answers);
+            questions.filter(|(q, _)| is_meant(&q.kind)).filter_map(move |(_, given)| Some((result, given.as_ref()?)))
+        });
+        answers.last()
+    }
+
+    fn questions_right_pct(&self) -> Option<f64> {
+        let answers = self.replay.outcome.stages.iter().flat_map(|s| &s.answers).flatten();
+        let judged: Vec<bool> = answers.filter_map(|given| given.right).collect();
+        let right = judged.iter().filter(|r| **r).count();
+        (!judged.is_empty()).then(|| 100.0 * right as f64 / judged.len() as f64)
+    }
+
+    /// Nearest-rank percentile of the distances between outlines.
+    fn outline_percentile(&self, share: f64) -> Option<f64> {
+        let distances = self.outlines.as_ref()?;
+        let rank = (share * distances.len() as f64).ceil() as usize;
+        Some(f64::from(distances[rank.clamp(1, distances.len()) - 1]))
+    }
+
+    fn outline_share(&self, tolerance: f32) -> Option<f64> {
+        let distances = self.outlines.as_ref()?;
+        let within = distances.partition_point(|&d| d <= tolerance);
+        Some(within as f64 / distances.len() as f64)
+    }
+
+    fn overcut(&self) -> Found {
+        let any = self.shape.sets.iter().any(|s| s.removed && s.sound);
+        let farthest = self.shape.farthest(|s| s.removed && s.sound, |s| s.decay);
+        self.deepest(farthest, if any { None } else { Some(0.0) })
+    }
+
+    fn undercut(&self) -> Found {
+        let any = self.shape.sets.iter().any(|s| s.decay && !s.removed);
+        let farthest = self.shape.farthest(|s| s.decay && !s.removed, |s| s.removed);
+        self.deepest(farthest, if any { None } else { Some(0.0) })
+    }
+
+    fn deepest(&self, found: Option<Deepest>, otherwise: Option<f64>) -> Found {
+        match found {
+            Some(Deepest { mm, voxel }) => {
+                Found { value: Some(f64::from(mm)), evidence: Some(self.evidence_at(voxel)) }
+            }
+            None => otherwise.into(),
+        }
+    }
+
+    fn evidence_at(&self, voxel: usize) -> Evidence {
+        let grid = &self.shape.grid;
+        Evidence { at: self.seen.fell_at[voxel], place: grid.centre(grid.cell(voxel)) }
+    }
+}
+
+fn is_tooth(kind: &QuestionKind) -> bool {
+    matches!(kind, QuestionKind::ToothWith { .. })
+}
+
+fn is_quadrant(kind: &QuestionKind) -> bool {
+    matches!(kind, QuestionKind::QuadrantOf { .. })
+}
+
+fn flag(right: Option<bool>) -> f64 {
+    if right == Some(true) { 1.0 } else { 0.0 }
+}
+
+fn seconds(ticks: u64) -> f64 {
+    ticks as f64 * TICK_S
+}
+
+/// A coefficient as it was written: 0.7, not 0.699999988079071.
+fn clean(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}

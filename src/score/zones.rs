@@ -1,0 +1,50 @@
+//! Which voxels a zone holds.
+
+use crate::frame::Vec3;
+use crate::scenario::{Region, Zone};
+use crate::volume::{Grid, Label, Volume, distance};
+
+/// One flag per voxel of the volume at the start.
+pub fn mask(zone: &Zone, initial: &Volume) -> Vec<bool> {
+    let grid = initial.grid();
+    match &zone.region {
+        Region::Tissue(label) => initial.tissues().map(|l| l == *label).collect(),
+        Region::Around { label, within } => around(initial, *label, *within),
+        Region::Sphere { centre, radius } => {
+            let centre = Vec3::from(*centre);
+            matter_where(initial, |p| p.distance_squared(centre) <= radius * radius)
+        }
+        Region::Box { min, max } => {
+            let (min, max) = (Vec3::from(*min), Vec3::from(*max));
+            matter_where(initial, |p| p.cmpge(min).all() && p.cmple(max).all())
+        }
+        Region::Cylinder { from, to, radius } => {
+            let (from, to) = (Vec3::from(*from), Vec3::from(*to));
+            matter_where(initial, |p| is_in_cylinder(p, from, to, *radius))
+        }
+        // A map of another size belongs to another tooth: it marks nothing here.
+        Region::Mask(mask) if mask.dims == grid.dims => {
+            mask.is_inside.iter().zip(initial.tissues()).map(|(&inside, l)| inside && l != Label::AIR).collect()
+        }
+        Region::Mask(_) => vec![false; grid.len()],
+    }
+}
+
+fn matter_where(initial: &Volume, is_inside: impl Fn(Vec3) -> bool) -> Vec<bool> {
+    let grid: &Grid = initial.grid();
+    let tissues = initial.tissues().zip(grid.cells());
+    tissues.map(|(l, cell)| l != Label::AIR && is_inside(grid.centre(cell))).collect()
+}
+
+/// Matter within a distance of a tissue, the tissue itself left out.
+fn around(initial: &Volume, label: Label, within: f32) -> Vec<bool> {
+    let distance = distance::to_set(initial.grid(), |i| initial.tissue(i) == label);
+    let tissues = initial.tissues().zip(distance);
+    tissues.map(|(l, d)| l != Label::AIR && l != label && d <= within).collect()
+}
+
+fn is_in_cylinder(point: Vec3, from: Vec3, to: Vec3, radius: f32) -> bool {
+    let axis = to - from;
+    let along = (point - from).dot(axis) / axis.length_squared();
+    (0.0..=1.0).contains(&along) && (point - from - axis * along).length_squared() <= radius * radius
+}

@@ -1,0 +1,478 @@
+//! A scripted trainee: turns what an operator file says into moves of a hand, and closes the loop through what it feels.
+//!
+//! It sees what a person sees (surfaces, and decay where the scenario shows it) and otherwise knows only what it felt.
+
+use super::operator_file::{
+    ActionFile, AnswerActionFile, CutFile, FollowFile, OperatorFile, PlaceFile, PressFile, ProbeFile, WhenFile,
+};
+use super::{Answer, Input, Session, Trainee};
+use crate::device::{Device, Felt, Gone, HandModel, Move, Output, Reading, Scripted, Spec, Tremor};
+use crate::frame::Vec3;
+use crate::scenario::{Lesion, QuestionKind, Scenario, Stage, Workpiece};
+use crate::sim::Step;
+use crate::touch::WorkingEnd;
+use crate::volume::ISO;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// How far above a tooth the hand travels, mm.
+const TRAVEL_HEIGHT: f32 = 4.0;
+
+/// How far before the surface a hand slows down to touch, mm.
+const TOUCH_HEIGHT: f32 = 0.6;
+
+/// Speed of touching, mm/s.
+const TOUCH_SPEED: f32 = 8.0;
+
+/// A scripted trainee at work.
+#[derive(Clone, Debug)]
+pub struct Operator {
+    file: OperatorFile,
+    scenario: Arc<Scenario>,
+    workpiece: Arc<Workpiece>,
+    device: Scripted,
+    /// Index of the stage the plan is for.
+    stage: Option<usize>,
+    plan: VecDeque<Task>,
+    /// Places felt in this stage.
+    felt: Vec<FeltPlace>,
+    /// The place being felt.
+    feeling: Option<(usize, Vec3)>,
+    has_rated: bool,
+}
+
+/// What is left to do.
+#[derive(Clone, Debug)]
+enum Task {
+    Move(Move),
+    /// A move whose feeling is remembered: tooth, and place in tooth space.
+    Feel(Move, usize, Vec3),
+    Input(Input),
+    Answer(AnswerActionFile),
+    /// Drops the following so many tasks if the decay gone suffices.
+    SkipIfCleared {
+        percent: f64,
+        tasks: usize,
+    },
+    /// Begins the stage's rule again.
+    Again,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct FeltPlace {
+    tooth: usize,
+    place_in_tooth: Vec3,
+    /// N/mm
+    stiffness: f32,
+}
+
+impl Operator {
+    /// An operator holding a device above the workpiece. The seed decides its tremor.
+    pub fn new(
+        file: OperatorFile,
+        scenario: Arc<Scenario>,
+        workpiece: Arc<Workpiece>,
+        spec: Spec,
+        seed: u64,
+    ) -> Operator {
+        let start = Vec3::Y * (2.0 * TRAVEL_HEIGHT);
+        let model = HandModel::holding(spec.apparent_mass, spec.resolution);
+        let tremor = Tremor::new(file.hand.tremor_mm, seed);
+        Operator {
+            device: Scripted::new(spec, model, tremor, start),
+            file,
+            scenario,
+            workpiece,
+            stage: None,
+            plan: VecDeque::new(),
+            felt: Vec::new(),
+            feeling: None,
+            has_rated: false,
+        }
+    }
+
+    fn in_world(&self, point_in_tooth: Vec3) -> Vec3 {
+        self.workpiece.world_from_tooth * point_in_tooth
+    }
+
+    /// Radius of the working end now in the hand, mm.
+    fn radius(&self, instrument: usize) -> f32 {
+        match self.scenario.instruments[instrument].make().end {
+            WorkingEnd::Point => 0.0,
+            WorkingEnd::Ball { radius } => radius,
+        }
+    }
+
+    fn begin_stage(&mut self, index: usize) {
+        self.stage = Some(index);
+        self.felt.clear();
+        self.feeling = None;
+        self.device.stop();
+        self.plan.clear();
+        self.follow_rule(index);
+    }
+
+    fn follow_rule(&mut self, index: usize) {
+        let scenario = self.scenario.clone();
+        let stage = &scenario.stages[index];
+        let file = self.file.clone();
+        let Some(rule) = file.rules.iter().find(|r| fits(&r.when, stage)) else { return };
+        let mut instrument = stage.instruments[0];
+        for action in &rule.actions {
+            self.compile(action, stage, &mut instrument);
+        }
+        if rule.repeat {
+            self.plan.push_back(Task::Again);
+        }
+    }
+
+    fn compile(&mut self, action: &ActionFile, stage: &Stage, instrument: &mut usize) {
+        match action {
+            ActionFile::WaitS(seconds) => self.plan.push_back(Task::Move(Move::Wait { seconds: *seconds })),
+            ActionFile::Take(name) => {
+                if let Some(chosen) = self.choose(name, stage) {
+                    *instrument = chosen;
+                    self.lift_off();
+                    self.plan.push_back(Task::Input(Input::Take { instrument: chosen }));
+                }
+            }
+            ActionFile::Approach(approach) => {
+                let (_, surface, _) = self.place(&approach.at);
+                self.travel_to(surface + Vec3::Z * approach.above_mm);
+            }
+            ActionFile::Press(press) => self.press(press, self.radius(*instrument)),
+            ActionFile::Follow(follow) => self.follow(follow, self.radius(*instrument)),
+            ActionFile::Probe(probe) => self.probe(probe, self.radius(*instrument)),
+            ActionFile::Cut(cut) => self.cut(cut, self.radius(*instrument)),
+            ActionFile::Answer(answer) => self.plan.push_back(Task::Answer(answer.clone())),
+            ActionFile::Confirm => {
+                self.lift_off();
+                self.plan.push_back(Task::Input(Input::Confirm));
+            }
+        }
+    }
+
+    /// An instrument of the stage by id, or the first bur or explorer.
+    fn choose(&self, name: &str, stage: &Stage) -> Option<usize> {
+        let is_meant = |&&index: &&usize| {
+            let entry = &self.scenario.instruments[index];
+            entry.id == name || (name == "bur" && entry.cuts) || (name == "explorer" && !entry.cuts)
+        };
+        stage.instruments.iter().find(is_meant).copied()
+    }
+
+    /// Tooth, point of its surface and normal there, in tooth space.
+    fn place(&self, place: &PlaceFile) -> (usize, Vec3, Vec3) {
+        let teeth = &self.workpiece.teeth;
+        let tooth = match place {
+            PlaceFile::Tooth(id) => teeth.iter().position(|t| t.id == *id).unwrap_or(0),
+            PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(0, |l| l.tooth),
+            PlaceFile::Crown | PlaceFile::Quadrant(_) => 0,
+        };
+        let (low, high) = (teeth[tooth].crown_low, teeth[tooth].crown_high);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let over = match place {
+            PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(middle, |l| l.centre),
+            PlaceFile::Quadrant(quadrant) => {
+                let buccal = if *quadrant <= 2 { 0.42 } else { -0.42 };
+                let distal = if quadrant % 2 == 1 { 0.42 } else { -0.42 };
+                middle + Vec3::new(half.x * buccal, half.y * distal, 0.0)
+            }
+            PlaceFile::Crown | PlaceFile::Tooth(_) => middle,
+        };
+        let (surface, normal) = self.surface_at(over.x, over.y, high.z).unwrap_or((over, Vec3::Z));
+        (tooth, surface, normal)
+    }
+
+    /// The occlusal surface over a point of the ground plan, with its normal; tooth space.
+    fn surface_at(&self, x: f32, y: f32, top: f32) -> Option<(Vec3, Vec3)> {
+        let volume = &self.workpiece.volume;
+        let step = 0.5 * volume.grid().spacing.min_element();
+        let point = |i: u32| Vec3::new(x, y, top + 1.0 - i as f32 * step);
+        let hit = (0..(12.0 / step) as u32).map(point).find(|&p| volume.density_at(p) >= ISO)?;
+        let (_, gradient) = volume.density_and_gradient_at(hit);
+        Some((hit, (-gradient).try_normalize().unwrap_or(Vec3::Z)))
+    }
+
+    fn top(&self) -> f32 {
+        self.workpiece.teeth.iter().map(|t| t.crown_high.z).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// Straight up to travelling height from wherever the hand then is.
+    fn lift_off(&mut self) {
+        let speed = self.file.hand.speed_mm_s;
+        let height = (self.workpiece.world_from_tooth * (Vec3::Z * (self.top() + TRAVEL_HEIGHT))).y;
+        // Where the hand will be is not known yet: the move is finished when it is made.
+        self.plan.push_back(Task::Move(Move::Rise { to_height: height, speed }));
+    }
+
+    /// Up, across and down to a point of tooth space.
+    fn travel_to(&mut self, point_in_tooth: Vec3) {
+        let speed = self.file.hand.speed_mm_s;
+        self.lift_off();
+        let above = Vec3::new(point_in_tooth.x, point_in_tooth.y, self.top() + TRAVEL_HEIGHT);
+        let (above, to) = (self.in_world(above), self.in_world(point_in_tooth));
+        self.plan.push_back(Task::Move(Move::Reach { to: above, speed }));
+        self.plan.push_back(Task::Move(Move::Reach { to, speed }));
+    }
+
+    fn press(&mut self, press: &PressFile, radius: f32) {
+        let (tooth, surface, normal) = self.place(&press.at);
+        self.press_at(tooth, surface, normal, radius, press.force_n, press.hold_s);
+        self.lift_off();
+    }
+
+    fn press_at(&mut self, tooth: usize, surface: Vec3, normal: Vec3, radius: f32, force: f32, hold: f32) {
+        self.travel_to(surface + normal * (radius + TOUCH_HEIGHT));
+        let along = -self.workpiece.world_from_tooth.turn(normal);
+        let speed = TOUCH_SPEED.min(self.file.hand.speed_mm_s);
+        let press = Move::Press { along, force, hold, reach: 15.0, speed };
+        self.plan.push_back(Task::Feel(press, tooth, surface));
+    }
+
+    fn follow(&mut self, follow: &FollowFile, radius: f32) {
+        let along = self.workpiece.world_from_tooth.turn(Vec3::NEG_Z);
+        for tooth in self.workpiece.clone().teeth.iter() {
+            for line in 0..follow.lines {
+                let across = spread(line, follow.lines);
+                let path = self.line_over(tooth.crown_low, tooth.crown_high, across, radius);
+                let Some(&start) = path.first() else { continue };
+                self.travel_to(start + Vec3::Z * TOUCH_HEIGHT);
+                let path = path.into_iter().map(|p| self.in_world(p)).collect();
+                self.plan.push_back(Task::Move(Move::Trace {
+                    path,
+                    along,
+                    force: follow.press_n,
+                    speed: follow.speed_mm_s,
+                    lean: [-TOUCH_HEIGHT, 3.0],
+                }));
+            }
+        }
+        self.lift_off();
+    }
+
+    /// A line from mesial to distal over a crown, where the instrument's centre would glide; tooth space.
+    fn line_over(&self, low: Vec3, high: Vec3, across: f32, radius: f32) -> Vec<Vec3> {
+        /// Share of the crown's width that is occlusal surface.
+        const OCCLUSAL: f32 = 0.7;
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * OCCLUSAL);
+        (0..=24)
+            .filter_map(|i| {
+                let (x, y) = (middle.x + half.x * across, middle.y + half.y * (i as f32 / 12.0 - 1.0));
+                self.surface_at(x, y, high.z).map(|(p, n)| p + n * radius)
+            })
+            .collect()
+    }
+
+    fn probe(&mut self, probe: &ProbeFile, radius: f32) {
+        /// Share of the crown's width that is probed: beyond, surfaces are too steep to press on.
+        const PROBED: f32 = 0.62;
+        for (index, tooth) in self.workpiece.clone().teeth.iter().enumerate() {
+            let (middle, half) =
+                (0.5 * (tooth.crown_low + tooth.crown_high), 0.5 * (tooth.crown_high - tooth.crown_low));
+            for i in 0..probe.side {
+                for j in 0..probe.side {
+                    // Back and forth, so that the hand has short ways.
+                    let j = if i % 2 == 0 { j } else { probe.side - 1 - j };
+                    let (u, v) = (spread(i, probe.side) * PROBED, spread(j, probe.side) * PROBED);
+                    let at = self.surface_at(middle.x + half.x * u, middle.y + half.y * v, tooth.crown_high.z);
+                    if let Some((surface, normal)) = at {
+                        self.tap(index, surface, normal, radius, probe);
+                    }
+                }
+            }
+        }
+        self.lift_off();
+    }
+
+    /// A short press and back, without the way up to travelling height.
+    fn tap(&mut self, tooth: usize, surface: Vec3, normal: Vec3, radius: f32, probe: &ProbeFile) {
+        let speed = self.file.hand.speed_mm_s;
+        let before = self.in_world(surface + normal * (radius + TOUCH_HEIGHT));
+        let above = self.in_world(Vec3::new(surface.x, surface.y, self.top() + 1.0));
+        let along = -self.workpiece.world_from_tooth.turn(normal);
+        let press_speed = TOUCH_SPEED.min(speed);
+        self.plan.push_back(Task::Move(Move::Reach { to: above, speed }));
+        self.plan.push_back(Task::Move(Move::Reach { to: before, speed }));
+        let press = Move::Press { along, force: probe.press_n, hold: 0.02, reach: 15.0, speed: press_speed };
+        self.plan.push_back(Task::Feel(press, tooth, surface));
+        self.plan.push_back(Task::Move(Move::Reach { to: before, speed }));
+        self.plan.push_back(Task::Move(Move::Reach { to: above, speed }));
+    }
+
+    fn cut(&mut self, cut: &CutFile, radius: f32) {
+        for lesion in &self.workpiece.clone().lesions {
+            for pass in 0..cut.passes {
+                let before = self.plan.len();
+                self.cut_pass(cut, lesion, radius, pass);
+                let tasks = self.plan.split_off(before);
+                self.plan.push_back(Task::SkipIfCleared { percent: cut.until_cleared_pct, tasks: tasks.len() });
+                self.plan.extend(tasks);
+            }
+        }
+        self.lift_off();
+    }
+
+    /// Down into the lesion, then round and round from its floor up its walls: where the bur's surface is to run along the
+    /// lesion's border, its centre runs on a bowl.
+    fn cut_pass(&mut self, cut: &CutFile, lesion: &Lesion, radius: f32, pass: u32) {
+        /// Radians above the lesion's equator up to which its walls are followed.
+        const TOP: f32 = 0.6;
+        const POINTS: u32 = 32;
+        let bowl = (lesion.radii - radius + cut.margin_mm).max(Vec3::splat(0.02));
+        let floor = -0.5 * core::f32::consts::PI;
+        let rings = ((TOP - floor) * bowl.max_element() / cut.pitch_mm).ceil().max(2.0) as u32;
+        let on_bowl = |i: u32| {
+            let rise = floor + (TOP - floor) * i as f32 / (rings * POINTS) as f32;
+            // Every other pass goes the other way round.
+            let way = if pass.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let turn = way * core::f32::consts::TAU * i as f32 / POINTS as f32;
+            let (level, up) = (libm::cosf(rise), libm::sinf(rise));
+            lesion.centre + Vec3::new(level * libm::cosf(turn), level * libm::sinf(turn), up) * bowl
+        };
+        let surface =
+            self.surface_at(lesion.centre.x, lesion.centre.y, self.top()).map_or(lesion.centre.z, |(p, _)| p.z);
+        let above = Vec3::new(lesion.centre.x, lesion.centre.y, surface + radius + TOUCH_HEIGHT);
+        self.travel_to(above);
+        let path = [above].into_iter().chain((0..rings * POINTS).map(on_bowl)).map(|p| self.in_world(p)).collect();
+        self.plan.push_back(Task::Move(Move::Guide {
+            path,
+            speed: cut.speed_mm_s,
+            lean: cut.lean_mm,
+            force: cut.press_n,
+            patience: cut.patience_s,
+        }));
+    }
+
+    /// The softest place felt, and how soft it is against the typical place of its kind.
+    fn softest(&self) -> Option<(FeltPlace, f32)> {
+        let mut all: Vec<f32> = self.felt.iter().map(|f| f.stiffness).collect();
+        all.sort_by(f32::total_cmp);
+        let typical = *all.get(all.len() / 2)?;
+        let softest = self.felt.iter().min_by(|a, b| a.stiffness.total_cmp(&b.stiffness))?;
+        Some((*softest, softest.stiffness / typical))
+    }
+
+    /// Answers by what was felt.
+    fn answers(&self, kind: &AnswerActionFile, stage: &Stage) -> Vec<Input> {
+        let noticed_below = self.file.rules.iter().flat_map(|r| &r.actions).find_map(|a| match a {
+            ActionFile::Probe(probe) => Some(probe.notices_below),
+            _ => None,
+        });
+        let Some((place, ratio)) = self.softest() else { return Vec::new() };
+        let is_sure = noticed_below.is_some_and(|below| ratio < below);
+        if !is_sure && !matches!(kind, AnswerActionFile::Guess) {
+            return Vec::new();
+        }
+        let tooth = &self.workpiece.teeth[place.tooth];
+        let answer = |kind: &QuestionKind| match kind {
+            QuestionKind::ToothWith { .. } => Some(Answer::Word(tooth.id.clone())),
+            QuestionKind::QuadrantOf { .. } => Some(Answer::Quadrant(Workpiece::quadrant(tooth, place.place_in_tooth))),
+            _ => None,
+        };
+        let input =
+            |q: &crate::scenario::Question| Some(Input::Answer { question: q.id.clone(), value: answer(&q.kind)? });
+        stage.ask.iter().filter_map(input).collect()
+    }
+
+    /// Rates every statement as the operator feels about the system.
+    fn ratings(&mut self) -> Vec<Input> {
+        if std::mem::replace(&mut self.has_rated, true) {
+            return Vec::new();
+        }
+        let Some(questionnaire) = &self.scenario.questionnaire else { return Vec::new() };
+        let agrees = self.file.agrees.min(questionnaire.steps);
+        let rate = |item| Input::Rate {
+            item: crate::scenario::Item::clone(item).id,
+            value: questionnaire.counted(item, agrees),
+        };
+        questionnaire.items().map(rate).collect()
+    }
+
+    /// Remembers what was felt by the move that just ended.
+    fn remember(&mut self) {
+        let (Some((tooth, place_in_tooth)), Some(felt)) = (self.feeling.take(), self.device.take_felt()) else {
+            return;
+        };
+        if let Felt { stiffness: Some(stiffness), .. } = felt {
+            self.felt.push(FeltPlace { tooth, place_in_tooth, stiffness });
+        }
+    }
+
+    /// Goes on with the plan until the hand is busy or something is to be said.
+    fn go_on(&mut self, session: &Session, index: usize) -> Vec<Input> {
+        while self.device.is_idle() {
+            self.remember();
+            match self.plan.pop_front() {
+                None => break,
+                Some(Task::Move(next)) => self.device.push(next),
+                Some(Task::Feel(next, tooth, place)) => {
+                    self.feeling = Some((tooth, place));
+                    self.device.push(next);
+                }
+                Some(Task::Input(input)) => return vec![input],
+                Some(Task::Answer(kind)) => {
+                    let inputs = self.answers(&kind, &self.scenario.stages[index]);
+                    if !inputs.is_empty() {
+                        return inputs;
+                    }
+                }
+                Some(Task::SkipIfCleared { percent, tasks }) => {
+                    if session.cleared_pct().is_none_or(|now| now >= percent) {
+                        self.plan.drain(..tasks.min(self.plan.len()));
+                    }
+                }
+                Some(Task::Again) => {
+                    self.felt.clear();
+                    self.follow_rule(index);
+                    // A rule without any move would go round for ever within this tick.
+                    break;
+                }
+            }
+        }
+        Vec::new()
+    }
+}
+
+fn fits(when: &WhenFile, stage: &Stage) -> bool {
+    match when {
+        WhenFile::Always => true,
+        WhenFile::Cutting => stage.cutting,
+        WhenFile::Searching => {
+            stage.ask.iter().any(|q| matches!(q.kind, QuestionKind::ToothWith { .. } | QuestionKind::QuadrantOf { .. }))
+        }
+        WhenFile::Stage(id) => stage.id == *id,
+    }
+}
+
+/// The i-th of n places spread evenly over -1…1, ends included; 0 for a single one.
+fn spread(i: u32, n: u32) -> f32 {
+    if n > 1 { 2.0 * i as f32 / (n - 1) as f32 - 1.0 } else { 0.0 }
+}
+
+impl Device for Operator {
+    fn spec(&self) -> &Spec {
+        self.device.spec()
+    }
+
+    fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
+        self.device.exchange(output)
+    }
+}
+
+impl Trainee for Operator {
+    fn respond(&mut self, session: &Session, screen: Option<&Step>) -> Vec<Input> {
+        if let Some(step) = screen {
+            self.device.see(step.tip);
+        }
+        match session.stage() {
+            None => self.ratings(),
+            Some((index, _)) => {
+                if self.stage != Some(index) {
+                    self.begin_stage(index);
+                }
+                self.go_on(session, index)
+            }
+        }
+    }
+}

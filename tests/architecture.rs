@@ -1,0 +1,133 @@
+//! The table of modules in `ARCHITECTURE.md` is true.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Each module with those it may use, from the table.
+fn table() -> BTreeMap<String, Vec<String>> {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let rows = text.lines().filter(|l| l.starts_with("| `"));
+    rows.map(|row| {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let uses = cells[2].split(',').map(|m| m.trim().to_string()).filter(|m| !m.is_empty());
+        (cells[0].trim_matches('`').to_string(), uses.collect())
+    })
+    .collect()
+}
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => files.extend(sources(&path)),
+            false if path.extension().is_some_and(|e| e == "rs") => files.push(path),
+            false => {}
+        }
+    }
+    files
+}
+
+fn module_of(path: &Path) -> String {
+    let below = path.strip_prefix(root().join("src")).unwrap();
+    below.components().next().unwrap().as_os_str().to_string_lossy().trim_end_matches(".rs").to_string()
+}
+
+/// Every `crate::module` in a text, with its line. Comments do not count; `use crate::{a, b}` does.
+fn uses(text: &str) -> Vec<(usize, String)> {
+    let mut found = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let code = line.split("//").next().unwrap_or_default();
+        for part in code.split("crate::").skip(1) {
+            let names: Vec<&str> = match part.strip_prefix('{') {
+                Some(list) => list.split(['}', ',']).collect(),
+                None => vec![part],
+            };
+            for name in names {
+                let name: String = name.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                if !name.is_empty() {
+                    found.push((number + 1, name));
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn no_module_uses_one_above_it() {
+    // Aim: the table in ARCHITECTURE.md says who may use whom. Method: read it, and every `crate::` in the sources.
+    let table = table();
+    let mut wrong = Vec::new();
+    for path in sources(&root().join("src")) {
+        let module = module_of(&path);
+        if matches!(module.as_str(), "lib" | "main") {
+            continue;
+        }
+        let allowed = table.get(&module).unwrap_or_else(|| panic!("{module} is not in the table"));
+        let text = fs::read_to_string(&path).unwrap();
+        for (line, used) in uses(&text) {
+            if used != module && !allowed.contains(&used) {
+                wrong.push(format!("{}:{line}: {module} may not use {used}", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_table_lists_every_module_lowest_first() {
+    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
+    let order: Vec<String> =
+        text.lines().filter(|l| l.starts_with("| `")).map(|l| l.split('`').nth(1).unwrap().to_string()).collect();
+    let lib = fs::read_to_string(root().join("src/lib.rs")).unwrap();
+    let declared: Vec<&str> = lib.lines().filter_map(|l| l.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
+    assert_eq!(order, declared, "ARCHITECTURE.md and src/lib.rs name the same modules in the same order");
+    for (module, uses) in table() {
+        let place = |m: &str| order.iter().position(|o| o == m).unwrap_or_else(|| panic!("no module {m}"));
+        for used in uses {
+            assert!(place(&used) < place(&module), "{module} uses {used}, which stands above it");
+        }
+    }
+}
+
+#[test]
+fn the_lower_rooms_keep_their_promises() {
+    // Aim: what cannot be seen from imports of our own modules: no clock, no printing, no serde, no randomness where a
+    // tick is turned.
+    let banned: [(&[&str], &[&str]); 3] = [
+        (
+            &["tick", "frame", "mesh", "volume", "anatomy", "touch", "device", "sim", "score"],
+            &["serde", "std::time", "SystemTime", "Instant", "println!", "eprintln!", "HashMap", "std::fs"],
+        ),
+        (
+            &["scenario", "session", "record", "report", "content"],
+            &["std::time", "SystemTime", "Instant", "println!", "HashMap"],
+        ),
+        (
+            &["volume", "touch", "sim"],
+            &[".sin()", ".cos()", ".exp()", ".ln()", ".powf(", ".acos()", ".tan()", "thread_rng"],
+        ),
+    ];
+    let mut wrong = Vec::new();
+    for path in sources(&root().join("src")) {
+        let module = module_of(&path);
+        let text = fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        for (modules, words) in &banned {
+            if modules.contains(&module.as_str()) {
+                for (number, line) in code.lines().enumerate().filter(|(_, l)| !l.trim_start().starts_with("//")) {
+                    for word in words.iter().filter(|w| line.contains(**w)) {
+                        wrong.push(format!("{}:{}: {module} has {word}", path.display(), number + 1));
+                    }
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}

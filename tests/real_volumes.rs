@@ -1,0 +1,88 @@
+//! Volumes that others made, held against what is known of them.
+//!
+//! They lie in `$TYPODONT_DATA`, or in `../shared/data` beside the project; their licences keep them out of it.
+
+use glam::DVec3;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use typodont::content::nrrd::segmentation::{self, Segmentation};
+use typodont::content::nrrd::{self, Encoding, Samples, Space};
+
+/// The file's path; without the file the test says loudly that it did nothing.
+fn find(name: &str) -> Option<PathBuf> {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    let folder = std::env::var_os("TYPODONT_DATA").map_or_else(beside, PathBuf::from);
+    let path = folder.join(name);
+    if !path.exists() {
+        // Straight to the terminal: the test harness would keep what a passing test prints to itself.
+        let _ = writeln!(std::io::stderr(), "SKIPPED: no {} — set TYPODONT_DATA", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+#[test]
+fn the_ge_tooth_has_its_three_peaks() {
+    let Some(path) = find("ge-tooth/tooth_u8_103x94x161.nrrd") else { return };
+    let image = nrrd::read(&path).unwrap();
+    assert_eq!(image.geometry.dims, [103, 94, 161]);
+    assert_eq!((image.geometry.spacing(), image.geometry.space), (DVec3::ONE, Space::LeftPosteriorSuperior));
+    let Samples::U8(samples) = &image.samples else { panic!("uint8") };
+    let mut histogram = [0; 256];
+    samples.iter().for_each(|&sample| histogram[usize::from(sample)] += 1);
+    for (what, peak) in [("air and mount", 77), ("dentine", 163), ("enamel", 234)] {
+        let around = peak - 15..=peak + 15;
+        assert_eq!(around.max_by_key(|&value| histogram[value]), Some(peak), "{what}");
+    }
+    for encoding in [Encoding::Raw, Encoding::Gzip] {
+        let bytes = nrrd::bytes(&image, encoding).unwrap();
+        assert_eq!(nrrd::parse(&bytes).unwrap(), image, "{encoding:?}");
+    }
+}
+
+#[test]
+fn the_ge_tooth_is_labelled_as_its_thresholds_say() {
+    let Some(scan) = find("ge-tooth/tooth_u8_103x94x161.nrrd") else { return };
+    let Some(path) = find("ge-tooth/ge_tooth_threshold_labels.seg.nrrd") else { return };
+    let Samples::U8(samples) = nrrd::read(&scan).unwrap().samples else { panic!("uint8") };
+    let tooth = check(&path, ["enamel", "dentine", "pulp"]);
+    assert_eq!([1, 2, 3].map(|label| tooth.count(label)), [93_851, 298_759, 17_441]);
+    for (label, sample) in tooth.labels.iter().zip(samples) {
+        match label {
+            1 => assert!(sample >= 200),
+            2 => assert!((120..200).contains(&sample)),
+            _ => assert!(sample < 200),
+        }
+    }
+}
+
+#[test]
+fn the_openmandible_teeth_have_the_volumes_of_their_meshes() {
+    let teeth = [
+        // Held against the label map's own figures, and those of the meshes.
+        ("openmandible/openmandible_FDI36_0.2mm.seg.nrrd", [70, 66, 106], 0.2, [221.76, 647.39, 33.78], 0.005),
+        ("openmandible/openmandible_FDI41_0.1mm.seg.nrrd", [65, 71, 238], 0.1, [55.1, 204.8, 10.7], 0.2),
+    ];
+    for (name, dims, spacing, mm3, tolerance) in teeth {
+        let Some(path) = find(name) else { continue };
+        let tooth = check(&path, ["enamel", "dentine", "pulp"]);
+        assert_eq!(tooth.geometry.dims, dims);
+        assert!((tooth.geometry.spacing() - DVec3::splat(spacing)).length() < 1e-12);
+        let grid = tooth.geometry.grid().unwrap();
+        for (label, expected) in (1..).zip(mm3) {
+            let found = tooth.count(label) as f64 * grid.voxel_mm3();
+            assert!((found - expected).abs() < tolerance, "{name}: label {label} {found} mm³, not {expected}");
+        }
+    }
+}
+
+/// Reads a segmentation of these names, and writes and reads it again.
+fn check(path: &Path, names: [&str; 3]) -> Segmentation {
+    let tooth = segmentation::read(path).unwrap_or_else(|error| panic!("{error}"));
+    let found: Vec<&str> = tooth.segments.iter().map(|segment| segment.name.as_str()).collect();
+    assert_eq!(found, names);
+    assert_eq!(tooth.segments[0].color, [0.95, 0.95, 0.9]);
+    let again = segmentation::parse(&segmentation::bytes(&tooth).unwrap()).unwrap();
+    assert_eq!(again, tooth);
+    tooth
+}
