@@ -8,7 +8,7 @@ use crate::report::bundle;
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece, hex};
 use crate::session::{self, Operator, OperatorFile, Progress, Session};
 use crate::sim::Simulation;
-use crate::tick::{TICK_S, Tick};
+use crate::tick::TICK_S;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
@@ -156,6 +156,8 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
         Progress::DeviceGone(gone) => gone.to_string(),
     };
     recorder.finish(&EndFile { reason, servo: servo(&simulation) }).map_err(Failure::wrong)?;
+    // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
+    drop((session, simulation, trainee, workpiece));
     let bar = spinner("scoring and drawing");
     let bundle = unfinished.complete(&super::templates()).map_err(Failure::wrong);
     bar.finish_and_clear();
@@ -191,10 +193,4 @@ pub fn spinner(what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new_spinner().with_style(style).with_message(what);
     bar.enable_steady_tick(std::time::Duration::from_millis(120));
     bar
-}
-
-/// Ticks of a session as minutes and seconds, for people.
-pub fn length(ticks: u64) -> String {
-    let seconds = Tick(ticks).seconds() as u64;
-    format!("{}:{:02}", seconds / 60, seconds % 60)
 }

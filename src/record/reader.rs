@@ -24,7 +24,7 @@ pub struct Recording {
     /// `None` for a session that was cut off.
     pub end: Option<EndFile>,
     pub scenario: Arc<Scenario>,
-    pub initial: Volume,
+    pub initial: Arc<Volume>,
     /// One per tick, from tick 0 on without a gap.
     pub ticks: Vec<Haptic>,
     /// Inputs in order, each before the step of its tick.
@@ -195,6 +195,6 @@ impl Found {
         }
         let source = Source::new(format!("{name}: scenario.json"), text);
         let scenario = scenario::resolve(source, &library, Forms::Recorded).map_err(Unreadable::Scenario)?;
-        Ok(Recording { head, end, scenario: Arc::new(scenario), initial, ticks, inputs, commands, events, digests })
+        Ok(Recording { head, end, scenario: Arc::new(scenario), initial: Arc::new(initial), ticks, inputs, commands, events, digests })
     }
 }

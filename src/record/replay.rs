@@ -125,7 +125,7 @@ pub fn replay(
         witness.command(last, told.matches(command));
     }
     let difference = witness.conclude(last);
-    Ok(Replay { volume: simulation.volume().clone(), outcome: session.outcome(), workpiece, difference })
+    Ok(Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference })
 }
 
 /// Commands the session has given that the recording must have as well, in this order.

@@ -91,7 +91,7 @@ fn derive(
     files.insert("initial.seg.nrrd".to_string(), labelmap::tissues(&workpiece.volume, tissues)?);
     files.insert("final.seg.nrrd".to_string(), labelmap::tissues(&scored.replay.volume, tissues)?);
     files.insert("performance.seg.nrrd".to_string(), labelmap::performance(grid, &scored.verdicts)?);
-    files.insert("removal_time.nrrd".to_string(), labelmap::removal_times(grid, &scored.fell_at)?);
+    files.insert("removal_time.nrrd".to_string(), labelmap::removal_times(grid, &scored.falls)?);
     files.insert("performance.glb".to_string(), glb::bytes(&pictures::parts(scored))?);
     let views = pictures::all(recording, scored);
     files.extend(views.iter().map(|view| (format!("views/{}.png", view.name), view.png.clone())));

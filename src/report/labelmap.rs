@@ -4,8 +4,7 @@ use crate::content::TissueTable;
 use crate::content::nrrd;
 use crate::content::nrrd::segmentation::{self, Segment, Segmentation};
 use crate::content::nrrd::{Encoding, Geometry, Image, Samples, Space};
-use crate::score::Verdict;
-use crate::tick::Tick;
+use crate::score::{Falls, Verdict};
 use crate::volume::{Grid, Volume};
 
 /// The tissues of a volume as `.seg.nrrd`.
@@ -38,10 +37,22 @@ fn encode(grid: &Grid, labels: Vec<u8>, segments: Vec<Segment>) -> Result<Vec<u8
     segmentation::bytes(&Segmentation { geometry, labels, segments }).map_err(|e| e.to_string())
 }
 
-/// When each voxel fell, s; NaN for those that never did.
-pub fn removal_times(grid: &Grid, fell_at: &[Option<Tick>]) -> Result<Vec<u8>, String> {
-    let seconds = fell_at.iter().map(|t| t.map_or(f32::NAN, |t| t.seconds() as f32)).collect();
-    let geometry = Geometry::of(grid, Space::LeftPosteriorSuperior);
+/// When each voxel fell, s; NaN for those that never did. The box holds no more than what fell.
+pub fn removal_times(grid: &Grid, falls: &Falls) -> Result<Vec<u8>, String> {
+    let fallen = || falls.iter().map(|(voxel, _)| grid.cell(voxel));
+    let (low, high) = fallen().fold(([u32::MAX; 3], [0; 3]), |(low, high): ([u32; 3], [u32; 3]), cell| {
+        (std::array::from_fn(|a| low[a].min(cell[a])), std::array::from_fn(|a| high[a].max(cell[a])))
+    });
+    // Nothing fell: one voxel says so.
+    let (low, high) = if low[0] == u32::MAX { ([0; 3], [0; 3]) } else { (low, high) };
+    let dims = std::array::from_fn(|a| high[a] - low[a] + 1);
+    let part = Grid { dims, spacing: grid.spacing, origin: grid.centre(low) };
+    let mut seconds = vec![f32::NAN; part.len()];
+    for (voxel, tick) in falls.iter() {
+        let cell = grid.cell(voxel);
+        seconds[part.index(std::array::from_fn(|a| cell[a] - low[a]))] = tick.seconds() as f32;
+    }
+    let geometry = Geometry::of(&part, Space::LeftPosteriorSuperior);
     let keys = vec![
         ("typodont_quantity".to_string(), "removal time".to_string()),
         ("typodont_unit".to_string(), "s".to_string()),

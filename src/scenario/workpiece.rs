@@ -10,11 +10,12 @@ use crate::frame::{Pose, Quat, Vec3};
 use crate::touch::{self, Shape};
 use crate::volume::{Grid, ISO, Label, Volume};
 use std::fmt;
+use std::sync::Arc;
 
 /// What a session works on.
 #[derive(Clone, Debug)]
 pub struct Workpiece {
-    pub volume: Volume,
+    pub volume: Arc<Volume>,
     pub teeth: Vec<ToothPlace>,
     pub lesions: Vec<Lesion>,
     /// Gum and neighbours.
@@ -97,11 +98,11 @@ impl Workpiece {
             Layout::Pair { gap } => side_by_side(&parts, gap)?,
             Layout::Single | Layout::Jaw => parts.swap_remove(0),
         };
-        Workpiece::of(scenario, volume, seed)
+        Workpiece::of(scenario, Arc::new(volume), seed)
     }
 
     /// The workpiece of a session whose first volume is known: from a recording.
-    pub fn of(scenario: &Scenario, volume: Volume, seed: u64) -> Result<Workpiece, Unmakeable> {
+    pub fn of(scenario: &Scenario, volume: Arc<Volume>, seed: u64) -> Result<Workpiece, Unmakeable> {
         let mut teeth = Vec::new();
         let mut lesions = Vec::new();
         for (index, tooth) in scenario.scene.teeth.iter().enumerate() {

@@ -141,7 +141,7 @@ impl Source<'_> {
                 Found { value: Some(if voxel.is_some() { 1.0 } else { 0.0 }), evidence }
             }
             "remaining_dentine_thickness_min_mm" => {
-                self.deepest(self.shape.nearest(|s| s.removed && !s.vulnerable, |s| s.vulnerable), None)
+                self.deepest(self.shape.nearest(|s| s.removed() && !s.vulnerable(), |s| s.vulnerable()), None)
             }
             "force_max_n" => match seen.force.highest {
                 None => 0.0.into(),
@@ -209,14 +209,14 @@ impl Source<'_> {
     }
 
     fn overcut(&self) -> Found {
-        let any = self.shape.sets.iter().any(|s| s.removed && s.sound);
-        let farthest = self.shape.farthest(|s| s.removed && s.sound, |s| s.decay);
+        let any = self.shape.sets.iter().any(|s| s.removed() && s.sound());
+        let farthest = self.shape.farthest(|s| s.removed() && s.sound(), |s| s.decay());
         self.deepest(farthest, if any { None } else { Some(0.0) })
     }
 
     fn undercut(&self) -> Found {
-        let any = self.shape.sets.iter().any(|s| s.decay && !s.removed);
-        let farthest = self.shape.farthest(|s| s.decay && !s.removed, |s| s.removed);
+        let any = self.shape.sets.iter().any(|s| s.decay() && !s.removed());
+        let farthest = self.shape.farthest(|s| s.decay() && !s.removed(), |s| s.removed());
         self.deepest(farthest, if any { None } else { Some(0.0) })
     }
 
@@ -231,7 +231,7 @@ impl Source<'_> {
 
     fn evidence_at(&self, voxel: usize) -> Evidence {
         let grid = &self.shape.grid;
-        Evidence { at: self.seen.fell_at[voxel], place: grid.centre(grid.cell(voxel)) }
+        Evidence { at: self.seen.falls.at(voxel), place: grid.centre(grid.cell(voxel)) }
     }
 }
 

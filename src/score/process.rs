@@ -1,5 +1,6 @@
 //! How the work was done: force, speed and way, tick by tick.
 
+use super::falls::Falls;
 use super::shape::Danger;
 use crate::content::Role;
 use crate::frame::{Pose, Vec3};
@@ -61,7 +62,7 @@ pub struct Seen {
     pub neighbour_ticks: u64,
     /// Log dimensionless jerk.
     pub smoothness: Option<f64>,
-    pub fell_at: Vec<Option<Tick>>,
+    pub falls: Falls,
     pub trace: Trace,
 }
 
@@ -103,6 +104,8 @@ pub struct Watcher {
     now: Sample,
     /// Places of the tip in contact, every [`SPAN`] ticks, by unbroken spell of contact.
     spells: Vec<Vec<Vec3>>,
+    /// Voxels that became air, in the order of time.
+    fallen: Vec<(u32, Tick)>,
 }
 
 impl Watcher {
@@ -128,13 +131,14 @@ impl Watcher {
                 soft_ticks: 0,
                 neighbour_ticks: 0,
                 smoothness: None,
-                fell_at: vec![None; workpiece.volume.grid().len()],
+                falls: Falls::default(),
                 trace: Trace::default(),
             },
             last_place: None,
             was_touched: false,
             now,
             spells: Vec::new(),
+            fallen: Vec::new(),
         })
     }
 
@@ -142,9 +146,7 @@ impl Watcher {
         let tick = haptic.tick;
         let place = self.tooth_from_world * step.tip;
         self.seen.ticks = tick.0 + 1;
-        for edit in edits.iter().filter(|e| e.removes()) {
-            self.seen.fell_at[edit.index as usize] = Some(tick);
-        }
+        self.fallen.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, tick)));
         self.seen.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
         self.was_touched |= step.touch.is_some();
@@ -197,6 +199,7 @@ impl Watcher {
     }
 
     pub fn conclude(mut self) -> Seen {
+        self.seen.falls = Falls::sorted(self.fallen);
         self.seen.smoothness = log_dimensionless_jerk(&self.spells);
         self.seen
     }

@@ -1,5 +1,6 @@
 //! What was taken away, against what was to be taken away.
 
+use super::bits::Bits;
 use super::crop::Crop;
 use super::zones;
 use crate::content::Role;
@@ -16,18 +17,49 @@ pub struct Shape {
     /// One set of flags per voxel.
     pub sets: Vec<Sets>,
     /// The scenario's zones, in its order.
-    pub zones: Vec<Vec<bool>>,
+    pub zones: Vec<Bits>,
     pub counts: Counts,
 }
 
-/// What holds of one voxel.
+/// What holds of one voxel, a bit for each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sets {
-    pub removed: bool,
-    pub decay: bool,
-    pub target: bool,
-    pub sound: bool,
-    pub vulnerable: bool,
+pub struct Sets(u8);
+
+impl Sets {
+    const REMOVED: u8 = 1;
+    const DECAY: u8 = 2;
+    const TARGET: u8 = 4;
+    const SOUND: u8 = 8;
+    const VULNERABLE: u8 = 16;
+
+    fn with(self, bit: u8, holds: bool) -> Sets {
+        Sets(if holds { self.0 | bit } else { self.0 })
+    }
+
+    pub fn removed(self) -> bool {
+        self.0 & Sets::REMOVED != 0
+    }
+
+    pub fn decay(self) -> bool {
+        self.0 & Sets::DECAY != 0
+    }
+
+    pub fn target(self) -> bool {
+        self.0 & Sets::TARGET != 0
+    }
+
+    /// To be removed: decay, or a target.
+    pub fn wanted(self) -> bool {
+        self.0 & (Sets::DECAY | Sets::TARGET) != 0
+    }
+
+    pub fn sound(self) -> bool {
+        self.0 & Sets::SOUND != 0
+    }
+
+    pub fn vulnerable(self) -> bool {
+        self.0 & Sets::VULNERABLE != 0
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,7 +82,7 @@ pub struct Deepest {
 impl Shape {
     pub fn of(scenario: &Scenario, replay: &Replay) -> Shape {
         let initial = &replay.workpiece.volume;
-        let zones: Vec<Vec<bool>> = scenario.zones.iter().map(|z| zones::mask(z, initial)).collect();
+        let zones: Vec<Bits> = scenario.zones.iter().map(|z| zones::mask(z, initial)).collect();
         let targets: Vec<usize> = (0..zones.len()).filter(|&z| scenario.zones[z].role == ZoneRole::Target).collect();
         let role: [Option<Role>; 256] = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
         let mut counts = Counts::default();
@@ -61,46 +93,46 @@ impl Shape {
             }
             let role = role[usize::from(before.0)];
             let decay = role == Some(Role::Decay);
-            let set = Sets {
-                removed: after == Label::AIR,
-                decay,
-                target: if targets.is_empty() { decay } else { targets.iter().any(|&z| zones[z][index]) },
-                sound: role == Some(Role::Sound),
-                vulnerable: role == Some(Role::Vulnerable),
-            };
-            counts.add(&set);
+            let target = if targets.is_empty() { decay } else { targets.iter().any(|&z| zones[z].contains(index)) };
+            let set = Sets::default()
+                .with(Sets::REMOVED, after == Label::AIR)
+                .with(Sets::DECAY, decay)
+                .with(Sets::TARGET, target)
+                .with(Sets::SOUND, role == Some(Role::Sound))
+                .with(Sets::VULNERABLE, role == Some(Role::Vulnerable));
+            counts.add(set);
             set
         });
         let sets = sets.collect();
         Shape { grid: *initial.grid(), sets, zones, counts }
     }
 
-    fn indices(&self, holds: impl Fn(&Sets) -> bool) -> impl Iterator<Item = usize> {
-        self.sets.iter().enumerate().filter(move |(_, s)| holds(s)).map(|(i, _)| i)
+    fn indices(&self, holds: impl Fn(Sets) -> bool) -> impl Iterator<Item = usize> {
+        self.sets.iter().enumerate().filter(move |(_, s)| holds(**s)).map(|(i, _)| i)
     }
 
     /// The voxel of one set that is farthest from another; `None` when either is empty.
-    pub fn farthest(&self, of: impl Fn(&Sets) -> bool, from: impl Fn(&Sets) -> bool) -> Option<Deepest> {
+    pub fn farthest(&self, of: impl Fn(Sets) -> bool, from: impl Fn(Sets) -> bool) -> Option<Deepest> {
         self.extreme(of, from, |a, b| a > b)
     }
 
     /// The voxel of one set that is nearest to another; `None` when either is empty.
-    pub fn nearest(&self, of: impl Fn(&Sets) -> bool, to: impl Fn(&Sets) -> bool) -> Option<Deepest> {
+    pub fn nearest(&self, of: impl Fn(Sets) -> bool, to: impl Fn(Sets) -> bool) -> Option<Deepest> {
         self.extreme(of, to, |a, b| a < b)
     }
 
     fn extreme(
         &self,
-        of: impl Fn(&Sets) -> bool,
-        from: impl Fn(&Sets) -> bool,
+        of: impl Fn(Sets) -> bool,
+        from: impl Fn(Sets) -> bool,
         beats: impl Fn(f32, f32) -> bool,
     ) -> Option<Deepest> {
         let crop = Crop::around(&self.grid, 0, self.indices(|s| of(s) || from(s)))?;
-        let distances = distance::to_set(&crop.grid, |i| from(&self.sets[crop.whole_index(i)]));
+        let distances = distance::to_set(&crop.grid, |i| from(self.sets[crop.whole_index(i)]));
         let mut best: Option<Deepest> = None;
         for (index, &mm) in distances.iter().enumerate().filter(|(_, d)| d.is_finite()) {
             let voxel = crop.whole_index(index);
-            if of(&self.sets[voxel]) && best.is_none_or(|b| beats(mm, b.mm)) {
+            if of(self.sets[voxel]) && best.is_none_or(|b| beats(mm, b.mm)) {
                 best = Some(Deepest { mm, voxel });
             }
         }
@@ -109,14 +141,14 @@ impl Shape {
 
     /// Distances between the borders of R and T, both ways, in ascending order; `None` when either is empty.
     pub fn outline_distances(&self) -> Option<Vec<f32>> {
-        let crop = Crop::around(&self.grid, 1, self.indices(|s| s.removed || s.target))?;
+        let crop = Crop::around(&self.grid, 1, self.indices(|s| s.removed() || s.target()))?;
         let at = |i: usize| self.sets[crop.whole_index(i)];
-        let is_border = |i: usize, holds: &dyn Fn(&Sets) -> bool| {
+        let is_border = |i: usize, holds: &dyn Fn(Sets) -> bool| {
             // A voxel on the box's own edge has neighbours outside that hold nothing.
-            holds(&at(i)) && (crop.grid.neighbours(i).count() < 6 || crop.grid.neighbours(i).any(|n| !holds(&at(n))))
+            holds(at(i)) && (crop.grid.neighbours(i).count() < 6 || crop.grid.neighbours(i).any(|n| !holds(at(n))))
         };
-        let of_removed: Vec<bool> = (0..crop.grid.len()).map(|i| is_border(i, &|s| s.removed)).collect();
-        let of_target: Vec<bool> = (0..crop.grid.len()).map(|i| is_border(i, &|s| s.target)).collect();
+        let of_removed: Vec<bool> = (0..crop.grid.len()).map(|i| is_border(i, &|s| s.removed())).collect();
+        let of_target: Vec<bool> = (0..crop.grid.len()).map(|i| is_border(i, &|s| s.target())).collect();
         if !of_removed.contains(&true) || !of_target.contains(&true) {
             return None;
         }
@@ -132,28 +164,28 @@ impl Shape {
     /// The first vulnerable voxel that was removed or lies beside a removed one.
     pub fn exposed(&self) -> Option<usize> {
         let is_laid_open = |i: usize| {
-            self.sets[i].removed || self.grid.neighbours(i).any(|n| self.sets[n].removed && !self.sets[n].vulnerable)
+            self.sets[i].removed() || self.grid.neighbours(i).any(|n| self.sets[n].removed() && !self.sets[n].vulnerable())
         };
-        self.indices(|s| s.vulnerable).find(|&i| is_laid_open(i))
+        self.indices(|s| s.vulnerable()).find(|&i| is_laid_open(i))
     }
 
     /// Every voxel that is vulnerable and was removed or laid open.
     pub fn is_exposed(&self, voxel: usize) -> bool {
-        self.sets[voxel].vulnerable
-            && (self.sets[voxel].removed || self.grid.neighbours(voxel).any(|n| self.sets[n].removed))
+        self.sets[voxel].vulnerable()
+            && (self.sets[voxel].removed() || self.grid.neighbours(voxel).any(|n| self.sets[n].removed()))
     }
 
     /// 100·|R∩Z| / |Z|; `None` for an empty zone.
     pub fn zone_removed_pct(&self, zone: usize) -> Option<f64> {
-        let inside = self.zones[zone].iter().zip(&self.sets).filter(|(z, _)| **z);
-        let (all, removed) = inside.fold((0u32, 0u32), |(all, gone), (_, s)| (all + 1, gone + u32::from(s.removed)));
-        (all > 0).then(|| 100.0 * f64::from(removed) / f64::from(all))
+        let all = self.zones[zone].count();
+        let removed = self.zones[zone].iter().filter(|&v| self.sets[v].removed()).count();
+        (all > 0).then(|| 100.0 * removed as f64 / all as f64)
     }
 }
 
 impl Counts {
-    fn add(&mut self, set: &Sets) {
-        let Sets { removed, decay, target, .. } = *set;
+    fn add(&mut self, set: Sets) {
+        let (removed, decay, target) = (set.removed(), set.decay(), set.target());
         self.removed += usize::from(removed);
         self.decay += usize::from(decay);
         self.target += usize::from(target);

@@ -1,7 +1,7 @@
 //! A verdict on every voxel.
 
 use super::crop::Crop;
-use super::shape::{Sets, Shape};
+use super::shape::Shape;
 use crate::record::Replay;
 use crate::scenario::Scenario;
 use crate::scenario::file::ZoneRole;
@@ -104,22 +104,21 @@ pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
     let is_harmless = harmless(scenario, shape);
     let is_forbidden = |voxel: usize| {
         let mut zones = scenario.zones.iter().zip(&shape.zones);
-        zones.any(|(z, mask)| z.role == ZoneRole::NeverRemove && mask[voxel])
+        zones.any(|(z, mask)| z.role == ZoneRole::NeverRemove && mask.contains(voxel))
     };
     let verdict = |voxel: usize| {
         if initial.tissue(voxel) == Label::AIR {
             return Verdict::Outside;
         }
-        let Sets { removed, decay, target, sound, .. } = shape.sets[voxel];
-        let wanted = decay || target;
-        match (removed, wanted) {
+        let sets = shape.sets[voxel];
+        match (sets.removed(), sets.wanted()) {
             (true, _) if is_forbidden(voxel) => Verdict::VulnerableTouched,
             _ if shape.is_exposed(voxel) => Verdict::VulnerableTouched,
             (true, true) => Verdict::RightlyRemoved,
             (true, false) if is_harmless(voxel) => Verdict::WithinLeeway,
             (true, false) => Verdict::Overcut,
             (false, true) => Verdict::Left,
-            (false, false) if sound => Verdict::KeptSound,
+            (false, false) if sets.sound() => Verdict::KeptSound,
             (false, false) => Verdict::Kept,
         }
     };
@@ -128,16 +127,15 @@ pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
 
 /// Where removing sound tissue does no harm: in leeway zones, and within the leeway of what was to be removed.
 fn harmless<'a>(scenario: &'a Scenario, shape: &'a Shape) -> impl Fn(usize) -> bool + 'a {
-    let wanted = |s: &Sets| s.decay || s.target;
     let margin = (scenario.measures.leeway / shape.grid.spacing.min_element()).ceil() as u32 + 1;
-    let indices = (0..shape.grid.len()).filter(|&i| wanted(&shape.sets[i]));
+    let indices = (0..shape.grid.len()).filter(|&i| shape.sets[i].wanted());
     let near = Crop::around(&shape.grid, margin, indices).map(|crop| {
-        let distances = distance::to_set(&crop.grid, |i| wanted(&shape.sets[crop.whole_index(i)]));
+        let distances = distance::to_set(&crop.grid, |i| shape.sets[crop.whole_index(i)].wanted());
         (crop, distances)
     });
     move |voxel| {
         let in_zone =
-            scenario.zones.iter().zip(&shape.zones).any(|(z, mask)| z.role == ZoneRole::Leeway && mask[voxel]);
+            scenario.zones.iter().zip(&shape.zones).any(|(z, mask)| z.role == ZoneRole::Leeway && mask.contains(voxel));
         let is_near = near.as_ref().is_some_and(|(crop, distances)| {
             crop.index_of(voxel).is_some_and(|i| distances[i] <= scenario.measures.leeway)
         });

@@ -1,11 +1,13 @@
 //! Which voxels a zone holds.
 
+use super::bits::Bits;
+use super::crop::Crop;
 use crate::frame::Vec3;
 use crate::scenario::{Region, Zone};
 use crate::volume::{Grid, Label, Volume, distance};
 
 /// One flag per voxel of the volume at the start.
-pub fn mask(zone: &Zone, initial: &Volume) -> Vec<bool> {
+pub fn mask(zone: &Zone, initial: &Volume) -> Bits {
     let grid = initial.grid();
     match &zone.region {
         Region::Tissue(label) => initial.tissues().map(|l| l == *label).collect(),
@@ -26,21 +28,27 @@ pub fn mask(zone: &Zone, initial: &Volume) -> Vec<bool> {
         Region::Mask(mask) if mask.dims == grid.dims => {
             mask.is_inside.iter().zip(initial.tissues()).map(|(&inside, l)| inside && l != Label::AIR).collect()
         }
-        Region::Mask(_) => vec![false; grid.len()],
+        Region::Mask(_) => initial.tissues().map(|_| false).collect(),
     }
 }
 
-fn matter_where(initial: &Volume, is_inside: impl Fn(Vec3) -> bool) -> Vec<bool> {
+fn matter_where(initial: &Volume, is_inside: impl Fn(Vec3) -> bool) -> Bits {
     let grid: &Grid = initial.grid();
     let tissues = initial.tissues().zip(grid.cells());
     tissues.map(|(l, cell)| l != Label::AIR && is_inside(grid.centre(cell))).collect()
 }
 
 /// Matter within a distance of a tissue, the tissue itself left out.
-fn around(initial: &Volume, label: Label, within: f32) -> Vec<bool> {
-    let distance = distance::to_set(initial.grid(), |i| initial.tissue(i) == label);
-    let tissues = initial.tissues().zip(distance);
-    tissues.map(|(l, d)| l != Label::AIR && l != label && d <= within).collect()
+fn around(initial: &Volume, label: Label, within: f32) -> Bits {
+    let grid = initial.grid();
+    let is_label = |i: usize| initial.tissue(i) == label;
+    let margin = (within / grid.spacing.min_element()).ceil() as u32 + 1;
+    let Some(crop) = Crop::around(grid, margin, (0..grid.len()).filter(|&i| is_label(i))) else {
+        return initial.tissues().map(|_| false).collect();
+    };
+    let distance = distance::to_set(&crop.grid, |i| is_label(crop.whole_index(i)));
+    let is_near = |voxel: usize| crop.index_of(voxel).is_some_and(|i| distance[i] <= within);
+    initial.tissues().enumerate().map(|(i, l)| l != Label::AIR && l != label && is_near(i)).collect()
 }
 
 fn is_in_cylinder(point: Vec3, from: Vec3, to: Vec3, radius: f32) -> bool {

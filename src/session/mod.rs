@@ -8,7 +8,7 @@ mod operator;
 mod operator_file;
 
 pub use operator::Operator;
-pub use operator_file::OperatorFile;
+pub use operator_file::{ActionFile, OperatorFile};
 pub use run::{Observer, Progress, Trainee, run};
 
 use crate::content::Role;
@@ -17,13 +17,13 @@ use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
 use crate::sim::{Command, Setup, Step};
 use crate::tick::Tick;
 use crate::touch::Matter;
-use crate::volume::{Edit, Label};
+use crate::volume::{Edit, Label, Volume};
 use std::sync::Arc;
 
 /// The simulation of a scenario on a workpiece, for a device.
 pub fn setup(scenario: &Scenario, workpiece: &Workpiece, device: Spec) -> Setup {
     Setup {
-        matter: Matter { volume: workpiece.volume.clone(), around: workpiece.around.clone() },
+        matter: Matter { volume: Volume::clone(&workpiece.volume), around: workpiece.around.clone() },
         materials: scenario.tissues.materials(),
         instruments: scenario.instruments.iter().map(|i| i.make()).collect(),
         carving: scenario.carving,

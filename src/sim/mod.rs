@@ -222,6 +222,11 @@ impl Simulation {
         &self.matter.volume
     }
 
+    /// The matter as it is now, for whoever needs nothing else of the world.
+    pub fn into_volume(self) -> Volume {
+        self.matter.volume
+    }
+
     pub fn matter(&self) -> &Matter {
         &self.matter
     }

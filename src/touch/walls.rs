@@ -58,7 +58,7 @@ pub(super) fn find(planes: &mut Vec<Plane>, matter: &Matter, instrument: &Instru
         let distance = (ISO - density) * 2.0 * volume.band();
         let seen = match distance > CLOSE && radius > 0.0 {
             true => Sight { direction: feeler, normal: -feeler, distance },
-            false => Sight::along(volume, tip, feeler, radius).settled(volume, tip, radius),
+            false => Sight::along(volume, tip, feeler, radius).settled(volume, tip, radius).or_back(way),
         };
         planes.push(Plane {
             normal: seen.normal,
@@ -102,6 +102,12 @@ impl Sight {
             false => -direction,
         };
         Sight { direction, normal, distance: (ISO - density) * 2.0 * band }
+    }
+
+    /// A point has no centre to back out toward: where there is no slope, as in a pit of one voxel, it goes back the way
+    /// it came, or it would fall through.
+    fn or_back(self, way: Vec3) -> Sight {
+        if self.normal == Vec3::ZERO { Sight { normal: -way, ..self } } else { self }
     }
 
     /// Looks again where a ball truly meets matter: where its own normal and matter's are opposite.

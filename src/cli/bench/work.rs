@@ -1,0 +1,99 @@
+//! Work on whole volumes: distances, files, surfaces, pictures; and how long the program takes to start.
+
+use super::figures::{Figures, repeated};
+use crate::anatomy::Tissues;
+use crate::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
+use crate::content::{Library, TissueTable};
+use crate::diagnostic::{Diagnostic, Source};
+use crate::scenario::{self, Form, Forms, Scenario, Workpiece};
+use crate::volume::{Label, Volume, distance};
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::Arc;
+
+/// The exercise that is measured on.
+const GRINDING: (&str, &str) = ("scenarios/5-grinding.json", include_str!("../../../scenarios/5-grinding.json"));
+
+/// The lesion of every measured session: the same at every size.
+pub const SEED: u64 = 1;
+
+/// The grinding exercise on a given tooth.
+pub fn grinding(tooth: Volume) -> Result<(Arc<Scenario>, Arc<Workpiece>), String> {
+    let source = Source::new(GRINDING.0, GRINDING.1);
+    let mut scenario = scenario::resolve(source, &Library::shipped(), Forms::Made).map_err(lines)?;
+    let tooth = Arc::new(tooth);
+    for each in &mut scenario.scene.teeth {
+        each.form = Form::Given(tooth.clone());
+    }
+    drop(tooth);
+    let workpiece = Workpiece::make(&scenario, SEED).map_err(|e| e.to_string())?;
+    for each in &mut scenario.scene.teeth {
+        each.form = Form::Recorded;
+    }
+    Ok((Arc::new(scenario), Arc::new(workpiece)))
+}
+
+/// The labels of the shipped table.
+pub fn tissues() -> Result<Tissues, String> {
+    Ok(scenario::anatomy_tissues(&TissueTable::read(&Library::shipped()).map_err(lines)?))
+}
+
+fn lines(found: Vec<Diagnostic>) -> String {
+    found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n")
+}
+
+pub struct Work {
+    pub edt_ms: Figures,
+    pub load_ms: Figures,
+}
+
+pub fn on(tooth: &Volume) -> Result<Work, String> {
+    let edt_ms = repeated(1e3, || {
+        std::hint::black_box(distance::to_set(tooth.grid(), |i| tooth.tissue(i) == Label::AIR));
+    });
+    Ok(Work { edt_ms, load_ms: load_ms(tooth)? })
+}
+
+/// Reading the tooth from a compressed NRRD.
+fn load_ms(tooth: &Volume) -> Result<Figures, String> {
+    let image = Image {
+        geometry: Geometry::of(tooth.grid(), Space::LeftPosteriorSuperior),
+        samples: Samples::U8(tooth.densities().iter().map(|d| d.bits()).collect()),
+        keys: Vec::new(),
+    };
+    let bytes = nrrd::bytes(&image, Encoding::Gzip).map_err(|e| e.to_string())?;
+    drop(image);
+    let file = Scratch::new("nrrd");
+    std::fs::write(&file.0, bytes).map_err(|e| format!("{}: {e}", file.0.display()))?;
+    let mut failed = None;
+    let figures = repeated(1e3, || failed = nrrd::read(&file.0).err());
+    match failed {
+        Some(error) => Err(error.to_string()),
+        None => Ok(figures),
+    }
+}
+
+/// From the shell to the first line and back.
+pub fn startup_ms() -> Result<Figures, String> {
+    let program = std::env::current_exe().map_err(|e| e.to_string())?;
+    Ok(repeated(1e3, || {
+        let told = Command::new(&program).arg("--version").output();
+        std::hint::black_box(told.is_ok());
+    }))
+}
+
+/// A file that is gone with its name.
+pub struct Scratch(pub PathBuf);
+
+impl Scratch {
+    pub fn new(extension: &str) -> Scratch {
+        Scratch(std::env::temp_dir().join(format!("typodont-bench-{}.{extension}", std::process::id())))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // Gone already is as good.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
