@@ -118,8 +118,9 @@ fn a_point_never_falls_through_the_pit_it_has_cut() {
             let turn = tick as f32 * 0.004;
             let hand = Vec3::new(libm::cosf(turn), libm::sinf(turn), 1.0 - tick as f32 * 0.0006);
             let step = sim.step(&Reading::at(hand));
-            // A point hardly cuts: after 3.6 s its groove is a tenth of a millimetre deep, its hand 2.6 mm.
-            assert!(step.tip.z > -0.3, "spacing {spacing}, tick {tick}: the tip is at {} for a hand at {hand}", step.tip);
+            // Decay yields where the spring pulls by 2.2 mm; a tip that fell through would pull by nothing.
+            let stretch = step.tip.distance(hand);
+            assert!(hand.z > -2.0 || stretch > 1.5, "spacing {spacing}, tick {tick}: tip {}, hand {hand}", step.tip);
         }
     }
 }

@@ -220,7 +220,8 @@ impl Cohort {
     pub fn text(&self) -> String {
         let mut lines = Vec::new();
         for scenario in self.summary().scenarios {
-            lines.push(format!("{} ({} sessions)", scenario.title, scenario.sessions));
+            let plural = if scenario.sessions == 1 { "" } else { "s" };
+            lines.push(format!("{} ({} session{plural})", scenario.title, scenario.sessions));
             if let Some(points) = scenario.points_mean {
                 let (passed, graded) = (scenario.passed, scenario.graded);
                 lines.push(format!("  {passed} of {graded} passed, {} points on average", words::number(points)));

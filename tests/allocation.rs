@@ -1,0 +1,44 @@
+//! A step never allocates: not in free space, not in contact, not while cutting, not when a reading is bad.
+
+mod phantom;
+
+use phantom::*;
+use typodont::device::Reading;
+use typodont::frame::Vec3;
+use typodont::sim::{Command, Simulation};
+use typodont::touch::{Form, Instrument, Shape, WorkingEnd};
+use typodont::volume::Label;
+
+#[test]
+fn a_step_never_allocates() {
+    let block = volume([120, 90, 90], 0.1, |p| (p.z, if p.x > 0.0 { SOFT } else { HARD }));
+    let mut setup = setup(block, WorkingEnd::Ball { radius: 0.7 }, true);
+    setup.instruments.push(Instrument::new(WorkingEnd::Point, false));
+    setup.instruments.push(Instrument::new(WorkingEnd::Ball { radius: 1.15 }, true));
+    let form = Form::RoundBox { half: Vec3::splat(2.0), rounding: 0.5 };
+    setup.matter.around = vec![Shape { label: Label(9), tooth_from_shape: typodont::frame::Pose::at(Vec3::Y * 7.0), form }];
+    let mut sim = Simulation::new(setup);
+    let mut cut = 0;
+    let mut touched = 0;
+    let counted = allocation_counter::measure(|| {
+        for tick in 0..20_000u32 {
+            match tick {
+                8_000 => sim.apply(&Command::Take { instrument: 1 }),
+                12_000 => sim.apply(&Command::Take { instrument: 2 }),
+                15_000 => sim.apply(&Command::SetStiffness { label: SOFT, stiffness: 0.4 }),
+                _ => {}
+            }
+            let turn = tick as f32 * 0.002;
+            let depth = 3.5 * libm::sinf(tick as f32 * 0.0016);
+            let mut hand = Vec3::new(3.0 * libm::cosf(turn), 3.0 * libm::sinf(turn * 0.7), -depth);
+            if tick % 4_999 == 0 {
+                hand.x = f32::NAN;
+            }
+            let step = sim.step(&Reading::at(hand));
+            cut += u32::from(step.cutting);
+            touched += u32::from(step.touch.is_some());
+        }
+    });
+    assert!(cut > 500 && touched > 2_000, "the course must do what is measured: {cut} cut, {touched} touched");
+    assert_eq!(counted.count_total, 0, "{counted:?}");
+}

@@ -1,0 +1,104 @@
+//! The four shipped operators are what their names say, in every exercise and every measure where it shows.
+
+mod bundle;
+
+use bundle::*;
+use serde_json::Value;
+
+const OPERATORS: [&str; 4] = ["expert", "careful", "hasty", "timid"];
+
+/// Seeds of the exercises: lesions in different quarters and on either tooth.
+const SEEDS: [&str; 3] = ["1", "2", "3"];
+
+/// A measure's mean over the seeds, by operator; `None` where none of an operator's sessions has it.
+fn means(scenario: &str) -> impl Fn(&str, &str) -> Option<f64> {
+    let out = folder(&format!("operators_{}", scenario.replace('/', "_")));
+    let mut sessions: Vec<(&str, Vec<Value>)> = Vec::new();
+    for operator in OPERATORS {
+        let of_seed = |seed: &&str| session(&run(scenario, operator, &out, &["--seed", seed]));
+        sessions.push((operator, SEEDS.iter().map(of_seed).collect()));
+    }
+    move |operator, name| {
+        let found = sessions.iter().find(|(o, _)| *o == operator).unwrap();
+        let value = |s: &Value| if name == "points" { s["grade"]["points"].as_f64() } else { metric(s, name) };
+        let values: Vec<f64> = found.1.iter().filter_map(value).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    }
+}
+
+/// Asserts that a measure grows along a list of operators, and says by how much.
+fn grows(mean: &impl Fn(&str, &str) -> Option<f64>, name: &str, operators: &[&str]) {
+    let values: Vec<f64> = operators.iter().map(|o| mean(o, name).unwrap_or_else(|| panic!("{o} has no {name}"))).collect();
+    println!("{name}: {operators:?} {values:.3?}");
+    assert!(values.windows(2).all(|w| w[0] < w[1]), "{name} of {operators:?}: {values:?}");
+}
+
+/// Asserts that a measure grows or stays along a list of operators.
+fn never_falls(mean: &impl Fn(&str, &str) -> Option<f64>, name: &str, operators: &[&str]) {
+    let values: Vec<f64> = operators.iter().map(|o| mean(o, name).unwrap_or_else(|| panic!("{o} has no {name}"))).collect();
+    println!("{name}: {operators:?} {values:.3?}");
+    assert!(values.windows(2).all(|w| w[0] <= w[1]), "{name} of {operators:?}: {values:?}");
+}
+
+#[test]
+fn grinding_tells_them_apart() {
+    let mean = means("scenarios/5-grinding.json");
+    grows(&mean, "time_to_clear_s", &["hasty", "expert", "careful"]);
+    grows(&mean, "force_max_n", &["timid", "careful", "hasty"]);
+    grows(&mean, "force_max_n", &["expert", "hasty"]);
+    grows(&mean, "force_mean_n", &["timid", "careful", "hasty"]);
+    grows(&mean, "speed_max_mm_s", &["careful", "hasty"]);
+    grows(&mean, "efficiency_pct_s", &["careful", "expert"]);
+    grows(&mean, "decay_cleared_pct", &["timid", "careful"]);
+    grows(&mean, "decay_cleared_pct", &["timid", "expert"]);
+    grows(&mean, "recall", &["timid", "expert"]);
+    grows(&mean, "undercut_depth_max_mm", &["expert", "timid"]);
+    for calm in ["timid", "careful", "expert"] {
+        grows(&mean, "healthy_per_decay_pct", &[calm, "hasty"]);
+        grows(&mean, "overcut_depth_max_mm", &[calm, "hasty"]);
+        grows(&mean, "hausdorff95_mm", &[calm, "hasty"]);
+        grows(&mean, "precision", &["hasty", calm]);
+        grows(&mean, "remaining_dentine_thickness_min_mm", &["hasty", calm]);
+    }
+    for better in ["careful", "expert"] {
+        grows(&mean, "dice", &["timid", better]);
+        grows(&mean, "dice", &["hasty", better]);
+        grows(&mean, "points", &["timid", better]);
+        grows(&mean, "points", &["hasty", better]);
+        never_falls(&mean, "surface_within_tol(0.3)", &["hasty", better]);
+        // Nearer to zero is smoother.
+        grows(&mean, "jerk", &["hasty", better]);
+    }
+}
+
+#[test]
+fn searching_tells_them_apart() {
+    for (scenario, right, time) in [
+        ("scenarios/3-detection.json", "detect_tooth", "detect_level_time_s"),
+        ("scenarios/4-diagnosis.json", "detect_quadrant", "detect_quadrant_time_s"),
+    ] {
+        let mean = means(scenario);
+        for operator in OPERATORS {
+            println!("{scenario} {operator}: right {:?}, after {:?} s", mean(operator, right), mean(operator, time));
+        }
+        grows(&mean, "force_max_n", &["timid", "hasty"]);
+        grows(&mean, "force_max_n", &["careful", "hasty"]);
+        grows(&mean, "session_time_s", &["hasty", "careful"]);
+        assert_eq!(mean("expert", right), Some(1.0), "the expert finds it: {scenario}");
+        assert_eq!(mean("careful", right), Some(1.0), "the careful one finds it: {scenario}");
+        let of_timid = mean("timid", right).unwrap_or(0.0);
+        assert!(of_timid < 1.0 || mean("timid", time) > mean("careful", time), "the timid one finds it later or not");
+    }
+}
+
+#[test]
+fn everyone_gets_through_the_introductions() {
+    for scenario in ["scenarios/1-introduction.json", "scenarios/2-decay.json"] {
+        let mean = means(scenario);
+        grows(&mean, "session_time_s", &["hasty", "careful"]);
+        grows(&mean, "force_max_n", &["timid", "hasty"]);
+        for operator in OPERATORS {
+            assert!(mean(operator, "contact_time_s") > Some(0.0), "{operator} touches the tooth: {scenario}");
+        }
+    }
+}
