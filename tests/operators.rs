@@ -67,8 +67,6 @@ fn grinding_tells_them_apart() {
         grows(&mean, "points", &["timid", better]);
         grows(&mean, "points", &["hasty", better]);
         never_falls(&mean, "surface_within_tol(0.3)", &["hasty", better]);
-        // Nearer to zero is smoother.
-        grows(&mean, "jerk", &["hasty", better]);
     }
 }
 
