@@ -46,7 +46,7 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-fn spacing(text: &str) -> Result<f32, String> {
+pub fn spacing(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(mm) if (0.01..=2.0).contains(&mm) => Ok(mm),
         _ => Err("a distance between voxels lies between 0.01 and 2 mm".into()),

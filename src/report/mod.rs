@@ -13,6 +13,7 @@ mod session_file;
 mod words;
 
 pub use html::Templates;
+pub use labelmap::tissues as tissue_map;
 pub use pictures::preview_png;
 pub use session_file::{
     AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
