@@ -35,7 +35,7 @@ pub(super) struct Levels {
 
 impl Levels {
     pub(super) fn of(grid: &Grid, values: &[f32], background: f32, solid_from: f32) -> Result<Levels, Unclear> {
-        let depth = distance::to_set(grid, |i| !(values[i] >= solid_from));
+        let depth = distance::to_set(grid, |i| values[i] < solid_from);
         let deep = DEEP * grid.spacing.max_element();
         let core = || values.iter().zip(&depth).filter(|&(_, &depth)| depth > deep).map(|(&value, _)| value);
         let histogram = Histogram::of(core).ok_or(Unclear::OneLevel)?;

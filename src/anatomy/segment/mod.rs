@@ -75,6 +75,7 @@ pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &Tissues) -> Result<Volum
     let window = window_of_tooth(grid, &values, solid_from)?;
     let background = levels::background(&values, solid_from);
     let mut values = window.cut(values, background);
+    values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = background);
     let grid = &window.grid;
 
     let levels = Levels::of(grid, &values, background, solid_from)?;
