@@ -5,8 +5,11 @@
 use glam::DVec3;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use typodont::anatomy::Tissues;
 use typodont::content::nrrd::segmentation::{self, Segmentation};
 use typodont::content::nrrd::{self, Encoding, Samples, Space};
+use typodont::content::scan;
+use typodont::volume::Label;
 
 /// The file's path; without the file the test says loudly that it did nothing.
 fn find(name: &str) -> Option<PathBuf> {
@@ -38,6 +41,39 @@ fn the_ge_tooth_has_its_three_peaks() {
         let bytes = nrrd::bytes(&image, encoding).unwrap();
         assert_eq!(nrrd::parse(&bytes).unwrap(), image, "{encoding:?}");
     }
+}
+
+#[test]
+fn the_ge_tooth_becomes_enamel_over_dentine_over_pulp() {
+    // Aim: no plane, no skin of dentine on the crown, canals filled. Method: counts, and the surface of the upper crown.
+    let Some(path) = find("ge-tooth/tooth_u8_103x94x161.nrrd") else { return };
+    let tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+    let image = nrrd::read(&path).unwrap();
+    let tooth = scan::segmented(&image, Some([0.2; 3]), &tissues).unwrap();
+    let shares = [tissues.enamel, tissues.dentine, tissues.pulp].map(|tissue| tooth.count(tissue));
+    for (found, expected) in shares.into_iter().zip([106_000, 272_000, 21_000]) {
+        assert!(found.abs_diff(expected) * 10 < expected, "{shares:?}");
+    }
+    let grid = tooth.grid();
+    let [mut enamel, mut other] = [0, 0];
+    for (index, cell) in grid.cells().enumerate() {
+        let is_surface = || grid.neighbours(index).any(|n| tooth.tissue(n) == Label::AIR);
+        if grid.centre(cell).z > 4.0 && tooth.tissue(index) != Label::AIR && is_surface() {
+            *(if tooth.tissue(index) == tissues.enamel { &mut enamel } else { &mut other }) += 1;
+        }
+    }
+    assert!(enamel > 8000 && other == 0, "{enamel} of enamel, {other} not");
+    assert!(scan::segmented(&image, None, &tissues).unwrap_err().contains("give tooth spacing"));
+}
+
+#[test]
+fn a_drawn_tooth_keeps_every_voxel() {
+    let Some(path) = find("openmandible/openmandible_FDI36_0.2mm.seg.nrrd") else { return };
+    let image = nrrd::read(&path).unwrap();
+    let names = (1..=3).map(|number| (number, Label(number + 3))).collect();
+    let tooth = scan::labelled(&image, None, &names).unwrap();
+    let drawn = segmentation::read(&path).unwrap();
+    assert_eq!([4, 5, 6].map(|n| tooth.count(Label(n))), [1, 2, 3].map(|n| drawn.count(n)));
 }
 
 #[test]

@@ -13,7 +13,13 @@ mod shape;
 mod grow;
 pub mod molar;
 mod pieces;
+mod window;
+mod slope;
+mod turn;
+pub mod segment;
+mod charted;
 
+pub use charted::charted;
 pub use form::Form;
 pub use grow::{grid_fitting, grid_of_spacing, grow};
 
