@@ -21,15 +21,18 @@ const FILL_SHARE: f32 = 0.17;
 const WRAP: f32 = 0.2;
 
 /// Light lost where a surface turns away from the eye: draws a pale tooth's outline on white paper.
-const RIM: f32 = 0.28;
+const RIM: f32 = 0.2;
 
 /// Gloss of wet enamel, as a share of full light, and how tight its highlight is.
 const GLOSS: f32 = 0.10;
 const GLOSS_TIGHTNESS: i32 = 28;
 
+/// Shade on a tooth is warm, because light comes through it: the share by which red gains and blue loses there.
+const WARMTH: f32 = 0.12;
+
 /// Surroundings that a place's depth is compared with: half their width, mm, and the share of light that is lost at most.
-/// The finest shows fissures, the widest a cavity's floor. 0.45 in all still tells colours.
-const HOLLOWS: [(f32, f32); 3] = [(0.25, 0.22), (0.7, 0.24), (1.8, 0.22)];
+/// The finest shows fissures, the widest a cavity's floor. 0.6 in all still tells colours.
+const HOLLOWS: [(f32, f32); 3] = [(0.25, 0.24), (0.7, 0.22), (1.8, 0.16)];
 
 /// Fills in the light that falls on a hit; `hollow` is the share of light lost in hollows there.
 pub fn lit(camera: &Camera, hit: Hit, hollow: f32) -> Hit {
@@ -39,7 +42,8 @@ pub fn lit(camera: &Camera, hit: Hit, hollow: f32) -> Hit {
     let from_fill = normal.dot(fill).max(0.0);
     let away = 1.0 - normal.z.clamp(0.0, 1.0);
     let rim = 1.0 - RIM * away * away;
-    let open = 1.0 - hollow;
+    // At its outline a surface is deeper than its surroundings without being a hollow.
+    let open = 1.0 - hollow * (0.3 + 0.7 * normal.z.clamp(0.0, 1.0));
     let light = (AMBIENT + KEY_SHARE * from_key + FILL_SHARE * from_fill) * rim * open;
     let half = (key + Vec3::Z).normalize();
     let gloss = GLOSS * normal.dot(half).max(0.0).powi(GLOSS_TIGHTNESS) * open;
@@ -48,9 +52,11 @@ pub fn lit(camera: &Camera, hit: Hit, hollow: f32) -> Hit {
 
 /// A colour as a screen shows it, in the light of a hit.
 pub fn shade(colour: [f32; 3], hit: &Hit) -> [f32; 4] {
+    let lost = (1.0 - hit.light).max(0.0);
     // A square is near enough to a screen's curve, and the same on every machine.
-    let [red, green, blue] = colour.map(|c| (c * c * hit.light + hit.gloss * 0.8).min(1.0).sqrt());
-    [red, green, blue, 1.0]
+    let lit = |c: f32, warmth: f32| (c * c * (hit.light + warmth * lost * hit.light) + hit.gloss).min(1.0).sqrt();
+    let [red, green, blue] = colour;
+    [lit(red, WARMTH), lit(green, 0.0), lit(blue, -WARMTH), 1.0]
 }
 
 /// Per pixel, the share of light lost because it lies deeper than what is around it.

@@ -87,13 +87,18 @@ fn look_with(volume: &Volume, shot: &Shot, threads: usize) -> View {
     View { width, height, hits, edges }
 }
 
-/// Pixels whose neighbours see something else: nothing, something much nearer, or a surface turned elsewhere.
+/// Pixels whose neighbours see something else: nothing, a surface turned elsewhere, or one that is not its continuation.
 fn edge_pixels(hits: &[Option<Hit>], width: usize, pixel: f32) -> Vec<usize> {
-    /// Cosine between normals, 25°; and slope of depth, 76°, from which one sample shows stairs.
+    /// Cosine between normals: 25°.
     const TURNED: f32 = 0.906;
-    const STEEP: f32 = 4.0;
+    /// How far a neighbour lies off the plane through a hit, in pixels.
+    const OFF: f32 = 0.8;
     let differ = |a: &Option<Hit>, b: &Option<Hit>| match (a, b) {
-        (Some(a), Some(b)) => a.normal.dot(b.normal) < TURNED || (a.depth - b.depth).abs() > STEEP * pixel,
+        (Some(a), Some(b)) => {
+            let step = b.point - a.point;
+            let off = a.normal.dot(step).abs().max(b.normal.dot(step).abs());
+            a.normal.dot(b.normal) < TURNED || off > OFF * pixel
+        }
         (a, b) => a.is_some() != b.is_some(),
     };
     let is_edge = |i: usize| {
