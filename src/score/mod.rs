@@ -11,6 +11,7 @@ mod shape;
 mod verdict;
 mod zones;
 
+pub(crate) use crop::Crop;
 pub use grade::{Grade, HardFailResult, ItemResult};
 pub use measures::{Evidence, Measure, Measures};
 pub use process::{Sample, Trace};

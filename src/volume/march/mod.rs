@@ -141,26 +141,34 @@ fn add(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-/// The colour of the surface at a point of tooth space: the voxels around it, as much as each holds there.
+/// The colour of the surface at a point of tooth space: that of the solid voxels around it, each as much as it is near.
 pub fn surface_colour(volume: &Volume, point_in_tooth: Vec3, colour: impl Fn(Label, usize) -> [f32; 3]) -> [f32; 3] {
-    let grid = volume.grid();
-    let at = grid.from_tooth(point_in_tooth);
+    let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
+    around(volume, volume.grid().from_tooth(point_in_tooth), |label, index, share| {
+        sum += Vec3::from(colour(label, index)) * share;
+        weight += share;
+    });
+    if weight > 0.0 { (sum / weight).to_array() } else { [0.5; 3] }
+}
+
+/// Calls `see` with the label, index and share (0–1) of each solid voxel around a place given in voxel steps.
+fn around(volume: &Volume, at: Vec3, mut see: impl FnMut(Label, usize, f32)) {
+    let dims = volume.grid().dims;
     let base = at.floor();
     let part = at - base;
-    let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
     for corner in 0..8 {
         let offset = Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32);
-        let Some(cell) = grid.nearest(grid.origin + (base + offset) * grid.spacing) else { continue };
-        let index = grid.index(cell);
-        let voxel = volume.voxel(index);
-        if voxel.label != Label::AIR {
-            let near = Vec3::ONE - (offset - part).abs();
-            let share = near.x * near.y * near.z * voxel.density.unit();
-            sum += Vec3::from(colour(voxel.label, index)) * share;
-            weight += share;
+        let cell = base + offset;
+        let near = Vec3::ONE - (offset - part).abs();
+        let share = near.x * near.y * near.z;
+        if share > 0.0 && (0..3).all(|a| cell[a] >= 0.0 && cell[a] < dims[a] as f32) {
+            let index = volume.grid().index([0, 1, 2].map(|a| cell[a] as u32));
+            let label = volume.tissue(index);
+            if label != Label::AIR {
+                see(label, index, share);
+            }
         }
     }
-    if weight > 0.0 { (sum / weight).to_array() } else { [0.5; 3] }
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! A cut through a volume, flat and crisp.
 
 use super::rows::{in_rows, processors};
-use super::{Picture, Shot, add};
+use super::{Picture, Shot, add, around};
 use crate::frame::Vec3;
 use crate::volume::{ISO, Label, Volume};
 
@@ -84,25 +84,12 @@ impl<'a> Cut<'a> {
         if self.volume.density_in_grid(at) < ISO {
             return None;
         }
-        let base = at.floor();
-        let part = at - base;
         let mut found: [([f32; 3], f32); 8] = [([0.0; 3], 0.0); 8];
-        for corner in 0..8 {
-            let offset = Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32);
-            let near = Vec3::ONE - (offset - part).abs();
-            let share = near.x * near.y * near.z;
-            let Some(cell) = grid.nearest(grid.origin + (base + offset) * grid.spacing).filter(|_| share > 0.0) else {
-                continue;
-            };
-            let index = grid.index(cell);
-            let label = self.volume.labels()[index];
-            if label != Label::AIR {
-                let own = colour(label, index);
-                let place = found.iter().position(|(c, weight)| *weight == 0.0 || *c == own).unwrap_or(0);
-                found[place].0 = own;
-                found[place].1 += share;
-            }
-        }
+        around(self.volume, at, |label, index, share| {
+            let own = colour(label, index);
+            let place = found.iter().position(|(c, weight)| *weight == 0.0 || *c == own).unwrap_or(0);
+            found[place] = (own, found[place].1 + share);
+        });
         let heaviest = found.iter().fold(&found[0], |best, next| if next.1 > best.1 { next } else { best });
         (heaviest.1 > 0.0).then_some(heaviest.0)
     }
