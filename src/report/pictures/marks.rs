@@ -10,6 +10,9 @@ const INK: [f32; 3] = [0.35, 0.37, 0.40];
 const STROKE: f32 = 1.5;
 const LETTER: f32 = 11.0;
 
+/// Paper left around strokes that cross the tooth, pixels.
+const HALO: f32 = 2.5;
+
 /// Space to the picture's edge, pixels.
 const MARGIN: f32 = 10.0;
 
@@ -135,13 +138,14 @@ fn stroke(picture: &mut Picture, lines: &[Vec<[f32; 2]>]) {
     let ends = |axis: usize| lines.iter().flatten().map(move |p| p[axis]);
     let span = |axis: usize| {
         let (low, high) = (ends(axis).fold(f32::INFINITY, f32::min), ends(axis).fold(0.0, f32::max));
-        (low - STROKE).floor() as i64..=(high + STROKE).ceil() as i64
+        (low - HALO - STROKE).floor() as i64..=(high + HALO + STROKE).ceil() as i64
     };
     for y in span(1) {
         for x in span(0) {
             let point = [x as f32 + 0.5, y as f32 + 0.5];
             let legs = lines.iter().flat_map(|line| line.windows(2));
             let off = legs.map(|leg| distance(point, leg[0], leg[1])).fold(f32::INFINITY, f32::min);
+            picture.dab(x, y, PAPER, 0.7 * (0.5 * STROKE + HALO - off).clamp(0.0, 1.0));
             picture.dab(x, y, INK, (0.5 * STROKE + 0.5 - off).clamp(0.0, 1.0));
         }
     }

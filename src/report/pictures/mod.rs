@@ -102,7 +102,7 @@ fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn;
     [
         (Shows::Before, first.paint(before, |label, _| palette.tissue(label))),
         (Shows::After, last.paint(after, |label, _| palette.tissue(label))),
-        (Shows::Map, last.paint(after, |label, voxel| tint.colour(voxel).unwrap_or(kept(label, voxel)))),
+        (Shows::Map, last.paint(after, |label, voxel| tint.colour(voxel, kept(label, voxel)))),
     ]
     .map(|(shows, pixels)| Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot)))
 }
@@ -179,7 +179,7 @@ fn middle_of_work(scored: &Scored) -> Vec3 {
 pub fn parts(scored: &Scored) -> Vec<Part> {
     let after = &scored.replay.volume;
     let tint = Tint::of(scored);
-    let colour = |_, voxel: usize| tint.colour(voxel).unwrap_or(scored.verdicts[voxel].color());
+    let colour = |_, voxel: usize| tint.colour(voxel, scored.verdicts[voxel].color());
     let mesh = surface::extract(after);
     let colors = mesh.positions.iter().map(|p| tint::linear(march::surface_colour(after, *p, colour))).collect();
     let left = surface::of_mask(after.grid(), |voxel| scored.verdicts[voxel] == Verdict::Left);

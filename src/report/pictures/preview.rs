@@ -6,7 +6,7 @@ use crate::content::Role;
 use crate::frame::Vec3;
 use crate::scenario::{Scenario, Workpiece};
 use crate::volume::march::{self, Camera, Picture, Shot, Side};
-use crate::volume::{Density, Volume};
+use crate::volume::{Label, Volume, surface};
 
 /// Decay seen through what covers it: its colour, and how much of it shows.
 const MARK: [f32; 3] = [0.83, 0.18, 0.10];
@@ -21,26 +21,25 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece) -> Vec<u8> {
     let seen = |side: Side| {
         let shot = Shot { camera: Camera::framing(side, &workpiece.volume, 1.0), width: SIZE, height: SIZE };
         let mut picture = march::iso(&workpiece.volume, &shot, |label, _| palette.tissue(label));
-        picture.lay_over(&marked(&march::iso(&decay, &shot, |_, _| MARK)));
+        if let Some(decay) = &decay {
+            picture.lay_over(&marked(&march::iso(decay, &shot, |_, _| MARK)));
+        }
         marks::on_paper(&picture, &shot)
     };
     let shot = crown_shot(Side::Mesial, tooth_at(&workpiece.teeth, middle));
     let mut cut = march::slice(&workpiece.volume, &shot, middle, |label, _| palette.tissue(label));
-    cut.lay_over(&march::outline(&decay, &shot, middle, MARK, LINE_WIDTH));
+    if let Some(decay) = &decay {
+        cut.lay_over(&march::outline(decay, &shot, middle, MARK, LINE_WIDTH));
+    }
     cut.lay_over(&march::outline(&workpiece.volume, &shot, middle, LINE, LINE_WIDTH));
     let sides = seen(Side::Occlusal).beside(&seen(nearest_side(workpiece, middle)));
     png(&sides.beside(&marks::on_paper(&cut, &shot)))
 }
 
 /// The decay without the tooth.
-fn decay_alone(scenario: &Scenario, volume: &Volume) -> Volume {
-    let is_decay: [bool; 256] =
-        std::array::from_fn(|l| scenario.tissues.role(crate::volume::Label(l as u8)) == Some(Role::Decay));
-    let density = volume
-        .tissues()
-        .zip(volume.densities())
-        .map(|(label, density)| if is_decay[usize::from(label.0)] { *density } else { Density::EMPTY });
-    Volume::new(*volume.grid(), volume.band(), density.collect(), volume.labels().to_vec(), crate::volume::Label(1))
+fn decay_alone(scenario: &Scenario, volume: &Volume) -> Option<Volume> {
+    let is_decay: [bool; 256] = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)) == Some(Role::Decay));
+    surface::volume_of_mask(volume.grid(), |voxel| is_decay[usize::from(volume.tissue(voxel).0)], Label(1))
 }
 
 /// The side of the tooth to which a point is nearest.

@@ -20,8 +20,7 @@ impl Palette {
     /// What was kept steps back behind what was done: its verdict's colour, with a touch of its tissue's.
     pub fn quiet(&self, label: Label, verdict: Verdict) -> [f32; 3] {
         const TOUCH: f32 = 0.35;
-        let (own, tissue) = (verdict.color(), self.tissue(label));
-        std::array::from_fn(|i| own[i] + (tissue[i] - own[i]) * TOUCH)
+        mixed(verdict.color(), self.tissue(label), TOUCH)
     }
 }
 
@@ -35,7 +34,10 @@ pub struct Tint<'a> {
 }
 
 /// The same in voxels: a wall's own voxels touch removed ones, if only at a corner.
-const REACH: f32 = 1.8;
+const REACH: f32 = 2.4;
+
+/// The last part of the reach, over which the colour fades, so that a cavity's rim shows no stairs.
+const FADE: f32 = 0.5;
 
 impl<'a> Tint<'a> {
     pub fn of(scored: &'a Scored) -> Tint<'a> {
@@ -50,20 +52,25 @@ impl<'a> Tint<'a> {
         Tint { scored, near, reach: REACH * grid.spacing.max_element() }
     }
 
-    /// The colour of a solid voxel on the surface; `None` where nothing was done.
-    pub fn colour(&self, voxel: usize) -> Option<[f32; 3]> {
+    /// The colour of a solid voxel on the surface, where `kept` is that of a place where nothing was done.
+    pub fn colour(&self, voxel: usize, kept: [f32; 3]) -> [f32; 3] {
         match self.scored.verdicts[voxel] {
-            own @ (Verdict::Left | Verdict::VulnerableTouched) => Some(own.color()),
-            _ => self.bounded(voxel).map(Verdict::color),
+            own @ (Verdict::Left | Verdict::VulnerableTouched) => own.color(),
+            _ => self.bounded(voxel).map_or(kept, |(verdict, share)| mixed(kept, verdict.color(), share)),
         }
     }
 
-    /// The verdict on what was taken away beside a voxel.
-    fn bounded(&self, voxel: usize) -> Option<Verdict> {
+    /// The verdict on what was taken away beside a voxel, and how much of it shows there.
+    fn bounded(&self, voxel: usize) -> Option<(Verdict, f32)> {
         let (crop, distances, nearest) = self.near.as_ref()?;
-        let place = crop.index_of(voxel).filter(|&i| distances[i] <= self.reach)?;
-        Some(self.scored.verdicts[crop.whole_index(nearest[place] as usize)])
+        let place = crop.index_of(voxel).filter(|&i| distances[i] < self.reach)?;
+        let share = ((self.reach - distances[place]) / (FADE * self.reach)).min(1.0);
+        Some((self.scored.verdicts[crop.whole_index(nearest[place] as usize)], share))
     }
+}
+
+fn mixed(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
+    std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share)
 }
 
 /// A screen's colour as linear light (IEC 61966-2-1).

@@ -14,6 +14,9 @@ const STEP_IN_AIR: f32 = 1.6;
 const HALVINGS: u32 = 1;
 const SECANTS: u32 = 3;
 
+/// How far around a point its gradient is taken, in voxels along each axis.
+const SMOOTHING: f32 = 0.8;
+
 /// Follows rays that go straight away from a camera.
 pub struct Marcher<'a> {
     volume: &'a Volume,
@@ -123,9 +126,16 @@ impl<'a> Marcher<'a> {
         let depth = 0.5 * (outside + inside);
         let grid = self.volume.grid();
         let point = grid.origin + (start + self.along * depth) * grid.spacing;
-        let (_, gradient) = self.volume.density_and_gradient_at(point);
-        let normal = (-gradient).try_normalize().unwrap_or(self.camera.back());
+        let normal = self.normal(point).unwrap_or(self.camera.back());
         Hit { point, normal, depth, light: 1.0, gloss: 0.0 }
+    }
+
+    /// Outward, from gradients around a point: stairs that carving along voxels leaves do not catch the light.
+    fn normal(&self, point_in_tooth: Vec3) -> Option<Vec3> {
+        let reach = SMOOTHING * self.volume.grid().spacing;
+        let corners = [Vec3::ONE, Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0)];
+        let gradient = |corner: Vec3| self.volume.density_and_gradient_at(point_in_tooth + corner * reach).1;
+        (-corners.into_iter().map(gradient).sum::<Vec3>()).try_normalize()
     }
 }
 

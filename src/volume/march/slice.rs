@@ -84,7 +84,7 @@ impl<'a> Cut<'a> {
         if self.volume.density_in_grid(at) < ISO {
             return None;
         }
-        let mut found: [([f32; 3], f32); 8] = [([0.0; 3], 0.0); 8];
+        let mut found: [([f32; 3], f32); 27] = [([0.0; 3], 0.0); 27];
         around(self.volume, at, |label, index, share| {
             let own = colour(label, index);
             let place = found.iter().position(|(c, weight)| *weight == 0.0 || *c == own).unwrap_or(0);

@@ -2,7 +2,7 @@
 
 use super::{Cells, Field, within};
 use crate::mesh::Mesh;
-use crate::volume::{Density, Grid};
+use crate::volume::{Density, Grid, Label, Volume};
 
 /// Rounds of smoothing: after four, stairs of one voxel are gone and more rounds change little.
 const ROUNDS: usize = 4;
@@ -16,6 +16,14 @@ pub fn of_mask(grid: &Grid, is_inside: impl Fn(usize) -> bool) -> Mesh {
     let densities = part.smoothed();
     let end = part.grid.dims.map(|n| n as i32);
     within(Field { grid: &part.grid, densities: &densities }, Cells { low: [-1; 3], end })
+}
+
+/// The same set, smoothed alike, as matter of one label on a grid of its own; `None` for an empty set.
+pub fn volume_of_mask(grid: &Grid, is_inside: impl Fn(usize) -> bool, label: Label) -> Option<Volume> {
+    let part = Part::around(grid, is_inside)?;
+    let labels = vec![label; part.grid.len()];
+    let band = grid.spacing.max_element();
+    Some(Volume::new(part.grid, band, part.smoothed(), labels, label))
 }
 
 /// The smallest box around the voxels, one voxel wider on every side, and which of its voxels are inside.

@@ -8,7 +8,7 @@
 mod cases;
 mod mask;
 
-pub use mask::of_mask;
+pub use mask::{of_mask, volume_of_mask};
 
 use super::{BRICK, Density, Grid, Volume};
 use crate::frame::Vec3;
