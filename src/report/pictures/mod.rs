@@ -89,7 +89,7 @@ fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn;
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
     let shot = Shot { camera: Camera::framing(side, before, 1.0), width: SIZE, height: SIZE };
     let first = march::look(before, &shot);
-    let last = if is_unchanged(scored) { first.clone() } else { march::look(after, &shot) };
+    let last = if is_unchanged(scored) { first.clone() } else { march::look_again(after, &shot, &first) };
     let (name, title) = match side {
         Side::Occlusal => ("occlusal", "Occlusal side"),
         Side::Buccal => ("buccal", "Buccal side"),
@@ -204,7 +204,7 @@ fn encoded(drawn: Vec<Drawn>) -> Vec<Picture> {
 
 fn png(pixels: &Pixels) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
     encoder
         .write_image(&pixels.rgb8(), pixels.width, pixels.height, ExtendedColorType::Rgb8)
         .expect("memory takes every byte, and the size fits");

@@ -54,16 +54,26 @@ pub fn iso(volume: &Volume, shot: &Shot, colour: impl Fn(Label, usize) -> [f32; 
 
 /// Finds and lights the surface.
 pub fn look(volume: &Volume, shot: &Shot) -> View {
-    look_with(volume, shot, processors())
+    look_with(volume, shot, None, processors())
 }
 
-fn look_with(volume: &Volume, shot: &Shot, threads: usize) -> View {
+/// The same, faster, of a volume that since an earlier look with this shot has only lost matter.
+pub fn look_again(volume: &Volume, shot: &Shot, earlier: &View) -> View {
+    look_with(volume, shot, Some(earlier), processors())
+}
+
+fn look_with(volume: &Volume, shot: &Shot, earlier: Option<&View>, threads: usize) -> View {
     let Shot { camera, width, height } = *shot;
     let marcher = Marcher::new(volume, camera);
     let mut hits = vec![None; (width * height) as usize];
     in_rows(&mut hits, width, threads, |y, row| {
         for (x, hit) in row.iter_mut().enumerate() {
-            *hit = marcher.hit(shot.point(x as f32 + 0.5, y as f32 + 0.5));
+            let point = shot.point(x as f32 + 0.5, y as f32 + 0.5);
+            *hit = match earlier.map(|view| view.hits[y as usize * width as usize + x]) {
+                None => marcher.hit(point),
+                Some(None) => None,
+                Some(Some(before)) => marcher.hit_beyond(point, before.depth),
+            };
         }
     });
     let depths: Vec<Option<f32>> = hits.iter().map(|h| h.as_ref().map(|h| h.depth)).collect();
@@ -202,8 +212,27 @@ mod tests {
         let volume = phantom::ball([40, 40, 40], Vec3::splat(0.1), 1.2);
         let shot = Shot { camera: Camera::framing(Side::Buccal, &volume, 1.5), width: 97, height: 61 };
         let colour = |_: Label, index: usize| [index as f32 % 7.0 / 7.0, 0.4, 0.2];
-        let picture = |threads| look_with(&volume, &shot, threads).paint_with(&volume, colour, threads);
+        let picture = |threads| look_with(&volume, &shot, None, threads).paint_with(&volume, colour, threads);
         assert_eq!(picture(1), picture(3));
+    }
+
+    #[test]
+    fn looking_again_after_a_cut_is_as_good_as_looking_anew() {
+        let mut volume = phantom::ball([60, 60, 60], Vec3::splat(0.1), 2.5);
+        let shot = Shot { camera: Camera::framing(Side::Occlusal, &volume, 1.0), width: 80, height: 80 };
+        let before = look(&volume, &shot);
+        let grid = *volume.grid();
+        for (index, cell) in grid.cells().enumerate() {
+            if grid.centre(cell).distance(Vec3::new(0.5, 0.3, 2.5)) < 1.2 {
+                volume.set(index, super::super::Voxel::AIR);
+            }
+        }
+        let (anew, again) = (look(&volume, &shot), look_again(&volume, &shot, &before));
+        assert_ne!(before.hits, anew.hits);
+        for (a, b) in anew.hits.iter().zip(&again.hits) {
+            let depth = |hit: &Option<Hit>| hit.map_or(f32::INFINITY, |h| h.depth);
+            assert!(depth(a) == depth(b) || (depth(a) - depth(b)).abs() < 0.03, "{a:?} {b:?}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::{Camera, Hit};
 use crate::frame::Vec3;
-use crate::volume::{BRICK, Bricks, ISO, Volume};
+use crate::volume::{BRICK, Density, ISO, Volume};
 
 /// Step within a surface, in voxels: even a single voxel is solid for longer than that.
 const STEP: f32 = 0.8;
@@ -10,9 +10,12 @@ const STEP: f32 = 0.8;
 /// Step where nothing is, in the same: matter can be noticed, if not yet solid, two voxels long.
 const STEP_IN_AIR: f32 = 1.6;
 
+/// Share of a step that surely leads across a border between bricks, however numbers are rounded.
+const NUDGE: f32 = 0.02;
+
 /// Halvings of a step once the surface lies in it, and false positions after them: together a thousandth of a voxel.
-const HALVINGS: u32 = 1;
-const SECANTS: u32 = 3;
+const HALVINGS: u32 = 2;
+const SECANTS: u32 = 2;
 
 /// How far around a point its gradient is taken, in voxels along each axis.
 const SMOOTHING: f32 = 0.8;
@@ -29,9 +32,8 @@ pub struct Marcher<'a> {
     /// mm
     step: f32,
     step_in_air: f32,
-    /// Bricks in which every place is empty. Between its last voxels and the next brick's a brick mixes with the next, so
-    /// those must be empty too.
-    is_clear: Vec<bool>,
+    /// Where nothing is: in bricks, and in halves of them.
+    clear: [Clear; 2],
 }
 
 impl<'a> Marcher<'a> {
@@ -41,20 +43,26 @@ impl<'a> Marcher<'a> {
         let along = -camera.back() / spacing;
         let pace = along.abs().max_element();
         let (low, high) = (low - 1.0, high + 1.0);
-        let is_clear = clear_bricks(volume.bricks());
-        Marcher { volume, camera, low, high, along, step: STEP / pace, step_in_air: STEP_IN_AIR / pace, is_clear }
+        let clear = [Clear::bricks(volume), Clear::halves(volume)];
+        Marcher { volume, camera, low, high, along, step: STEP / pace, step_in_air: STEP_IN_AIR / pace, clear }
     }
 
     /// Where the ray through a point of the camera's plane first enters matter.
     pub fn hit(&self, point_in_tooth: Vec3) -> Option<Hit> {
+        self.hit_beyond(point_in_tooth, f32::NEG_INFINITY)
+    }
+
+    /// The same where nothing is known to be nearer to the camera than a depth.
+    pub fn hit_beyond(&self, point_in_tooth: Vec3, depth: f32) -> Option<Hit> {
         let start = self.volume.grid().from_tooth(point_in_tooth);
-        let (mut near, far) = self.span(start)?;
+        let (near, far) = self.span(start)?;
+        let mut near = near.max(depth - self.step);
         let mut before = near;
         while near < far {
             let at = start + self.along * near;
             if let Some(clear) = self.stride(at) {
                 before = near + clear;
-                near = before + 1e-4 * self.step;
+                near = before + NUDGE * self.step;
                 continue;
             }
             let density = self.volume.density_in_grid(at);
@@ -85,23 +93,21 @@ impl<'a> Marcher<'a> {
         (near < far).then_some((near, far))
     }
 
-    /// How far the ray stays in a brick around which nothing is, mm; `None` near matter.
+    /// How far the ray stays where nothing is, mm; `None` near matter.
     fn stride(&self, at: Vec3) -> Option<f32> {
         let dims = self.volume.grid().dims;
         let inside = |a: usize| at[a] >= 0.0 && at[a] < dims[a] as f32;
         if !(0..3).all(inside) {
             return None;
         }
-        let brick = [0, 1, 2].map(|a| at[a] as u32 / BRICK);
-        if !self.is_clear[self.volume.bricks().index(brick)] {
-            return None;
-        }
+        let voxel = [0, 1, 2].map(|a| at[a] as u32);
+        let clear = self.clear.iter().find(|clear| clear.holds(voxel))?;
         let mut least = f32::INFINITY;
         for axis in 0..3 {
-            let first = (brick[axis] * BRICK) as f32;
+            let first = (voxel[axis] >> clear.bits << clear.bits) as f32;
             let pace = self.along[axis];
             if pace.abs() > 1e-9 {
-                let room = if pace > 0.0 { first + BRICK as f32 - at[axis] } else { at[axis] - first };
+                let room = if pace > 0.0 { first + (1u32 << clear.bits) as f32 - at[axis] } else { at[axis] - first };
                 least = least.min(room / pace.abs());
             }
         }
@@ -139,16 +145,58 @@ impl<'a> Marcher<'a> {
     }
 }
 
-fn clear_bricks(bricks: &Bricks) -> Vec<bool> {
-    let dims = bricks.dims();
-    let is_clear = |brick: usize| {
-        let at = bricks.corner(brick).map(|v| v / BRICK);
-        (0..8).all(|n| {
-            let next: [u32; 3] = std::array::from_fn(|a| (at[a] + (n >> a & 1)).min(dims[a] - 1));
-            !bricks.is_occupied(next)
-        })
-    };
-    (0..bricks.len()).map(is_clear).collect()
+/// Cubes of voxels in which every place is empty. Between its last voxels and the next cube's a cube mixes with the next, so
+/// those must be empty too.
+struct Clear {
+    /// Voxels along one edge, as a power of two.
+    bits: u32,
+    dims: [u32; 3],
+    is_clear: Vec<bool>,
+}
+
+impl Clear {
+    fn bricks(volume: &Volume) -> Clear {
+        let bricks = volume.bricks();
+        let occupied: Vec<bool> = (0..bricks.len()).map(|b| bricks.is_occupied(cell(bricks.dims(), b))).collect();
+        Clear::around(BRICK.ilog2(), bricks.dims(), &occupied)
+    }
+
+    fn halves(volume: &Volume) -> Clear {
+        const EDGE: u32 = BRICK / 2;
+        let [nx, ny, _] = volume.grid().dims;
+        let dims = volume.grid().dims.map(|n| n.div_ceil(EDGE));
+        let mut occupied = vec![false; dims.iter().map(|&n| n as usize).product()];
+        for (row, values) in volume.densities().chunks_exact(nx as usize).enumerate() {
+            let [y, z] = [row as u32 % ny, row as u32 / ny];
+            let first = ((z / EDGE * dims[1] + y / EDGE) * dims[0]) as usize;
+            for (cube, run) in occupied[first..].iter_mut().zip(values.chunks(EDGE as usize)) {
+                *cube |= run.iter().any(|&d| d > Density::EMPTY);
+            }
+        }
+        Clear::around(EDGE.ilog2(), dims, &occupied)
+    }
+
+    fn around(bits: u32, dims: [u32; 3], occupied: &[bool]) -> Clear {
+        let mut is_clear: Vec<bool> = occupied.iter().map(|o| !o).collect();
+        for (index, _) in occupied.iter().enumerate().filter(|(_, o)| **o) {
+            let at = cell(dims, index);
+            for before in 1..8 {
+                let step: [u32; 3] = std::array::from_fn(|a| at[a].saturating_sub(before >> a & 1));
+                is_clear[((step[2] * dims[1] + step[1]) * dims[0] + step[0]) as usize] = false;
+            }
+        }
+        Clear { bits, dims, is_clear }
+    }
+
+    fn holds(&self, voxel: [u32; 3]) -> bool {
+        let [x, y, z] = voxel.map(|v| v >> self.bits);
+        self.is_clear[((z * self.dims[1] + y) * self.dims[0] + x) as usize]
+    }
+}
+
+fn cell([nx, ny, _]: [u32; 3], index: usize) -> [u32; 3] {
+    let index = index as u32;
+    [index % nx, index / nx % ny, index / (nx * ny)]
 }
 
 #[cfg(test)]

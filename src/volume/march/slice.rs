@@ -97,6 +97,10 @@ impl<'a> Cut<'a> {
     /// Pixels to the line of the surface within the cut; many where it is far.
     fn pixels_from_surface(&self, x: f32, y: f32) -> f32 {
         let point = self.shot.point(x, y) + self.offset;
+        let density = self.volume.density_at(point);
+        if density < 0.02 || density > 0.98 {
+            return f32::INFINITY;
+        }
         let (density, gradient) = self.volume.density_and_gradient_at(point);
         let back = self.shot.camera.back();
         let rise = (gradient - back * gradient.dot(back)).length();
