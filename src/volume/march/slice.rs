@@ -6,7 +6,7 @@ use crate::frame::Vec3;
 use crate::volume::{ISO, Label, Volume};
 
 /// Samples along each side of a pixel at the border of two colours.
-const FINE: u32 = 4;
+const FINE: u32 = 3;
 
 /// The volume cut across the camera's view at the depth of a point; solid matter in the colour of its voxels, the rest
 /// transparent. Borders between colours run where they weigh alike, so that no voxel shows as a square.
@@ -98,7 +98,7 @@ impl<'a> Cut<'a> {
     fn pixels_from_surface(&self, x: f32, y: f32) -> f32 {
         let point = self.shot.point(x, y) + self.offset;
         let density = self.volume.density_at(point);
-        if density < 0.02 || density > 0.98 {
+        if !(0.02..=0.98).contains(&density) {
             return f32::INFINITY;
         }
         let (density, gradient) = self.volume.density_and_gradient_at(point);
