@@ -14,6 +14,7 @@ mod verdict;
 mod zones;
 
 pub use falls::Falls;
+pub(crate) use crop::Crop;
 pub use grade::{Grade, HardFailResult, ItemResult};
 pub use measures::{Evidence, Measure, Measures};
 pub use process::{Sample, Trace};

@@ -13,7 +13,6 @@ use crate::tick::TICK_S;
 use crate::volume::Volume;
 use std::collections::BTreeMap;
 use std::process::Command;
-use std::sync::Arc;
 
 pub struct FiveMinutes {
     pub replay_s: Figures,
