@@ -16,7 +16,8 @@ fn a_step_never_allocates() {
     setup.instruments.push(Instrument::new(WorkingEnd::Point, false));
     setup.instruments.push(Instrument::new(WorkingEnd::Ball { radius: 1.15 }, true));
     let form = Form::RoundBox { half: Vec3::splat(2.0), rounding: 0.5 };
-    setup.matter.around = vec![Shape { label: Label(9), tooth_from_shape: typodont::frame::Pose::at(Vec3::Y * 7.0), form }];
+    setup.matter.around =
+        vec![Shape { label: Label(9), tooth_from_shape: typodont::frame::Pose::at(Vec3::Y * 7.0), form }];
     let mut sim = Simulation::new(setup);
     let mut cut = 0;
     let mut touched = 0;

@@ -14,7 +14,8 @@ fn needed(name: &str) -> Option<PathBuf> {
     let found = std::env::var_os(name).map(PathBuf::from);
     if found.is_none() {
         // Straight to the terminal: the test harness would keep what a passing test prints to itself.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no other program reads our bundles; set {name} (see scripts/test)");
+        let _ =
+            writeln!(std::io::stderr(), "SKIPPED: no other program reads our bundles; set {name} (see scripts/test)");
     }
     found
 }

@@ -60,8 +60,7 @@ fn table_8_1_comes_out_as_printed() {
     }
     let [html, csv, json] = ["html", "csv", "json"].map(|e| folder.join(format!("cohort.{e}")));
     let path = |p: &Path| p.to_str().unwrap().to_string();
-    let arguments =
-        ["cohort", &path(&folder), "--html", &path(&html), "--csv", &path(&csv), "--json", &path(&json)];
+    let arguments = ["cohort", &path(&folder), "--html", &path(&html), "--csv", &path(&csv), "--json", &path(&json)];
     let output = typodont(&arguments);
     assert!(output.status.success(), "{}", complained(&output));
 

@@ -28,14 +28,16 @@ fn means(scenario: &str) -> impl Fn(&str, &str) -> Option<f64> {
 
 /// Asserts that a measure grows along a list of operators, and says by how much.
 fn grows(mean: &impl Fn(&str, &str) -> Option<f64>, name: &str, operators: &[&str]) {
-    let values: Vec<f64> = operators.iter().map(|o| mean(o, name).unwrap_or_else(|| panic!("{o} has no {name}"))).collect();
+    let values: Vec<f64> =
+        operators.iter().map(|o| mean(o, name).unwrap_or_else(|| panic!("{o} has no {name}"))).collect();
     println!("{name}: {operators:?} {values:.3?}");
     assert!(values.windows(2).all(|w| w[0] < w[1]), "{name} of {operators:?}: {values:?}");
 }
 
 /// Asserts that a measure grows or stays along a list of operators.
 fn never_falls(mean: &impl Fn(&str, &str) -> Option<f64>, name: &str, operators: &[&str]) {
-    let values: Vec<f64> = operators.iter().map(|o| mean(o, name).unwrap_or_else(|| panic!("{o} has no {name}"))).collect();
+    let values: Vec<f64> =
+        operators.iter().map(|o| mean(o, name).unwrap_or_else(|| panic!("{o} has no {name}"))).collect();
     println!("{name}: {operators:?} {values:.3?}");
     assert!(values.windows(2).all(|w| w[0] <= w[1]), "{name} of {operators:?}: {values:?}");
 }

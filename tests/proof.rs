@@ -128,7 +128,8 @@ fn a_forger_who_knows_the_format_is_told_the_tick() {
             }
         });
         let complaint = verify(&forge(&whole, &format!("forger_{name}"), &forged)).expect_err(name);
-        let line = complaint.lines().find(|l| l.contains("recording.mcap: tick")).unwrap_or_else(|| panic!("{complaint}"));
+        let line =
+            complaint.lines().find(|l| l.contains("recording.mcap: tick")).unwrap_or_else(|| panic!("{complaint}"));
         let tick: u64 = line.split("tick ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!((9000..9010).contains(&tick), "{name}: {line}");
     }

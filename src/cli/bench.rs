@@ -157,8 +157,7 @@ impl Results {
         for (name, table) in tables {
             table.iter().for_each(|(dims, f)| line(format!("{name}.{dims}"), f));
         }
-        let single =
-            [("replay_s", &self.replay_s), ("score_s", &self.score_s), ("startup_ms", &self.startup_ms)];
+        let single = [("replay_s", &self.replay_s), ("score_s", &self.score_s), ("startup_ms", &self.startup_ms)];
         for (name, figures) in single {
             figures.iter().for_each(|f| line(name.to_string(), f));
         }

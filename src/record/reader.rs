@@ -195,6 +195,16 @@ impl Found {
         }
         let source = Source::new(format!("{name}: scenario.json"), text);
         let scenario = scenario::resolve(source, &library, Forms::Recorded).map_err(Unreadable::Scenario)?;
-        Ok(Recording { head, end, scenario: Arc::new(scenario), initial: Arc::new(initial), ticks, inputs, commands, events, digests })
+        Ok(Recording {
+            head,
+            end,
+            scenario: Arc::new(scenario),
+            initial: Arc::new(initial),
+            ticks,
+            inputs,
+            commands,
+            events,
+            digests,
+        })
     }
 }

@@ -13,8 +13,8 @@ mod shape;
 mod verdict;
 mod zones;
 
-pub use falls::Falls;
 pub(crate) use crop::Crop;
+pub use falls::Falls;
 pub use grade::{Grade, HardFailResult, ItemResult};
 pub use measures::{Evidence, Measure, Measures};
 pub use process::{Sample, Trace};

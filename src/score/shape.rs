@@ -164,7 +164,8 @@ impl Shape {
     /// The first vulnerable voxel that was removed or lies beside a removed one.
     pub fn exposed(&self) -> Option<usize> {
         let is_laid_open = |i: usize| {
-            self.sets[i].removed() || self.grid.neighbours(i).any(|n| self.sets[n].removed() && !self.sets[n].vulnerable())
+            self.sets[i].removed()
+                || self.grid.neighbours(i).any(|n| self.sets[n].removed() && !self.sets[n].vulnerable())
         };
         self.indices(|s| s.vulnerable()).find(|&i| is_laid_open(i))
     }
