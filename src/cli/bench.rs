@@ -46,7 +46,7 @@ struct Results {
     tick_us: BTreeMap<String, BTreeMap<&'static str, Figures>>,
     mesh_ms: BTreeMap<String, Figures>,
     remesh_ms: BTreeMap<String, Figures>,
-    frame_ms: BTreeMap<String, BTreeMap<&'static str, Figures>>,
+    frame_ms: BTreeMap<String, work::Frames>,
     edt_ms: BTreeMap<String, Figures>,
     load_ms: BTreeMap<String, Figures>,
     /// What the same path removes at each size, mm³.
@@ -109,6 +109,9 @@ fn measure(arguments: &Arguments, results: &mut Results) -> Result<(), String> {
 fn on(tooth: Volume, results: &mut Results) -> Result<(), String> {
     let name = name_of(tooth.grid().dims);
     let work = work::on(&tooth)?;
+    results.mesh_ms.insert(name.clone(), work.mesh_ms);
+    results.remesh_ms.insert(name.clone(), work.remesh_ms);
+    results.frame_ms.insert(name.clone(), work.frames);
     results.edt_ms.insert(name.clone(), work.edt_ms);
     results.load_ms.insert(name.clone(), work.load_ms);
     let ticks = ticks::on(tooth)?;
@@ -146,7 +149,7 @@ impl Results {
             cases.iter().for_each(|(case, f)| line(format!("tick_us.{dims}.{case}"), f));
         }
         for (dims, cases) in &self.frame_ms {
-            cases.iter().for_each(|(case, f)| line(format!("frame_ms.{dims}.{case}"), f));
+            line(format!("frame_ms.{dims}.iso ({})", cases.adapter), &cases.iso);
         }
         let tables = [
             ("mesh_ms", &self.mesh_ms),

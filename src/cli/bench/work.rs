@@ -5,8 +5,11 @@ use crate::anatomy::Tissues;
 use crate::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
 use crate::content::{Library, TissueTable};
 use crate::diagnostic::{Diagnostic, Source};
+use crate::frame::Vec3;
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece};
-use crate::volume::{Label, Volume, distance};
+use crate::volume::march::{self, Camera, Shot, Side};
+use crate::volume::{Label, Volume, Voxel, distance, surface};
+use serde::Serialize;
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::Arc;
@@ -45,13 +48,65 @@ fn lines(found: Vec<Diagnostic>) -> String {
 pub struct Work {
     pub edt_ms: Figures,
     pub load_ms: Figures,
+    pub mesh_ms: Figures,
+    /// What one tick of cutting makes necessary.
+    pub remesh_ms: Figures,
+    pub frames: Frames,
+}
+
+/// One picture of 780×690 pixels.
+#[derive(Serialize)]
+pub struct Frames {
+    /// What draws it.
+    pub adapter: &'static str,
+    /// The surface met by a ray through each pixel.
+    pub iso: Figures,
 }
 
 pub fn on(tooth: &Volume) -> Result<Work, String> {
     let edt_ms = repeated(1e3, || {
         std::hint::black_box(distance::to_set(tooth.grid(), |i| tooth.tissue(i) == Label::AIR));
     });
-    Ok(Work { edt_ms, load_ms: load_ms(tooth)? })
+    let mesh_ms = repeated(1e3, || {
+        std::hint::black_box(surface::extract(tooth));
+    });
+    let load_ms = load_ms(tooth)?;
+    Ok(Work { edt_ms, load_ms, mesh_ms, remesh_ms: remesh_ms(tooth), frames: frames(tooth) })
+}
+
+/// The surface around a bite of a bur of 0.7 mm radius, taken from the highest cusp.
+fn remesh_ms(tooth: &Volume) -> Figures {
+    let mut tooth = tooth.clone();
+    let grid = *tooth.grid();
+    let solid = (0..grid.len()).rev().find(|&i| tooth.tissue(i) != Label::AIR);
+    let Some(highest) = solid else { return Figures::of(Vec::new()) };
+    let middle = grid.centre(grid.cell(highest));
+    tooth.take_dirty();
+    let reach = Vec3::splat(0.7);
+    let [xs, ys, zs] = grid.cells_within(middle - reach, middle + reach);
+    for z in zs {
+        for y in ys.clone() {
+            for x in xs.clone() {
+                tooth.set_cell([x, y, z], Voxel::AIR);
+            }
+        }
+    }
+    let dirty = tooth.take_dirty();
+    repeated(1e3, || {
+        for brick in surface::affected(&tooth, &dirty) {
+            std::hint::black_box(surface::brick(&tooth, brick));
+        }
+    })
+}
+
+fn frames(tooth: &Volume) -> Frames {
+    let [width, height] = [780, 690];
+    let camera = Camera::framing(Side::Occlusal, tooth, width as f32 / height as f32);
+    let shot = Shot { camera, width, height };
+    let iso = repeated(1e3, || {
+        std::hint::black_box(march::iso(tooth, &shot, |_, _| [0.9, 0.85, 0.8]));
+    });
+    Frames { adapter: "cpu", iso }
 }
 
 /// Reading the tooth from a compressed NRRD.
