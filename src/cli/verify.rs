@@ -7,12 +7,17 @@ use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The bundle's folder
+    /// The bundle's folder, or a recording alone
     bundle: PathBuf,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let complaints = bundle::verify(&arguments.bundle, &super::templates()).map_err(Failure::wrong)?;
+    let path = &arguments.bundle;
+    let complaints = match path.is_file() {
+        true => bundle::verify_recording(path),
+        false => bundle::verify(path, &super::templates()),
+    };
+    let complaints = complaints.map_err(Failure::wrong)?;
     match complaints.is_empty() {
         true => {
             println!("{}: holds", arguments.bundle.display());

@@ -146,6 +146,14 @@ pub fn verify(bundle: &Path, templates: &Templates) -> Result<Vec<String>, Strin
     Ok(complaints)
 }
 
+/// [`verify`] for a recording without a bundle: whether it replays to what it says.
+pub fn verify_recording(path: &Path) -> Result<Vec<String>, String> {
+    let recording = Recording::read(path).map_err(|e| e.to_string())?;
+    let replay = record::replay(&recording, Watch::Everything, |_, _, _, _| ());
+    let replay = replay.map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(replay.difference.iter().map(ToString::to_string).collect())
+}
+
 /// Which files are not those that `session.json` names.
 fn compare_files(bundle: &Path, recording: &[u8], session: &SessionFile) -> Vec<String> {
     let mut complaints = Vec::new();

@@ -1,0 +1,52 @@
+//! A recording of a released exercise still replays to the last bit and still scores the same, in every build.
+//!
+//! When touch, carving or a formula changes on purpose, this recording no longer holds: record it anew
+//! (`typodont run scenarios/5-grinding.json --headless --operator hasty --seed 4 --participant golden`), say so in the
+//! changelog, and raise `SCORER_VERSION` if a formula changed.
+
+mod bundle;
+
+use bundle::*;
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+use typodont::record::{self, Recording, Watch};
+use typodont::report::SessionFile;
+use typodont::score;
+
+const GOLDEN: &str = "tests/golden/5-grinding.mcap";
+
+#[test]
+fn the_golden_recording_replays_and_scores_as_ever() {
+    let recording = Recording::read(Path::new(GOLDEN)).unwrap();
+    let scored = score::score(&recording, Watch::Everything).unwrap();
+    assert_eq!(scored.replay.difference, None);
+    let expected: Value =
+        serde_json::from_str(&std::fs::read_to_string("tests/golden/5-grinding.json").unwrap()).unwrap();
+    let now: Value = serde_json::from_str(&SessionFile::of(&recording, &scored).text()).unwrap();
+    assert_eq!(now["metrics"], expected["metrics"]);
+    assert_eq!(now["grade"]["points"], expected["points"]);
+    assert_eq!(now["grade"]["hard_fails"], expected["hard_fails"]);
+}
+
+#[test]
+fn debug_and_release_turn_it_to_the_same_digest() {
+    // Every second's digest and every force is compared with what is recorded: two builds that both hold agree.
+    let here = env!("CARGO_BIN_EXE_typodont").to_string();
+    let release = std::env::var("TYPODONT_RELEASE").ok();
+    for program in [Some(here), release].into_iter().flatten() {
+        let output = Command::new(&program).args(["verify", GOLDEN]).output().unwrap();
+        assert!(output.status.success(), "{program}: {}", complained(&output));
+    }
+}
+
+#[test]
+fn a_single_tick_that_differs_is_named() {
+    // Aim: the comparison of the test above can fail. Method: another reading in one tick.
+    let mut recording = Recording::read(Path::new(GOLDEN)).unwrap();
+    recording.ticks[7_000].reading.pose.position.x += 0.01;
+    let replay = record::replay(&recording, Watch::Everything, |_, _, _, _| ()).unwrap();
+    let difference = replay.difference.expect("the digests know the reading").to_string();
+    let tick: u64 = difference.split("tick ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!((7_000..=8_000).contains(&tick), "{difference}");
+}
