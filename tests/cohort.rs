@@ -8,8 +8,10 @@ use std::path::Path;
 
 /// Scenario 3: stiffness at the answer, whether it was right, time. Scenario 4: quadrant's truth, time. Scenario 5: time
 /// to clear, decay cleared %, healthy per decay %. Times in minutes and seconds as printed.
+type Row = (f64, bool, &'static str, bool, &'static str, &'static str, f64, f64);
+
 #[rustfmt::skip]
-const TABLE: [(f64, bool, &str, bool, &str, &str, f64, f64); 10] = [
+const TABLE: [Row; 10] = [
     (0.4, true,  "1:35", false, "5:00", "3:16", 98.74,  75.84),
     (0.4, true,  "5:00", false, "5:00", "5:00", 97.75,  96.89),
     (0.7, true,  "1:12", true,  "1:20", "5:00", 72.92,  47.88),

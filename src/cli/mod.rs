@@ -82,6 +82,15 @@ impl Failure {
         Failure::Wrong(what.to_string())
     }
 
+    /// What is wrong, a line for each complaint.
+    fn lines(&self) -> String {
+        match self {
+            Failure::Complaints(found) => found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n"),
+            Failure::Wrong(what) => what.clone(),
+            Failure::Told => String::new(),
+        }
+    }
+
     fn tell(&self) {
         match self {
             Failure::Complaints(found) => {

@@ -152,7 +152,7 @@ pub struct ScanFile {
     /// NRRD file, relative to the scenario's folder.
     #[schemars(length(min = 1, max = 500))]
     pub file: String,
-    /// Distance between voxels along x, y and z, mm, where the file's own is missing or wrong.
+    /// Distance between voxels along x, y and z, mm, where the file's own is wrong.
     #[serde(default)]
     pub spacing_mm: Option<[SpacingFile; 3]>,
 }
@@ -163,10 +163,11 @@ pub struct LabelsFile {
     /// NRRD file of labels (such as 3D Slicer's .seg.nrrd), relative to the scenario's folder.
     #[schemars(length(min = 1, max = 500))]
     pub file: String,
-    /// Distance between voxels along x, y and z, mm, where the file's own is missing or wrong.
+    /// Distance between voxels along x, y and z, mm, where the file's own is wrong.
     #[serde(default)]
     pub spacing_mm: Option<[SpacingFile; 3]>,
-    /// Which number in the file is which tissue: { "1": "enamel", "2": "dentine", "3": "pulp" }; numbers left out are air.
+    /// Which number in the file is which tissue: { "1": "enamel", "2": "dentine", "3": "pulp" }. 0 is air; every other
+    /// number in the file must be named.
     pub tissues: BTreeMap<String, String>,
 }
 

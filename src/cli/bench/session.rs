@@ -1,8 +1,9 @@
 //! Whole sessions: what five minutes cost to replay and to score, and the most memory one holds.
 
 use super::figures::{Figures, repeated};
-use super::work::{SEED, Scratch, grinding};
+use super::work::{SEED, Scratch, exercise, grinding, lines};
 use super::{DIMS, grown, name_of};
+use crate::cli::run::{Run, perform};
 use crate::content::Library;
 use crate::device::Spec;
 use crate::record::{self, EndFile, HeadFile, Recorder, Recording, ServoFile, SpecFile, Watch};
@@ -13,6 +14,7 @@ use crate::tick::TICK_S;
 use crate::volume::Volume;
 use std::collections::BTreeMap;
 use std::process::Command;
+use std::sync::Arc;
 
 pub struct FiveMinutes {
     pub replay_s: Figures,
@@ -21,7 +23,7 @@ pub struct FiveMinutes {
 
 /// The careful operator at work until the exercise's five minutes are over.
 pub fn five_minutes(tooth: Volume) -> Result<FiveMinutes, String> {
-    let recording = played(tooth, true)?;
+    let recording = played(tooth)?;
     let mut seen = None;
     let mut failed = None;
     let replay_s = repeated(1.0, || match score::watch(&recording, Watch::Nothing) {
@@ -42,14 +44,11 @@ pub fn five_minutes(tooth: Volume) -> Result<FiveMinutes, String> {
     Ok(FiveMinutes { replay_s, score_s: Figures::of(times.collect()) })
 }
 
-/// Runs and records a session; `on` and on, or until the operator is content.
-fn played(tooth: Volume, on_and_on: bool) -> Result<Recording, String> {
+/// Runs and records a session that goes on and on.
+fn played(tooth: Volume) -> Result<Recording, String> {
     let (scenario, workpiece) = grinding(tooth)?;
-    let mut operator = OperatorFile::read(&Library::shipped(), "careful")
-        .map_err(|found| found.iter().map(|d| d.headline()).collect::<Vec<_>>().join("\n"))?;
-    if on_and_on {
-        keep_cutting(&mut operator);
-    }
+    let mut operator = careful()?;
+    keep_cutting(&mut operator);
     let spec = Spec::phantom_omni();
     let head = HeadFile {
         version: record::VERSION,
@@ -85,7 +84,8 @@ fn keep_cutting(operator: &mut OperatorFile) {
     }
 }
 
-/// The most memory that a process of its own holds while a session of a size is run, recorded, replayed and scored, MiB.
+/// The most memory that a process of its own holds while a session of a size is run, recorded, scored and
+/// reported, MiB.
 pub fn peak_mib(dims: &str) -> Result<f64, String> {
     let program = std::env::current_exe().map_err(|e| e.to_string())?;
     let told = Command::new(program).args(["bench", "--session-peak", dims]).output().map_err(|e| e.to_string())?;
@@ -93,16 +93,26 @@ pub fn peak_mib(dims: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| format!("a session of {dims}: {}", String::from_utf8_lossy(&told.stderr)))
 }
 
+/// Runs, records, scores and reports as `typodont run` does, then says what that took.
 pub fn print_peak(dims: &str) -> Result<(), String> {
     let known = DIMS.into_iter().find(|d| name_of(*d) == dims);
     let dims = known.ok_or_else(|| format!("unknown-size: \"{dims}\" is none of the measured sizes"))?;
-    let recording = played(grown(dims)?, false)?;
-    let scored = score::score(&recording, Watch::Everything)?;
-    if let Some(difference) = scored.replay.difference {
-        return Err(format!("the session does not replay: {difference}"));
-    }
+    let folder = Scratch::new("session");
+    let run = Run {
+        scenario: Arc::new(exercise(grown(dims)?)?),
+        operator: careful()?,
+        seed: SEED,
+        participant: "",
+        out: &folder.0,
+        digests: BTreeMap::new(),
+    };
+    perform(&run).map_err(|failure| failure.lines())?;
     println!("{:.1}", peak_of_this_process()?);
     Ok(())
+}
+
+fn careful() -> Result<OperatorFile, String> {
+    OperatorFile::read(&Library::shipped(), "careful").map_err(lines)
 }
 
 /// The highest resident memory so far, MiB. Linux tells it; elsewhere there is no figure.

@@ -21,14 +21,19 @@ const GRINDING: (&str, &str) = ("scenarios/5-grinding.json", include_str!("../..
 pub const SEED: u64 = 1;
 
 /// The grinding exercise on a given tooth.
-pub fn grinding(tooth: Volume) -> Result<(Arc<Scenario>, Arc<Workpiece>), String> {
+pub fn exercise(tooth: Volume) -> Result<Scenario, String> {
     let source = Source::new(GRINDING.0, GRINDING.1);
     let mut scenario = scenario::resolve(source, &Library::shipped(), Forms::Made).map_err(lines)?;
     let tooth = Arc::new(tooth);
     for each in &mut scenario.scene.teeth {
         each.form = Form::Given(tooth.clone());
     }
-    drop(tooth);
+    Ok(scenario)
+}
+
+/// [`exercise`] and what its session works on; the tooth it was made from is let go.
+pub fn grinding(tooth: Volume) -> Result<(Arc<Scenario>, Arc<Workpiece>), String> {
+    let mut scenario = exercise(tooth)?;
     let workpiece = Workpiece::make(&scenario, SEED).map_err(|e| e.to_string())?;
     for each in &mut scenario.scene.teeth {
         each.form = Form::Recorded;
@@ -41,7 +46,7 @@ pub fn tissues() -> Result<Tissues, String> {
     Ok(scenario::anatomy_tissues(&TissueTable::read(&Library::shipped()).map_err(lines)?))
 }
 
-fn lines(found: Vec<Diagnostic>) -> String {
+pub fn lines(found: Vec<Diagnostic>) -> String {
     found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n")
 }
 
@@ -137,7 +142,7 @@ pub fn startup_ms() -> Result<Figures, String> {
     }))
 }
 
-/// A file that is gone with its name.
+/// A file or a folder that is gone with its name.
 pub struct Scratch(pub PathBuf);
 
 impl Scratch {
@@ -149,6 +154,6 @@ impl Scratch {
 impl Drop for Scratch {
     fn drop(&mut self) {
         // Gone already is as good.
-        let _ = std::fs::remove_file(&self.0);
+        let _ = if self.0.is_dir() { std::fs::remove_dir_all(&self.0) } else { std::fs::remove_file(&self.0) };
     }
 }
