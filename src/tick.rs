@@ -17,11 +17,6 @@ impl Tick {
         self.0 as f64 * TICK_S
     }
 
-    /// The tick nearest to a duration in seconds; negative and non-finite durations give zero.
-    pub fn from_seconds(seconds: f64) -> Tick {
-        Tick((seconds / TICK_S).round().max(0.0) as u64)
-    }
-
     pub fn next(self) -> Tick {
         Tick(self.0 + 1)
     }
@@ -39,10 +34,7 @@ mod tests {
     #[test]
     fn seconds_and_ticks_agree() {
         // Aim: a time limit written in seconds ends on exactly the tick a reader expects.
-        assert_eq!(Tick::from_seconds(300.0), Tick(300_000));
         assert_eq!(Tick(300_000).seconds(), 300.0);
-        assert_eq!(Tick::from_seconds(-1.0), Tick::ZERO);
-        assert_eq!(Tick::from_seconds(f64::NAN), Tick::ZERO);
         assert_eq!(Tick(1500).seconds_since(Tick(500)), 1.0);
     }
 }

@@ -72,13 +72,26 @@ fn one_flipped_bit_anywhere_makes_verify_fail_and_name_the_file() {
     verify(&forged).unwrap();
 }
 
-/// Writes a recording again with some message changed, as a forger would who knows the format.
-fn rewritten(bytes: &[u8], mut change: impl FnMut(&str, usize, &mut Vec<u8>)) -> Vec<u8> {
+/// Writes a recording again with some message changed or, left empty, dropped: as a forger would who knows the format.
+fn rewritten(bytes: &[u8], change: impl FnMut(&str, usize, &mut Vec<u8>)) -> Vec<u8> {
+    rewritten_with(bytes, |head| head.to_string(), change)
+}
+
+/// The same, with the head changed too.
+fn rewritten_with(
+    bytes: &[u8],
+    head: impl Fn(&str) -> String,
+    mut change: impl FnMut(&str, usize, &mut Vec<u8>),
+) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let mut writer = WriteOptions::new().profile("ros2").create(&mut out).unwrap();
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();
     for index in &summary.metadata_indexes {
-        writer.write_metadata(&mcap::read::metadata(bytes, index).unwrap()).unwrap();
+        let mut metadata = mcap::read::metadata(bytes, index).unwrap();
+        if metadata.name == "session" {
+            metadata.metadata.values_mut().for_each(|text| *text = head(text));
+        }
+        writer.write_metadata(&metadata).unwrap();
     }
     for index in &summary.attachment_indexes {
         let Attachment { name, media_type, data, .. } = mcap::read::attachment(bytes, index).unwrap();
@@ -93,8 +106,10 @@ fn rewritten(bytes: &[u8], mut change: impl FnMut(&str, usize, &mut Vec<u8>)) ->
         let mut data = message.data.into_owned();
         change(&topic, *count, &mut data);
         *count += 1;
-        message.data = Cow::Owned(data);
-        writer.write(&message).unwrap();
+        if !data.is_empty() {
+            message.data = Cow::Owned(data);
+            writer.write(&message).unwrap();
+        }
     }
     writer.finish().unwrap();
     drop(writer);
@@ -133,7 +148,7 @@ fn a_forger_who_knows_the_format_is_told_the_tick() {
         let tick: u64 = line.split("tick ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
         assert!((9000..9010).contains(&tick), "{name}: {line}");
     }
-    // An answer, a confirmation: what a person did is sealed as well.
+    // A digest that is another.
     let forged = rewritten(&bytes, |topic, n, data| {
         if topic == "/digest" && n == 3 {
             *data = String::from_utf8(data.clone()).unwrap().replace("sha256\":\"", "sha256\":\"0").into_bytes();
@@ -141,6 +156,108 @@ fn a_forger_who_knows_the_format_is_told_the_tick() {
     });
     let complaint = verify(&forge(&whole, "forger_digest", &forged)).expect_err("digest");
     assert!(complaint.contains("tick 4000"), "{complaint}");
+}
+
+#[test]
+fn what_a_session_was_made_from_is_sealed() {
+    // Aim: the seed decides which quadrant is right, the scenario which grade is given; neither can be changed later.
+    let whole = run("scenarios/4-diagnosis.json", "careful", &folder("seal_whole"), &[]);
+    let bytes = fs::read(whole.join("recording.mcap")).unwrap();
+    let heads: [(&str, &str, &str); 3] = [
+        ("seed", "\"seed\":1,", "\"seed\":2,"),
+        ("participant", "\"participant\":\"\"", "\"participant\":\"7\""),
+        ("stiffness", "\"max_stiffness_n_per_mm\":1.02", "\"max_stiffness_n_per_mm\":1.03"),
+    ];
+    for (name, from, to) in heads {
+        let head = |text: &str| {
+            assert!(text.contains(from), "{text}");
+            text.replace(from, to)
+        };
+        let forged = forge(&whole, &format!("seal_{name}"), &rewritten_with(&bytes, head, |_, _, _| {}));
+        let complaint = verify(&forged).expect_err(name);
+        assert!(complaint.contains("recording.mcap: tick"), "{name}: {complaint}");
+    }
+}
+
+#[test]
+fn nothing_can_be_added_after_the_end_or_left_out() {
+    let whole = run("scenarios/4-diagnosis.json", "careful", &folder("strays_whole"), &[]);
+    let bytes = fs::read(whole.join("recording.mcap")).unwrap();
+    // Ratings come after the last tick: one is moved beyond it, and the last is dropped.
+    let mut last = 0;
+    rewritten(&bytes, |topic, n, _| last = if topic == "/event" { n } else { last });
+    let late = rewritten(&bytes, |topic, n, data| {
+        if topic == "/event" && n == last {
+            let text = String::from_utf8(data.clone()).unwrap();
+            let (_, rest) = text.split_once(',').unwrap();
+            *data = format!("{{\"tick\":1000000000,{rest}").into_bytes();
+        }
+    });
+    let complaint = verify(&forge(&whole, "strays_late", &late)).expect_err("late");
+    assert!(complaint.contains("an event of tick 1000000000"), "{complaint}");
+    let dropped = rewritten(&bytes, |topic, n, data| {
+        if topic == "/event" && n == last {
+            data.clear();
+        }
+    });
+    verify(&forge(&whole, "strays_dropped", &dropped)).expect_err("dropped");
+}
+
+#[test]
+fn the_accused_does_not_choose_what_is_checked() {
+    // Aim: a result that claims to come from other formulae, another program or another template is not believed.
+    let whole = run(GRINDING, "hasty", &folder("accused_whole"), &[]);
+    for (name, part, value) in [
+        ("scorer", "scorer_version", serde_json::json!(0)),
+        ("program", "typodont_version", serde_json::json!("0.0.9")),
+        ("template", "template_sha256", serde_json::json!("00")),
+    ] {
+        let forged = copy(&whole, &format!("accused_{name}"));
+        let mut better = session(&whole);
+        better[part] = value;
+        better["metrics"]["healthy_per_decay_pct"] = 0.0.into();
+        better["grade"]["passed"] = true.into();
+        fs::write(forged.join("session.json"), serde_json::to_string_pretty(&better).unwrap() + "\n").unwrap();
+        let complaint = verify(&forged).expect_err(name);
+        assert!(complaint.contains("metrics.healthy_per_decay_pct"), "{name}: {complaint}");
+    }
+    // Another page alone is not refused, for a school may have changed its template; but it is not vouched for.
+    let forged = copy(&whole, "accused_page");
+    let page = "<h1>Passed</h1>";
+    fs::write(forged.join("report.html"), page).unwrap();
+    let mut other = session(&whole);
+    other["template_sha256"] = "00".into();
+    let digest: String = Sha256::digest(page).iter().map(|b| format!("{b:02x}")).collect();
+    other["digests"]["report.html"] = digest.into();
+    let text = fs::read_to_string(whole.join("session.json")).unwrap();
+    let text = text.replace(session(&whole)["template_sha256"].as_str().unwrap(), "00");
+    let text = text.replace(
+        session(&whole)["digests"]["report.html"].as_str().unwrap(),
+        other["digests"]["report.html"].as_str().unwrap(),
+    );
+    fs::write(forged.join("session.json"), text).unwrap();
+    let output = typodont(&["verify", forged.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", complained(&output));
+    assert!(told(&output).contains("not judged: report.html"), "{}", told(&output));
+    // A file that no bundle has.
+    let forged = copy(&whole, "accused_stranger");
+    fs::write(forged.join("views/zz.png"), "x").unwrap();
+    assert!(verify(&forged).expect_err("stranger").contains("views/zz.png: is not part of a bundle"));
+}
+
+#[test]
+fn a_session_that_was_cut_off_is_finished_but_not_passed() {
+    let whole = run(GRINDING, "careful", &folder("cut_whole"), &[]);
+    let bytes = fs::read(whole.join("recording.mcap")).unwrap();
+    let partial = folder("cut_off").join("session.partial");
+    fs::create_dir_all(&partial).unwrap();
+    fs::write(partial.join("recording.mcap"), &bytes[..bytes.len() * 97 / 100]).unwrap();
+    let output = typodont(&["finish", partial.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", complained(&output));
+    let finished = PathBuf::from(told(&output).trim());
+    assert!(!partial.exists() && finished.ends_with("session"));
+    let grade = &session(&finished)["grade"];
+    assert_eq!((&grade["finished"], &grade["passed"]), (&false.into(), &false.into()), "{grade}");
 }
 
 #[test]

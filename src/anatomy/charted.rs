@@ -11,7 +11,7 @@ const ROUNDS: usize = 6;
 const HOLD: f32 = 0.05;
 
 /// Empty voxels around the matter that smoothing needs beyond the surface's own.
-const SPARE: u32 = 1;
+const SPARE: [u32; 3] = [1; 3];
 
 /// Makes a volume of a map. Every voxel keeps its label and stays solid or empty as it was drawn.
 ///

@@ -14,15 +14,15 @@ pub(super) struct Window {
     /// Where the window's first voxel lies in the whole grid; negative beyond its border.
     first: [i64; 3],
     /// Voxels of the window's margin that work alone needs.
-    spare: u32,
+    spare: [u32; 3],
 }
 
 impl Window {
     /// The voxels from `low` to `high` with room for their surface and `spare` voxels on every side.
-    pub(super) fn around(whole: &Grid, low: [u32; 3], high: [u32; 3], spare: u32) -> Window {
-        let margin = ROOM + spare;
-        let first = low.map(|n| i64::from(n) - i64::from(margin));
-        let dims = std::array::from_fn(|axis| high[axis] - low[axis] + 1 + 2 * margin);
+    pub(super) fn around(whole: &Grid, low: [u32; 3], high: [u32; 3], spare: [u32; 3]) -> Window {
+        let margin = spare.map(|n| ROOM + n);
+        let first = std::array::from_fn(|axis| i64::from(low[axis]) - i64::from(margin[axis]));
+        let dims = std::array::from_fn(|axis| high[axis] - low[axis] + 1 + 2 * margin[axis]);
         Window { grid: moved(whole, first, dims), whole: *whole, first, spare }
     }
 
@@ -37,8 +37,8 @@ impl Window {
 
     /// The whole again, with nothing outside the window; it grows where matter needs room beyond its border.
     pub(super) fn paste(&self, density: Vec<Density>, label: Vec<Label>) -> (Grid, Vec<Density>, Vec<Label>) {
-        let low = |axis: usize| self.first[axis] + i64::from(self.spare);
-        let high = |axis: usize| self.first[axis] + i64::from(self.grid.dims[axis]) - i64::from(self.spare);
+        let low = |axis: usize| self.first[axis] + i64::from(self.spare[axis]);
+        let high = |axis: usize| self.first[axis] + i64::from(self.grid.dims[axis]) - i64::from(self.spare[axis]);
         let before: [i64; 3] = std::array::from_fn(|axis| low(axis).min(0));
         let end = |axis: usize| high(axis).max(i64::from(self.whole.dims[axis]));
         let grid = moved(&self.whole, before, std::array::from_fn(|axis| (end(axis) - before[axis]) as u32));
@@ -79,7 +79,7 @@ mod tests {
         // Aim: a voxel keeps its place in space through cut and paste. Method: a window over one corner of a grid.
         let whole = Grid::centred([7, 6, 5], Vec3::new(0.5, 0.25, 1.0));
         let values: Vec<usize> = (1..=whole.len()).collect();
-        let window = Window::around(&whole, [1, 2, 1], [3, 4, 4], 2);
+        let window = Window::around(&whole, [1, 2, 1], [3, 4, 4], [2; 3]);
         let cut = window.cut(values, 0);
         let label: Vec<Label> = cut.iter().map(|&v| Label(v as u8)).collect();
         let (grid, _, label) = window.paste(vec![Density::FULL; label.len()], label);

@@ -5,7 +5,7 @@ mod session;
 mod ticks;
 mod work;
 
-use super::Failure;
+use super::{Failure, say};
 use crate::anatomy;
 use crate::content::{nrrd, scan};
 use crate::volume::Volume;
@@ -21,7 +21,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     volume: Option<PathBuf>,
     /// Distance between that volume's voxels, where its header lacks it
-    #[arg(long, value_name = "MM", requires = "volume")]
+    #[arg(long, value_name = "MM", requires = "volume", value_parser = super::run::spacing)]
     tooth_spacing_mm: Option<f32>,
     /// Print JSON instead of a table
     #[arg(long)]
@@ -75,10 +75,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     measured.map_err(Failure::Wrong)?;
     match arguments.json {
         // The types hold nothing that JSON cannot say.
-        true => println!("{}", serde_json::to_string_pretty(&results).unwrap_or_default()),
-        false => print!("{}", results.table()),
+        true => say(serde_json::to_string_pretty(&results).unwrap_or_default()),
+        false => say(results.table().trim_end()),
     }
-    Ok(())
 }
 
 fn measure(arguments: &Arguments, results: &mut Results) -> Result<(), String> {

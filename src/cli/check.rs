@@ -1,6 +1,6 @@
 //! `typodont check`: every complaint about every file.
 
-use super::Failure;
+use super::{Failure, say};
 use crate::content::{self, Library};
 use crate::diagnostic::Diagnostic;
 use crate::scenario::{self, Forms};
@@ -47,9 +47,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     match arguments.format {
-        Format::Text if found.is_empty() => println!("{checked} files, no complaints"),
+        Format::Text if found.is_empty() => say(format!("{checked} files, no complaints"))?,
         Format::Text => return Err(Failure::Complaints(found)),
-        Format::Json => println!("{}", as_json(&found)),
+        Format::Json => say(as_json(&found))?,
     }
     if found.is_empty() { Ok(()) } else { Err(Failure::Told) }
 }

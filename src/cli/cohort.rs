@@ -1,6 +1,6 @@
 //! `typodont cohort`: many bundles, one table.
 
-use super::{Failure, write};
+use super::{Failure, say, write};
 use crate::report::cohort::Cohort;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -34,14 +34,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let Arguments { csv, html, json, .. } = arguments;
     write_all(&cohort, html.as_deref(), csv.as_deref(), json.as_deref())?;
-    print!("{}", cohort.text());
-    Ok(())
+    say(cohort.text().trim_end())
 }
 
 /// Writes what was asked for.
 pub fn write_all(cohort: &Cohort, html: Option<&Path>, csv: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> {
     if let Some(path) = html {
-        write(path, cohort.html(&super::templates(), path).map_err(Failure::wrong)?)?;
+        write(path, cohort.html(&super::templates()?, path).map_err(Failure::wrong)?)?;
     }
     if let Some(path) = csv {
         write(path, cohort.csv())?;

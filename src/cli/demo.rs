@@ -1,7 +1,7 @@
 //! `typodont demo`: the whole way, from the shipped exercises to a page about them.
 
 use super::run::{Run, operator, perform};
-use super::{Failure, SESSIONS, cohort};
+use super::{Failure, SESSIONS, cohort, say};
 use crate::content::Library;
 use crate::diagnostic::Source;
 use crate::report::cohort::Cohort;
@@ -38,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let operator = operator(&arguments.operator, &library)?;
     for (name, text) in EXERCISES {
         let scenario = scenario::resolve(Source::new(name, text), &library, Forms::Made)?;
-        println!("{}: {}", scenario.id, scenario.title);
+        say(format!("{}: {}", scenario.id, scenario.title))?;
         let run = Run {
             scenario: Arc::new(scenario),
             operator: operator.clone(),
@@ -47,7 +47,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             out: &arguments.out,
             digests: BTreeMap::new(),
         };
-        println!("  {}", perform(&run)?.join("report.html").display());
+        say(format!("  {}", perform(&run)?.join("report.html").display()))?;
     }
     let cohort = Cohort::read(&arguments.out);
     let page = arguments.out.join("cohort.html");
@@ -57,6 +57,5 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         Some(&arguments.out.join("cohort.csv")),
         Some(&arguments.out.join("cohort.json")),
     )?;
-    println!("{}", page.display());
-    Ok(())
+    say(page.display())
 }

@@ -1,13 +1,12 @@
 //! `typodont devices`: what can be held.
 
-use super::Failure;
+use super::{Failure, say};
 use crate::device::Spec;
 
 pub fn run() -> Result<(), Failure> {
     let spec = Spec::phantom_omni();
-    println!(
+    say(format!(
         "scripted   a scripted hand on a simulated {}: {} N, {} mm steps",
         spec.name, spec.max_force, spec.resolution
-    );
-    Ok(())
+    ))
 }

@@ -1,6 +1,6 @@
 //! `typodont import`: from a scan to a labelled tooth.
 
-use super::{Failure, write};
+use super::{Failure, say, write};
 use crate::content::{self, Library, TissueTable, nrrd, scan};
 use crate::report::tissue_map;
 use crate::scenario;
@@ -32,8 +32,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     bar.finish_and_clear();
     let tooth = tooth?;
     write(output, tissue_map(&tooth, &table).map_err(Failure::Wrong)?)?;
-    println!("{}", describe(&tooth, &table));
-    Ok(())
+    say(describe(&tooth, &table))
 }
 
 /// Size and tissues in a line each, so that a wrong spacing or a wrong threshold is seen at once.

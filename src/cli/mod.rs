@@ -8,6 +8,7 @@ mod check;
 mod cohort;
 mod demo;
 mod devices;
+mod finish;
 mod import;
 mod preview;
 mod run;
@@ -17,6 +18,7 @@ mod verify;
 use crate::diagnostic::Diagnostic;
 use clap::{Parser, Subcommand};
 use std::fmt;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -44,6 +46,8 @@ enum Command {
     Devices,
     /// Turn a bundle's recording again and compare everything
     Verify(verify::Arguments),
+    /// Make the bundle of a session that was cut off
+    Finish(finish::Arguments),
     /// Score a bundle again from its recording alone
     Score(score::Arguments),
     /// Put many bundles into one table
@@ -61,6 +65,8 @@ pub(crate) enum Failure {
     Complaints(Vec<Diagnostic>),
     /// Anything else that is wrong with the input, as lines.
     Wrong(String),
+    /// The command itself is wrong.
+    Misuse(String),
     /// It was said already; only the status is left.
     Told,
 }
@@ -78,6 +84,10 @@ impl From<Diagnostic> for Failure {
 }
 
 impl Failure {
+    fn misuse(what: impl fmt::Display) -> Failure {
+        Failure::Misuse(what.to_string())
+    }
+
     fn wrong(what: impl fmt::Display) -> Failure {
         Failure::Wrong(what.to_string())
     }
@@ -86,7 +96,7 @@ impl Failure {
     fn lines(&self) -> String {
         match self {
             Failure::Complaints(found) => found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n"),
-            Failure::Wrong(what) => what.clone(),
+            Failure::Wrong(what) | Failure::Misuse(what) => what.clone(),
             Failure::Told => String::new(),
         }
     }
@@ -101,7 +111,7 @@ impl Failure {
                     eprintln!("{} complaints", found.len());
                 }
             }
-            Failure::Wrong(what) => eprintln!("{what}"),
+            Failure::Wrong(what) | Failure::Misuse(what) => eprintln!("{what}"),
             Failure::Told => {}
         }
     }
@@ -113,13 +123,11 @@ pub fn main() -> ExitCode {
         Command::Run(arguments) => run::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
-        Command::Schema => {
-            print!("{}", crate::scenario::schema_text());
-            Ok(())
-        }
+        Command::Schema => say(crate::scenario::schema_text().trim_end()),
         Command::Preview(arguments) => preview::run(&arguments),
         Command::Devices => devices::run(),
         Command::Verify(arguments) => verify::run(&arguments),
+        Command::Finish(arguments) => finish::run(&arguments),
         Command::Score(arguments) => score::run(&arguments),
         Command::Cohort(arguments) => cohort::run(&arguments),
         Command::Import(arguments) => import::run(&arguments),
@@ -129,7 +137,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.tell();
-            ExitCode::from(1)
+            ExitCode::from(if matches!(failure, Failure::Misuse(_)) { 2 } else { 1 })
         }
     }
 }
@@ -138,8 +146,19 @@ pub fn main() -> ExitCode {
 const SESSIONS: &str = "reports/sessions";
 
 /// Templates of the folder `reports/templates` here, if there is one; otherwise those that ship with the program.
-fn templates() -> crate::report::Templates {
-    crate::report::Templates::in_folder(Path::new("reports/templates"))
+fn templates() -> Result<crate::report::Templates, Failure> {
+    crate::report::Templates::in_folder(Path::new("reports/templates")).map_err(Failure::Wrong)
+}
+
+/// Prints a line. Who listens no more, as `head` after its last line, has heard enough.
+fn say(line: impl fmt::Display) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::Wrong(format!("standard output: unwritable-file: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Writes a file, or says why not.

@@ -1,6 +1,6 @@
 //! `typodont run`: one exercise, one bundle.
 
-use super::{Failure, SESSIONS, check};
+use super::{Failure, SESSIONS, check, say};
 use crate::content::{self, Library, nrrd, scan};
 use crate::device::Spec;
 use crate::record::{self, EndFile, HeadFile, Recorder, ServoFile, SpecFile};
@@ -73,11 +73,11 @@ pub struct Run<'a> {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !arguments.headless {
-        return Err(Failure::wrong("no-window: this version runs exercises without a window only; add --headless"));
+        return Err(Failure::misuse("no-window: this version runs exercises without a window only; add --headless"));
     }
     if arguments.device != "scripted" {
         let what = format!("unknown-device: no device is named \"{}\"; see `typodont devices`", arguments.device);
-        return Err(Failure::Wrong(what));
+        return Err(Failure::Misuse(what));
     }
     let source = content::read_text(&arguments.scenario)?;
     let library = check::library_for(&arguments.scenario);
@@ -95,8 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         out: &arguments.out,
         digests,
     };
-    println!("{}", perform(&run)?.display());
-    Ok(())
+    say(perform(&run)?.display())
 }
 
 /// Puts a scan in the place of every tooth; returns the scan's SHA-256.
@@ -143,9 +142,16 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
         digests: digests.clone(),
     };
     let name = bundle_name(&head, now);
+    // A page that cannot be made should be known before the work, not after.
+    let templates = super::templates()?;
     let unfinished = bundle::Unfinished::begin(out, &name).map_err(Failure::wrong)?;
-    let mut recorder =
-        Recorder::create(&unfinished.recording(), &head, scenario, &workpiece.volume).map_err(Failure::wrong)?;
+    let mut recorder = match Recorder::create(&unfinished.recording(), &head, scenario, &workpiece.volume) {
+        Ok(recorder) => recorder,
+        Err(error) => {
+            unfinished.abandon();
+            return Err(Failure::wrong(error));
+        }
+    };
     let mut session = Session::new(scenario.clone(), &workpiece);
     let mut simulation = Simulation::new(session::setup(scenario, &workpiece, spec.clone()));
     let mut trainee = Operator::new(operator.clone(), scenario.clone(), workpiece.clone(), spec, *seed);
@@ -159,7 +165,7 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
     // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
     drop((session, simulation, trainee, workpiece));
     let bar = spinner("scoring and drawing");
-    let bundle = unfinished.complete(&super::templates()).map_err(Failure::wrong);
+    let bundle = unfinished.complete(&templates).map_err(Failure::wrong);
     bar.finish_and_clear();
     bundle
 }

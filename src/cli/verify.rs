@@ -1,7 +1,7 @@
 //! `typodont verify`: does the bundle hold?
 
-use super::Failure;
-use crate::report::bundle;
+use super::{Failure, say};
+use crate::report::bundle::{self, Judgement};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -13,21 +13,17 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let path = &arguments.bundle;
-    let complaints = match path.is_file() {
+    let judgement = match path.is_file() {
         true => bundle::verify_recording(path),
-        false => bundle::verify(path, &super::templates()),
+        false => bundle::verify(path, &super::templates()?),
     };
-    let complaints = complaints.map_err(Failure::wrong)?;
-    match complaints.is_empty() {
-        true => {
-            println!("{}: holds", arguments.bundle.display());
-            Ok(())
-        }
-        false => {
-            for complaint in &complaints {
-                eprintln!("{}: {complaint}", arguments.bundle.display());
-            }
-            Err(Failure::Told)
-        }
+    let Judgement { complaints, unjudged } = judgement.map_err(Failure::wrong)?;
+    for complaint in &complaints {
+        eprintln!("{}: {complaint}", path.display());
+    }
+    match (complaints.is_empty(), unjudged.is_empty()) {
+        (false, _) => Err(Failure::Told),
+        (true, true) => say(format!("{}: holds", path.display())),
+        (true, false) => say(format!("{}: holds, but not judged: {}", path.display(), unjudged.join("; "))),
     }
 }

@@ -11,6 +11,10 @@ use std::collections::BTreeMap;
 /// Version of the recording's format. A reader refuses a newer one.
 pub const VERSION: u32 = 1;
 
+/// Names of the metadata records: what is known before the first tick, and after the last.
+pub(super) const HEAD: &str = "session";
+pub(super) const END: &str = "end";
+
 /// What is known before the first tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HeadFile {

@@ -1,14 +1,15 @@
 //! Reading a recording, whole or cut off.
 
-use super::file::{DigestFile, EndFile, EventFile, HeadFile, InputFile, VERSION, WhatFile};
+use super::file::{DigestFile, END, EndFile, EventFile, HEAD, HeadFile, InputFile, VERSION, WhatFile};
 use super::haptic::Haptic;
+use super::replay::Running;
 use super::volume;
 use crate::content::Library;
 use crate::diagnostic::{Diagnostic, Source};
 use crate::scenario::{self, Forms, Scenario, Workpiece};
 use crate::session::Input;
 use crate::sim::Command;
-use crate::tick::Tick;
+use crate::tick::{TICK_S, Tick};
 use crate::volume::Volume;
 use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
@@ -34,6 +35,10 @@ pub struct Recording {
     /// Bytes of the `/event` messages, in order, for the digest.
     pub(super) events: Vec<(Tick, Vec<u8>)>,
     pub(super) digests: Vec<DigestFile>,
+    /// The digest of everything before the first tick.
+    pub(super) begun: Running,
+    /// The end as it was written, for the digest.
+    pub(super) end_bytes: Vec<u8>,
 }
 
 /// Why a recording cannot be read.
@@ -80,6 +85,8 @@ struct Found {
     inputs: Vec<(Tick, Input)>,
     commands: Vec<(Tick, Command)>,
     digests: Vec<DigestFile>,
+    begun: Running,
+    end_bytes: Vec<u8>,
 }
 
 impl Recording {
@@ -130,12 +137,19 @@ impl Found {
                 let text = metadata.metadata.get("json").map_or("", String::as_str);
                 let broken = |e: serde_json::Error| format!("metadata \"{}\": {e}", metadata.name);
                 match metadata.name.as_str() {
-                    "session" => self.head = Some(serde_json::from_str(text).map_err(broken)?),
-                    "end" => self.end = Some(serde_json::from_str(text).map_err(broken)?),
+                    HEAD => {
+                        self.begun.part(HEAD, text.as_bytes());
+                        self.head = Some(serde_json::from_str(text).map_err(broken)?);
+                    }
+                    END => {
+                        self.end_bytes = text.as_bytes().to_vec();
+                        self.end = Some(serde_json::from_str(text).map_err(broken)?);
+                    }
                     _ => {}
                 }
             }
             Record::Attachment { header, data, .. } => {
+                self.begun.part(&header.name, &data);
                 self.files.insert(header.name, data.into_owned());
             }
             Record::Channel(channel) => {
@@ -168,6 +182,9 @@ impl Found {
     fn add_event(&mut self, data: &[u8]) -> Result<(), String> {
         let event: EventFile = serde_json::from_slice(data).map_err(|e| format!("an event: {e}"))?;
         let tick = Tick(event.tick);
+        if self.events.last().is_some_and(|(before, _)| *before > tick) || tick.0 > self.ticks.len() as u64 {
+            return Err(format!("an event of tick {} stands after {} ticks", tick.0, self.ticks.len()));
+        }
         match &event.what {
             WhatFile::Input(input) => self.inputs.push((tick, Input::from(InputFile::clone(input)))),
             WhatFile::Command(command) => self.commands.push((tick, Command::from(command))),
@@ -179,7 +196,7 @@ impl Found {
 
     fn put_together(self, name: &str) -> Result<Recording, Unreadable> {
         let damaged = |what: &str| Unreadable::Damaged { name: name.to_string(), what: what.to_string() };
-        let Found { head, end, mut files, ticks, events, inputs, commands, digests, .. } = self;
+        let Found { head, end, mut files, ticks, events, inputs, commands, digests, begun, end_bytes, .. } = self;
         let head = head.ok_or(damaged("it does not say which session it is of"))?;
         if head.version > VERSION {
             return Err(Unreadable::Newer { name: name.to_string(), version: head.version });
@@ -195,6 +212,12 @@ impl Found {
         }
         let source = Source::new(format!("{name}: scenario.json"), text);
         let scenario = scenario::resolve(source, &library, Forms::Recorded).map_err(Unreadable::Scenario)?;
+        if scenario.sha256 != head.scenario_sha256 {
+            return Err(damaged("its scenario is not the one that its head names"));
+        }
+        if head.tick_s != TICK_S {
+            return Err(damaged("its ticks are of another length"));
+        }
         Ok(Recording {
             head,
             end,
@@ -205,6 +228,8 @@ impl Found {
             commands,
             events,
             digests,
+            begun,
+            end_bytes,
         })
     }
 }

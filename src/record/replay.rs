@@ -1,10 +1,10 @@
 //! Turning a recording's readings again.
 
-use super::file::SpecFile;
+use super::file::{END, SpecFile};
 use super::haptic::Haptic;
 use super::reader::Recording;
 use super::writer::DIGEST_TICKS;
-use crate::device::Spec;
+use crate::device::{Device, Output, Playback, Spec};
 use crate::scenario::Workpiece;
 use crate::session::{self, Effect, Event, Outcome, Session};
 use crate::sim::{Command, Simulation, Step};
@@ -15,12 +15,20 @@ use std::collections::VecDeque;
 use std::fmt;
 
 /// The digest of a session while it runs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Running(Sha256);
 
 impl Running {
     pub fn new() -> Running {
         Running(Sha256::new())
+    }
+
+    /// Something a session is made of, or what became of it: the head, a file, the end.
+    pub fn part(&mut self, name: &str, bytes: &[u8]) {
+        for part in [name.as_bytes(), bytes] {
+            self.0.update((part.len() as u64).to_le_bytes());
+            self.0.update(part);
+        }
     }
 
     pub fn event(&mut self, bytes: &[u8]) {
@@ -61,6 +69,10 @@ pub enum Difference {
     Digest { tick: Tick },
     /// The session tells the simulation something else than was recorded.
     Command { tick: Tick },
+    /// The counts at the end are not those of the replay.
+    Counts,
+    /// Events or digests stand where no session would have put them.
+    Strays,
     /// The recording has no digest at its end.
     Unsealed,
 }
@@ -72,6 +84,8 @@ impl fmt::Display for Difference {
             Difference::Tick { tick, what } => write!(f, "{}: the {what} differs from what was recorded", at(tick)),
             Difference::Digest { tick } => write!(f, "{}: the digest of everything so far differs", at(tick)),
             Difference::Command { tick } => write!(f, "{}: the session would have given another command", at(tick)),
+            Difference::Counts => f.write_str("the counts of ticks and faults at the end are not those of the replay"),
+            Difference::Strays => f.write_str("events or digests stand beyond the session's end"),
             Difference::Unsealed => f.write_str("the recording breaks off before its end"),
         }
     }
@@ -95,50 +109,63 @@ pub fn replay(
     mut visit: impl FnMut(&Haptic, &Step, &[Edit], &Session),
 ) -> Result<Replay, String> {
     let workpiece = recording.workpiece()?;
-    let device = Spec::from(&recording.head.device as &SpecFile);
-    let mut simulation = Simulation::new(session::setup(&recording.scenario, &workpiece, device));
+    let spec = Spec::from(&recording.head.device as &SpecFile);
+    let mut simulation = Simulation::new(session::setup(&recording.scenario, &workpiece, spec.clone()));
     let mut session = Session::new(recording.scenario.clone(), &workpiece);
     let mut told = Told::default();
-    told.expect(&session.begin());
+    told.expect(Tick::ZERO, &session.begin());
     let mut witness = Witness::new(recording, watch);
+    let mut hand = Playback::new(spec, recording.ticks.iter().map(|t| t.reading));
+    let mut output = Output::default();
     let mut inputs = recording.inputs.iter().peekable();
     let mut commands = recording.commands.iter().peekable();
     for haptic in &recording.ticks {
         let tick = haptic.tick;
         while let Some((_, input)) = inputs.next_if(|(at, _)| *at <= tick) {
-            told.expect(&session.advance(Event::Input(input)));
+            told.expect(tick, &session.advance(Event::Input(input)));
         }
-        while let Some((_, command)) = commands.next_if(|(at, _)| *at <= tick) {
-            witness.command(tick, told.matches(command));
+        while let Some((at, command)) = commands.next_if(|(at, _)| *at <= tick) {
+            witness.command(tick, told.matches(*at, command));
             simulation.apply(command);
         }
-        let step = simulation.step(&haptic.reading);
+        let Ok(reading) = hand.exchange(&output) else { break };
+        let step = simulation.step(&reading);
+        output = Output { force: step.force };
         witness.tick(haptic, &step, simulation.edits());
         visit(haptic, &step, simulation.edits(), &session);
-        told.expect(&session.advance(Event::Tick { step: &step, edits: simulation.edits() }));
+        told.expect(tick.next(), &session.advance(Event::Tick { step: &step, edits: simulation.edits() }));
     }
     let last = Tick(recording.ticks.len() as u64);
     for (_, input) in inputs {
-        told.expect(&session.advance(Event::Input(input)));
+        told.expect(last, &session.advance(Event::Input(input)));
     }
-    for (_, command) in commands {
-        witness.command(last, told.matches(command));
+    for (at, command) in commands {
+        witness.command(last, told.matches(*at, command));
     }
-    let difference = witness.conclude(last);
+    let is_counted = recording.end.as_ref().is_none_or(|end| {
+        let gate = simulation.gate();
+        (end.servo.ticks, end.servo.faults, end.servo.clamped) == (last.0, gate.faults(), gate.clamped_forces)
+    });
+    let difference = witness.conclude(last, told.is_empty(), is_counted);
     Ok(Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference })
 }
 
-/// Commands the session has given that the recording must have as well, in this order.
+/// Commands the session has given that the recording must have as well, in this order and at these ticks.
 #[derive(Default)]
-struct Told(VecDeque<Command>);
+struct Told(VecDeque<(Tick, Command)>);
 
 impl Told {
-    fn expect(&mut self, effects: &[Effect]) {
-        self.0.extend(effects.iter().filter_map(|e| if let Effect::Tell(command) = e { Some(*command) } else { None }));
+    fn expect(&mut self, at: Tick, effects: &[Effect]) {
+        let told = effects.iter().filter_map(|e| if let Effect::Tell(command) = e { Some(*command) } else { None });
+        self.0.extend(told.map(|command| (at, command)));
     }
 
-    fn matches(&mut self, command: &Command) -> bool {
-        self.0.pop_front().as_ref() == Some(command)
+    fn matches(&mut self, at: Tick, command: &Command) -> bool {
+        self.0.pop_front() == Some((at, *command))
+    }
+
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 }
 
@@ -154,7 +181,14 @@ struct Witness<'a> {
 
 impl<'a> Witness<'a> {
     fn new(recording: &'a Recording, watch: Watch) -> Witness<'a> {
-        Witness { recording, watch, running: Running::new(), events_seen: 0, digests_seen: 0, difference: None }
+        Witness {
+            recording,
+            watch,
+            running: recording.begun.clone(),
+            events_seen: 0,
+            digests_seen: 0,
+            difference: None,
+        }
     }
 
     fn is_watching(&self) -> bool {
@@ -201,15 +235,21 @@ impl<'a> Witness<'a> {
         }
     }
 
-    fn conclude(mut self, last: Tick) -> Option<Difference> {
-        if self.is_watching() {
-            self.see_events(last);
-            match self.recording.end.is_some() {
-                true => self.see_digest(last),
-                false => self.difference = Some(Difference::Unsealed),
-            }
+    fn conclude(mut self, last: Tick, told_all: bool, is_counted: bool) -> Option<Difference> {
+        if !self.is_watching() {
+            return self.difference;
         }
-        self.difference
+        self.see_events(last);
+        if self.recording.end.is_none() {
+            return Some(Difference::Unsealed);
+        }
+        self.running.part(END, &self.recording.end_bytes);
+        self.see_digest(last);
+        let is_whole =
+            self.events_seen == self.recording.events.len() && self.digests_seen == self.recording.digests.len();
+        let told = if told_all { None } else { Some(Difference::Command { tick: last }) };
+        let counts = if is_counted { None } else { Some(Difference::Counts) };
+        self.difference.or(told).or(counts).or(if is_whole { None } else { Some(Difference::Strays) })
     }
 }
 

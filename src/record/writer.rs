@@ -1,6 +1,8 @@
 //! Writing a recording while its session runs.
 
-use super::file::{CommandFile, DigestFile, EndFile, EventFile, HeadFile, InputFile, WhatFile, ended_by_name};
+use super::file::{
+    CommandFile, DigestFile, END, EndFile, EventFile, HEAD, HeadFile, InputFile, WhatFile, ended_by_name,
+};
 use super::haptic::{self, Haptic};
 use super::{replay::Running, volume};
 use crate::device::Reading;
@@ -63,8 +65,11 @@ impl Recorder {
             .disable_seeking(true);
         let attempt = || -> Result<Recorder, McapError> {
             let mut writer = options.create(file)?;
-            writer.write_metadata(&metadata("session", head))?;
+            let mut running = Running::new();
+            running.part(HEAD, &json(head));
+            writer.write_metadata(&metadata(HEAD, head))?;
             let mut attach = |name: &str, media_type: &str, data: &[u8]| {
+                running.part(name, data);
                 let (name, media_type) = (name.to_string(), media_type.to_string());
                 writer.attach(&Attachment { log_time: 0, create_time: 0, name, media_type, data: Cow::Borrowed(data) })
             };
@@ -80,7 +85,7 @@ impl Recorder {
             let event = writer.add_channel(0, "/event", "json", &none)?;
             let digest = writer.add_channel(0, "/digest", "json", &none)?;
             let path = path.to_path_buf();
-            Ok(Recorder { path, writer, haptic, event, digest, sequence: 0, running: Running::new() })
+            Ok(Recorder { path, writer, haptic, event, digest, sequence: 0, running })
         };
         attempt().map_err(|e| failed(e.to_string()))
     }
@@ -105,9 +110,10 @@ impl Recorder {
     /// Ends the recording.
     pub fn finish(mut self, end: &EndFile) -> Result<(), Unwritable> {
         let tick = Tick(end.servo.ticks);
+        self.running.part(END, &json(end));
         let digest = DigestFile { tick: tick.0, sha256: self.running.sha256() };
         self.write(self.digest, tick, &json(&digest))?;
-        let done = self.writer.write_metadata(&metadata("end", end)).and_then(|()| self.writer.finish().map(drop));
+        let done = self.writer.write_metadata(&metadata(END, end)).and_then(|()| self.writer.finish().map(drop));
         done.map_err(|e| self.failed(e))
     }
 }

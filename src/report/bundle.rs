@@ -55,6 +55,27 @@ impl Unfinished {
         Ok(Unfinished { partial, path })
     }
 
+    /// Takes up the folder that a session left which was cut off.
+    pub fn resume(partial: &Path) -> Result<Unfinished, Unmade> {
+        let path = match partial.extension().is_some_and(|e| e == "partial") {
+            true => partial.with_extension(""),
+            false => {
+                let why = "an unfinished session's folder ends in .partial".to_string();
+                return Err(Unmade { path: partial.to_path_buf(), why });
+            }
+        };
+        match path.exists() {
+            true => Err(Unmade { path, why: "there is a bundle of that name already".into() }),
+            false => Ok(Unfinished { partial: partial.to_path_buf(), path }),
+        }
+    }
+
+    /// Removes the folder of a session that never began.
+    pub fn abandon(self) {
+        // What cannot be removed stays, under a name that says it is nothing.
+        let _ = fs::remove_dir_all(&self.partial);
+    }
+
     /// Where the recording goes.
     pub fn recording(&self) -> PathBuf {
         self.partial.join(record::FILE_NAME)
@@ -110,48 +131,78 @@ fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
-/// Everything that does not hold about a bundle; nothing when it holds.
+/// What there is to say about a bundle.
+#[derive(Clone, Debug, Default)]
+pub struct Judgement {
+    /// What does not hold.
+    pub complaints: Vec<String>,
+    /// What could not be judged: with these a bundle holds as far as can be told, and no further.
+    pub unjudged: Vec<String>,
+}
+
+/// Turns a bundle's recording again, makes everything that follows from it anew, and compares.
 ///
-/// `Err` when it cannot be judged at all: no recording, or one that cannot be read.
-pub fn verify(bundle: &Path, templates: &Templates) -> Result<Vec<String>, String> {
+/// `Err` when it cannot be judged at all: no recording, one that cannot be read, or one of another version's session.
+pub fn verify(bundle: &Path, templates: &Templates) -> Result<Judgement, String> {
     let path = bundle.join(record::FILE_NAME);
     let bytes = crate::content::read_file(&path).map_err(|d| d.headline())?;
     let recording = Recording::parse(&path.display().to_string(), &bytes).map_err(|e| e.to_string())?;
-    let scored = score::score(&recording, Watch::Everything).map_err(|e| format!("{}: {e}", path.display()))?;
-    let mut complaints = Vec::new();
-    if let Some(difference) = &scored.replay.difference {
-        complaints.push(format!("{}: {difference}", record::FILE_NAME));
+    let (made_by, this) = (&recording.head.typodont_version, env!("CARGO_PKG_VERSION"));
+    if made_by != this {
+        return Err(format!("{}: another-version: made by typodont {made_by}, this is {this}", bundle.display()));
     }
+    let scored = score::score(&recording, Watch::Everything).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut complaints: Vec<String> =
+        scored.replay.difference.iter().map(|d| format!("{}: {d}", record::FILE_NAME)).collect();
     let written = match fs::read(bundle.join(SESSION_FILE)) {
         Ok(written) => written,
         Err(error) => {
             complaints.push(format!("{SESSION_FILE}: {error}"));
-            return Ok(complaints);
+            return Ok(Judgement { complaints, ..Judgement::default() });
         }
     };
-    match serde_json::from_slice::<SessionFile>(&written) {
-        Err(error) => complaints.push(format!("{SESSION_FILE}: {error}")),
-        Ok(session) => {
-            complaints.extend(compare_files(bundle, &bytes, &session));
-            if session.scorer_version == score::SCORER_VERSION {
-                complaints.extend(compare_results(&recording, &scored, &session));
-            }
-            // Made by this very version, everything can be made anew; by another, digests must do.
-            if complaints.is_empty() && session.typodont_version == env!("CARGO_PKG_VERSION") {
-                let anew = derive(&recording, &bytes, &scored, templates)?;
-                complaints.extend(compare_derived(bundle, &session, &anew, &written));
-            }
+    let session: SessionFile = match serde_json::from_slice(&written) {
+        Ok(session) => session,
+        Err(error) => {
+            complaints.push(format!("{SESSION_FILE}: {error}"));
+            return Ok(Judgement { complaints, ..Judgement::default() });
+        }
+    };
+    complaints.extend(compare_files(bundle, &bytes, &session));
+    complaints.extend(compare_results(&recording, &scored, &session));
+    let mut unjudged = Vec::new();
+    let anew = derive(&recording, &bytes, &scored, templates)?;
+    complaints.extend(strangers(bundle, &anew));
+    if complaints.is_empty() {
+        let is_our_page = session.template_sha256 == sha256(templates.report.as_bytes());
+        complaints.extend(compare_derived(bundle, &session, &anew, &written, is_our_page));
+        if !is_our_page {
+            unjudged.push(format!("{REPORT_FILE}: made from another template than the one here"));
         }
     }
-    Ok(complaints)
+    Ok(Judgement { complaints, unjudged })
+}
+
+/// Files that no bundle has.
+fn strangers(bundle: &Path, anew: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
+    let in_folder = |folder: &str| -> Vec<String> {
+        let entries = fs::read_dir(bundle.join(folder)).into_iter().flatten().flatten();
+        entries.map(|e| format!("{folder}{}", e.file_name().to_string_lossy())).collect()
+    };
+    let is_ours = |name: &String| anew.contains_key(name) || name == record::FILE_NAME || name == "views";
+    let mut found: Vec<String> = in_folder("").into_iter().chain(in_folder("views/")).collect();
+    found.retain(|name| !is_ours(name));
+    found.sort();
+    found.iter().map(|name| format!("{name}: is not part of a bundle")).collect()
 }
 
 /// [`verify`] for a recording without a bundle: whether it replays to what it says.
-pub fn verify_recording(path: &Path) -> Result<Vec<String>, String> {
+pub fn verify_recording(path: &Path) -> Result<Judgement, String> {
     let recording = Recording::read(path).map_err(|e| e.to_string())?;
     let replay = record::replay(&recording, Watch::Everything, |_, _, _, _| ());
     let replay = replay.map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(replay.difference.iter().map(ToString::to_string).collect())
+    let complaints = replay.difference.iter().map(ToString::to_string).collect();
+    Ok(Judgement { complaints, ..Judgement::default() })
 }
 
 /// Which files are not those that `session.json` names.
@@ -183,30 +234,44 @@ fn compare_derived(
     session: &SessionFile,
     anew: &BTreeMap<String, Vec<u8>>,
     written: &[u8],
+    is_our_page: bool,
 ) -> Vec<String> {
     let mut complaints = Vec::new();
-    // With another template than the school's the page cannot be made anew; its digest was compared.
-    let is_our_page = anew.get(SESSION_FILE).is_some_and(|text| {
-        serde_json::from_slice::<SessionFile>(text).is_ok_and(|s| s.template_sha256 == session.template_sha256)
-    });
-    for (name, bytes) in anew.iter().filter(|(n, _)| is_our_page || !matches!(n.as_str(), REPORT_FILE | SESSION_FILE)) {
-        let found = if name == SESSION_FILE { Some(written.to_vec()) } else { fs::read(bundle.join(name)).ok() };
-        if found.as_deref() != Some(bytes) {
+    for (name, bytes) in anew {
+        let follows = match name.as_str() {
+            // Of a page made from a school's own template only the digest is known, which was compared.
+            REPORT_FILE if !is_our_page => true,
+            SESSION_FILE => with_page_of(bytes, session).is_some_and(|text| text.as_bytes() == written),
+            _ => fs::read(bundle.join(name)).is_ok_and(|found| found == *bytes),
+        };
+        if !follows {
             complaints.push(format!("{name}: it does not follow from the recording"));
         }
     }
     complaints
 }
 
+/// The text of a result made anew, as it would be with the page that another result names.
+fn with_page_of(anew: &[u8], session: &SessionFile) -> Option<String> {
+    let mut expected: SessionFile = serde_json::from_slice(anew).ok()?;
+    expected.template_sha256.clone_from(&session.template_sha256);
+    if let Some(page) = session.digests.get(REPORT_FILE) {
+        expected.digests.insert(REPORT_FILE.to_string(), page.clone());
+    }
+    Some(expected.text())
+}
+
 /// Which results in `session.json` the recording does not give.
 fn compare_results(recording: &Recording, scored: &Scored, session: &SessionFile) -> Vec<String> {
     let again = SessionFile::of(recording, scored);
     let mut complaints = Vec::new();
-    for (name, value) in &again.metrics {
-        let written = session.metrics.get(name);
-        if written.is_some_and(|w| w != value) {
+    let tell = |value: Option<f64>| value.map_or("none".to_string(), |v| v.to_string());
+    for (name, &value) in &again.metrics {
+        let written = session.metrics.get(name).copied().flatten();
+        if written != value {
+            let (written, value) = (tell(written), tell(value));
             complaints
-                .push(format!("{SESSION_FILE}: metrics.{name}: {written:?} is written, the recording gives {value:?}"));
+                .push(format!("{SESSION_FILE}: metrics.{name}: {written} is written, the recording gives {value}"));
         }
     }
     let mut part = |name: &str, differs: bool| {

@@ -50,6 +50,8 @@ pub struct ScenarioSummary {
     pub graded: usize,
     pub points_mean: Option<f64>,
     pub metrics: BTreeMap<String, Spread>,
+    /// Why these sessions should not be compared without a second look.
+    pub cautions: Vec<String>,
     /// Answers that were right, of those that were asked for, by the measure that says so.
     pub right: BTreeMap<String, RightCount>,
 }
@@ -236,6 +238,7 @@ impl Cohort {
                     ));
                 }
             }
+            lines.extend(scenario.cautions.iter().map(|caution| format!("  caution: {caution}")));
         }
         lines.join("\n") + "\n"
     }
@@ -250,12 +253,16 @@ fn read_session(file: &Path) -> Result<SessionFile, String> {
     let session: SessionFile = serde_json::from_str(&text.text).map_err(|e| format!("not a session: {e}"))?;
     match session.version {
         super::session_file::VERSION => Ok(session),
-        version => Err(format!("made by a newer program (version {version})")),
+        version if version > super::session_file::VERSION => {
+            Err(format!("made by a newer program (version {version})"))
+        }
+        version => Err(format!("not a session: version {version}")),
     }
 }
 
 fn summarize(id: &str, sessions: &[&SessionFile]) -> ScenarioSummary {
     let grades: Vec<_> = sessions.iter().filter_map(|s| s.grade.as_ref()).collect();
+    let cautions = cautions(sessions);
     let names = dedup(sessions.iter().flat_map(|s| s.metrics.keys().map(String::as_str)));
     let metrics = names.into_iter().filter_map(|name| {
         let values: Vec<f64> = sessions.iter().filter_map(|s| s.metric(name)).collect();
@@ -280,8 +287,30 @@ fn summarize(id: &str, sessions: &[&SessionFile]) -> ScenarioSummary {
         graded: grades.len(),
         points_mean: mean(grades.iter().map(|g| g.points)),
         metrics: metrics.collect(),
+        cautions,
         right: right.collect(),
     }
+}
+
+/// What keeps sessions of an exercise from being alike.
+fn cautions(sessions: &[&SessionFile]) -> Vec<String> {
+    let mut found = Vec::new();
+    let versions = dedup(sessions.iter().map(|s| s.scenario.sha256.as_str()).filter(|s| !s.is_empty())).len();
+    if versions > 1 {
+        found.push(format!("the exercise was changed between these sessions: {versions} versions of it"));
+    }
+    let mut formulae: Vec<u32> = sessions.iter().map(|s| s.scorer_version).filter(|v| *v > 0).collect();
+    formulae.sort_unstable();
+    formulae.dedup();
+    if formulae.len() > 1 {
+        found.push(format!("scored by different versions of the formulae: {formulae:?}"));
+    }
+    let ended_early = |s: &&&SessionFile| !matches!(s.ended_because.as_str(), "" | "complete");
+    let unfinished = sessions.iter().filter(ended_early).count();
+    if unfinished > 0 {
+        found.push(format!("{unfinished} of them ended before their time"));
+    }
+    found
 }
 
 fn spread(values: &[f64]) -> Option<Spread> {

@@ -117,7 +117,7 @@ fn nice(value: f64) -> f64 {
     if value <= 0.0 {
         return 1.0;
     }
-    let power = 10f64.powf(value.log10().floor());
+    let power = libm::pow(10.0, libm::log10(value).floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|f| f * power).find(|&n| n >= value * 0.9999).unwrap_or(10.0 * power)
 }
 

@@ -15,6 +15,7 @@ use minijinja::value::{Serde, Value};
 use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::Path;
 
 const REPORT: &str = include_str!("../../reports/templates/report.html");
@@ -34,9 +35,21 @@ impl Templates {
     }
 
     /// Those of a folder; what it lacks ships with the program.
-    pub fn in_folder(folder: &Path) -> Templates {
-        let read = |name: &str, otherwise: &str| fs::read_to_string(folder.join(name)).unwrap_or(otherwise.into());
-        Templates { report: read("report.html", REPORT), cohort: read("cohort.html", COHORT) }
+    ///
+    /// `Err` when one of them cannot be read or is no template.
+    pub fn in_folder(folder: &Path) -> Result<Templates, String> {
+        let read = |name: &str, otherwise: &str| {
+            let path = folder.join(name);
+            let text = match fs::read_to_string(&path) {
+                Err(error) if error.kind() == ErrorKind::NotFound => otherwise.to_string(),
+                Err(error) => return Err(format!("{}: unreadable-file: {error}", path.display())),
+                Ok(text) => text,
+            };
+            let parsed = Environment::new().add_template("page", &text).map(drop);
+            parsed.map_err(|e| format!("{}: wrong-template: {e}", path.display()))?;
+            Ok(text)
+        };
+        Ok(Templates { report: read("report.html", REPORT)?, cohort: read("cohort.html", COHORT)? })
     }
 
     fn render(name: &str, template: &str, page: &impl Serialize) -> Result<String, String> {
@@ -363,6 +376,7 @@ struct CohortScenario {
     graded: usize,
     points_mean: String,
     words: Vec<(String, String)>,
+    cautions: Vec<String>,
     columns: Vec<String>,
     rows: Vec<CohortRow>,
     metrics: Vec<SpreadLine>,
@@ -462,6 +476,7 @@ fn cohort_scenario(cohort: &Cohort, summary: &super::cohort::ScenarioSummary, li
         graded: summary.graded,
         points_mean: summary.points_mean.map_or("–".into(), words::number),
         words: in_words(summary),
+        cautions: summary.cautions.clone(),
         columns: columns.iter().map(|c| words::title(c)).collect(),
         rows: sessions.map(row).collect(),
         metrics: cohort.metric_names().iter().filter_map(metric).collect(),

@@ -112,6 +112,9 @@ pub struct GradeFile {
     pub points: f64,
     pub max_points: f64,
     pub pass_points: f64,
+    /// False for a session that was given up or cut off: it cannot be passed.
+    #[serde(default = "yes")]
+    pub finished: bool,
     pub passed: bool,
     /// Titles of what failed the session outright.
     pub hard_fails: Vec<String>,
@@ -217,6 +220,10 @@ impl SessionFile {
     }
 }
 
+fn yes() -> bool {
+    true
+}
+
 /// Nine decimals: below what any measure means, above what rounding leaves.
 fn tidy(value: f64) -> f64 {
     let rounded = (value * 1e9).round() / 1e9;
@@ -279,6 +286,7 @@ fn grade(grade: &Grade) -> GradeFile {
         points: tidy(grade.points),
         max_points: tidy(grade.max_points),
         pass_points: grade.pass_points,
+        finished: grade.finished,
         passed: grade.passed,
         hard_fails: grade.hard_fails.iter().filter(|f| f.failed).map(|f| f.title.clone()).collect(),
         items: grade

@@ -130,6 +130,13 @@ pub enum Region {
     Mask(Arc<Mask>),
 }
 
+impl Region {
+    /// The size of the label map that marks the region, if one does.
+    pub fn map_dims(&self) -> Option<[u32; 3]> {
+        if let Region::Mask(mask) = self { Some(mask.dims) } else { None }
+    }
+}
+
 /// Voxels of a label map, on the grid it was read with.
 #[derive(Clone, Debug)]
 pub struct Mask {
@@ -241,6 +248,19 @@ pub struct HardFail {
 pub enum Limit {
     Above(f64),
     Below(f64),
+}
+
+impl QuestionKind {
+    /// True when an answer can be right or wrong.
+    pub fn is_judged(&self) -> bool {
+        match self {
+            QuestionKind::ToothWith { .. } | QuestionKind::QuadrantOf { .. } => true,
+            QuestionKind::Choice { correct, .. } => correct.is_some(),
+            QuestionKind::YesNo { correct } => correct.is_some(),
+            QuestionKind::Number { correct, .. } => correct.is_some(),
+            QuestionKind::Text => false,
+        }
+    }
 }
 
 impl Scenario {

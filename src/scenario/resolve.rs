@@ -69,6 +69,9 @@ fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, fou
         Unmakeable::NoEnamel { tooth } => {
             (format!("{}/form", tooth_path(&written.scene, *tooth)), "check which number or grey value is enamel")
         }
+        Unmakeable::ZoneSize { zone, .. } => {
+            (format!("/zones/{zone}/region/labels/file"), "draw the map on the very volume that the tooth is made from")
+        }
         Unmakeable::UnequalSpacing => ("/scene".to_string(), "give both teeth the same spacing_mm"),
         Unmakeable::TooLarge { .. } | Unmakeable::OnlyRecorded => ("/scene".to_string(), "choose a larger spacing_mm"),
     };
@@ -551,6 +554,12 @@ impl Resolver<'_> {
             }
             file::AnswerFile::QuadrantOf(decay) => {
                 self.lesion(decay, lesions, &format!("{path}/answer/quadrant_of"));
+                if self.is_between_quadrants(scenario, decay) {
+                    let message = format!("\"{decay}\" lies in the middle, or not on the chewing surface");
+                    let help =
+                        "put it into a quadrant: \"at\": \"random_quadrant\" on surface O, or { \"quadrant\": 1 }";
+                    self.complain(&format!("{path}/answer/quadrant_of"), "no-quadrant", message, help);
+                }
                 QuestionKind::QuadrantOf { decay: decay.clone() }
             }
             file::AnswerFile::Choice(choice) => {
@@ -646,6 +655,19 @@ impl Resolver<'_> {
                 None
             }
         }
+    }
+
+    /// True when no quadrant is the right answer: a decay in the middle of a surface, or on a side of the tooth.
+    fn is_between_quadrants(&self, scenario: &ScenarioFile, decay: &str) -> bool {
+        let teeth: Vec<&file::ToothFile> = match &scenario.scene {
+            file::SceneFile::Tooth(tooth) => vec![tooth],
+            file::SceneFile::Jaw(jaw) => vec![&jaw.tooth],
+            file::SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
+        };
+        let mut all = teeth.into_iter().flat_map(|t| &t.decay);
+        all.any(|d| {
+            d.id == decay && (d.surface != file::SurfaceFile::O || matches!(d.at, file::DecayPlaceFile::Centre))
+        })
     }
 
     fn questionnaire(&mut self, name: &str) -> Option<Questionnaire> {

@@ -58,6 +58,8 @@ pub enum Unmakeable {
     UnequalSpacing,
     /// A tooth has no enamel, so its crown cannot be told.
     NoEnamel { tooth: usize },
+    /// A zone's label map is not of the workpiece's size: the zone by index, the map's size and the workpiece's.
+    ZoneSize { zone: usize, map: [u32; 3], workpiece: [u32; 3] },
     /// The volume would have too many voxels.
     TooLarge { voxels: u64 },
     /// The forms were not read: the volume is to be taken from the recording.
@@ -70,6 +72,11 @@ impl fmt::Display for Unmakeable {
             Unmakeable::DecayOutside { .. } => f.write_str("the decay lies outside the tooth's hard tissue"),
             Unmakeable::UnequalSpacing => f.write_str("the two teeth have different voxel sizes"),
             Unmakeable::NoEnamel { .. } => f.write_str("the tooth has no enamel, so its crown cannot be told"),
+            Unmakeable::ZoneSize { map, workpiece, .. } => write!(
+                f,
+                "the zone's label map has {}×{}×{} voxels, the workpiece {}×{}×{}",
+                map[0], map[1], map[2], workpiece[0], workpiece[1], workpiece[2]
+            ),
             Unmakeable::OnlyRecorded => f.write_str("the teeth's forms are in the recording only"),
             Unmakeable::TooLarge { voxels } => write!(f, "the volume would have {voxels} voxels"),
         }
@@ -87,7 +94,7 @@ impl Workpiece {
             let mut volume = form_of(tooth, &scenario.tissues)?;
             let place = place_of(tooth, &volume, &scenario.tissues).ok_or(Unmakeable::NoEnamel { tooth: index })?;
             for (number, decay) in tooth.decay.iter().enumerate() {
-                let lesion = locate(decay, index, &place, &volume, seed);
+                let lesion = locate(decay, index, &place, &volume, Side::All, seed);
                 if mark(&mut volume, &lesion, &scenario.tissues) == 0 {
                     return Err(Unmakeable::DecayOutside { tooth: index, decay: number });
                 }
@@ -98,6 +105,14 @@ impl Workpiece {
             Layout::Pair { gap } => side_by_side(&parts, gap)?,
             Layout::Single | Layout::Jaw => parts.swap_remove(0),
         };
+        if volume.grid().len() as u64 > VOXELS_MAX {
+            return Err(Unmakeable::TooLarge { voxels: volume.grid().len() as u64 });
+        }
+        for (zone, region) in scenario.zones.iter().map(|z| &z.region).enumerate() {
+            if let Some(map) = region.map_dims().filter(|map| *map != volume.grid().dims) {
+                return Err(Unmakeable::ZoneSize { zone, map, workpiece: volume.grid().dims });
+            }
+        }
         Workpiece::of(scenario, Arc::new(volume), seed)
     }
 
@@ -109,7 +124,7 @@ impl Workpiece {
             let side = Side::of(scenario.scene.layout, index);
             let place = place_within(tooth, &volume, &scenario.tissues, side);
             let place = place.ok_or(Unmakeable::NoEnamel { tooth: index })?;
-            lesions.extend(tooth.decay.iter().map(|decay| locate(decay, index, &place, &volume, seed)));
+            lesions.extend(tooth.decay.iter().map(|decay| locate(decay, index, &place, &volume, side, seed)));
             teeth.push(place);
         }
         let around = match scenario.scene.layout {
@@ -223,7 +238,7 @@ impl Bounds {
 }
 
 /// Where a decay goes: on a surface of its tooth, in a place of that surface.
-fn locate(decay: &Decay, tooth: usize, place: &ToothPlace, volume: &Volume, seed: u64) -> Lesion {
+fn locate(decay: &Decay, tooth: usize, place: &ToothPlace, volume: &Volume, side: Side, seed: u64) -> Lesion {
     /// Of half the crown: where the middle of a quadrant lies.
     const INTO_QUADRANT: f32 = 0.42;
     let (middle, half) = (0.5 * (place.crown_low + place.crown_high), 0.5 * (place.crown_high - place.crown_low));
@@ -247,17 +262,17 @@ fn locate(decay: &Decay, tooth: usize, place: &ToothPlace, volume: &Volume, seed
         DecayPlace::Offset([a, b]) => u * a + v * b,
     };
     let outside = middle + offset - inward * (half.max_element() + 2.0);
-    let centre = surface_below(volume, outside, inward) + inward * decay.depth;
+    let centre = surface_below(volume, side, outside, inward) + inward * decay.depth;
     let quadrant = Workpiece::quadrant(place, centre);
     Lesion { id: decay.id.clone(), tooth, label: decay.label, centre, radii: Vec3::from(decay.radii), quadrant }
 }
 
-/// Where a ray first meets matter; its far end when it meets none.
-fn surface_below(volume: &Volume, from: Vec3, along: Vec3) -> Vec3 {
+/// Where a ray first meets matter on a side of the scene; its far end when it meets none.
+fn surface_below(volume: &Volume, side: Side, from: Vec3, along: Vec3) -> Vec3 {
     let step = 0.5 * volume.grid().spacing.min_element();
     let steps = (30.0 / step) as u32;
     let point = |i: u32| from + along * (i as f32 * step);
-    (0..steps).map(point).find(|&p| volume.density_at(p) >= ISO).unwrap_or(point(steps))
+    (0..steps).map(point).find(|&p| side.holds(p) && volume.density_at(p) >= ISO).unwrap_or(point(steps))
 }
 
 /// A number from a seed and a name (SplitMix64 over the name's bytes): the same on every machine, for ever.

@@ -9,6 +9,8 @@ pub struct Grade {
     pub points: f64,
     pub max_points: f64,
     pub pass_points: f64,
+    /// False for a session that was not finished, whatever its points.
+    pub finished: bool,
     pub passed: bool,
     pub items: Vec<ItemResult>,
     pub hard_fails: Vec<HardFailResult>,
@@ -36,7 +38,8 @@ pub struct HardFailResult {
     pub failed: bool,
 }
 
-pub fn of(rubric: &Rubric, measures: &Measures) -> Grade {
+/// A session that was given up or cut off cannot be passed: not `finished`.
+pub fn of(rubric: &Rubric, measures: &Measures, finished: bool) -> Grade {
     let items: Vec<ItemResult> = rubric
         .items
         .iter()
@@ -68,8 +71,9 @@ pub fn of(rubric: &Rubric, measures: &Measures) -> Grade {
             HardFailResult { title: fail.title.clone(), metric, value, limit: fail.when, failed }
         })
         .collect();
-    let points: f64 = items.iter().map(|i| i.points).sum();
-    let passed = points >= rubric.pass_points && !hard_fails.iter().any(|f| f.failed);
+    // As exact as it is printed: a sum of thirds must not miss the mark by a rounding.
+    let points = (items.iter().map(|i| i.points).sum::<f64>() * 1e9).round() / 1e9;
+    let passed = finished && points >= rubric.pass_points && !hard_fails.iter().any(|f| f.failed);
     let max_points = items.iter().map(|i| i.max_points).sum();
-    Grade { points, max_points, pass_points: rubric.pass_points, passed, items, hard_fails }
+    Grade { points, max_points, pass_points: rubric.pass_points, finished, passed, items, hard_fails }
 }

@@ -112,13 +112,13 @@ impl Source<'_> {
             "decay_cleared_pct" => share(counts.removed_decay, counts.decay).map(|s| 100.0 * s).into(),
             "healthy_per_decay_pct" => share(counts.removed_other, counts.decay).map(|s| 100.0 * s).into(),
             "time_to_clear_s" => self.cutting_stage().map(|s| s.ended.seconds_since(s.started)).into(),
-            "detect_tooth" => self.search(is_tooth).map(|(_, given)| flag(given.right)).into(),
+            "detect_tooth" => self.named_rightly(is_tooth).into(),
             "detect_level" => self.search(is_tooth).and_then(|(_, g)| Some(f64::from(g.step?.0))).map(clean).into(),
             "detect_level_time_s" => {
                 let since = |(stage, given): (&StageResult, &Given)| given.step.map_or(stage.started, |(_, at)| at);
                 self.search(is_tooth).map(|found| found.1.at.seconds_since(since(found))).into()
             }
-            "detect_quadrant" => self.search(is_quadrant).map(|(_, given)| flag(given.right)).into(),
+            "detect_quadrant" => self.named_rightly(is_quadrant).into(),
             "detect_quadrant_time_s" => {
                 self.search(is_quadrant).map(|(stage, given)| given.at.seconds_since(stage.started)).into()
             }
@@ -143,15 +143,12 @@ impl Source<'_> {
             "remaining_dentine_thickness_min_mm" => {
                 self.deepest(self.shape.nearest(|s| s.removed() && !s.vulnerable(), |s| s.vulnerable()), None)
             }
-            "force_max_n" => match seen.force.highest {
-                None => 0.0.into(),
-                highest => highest.into(),
-            },
+            "force_max_n" => highest_or_zero(seen.force.highest),
             "force_mean_n" => seen.force.mean().into(),
             "speed_max_mm_s" => seen.speed.highest.into(),
-            "force_max_near_pulp_n" => seen.force_near.highest.into(),
-            "force_mean_near_pulp_n" => seen.force_near.mean().into(),
-            "speed_max_near_pulp_mm_s" => seen.speed_near.highest.into(),
+            "force_max_near_pulp_n" => highest_or_zero(seen.force_near.highest),
+            "force_mean_near_pulp_n" => seen.force_near.mean().unwrap_or(0.0).into(),
+            "speed_max_near_pulp_mm_s" => highest_or_zero(seen.speed_near.highest),
             "path_length_mm" => seen.path_mm.into(),
             "drilling_time_s" => seconds(seen.drilling_ticks).into(),
             "contact_time_s" => seconds(seen.contact_ticks).into(),
@@ -178,21 +175,32 @@ impl Source<'_> {
         self.replay.outcome.stages.get(self.recording.scenario.cutting_stage()?)
     }
 
+    /// Every question that was asked, with the stage's result and the answer.
+    fn asked(&self) -> impl Iterator<Item = (&StageResult, &QuestionKind, Option<&Given>)> {
+        let stages = self.recording.scenario.stages.iter().zip(&self.replay.outcome.stages);
+        stages.flat_map(|(stage, result)| {
+            let questions = stage.ask.iter().zip(&result.answers);
+            questions.map(move |(question, given)| (result, &question.kind, given.as_ref()))
+        })
+    }
+
+    /// 1 when the last answer of a kind is right, 0 when it is wrong or was not given; `None` when none was asked for.
+    fn named_rightly(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<f64> {
+        let is_asked = self.asked().any(|(_, kind, _)| is_meant(kind));
+        is_asked.then(|| self.search(is_meant).map_or(0.0, |(_, given)| flag(given.right)))
+    }
+
     /// The last answered question of a kind, with its stage.
     fn search(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<(&StageResult, &Given)> {
-        let stages = self.recording.scenario.stages.iter().zip(&self.replay.outcome.stages);
-        let answers = stages.flat_map(|(stage, result)| {
-            let questions = stage.ask.iter().zip(&result.answers);
-            questions.filter(|(q, _)| is_meant(&q.kind)).filter_map(move |(_, given)| Some((result, given.as_ref()?)))
-        });
-        answers.last()
+        self.asked().filter(|(_, kind, _)| is_meant(kind)).filter_map(|(stage, _, given)| Some((stage, given?))).last()
     }
 
     fn questions_right_pct(&self) -> Option<f64> {
-        let answers = self.replay.outcome.stages.iter().flat_map(|s| &s.answers).flatten();
-        let judged: Vec<bool> = answers.filter_map(|given| given.right).collect();
-        let right = judged.iter().filter(|r| **r).count();
-        (!judged.is_empty()).then(|| 100.0 * right as f64 / judged.len() as f64)
+        let judged = self.asked().filter(|(_, kind, _)| kind.is_judged());
+        let (right, all) = judged.fold((0u32, 0u32), |(right, all), (_, _, given)| {
+            (right + u32::from(given.is_some_and(|g| g.right == Some(true))), all + 1)
+        });
+        (all > 0).then(|| 100.0 * f64::from(right) / f64::from(all))
     }
 
     /// Nearest-rank percentile of the distances between outlines.
@@ -241,6 +249,11 @@ fn is_tooth(kind: &QuestionKind) -> bool {
 
 fn is_quadrant(kind: &QuestionKind) -> bool {
     matches!(kind, QuestionKind::QuadrantOf { .. })
+}
+
+/// What never occurred was never high.
+fn highest_or_zero(highest: Option<Moment>) -> Found {
+    if highest.is_none() { 0.0.into() } else { highest.into() }
 }
 
 fn flag(right: Option<bool>) -> f64 {

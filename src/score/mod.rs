@@ -67,7 +67,8 @@ pub fn judge(recording: &Recording, watched: Watched) -> Scored {
     let shape = shape::Shape::of(scenario, &replay);
     let verdicts = verdict::of(scenario, &replay, &shape);
     let measures = measures::all(recording, &replay, &seen, &shape);
-    let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures));
+    let is_finished = recording.end.is_some() && !replay.outcome.aborted;
+    let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
     let process::Seen { falls, trace, .. } = seen;
     Scored { replay, measures, verdicts, falls, trace, grade }
 }

@@ -214,10 +214,10 @@ fn log_dimensionless_jerk(spells: &[Vec<Vec3>]) -> Option<f64> {
         length += spell.windows(2).map(|w| f64::from(w[0].distance(w[1]))).sum::<f64>();
         let third = spell
             .windows(4)
-            .map(|w| ((w[3] - w[2] * 3.0 + w[1] * 3.0 - w[0]).as_dvec3() / dt.powi(3)).length_squared());
+            .map(|w| ((w[3] - w[2] * 3.0 + w[1] * 3.0 - w[0]).as_dvec3() / (dt * dt * dt)).length_squared());
         jerk_squared += third.sum::<f64>() * dt;
     }
-    let measure = seconds.powi(5) / (length * length) * jerk_squared;
+    let measure = (seconds * seconds * seconds * seconds * seconds) / (length * length) * jerk_squared;
     (seconds >= SMOOTHNESS_LEAST_S && measure.is_finite() && measure > 0.0).then(|| -libm::log(measure))
 }
 

@@ -161,16 +161,12 @@ impl Shape {
         Some(distances)
     }
 
-    /// The first vulnerable voxel that was removed or lies beside a removed one.
+    /// The first voxel that [`Shape::is_exposed`].
     pub fn exposed(&self) -> Option<usize> {
-        let is_laid_open = |i: usize| {
-            self.sets[i].removed()
-                || self.grid.neighbours(i).any(|n| self.sets[n].removed() && !self.sets[n].vulnerable())
-        };
-        self.indices(|s| s.vulnerable()).find(|&i| is_laid_open(i))
+        self.indices(|s| s.vulnerable()).find(|&voxel| self.is_exposed(voxel))
     }
 
-    /// Every voxel that is vulnerable and was removed or laid open.
+    /// True for a vulnerable voxel that was removed or lies beside a removed one.
     pub fn is_exposed(&self, voxel: usize) -> bool {
         self.sets[voxel].vulnerable()
             && (self.sets[voxel].removed() || self.grid.neighbours(voxel).any(|n| self.sets[n].removed()))

@@ -106,6 +106,11 @@ pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
         let mut zones = scenario.zones.iter().zip(&shape.zones);
         zones.any(|(z, mask)| z.role == ZoneRole::NeverRemove && mask.contains(voxel))
     };
+    // What must stay whole around the preparation has no leeway.
+    let is_container = |voxel: usize| {
+        let mut zones = scenario.zones.iter().zip(&shape.zones);
+        zones.any(|(z, mask)| z.role == ZoneRole::Container && mask.contains(voxel))
+    };
     let verdict = |voxel: usize| {
         if initial.tissue(voxel) == Label::AIR {
             return Verdict::Outside;
@@ -115,6 +120,7 @@ pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
             (true, _) if is_forbidden(voxel) => Verdict::VulnerableTouched,
             _ if shape.is_exposed(voxel) => Verdict::VulnerableTouched,
             (true, true) => Verdict::RightlyRemoved,
+            (true, false) if is_container(voxel) => Verdict::Overcut,
             (true, false) if is_harmless(voxel) => Verdict::WithinLeeway,
             (true, false) => Verdict::Overcut,
             (false, true) => Verdict::Left,

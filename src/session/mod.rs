@@ -229,11 +229,6 @@ impl Session {
         self.now.seconds_since(self.started)
     }
 
-    /// Index of the current stiffness step.
-    pub fn stiffness_step(&self) -> usize {
-        self.step
-    }
-
     /// Which questions of the current stage are answered.
     pub fn answered(&self) -> impl Iterator<Item = bool> + '_ {
         self.answers.iter().map(Option::is_some)

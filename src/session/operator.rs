@@ -33,6 +33,8 @@ pub struct Operator {
     device: Scripted,
     /// Index of the stage the plan is for.
     stage: Option<usize>,
+    /// Ticks since the stage began.
+    stage_ticks: u64,
     plan: VecDeque<Task>,
     /// Places felt in this stage.
     felt: Vec<FeltPlace>,
@@ -66,6 +68,10 @@ struct FeltPlace {
     stiffness: f32,
 }
 
+/// How long a script stays in a stage without a time limit before it gives the session up: 20 minutes. A script that
+/// does nothing more would otherwise fill the disk.
+const PATIENCE_TICKS: u64 = 20 * 60 * 1000;
+
 impl Operator {
     /// An operator holding a device above the workpiece. The seed decides its tremor.
     pub fn new(
@@ -84,6 +90,7 @@ impl Operator {
             scenario,
             workpiece,
             stage: None,
+            stage_ticks: 0,
             plan: VecDeque::new(),
             felt: Vec::new(),
             feeling: None,
@@ -105,6 +112,7 @@ impl Operator {
 
     fn begin_stage(&mut self, index: usize) {
         self.stage = Some(index);
+        self.stage_ticks = 0;
         self.felt.clear();
         self.feeling = None;
         self.device.stop();
@@ -471,7 +479,11 @@ impl Trainee for Operator {
                 if self.stage != Some(index) {
                     self.begin_stage(index);
                 }
-                self.go_on(session, index)
+                self.stage_ticks += 1;
+                match self.scenario.stages[index].time_limit {
+                    None if self.stage_ticks > PATIENCE_TICKS => vec![Input::Abort],
+                    _ => self.go_on(session, index),
+                }
             }
         }
     }

@@ -27,7 +27,7 @@ pub trait Observer {
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Progress {
-    /// All stages are over and everything was answered.
+    /// All stages are over, and whoever was asked for more has said all they wanted to.
     Complete,
     /// The trainee's device gave no more readings.
     DeviceGone(Gone),

@@ -38,7 +38,7 @@ pub(super) fn find(planes: &mut Vec<Plane>, matter: &Matter, instrument: &Instru
     // Between voxel centres a hollow reads narrower than it is, by up to h²/8 times the Laplacian of the distance, 2/r on a
     // sphere: without this much slack a bur would jam in the very groove it has cut.
     let slack = match instrument.cuts && radius > 0.0 {
-        true => grid.spacing.max_element().powi(2) / (4.0 * radius),
+        true => grid.spacing.max_element() * grid.spacing.max_element() / (4.0 * radius),
         false => 0.0,
     };
     let way = (goal - tip).normalize_or_zero();

@@ -16,6 +16,9 @@ use crate::volume::{Grid, Label, Volume, ramp};
 use levels::Levels;
 use std::fmt;
 
+/// Longest side of a voxel in shortest sides. Clinical scans have up to 10.
+const FLATNESS_MAX: f32 = 20.0;
+
 /// How long a tooth, or what was scanned of it, can be, mm: a milk incisor's crown to a canine with its root, with leeway.
 const LENGTH: std::ops::RangeInclusive<f32> = 4.0..=50.0;
 
@@ -28,6 +31,8 @@ pub enum Unclear {
     NoBody,
     /// Its hard matter has one level, not the two of dentine and enamel.
     OneLevel,
+    /// Voxels are so many times longer than they are wide.
+    Uneven(f32),
     /// The largest solid thing has a length that no tooth has, mm.
     Size(f32),
 }
@@ -40,6 +45,11 @@ impl fmt::Display for Unclear {
             Unclear::OneLevel => f.write_str(
                 "enamel cannot be told from dentine: the solid matter has one grey value, not two; \
                  give a CT volume in which enamel is brighter, or a label map",
+            ),
+            Unclear::Uneven(times) => write!(
+                f,
+                "its voxels are {times:.0} times longer than wide, more than {FLATNESS_MAX:.0} is a mistake; \
+                 check the spacing"
             ),
             Unclear::Size(mm) => write!(
                 f,
@@ -110,11 +120,17 @@ fn window_of_tooth(grid: &Grid, values: &[f32], solid_from: f32) -> Result<Windo
     let (tooth, _) = pieces.largest().ok_or(Unclear::NoBody)?;
     let [low, high] = box_around(grid, |i| pieces.at(i) == Some(tooth));
     let length = (grid.centre(high) - grid.centre(low) + grid.spacing).max_element();
+    // Thin slices are ordinary; beyond this a header is wrong, and distances in voxels lose their meaning.
+    let flatness = grid.spacing.max_element() / grid.spacing.min_element();
+    if flatness > FLATNESS_MAX {
+        return Err(Unclear::Uneven(flatness));
+    }
     if !LENGTH.contains(&length) {
         return Err(Unclear::Size(length));
     }
     // One more, so that the window's corner stays outside what bridging seals.
-    let spare = (cavity::bridge(grid) / grid.spacing.min_element()).ceil() as u32 + 1;
+    let bridge = cavity::bridge(grid);
+    let spare = grid.spacing.to_array().map(|step| (bridge / step).ceil() as u32 + 1);
     Ok(Window::around(grid, low, high, spare))
 }
 

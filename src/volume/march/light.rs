@@ -25,7 +25,7 @@ const RIM: f32 = 0.2;
 
 /// Gloss of wet enamel, as a share of full light, and how tight its highlight is.
 const GLOSS: f32 = 0.10;
-const GLOSS_TIGHTNESS: i32 = 28;
+const GLOSS_TIGHTNESS: f32 = 28.0;
 
 /// Shade on a tooth is warm, because light comes through it: the share by which red gains and blue loses there.
 const WARMTH: f32 = 0.12;
@@ -46,7 +46,7 @@ pub fn lit(camera: &Camera, hit: Hit, hollow: f32) -> Hit {
     let open = 1.0 - hollow * (0.3 + 0.7 * normal.z.clamp(0.0, 1.0));
     let light = (AMBIENT + KEY_SHARE * from_key + FILL_SHARE * from_fill) * rim * open;
     let half = (key + Vec3::Z).normalize();
-    let gloss = GLOSS * normal.dot(half).max(0.0).powi(GLOSS_TIGHTNESS) * open;
+    let gloss = GLOSS * libm::powf(normal.dot(half).max(0.0), GLOSS_TIGHTNESS) * open;
     Hit { light, gloss, ..hit }
 }
 
