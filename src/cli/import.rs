@@ -23,6 +23,12 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { scan: path, output, spacing_mm } = arguments;
     let wrong = |what: String| Failure::Wrong(format!("{}: wrong-volume: {what}", path.display()));
+    if !output.to_string_lossy().ends_with(".nrrd") {
+        return Err(Failure::misuse(format!("{}: the label map is a .seg.nrrd file", output.display())));
+    }
+    if output.canonicalize().is_ok_and(|o| path.canonicalize().is_ok_and(|p| p == o)) {
+        return Err(Failure::misuse(format!("{}: this is the scan itself", output.display())));
+    }
     content::read_file(path)?;
     let image = nrrd::read(path).map_err(|e| wrong(e.to_string()))?;
     let table = TissueTable::read(&Library::shipped())?;

@@ -20,6 +20,9 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
+        return Err(Failure::misuse(format!("{}: the picture is a .png file", arguments.output.display())));
+    }
     let source = content::read_text(&arguments.scenario)?;
     let scenario = scenario::resolve(source, &check::library_for(&arguments.scenario), Forms::Made)?;
     let workpiece = Workpiece::make(&scenario, arguments.seed).map_err(Failure::wrong)?;

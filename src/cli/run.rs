@@ -54,9 +54,10 @@ pub fn spacing(text: &str) -> Result<f32, String> {
 }
 
 fn participant(text: &str) -> Result<String, String> {
-    match text.chars().count() <= 10_000 {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+    match text.len() <= 64 && text.chars().all(is_plain) {
         true => Ok(text.to_string()),
-        false => Err("a code has at most 10 000 characters".into()),
+        false => Err("a code has up to 64 letters, digits, \"-\", \"_\" or \".\", and is never a name".into()),
     }
 }
 
@@ -116,6 +117,12 @@ fn replace_teeth(scenario: &mut Scenario, path: &Path, spacing: Option<f32>) -> 
 pub fn operator(name: &str, library: &Library) -> Result<OperatorFile, Failure> {
     match Path::new(name).extension() {
         Some(_) => Ok(content::json::read::<OperatorFile>(content::read_text(Path::new(name))?)?.value),
+        None if library.bytes(&OperatorFile::file(name)).is_err() => {
+            let known =
+                library.held().filter_map(|(file, _)| file.strip_prefix("content/operators/")?.strip_suffix(".json"));
+            let known = known.collect::<Vec<_>>().join(", ");
+            Err(Failure::Wrong(format!("unknown-operator: no operator is named \"{name}\"; known: {known}, or a file")))
+        }
         None => Ok(OperatorFile::read(library, name)?),
     }
 }
@@ -155,13 +162,19 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
     let mut session = Session::new(scenario.clone(), &workpiece);
     let mut simulation = Simulation::new(session::setup(scenario, &workpiece, spec.clone()));
     let mut trainee = Operator::new(operator.clone(), scenario.clone(), workpiece.clone(), spec, *seed);
-    let progress = session::run(&mut session, &mut simulation, &mut trainee, &mut recorder).map_err(Failure::wrong)?;
+    // What was recorded so far stays, and is told of.
+    let stopped = |error: record::Unwritable| {
+        let left = unfinished.recording();
+        let folder = left.parent().unwrap_or(&left).display().to_string();
+        Failure::Wrong(format!("{error}\nwhat was recorded is in {folder}; `typodont finish` makes a bundle of it"))
+    };
+    let progress = session::run(&mut session, &mut simulation, &mut trainee, &mut recorder).map_err(&stopped)?;
     let reason = match progress {
         Progress::Complete if session.outcome().aborted => "aborted".to_string(),
         Progress::Complete => "complete".to_string(),
         Progress::DeviceGone(gone) => gone.to_string(),
     };
-    recorder.finish(&EndFile { reason, servo: servo(&simulation) }).map_err(Failure::wrong)?;
+    recorder.finish(&EndFile { reason, servo: servo(&simulation) }).map_err(&stopped)?;
     // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
     drop((session, simulation, trainee, workpiece));
     let bar = spinner("scoring and drawing");

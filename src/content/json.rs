@@ -3,6 +3,7 @@
 //! Takes a text and a type. Gives the value and where each of its parts stands, or all that is wrong with it. The schema
 //! that the complaints come from is the one that is printed for editors: what it accepts is what is read.
 
+use super::syntax;
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
 use jsonc_parser::ast::{ObjectPropName, Value};
 use jsonc_parser::common::{Range as AstRange, Ranged};
@@ -71,7 +72,8 @@ pub fn read<T: DeserializeOwned + JsonSchema>(source: Arc<Source>) -> Result<Rea
     let parsed = parse_to_ast(&source.text, &CollectOptions::default(), &strict()).map_err(|error| {
         let message = error.kind().to_string().to_lowercase();
         let span = clip(error.range(), source.text.len());
-        vec![Diagnostic { span: Some(span), ..whole("syntax", message, "the file must be JSON (RFC 8259)") }]
+        let help = syntax::remedy(&source.text, span.start);
+        vec![Diagnostic { span: Some(span), ..whole("syntax", message, help) }]
     })?;
     let Some(value) = parsed.value else {
         return Err(vec![whole("syntax", "the file is empty".into(), "")]);
@@ -87,6 +89,12 @@ pub fn read<T: DeserializeOwned + JsonSchema>(source: Arc<Source>) -> Result<Rea
     let value = serde_json::from_str(&source.text).map(with_whole_numbers).and_then(serde_json::from_value);
     match value {
         Ok(value) => Ok(Read { value, places: Places { source, spans } }),
+        // A control character within a text: the one thing that the two readers of JSON see differently.
+        Err(error) if error.is_syntax() => {
+            let at = syntax::offset(&source.text, error.line(), error.column());
+            let message = error.to_string();
+            Err(vec![Diagnostic { span: Some(at..at), ..whole("syntax", message, syntax::remedy(&source.text, at)) }])
+        }
         Err(error) => {
             // Nothing known gets here: the schema says all that serde asks. Should it ever, the author still hears of it.
             let help = "this is a gap in the schema of this kind of file; please report it";

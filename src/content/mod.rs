@@ -3,6 +3,7 @@
 //! Takes bytes by name. Gives checked values, or every complaint there is. Never changes a file it reads.
 
 pub mod json;
+mod syntax;
 pub mod nrrd;
 pub mod scan;
 mod library;

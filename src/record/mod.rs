@@ -10,6 +10,7 @@
 
 mod haptic;
 mod file;
+mod records;
 mod reader;
 mod replay;
 mod volume;

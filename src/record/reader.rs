@@ -2,6 +2,7 @@
 
 use super::file::{DigestFile, END, EndFile, EventFile, HEAD, HeadFile, InputFile, VERSION, WhatFile};
 use super::haptic::Haptic;
+use super::records;
 use super::replay::Running;
 use super::volume;
 use crate::content::Library;
@@ -11,7 +12,6 @@ use crate::session::Input;
 use crate::sim::Command;
 use crate::tick::{TICK_S, Tick};
 use crate::volume::Volume;
-use mcap::read::{ChunkFlattener, Options};
 use mcap::records::Record;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -100,18 +100,7 @@ impl Recording {
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Recording, Unreadable> {
         let damaged = |what: String| Unreadable::Damaged { name: name.to_string(), what };
         let mut found = Found::default();
-        let options = Options::IgnoreEndMagic | Options::ValidateChunkCrcs;
-        let records = ChunkFlattener::new_with_options(bytes, options);
-        let records = records.map_err(|e| damaged(format!("this is not an MCAP recording: {e}")))?;
-        for record in records {
-            match record {
-                Ok(record) => found.add(record).map_err(damaged)?,
-                // A cut-off file ends in the middle of a record; a damaged one does not reach its end either. What was
-                // read so far stands; `verify` tells the two apart by what is missing.
-                Err(_) if found.head.is_some() => break,
-                Err(error) => return Err(damaged(error.to_string())),
-            }
-        }
+        records::walk(bytes, |record| found.add(record)).map_err(damaged)?;
         found.put_together(name)
     }
 

@@ -154,7 +154,7 @@ pub fn verify(bundle: &Path, templates: &Templates) -> Result<Judgement, String>
     let scored = score::score(&recording, Watch::Everything).map_err(|e| format!("{}: {e}", path.display()))?;
     let mut complaints: Vec<String> =
         scored.replay.difference.iter().map(|d| format!("{}: {d}", record::FILE_NAME)).collect();
-    let written = match fs::read(bundle.join(SESSION_FILE)) {
+    let written = match read_part(bundle, SESSION_FILE) {
         Ok(written) => written,
         Err(error) => {
             complaints.push(format!("{SESSION_FILE}: {error}"));
@@ -205,6 +205,16 @@ pub fn verify_recording(path: &Path) -> Result<Judgement, String> {
     Ok(Judgement { complaints, ..Judgement::default() })
 }
 
+/// A file of a bundle: a plain one, never a link, a pipe or a device, which might have no end.
+fn read_part(bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
+    let path = bundle.join(name);
+    match fs::symlink_metadata(&path) {
+        Err(error) => Err(error.to_string()),
+        Ok(meta) if !meta.is_file() => Err("this is not a plain file".to_string()),
+        Ok(_) => crate::content::read_file(&path).map_err(|d| d.message),
+    }
+}
+
 /// Which files are not those that `session.json` names.
 fn compare_files(bundle: &Path, recording: &[u8], session: &SessionFile) -> Vec<String> {
     let mut complaints = Vec::new();
@@ -217,7 +227,7 @@ fn compare_files(bundle: &Path, recording: &[u8], session: &SessionFile) -> Vec<
             complaints.push(format!("{SESSION_FILE}: digests: \"{name}\" is not a file of a bundle"));
             continue;
         }
-        match fs::read(bundle.join(name)) {
+        match read_part(bundle, name) {
             Err(error) => complaints.push(format!("{name}: {error}")),
             Ok(found) if *digest != sha256(&found) => {
                 complaints.push(format!("{name}: its bytes are not those that {SESSION_FILE} names"));
@@ -242,7 +252,7 @@ fn compare_derived(
             // Of a page made from a school's own template only the digest is known, which was compared.
             REPORT_FILE if !is_our_page => true,
             SESSION_FILE => with_page_of(bytes, session).is_some_and(|text| text.as_bytes() == written),
-            _ => fs::read(bundle.join(name)).is_ok_and(|found| found == *bytes),
+            _ => read_part(bundle, name).is_ok_and(|found| found == *bytes),
         };
         if !follows {
             complaints.push(format!("{name}: it does not follow from the recording"));

@@ -2,10 +2,11 @@
 
 use crate::scenario::Metric;
 
-/// A duration as minutes and seconds, `4:14.4`; under a minute as seconds, `9.5 s`.
+/// A duration as minutes and seconds, `4:14.4`; under a minute as seconds, `9.5 s`; under one, `0.05 s`.
 pub fn duration(seconds: f64) -> String {
     let tenths = (seconds.max(0.0) * 10.0).round() as u64;
     match tenths {
+        0..10 if seconds > 0.0 => format!("{seconds:.2} s"),
         0..600 => format!("{}.{} s", tenths / 10, tenths % 10),
         _ => format!("{}:{:02}.{}", tenths / 600, tenths / 10 % 60, tenths % 10),
     }

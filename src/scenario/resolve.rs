@@ -112,7 +112,7 @@ impl Resolver<'_> {
         let lesions: Vec<String> =
             scene.iter().flat_map(|s| &s.teeth).flat_map(|t| &t.decay).map(|d| d.id.clone()).collect();
         let stages = self.stages(written, &lesions);
-        let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones));
+        let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, !lesions.is_empty()));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
         let file::CarvingFile { dwell_s, dwell_share, max_feed_mm_s } = written.carving;
         Some(Scenario {
@@ -597,7 +597,7 @@ impl Resolver<'_> {
         }
     }
 
-    fn rubric(&mut self, written: &file::RubricFile, zones: &[Zone]) -> Rubric {
+    fn rubric(&mut self, written: &file::RubricFile, zones: &[Zone], has_decay: bool) -> Rubric {
         let sum: f64 = written.items.iter().map(|i| i.points).sum();
         if (sum - POINTS).abs() > 1e-6 {
             let help = "change the items' points so that together they make 100";
@@ -616,13 +616,17 @@ impl Resolver<'_> {
                 );
             }
             if let Some(metric) = self.metric(&item.metric, zones, &format!("{path}/metric")) {
+                self.check_direction(&metric, item, &path);
+                self.check_decay(&metric, has_decay, &format!("{path}/metric"));
                 let &file::RubricItemFile { points, full_at, zero_at, .. } = item;
                 items.push(RubricItem { title: item.title.clone(), metric, points, full_at, zero_at });
             }
         }
         let mut hard_fails = Vec::new();
         for (index, fail) in written.hard_fails.iter().enumerate() {
-            if let Some(metric) = self.metric(&fail.metric, zones, &format!("/rubric/hard_fails/{index}/metric")) {
+            let path = format!("/rubric/hard_fails/{index}/metric");
+            if let Some(metric) = self.metric(&fail.metric, zones, &path) {
+                self.check_decay(&metric, has_decay, &path);
                 let when = match fail.when {
                     file::FailFile::Above(value) => Limit::Above(value),
                     file::FailFile::Below(value) => Limit::Below(value),
@@ -631,6 +635,30 @@ impl Resolver<'_> {
             }
         }
         Rubric { pass_points: written.pass_points, items, hard_fails }
+    }
+
+    /// A rubric that rewards the wrong end of a measure is a slip of the pen.
+    fn check_direction(&mut self, metric: &Metric, item: &file::RubricItemFile, path: &str) {
+        let (is_backward, word) = match metric.about.better {
+            metric::Better::Higher => (item.full_at < item.zero_at, "higher"),
+            metric::Better::Lower => (item.full_at > item.zero_at, "lower"),
+            metric::Better::Neither => (false, ""),
+        };
+        if is_backward {
+            let message = format!("the worse value of \"{}\" earns the points", metric.name());
+            let help = format!("{word} is better: exchange full_at and zero_at");
+            self.complain(&format!("{path}/full_at"), "backward-rubric", message, help);
+        }
+    }
+
+    /// A measure of decay has no value where there is none.
+    fn check_decay(&mut self, metric: &Metric, has_decay: bool, path: &str) {
+        let needs_decay = ["decay_cleared_pct", "healthy_per_decay_pct", "efficiency_pct_s"];
+        if needs_decay.contains(&metric.about.name) && !has_decay {
+            let message = format!("\"{}\" needs decay, and no tooth has any", metric.name());
+            let help = "give a tooth decay, or take a measure of the target zone such as recall";
+            self.complain(path, "no-decay", message, help);
+        }
     }
 
     fn metric(&mut self, name: &str, zones: &[Zone], path: &str) -> Option<Metric> {
