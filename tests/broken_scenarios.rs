@@ -279,6 +279,22 @@ fn files_that_are_not_there_or_lead_away() {
 fn parts_that_do_not_fit_together() {
     let decay = "/scene/jaw/tooth/decay/0";
     check("weights that do not sum", "/rubric/items/0/points", json!(50), &[("wrong-sum", "/rubric/items")]);
+    check(
+        "the wrong end earns",
+        "/rubric/items/0/full_at",
+        json!(50),
+        &[("backward-rubric", "/rubric/items/0/full_at")],
+    );
+    check(
+        "decay measured where there is none",
+        "/scene/jaw/tooth/decay",
+        json!([]),
+        &[
+            ("no-decay", "/rubric/hard_fails/4/metric"),
+            ("no-decay", "/rubric/items/0/metric"),
+            ("no-decay", "/rubric/items/1/metric"),
+        ],
+    );
     check("no way between full and zero", "/rubric/items/0/zero_at", json!(98), &[("no-range", "/rubric/items/0")]);
     check(
         "a decay outside the tooth",

@@ -78,6 +78,14 @@ fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, fou
     found.push(places.complain(&path, "impossible-scene", problem.to_string(), Some(help.into())));
 }
 
+fn written_teeth(scene: &file::SceneFile) -> Vec<&file::ToothFile> {
+    match scene {
+        file::SceneFile::Tooth(tooth) => vec![tooth],
+        file::SceneFile::Jaw(jaw) => vec![&jaw.tooth],
+        file::SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
+    }
+}
+
 fn tooth_path(scene: &file::SceneFile, tooth: usize) -> String {
     match scene {
         file::SceneFile::Tooth(_) => "/scene/tooth".into(),
@@ -112,7 +120,8 @@ impl Resolver<'_> {
         let lesions: Vec<String> =
             scene.iter().flat_map(|s| &s.teeth).flat_map(|t| &t.decay).map(|d| d.id.clone()).collect();
         let stages = self.stages(written, &lesions);
-        let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, !lesions.is_empty()));
+        let has_decay = written_teeth(&written.scene).iter().any(|t| !t.decay.is_empty());
+        let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, has_decay));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
         let file::CarvingFile { dwell_s, dwell_share, max_feed_mm_s } = written.carving;
         Some(Scenario {
@@ -687,12 +696,7 @@ impl Resolver<'_> {
 
     /// True when no quadrant is the right answer: a decay in the middle of a surface, or on a side of the tooth.
     fn is_between_quadrants(&self, scenario: &ScenarioFile, decay: &str) -> bool {
-        let teeth: Vec<&file::ToothFile> = match &scenario.scene {
-            file::SceneFile::Tooth(tooth) => vec![tooth],
-            file::SceneFile::Jaw(jaw) => vec![&jaw.tooth],
-            file::SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
-        };
-        let mut all = teeth.into_iter().flat_map(|t| &t.decay);
+        let mut all = written_teeth(&scenario.scene).into_iter().flat_map(|t| &t.decay);
         all.any(|d| {
             d.id == decay && (d.surface != file::SurfaceFile::O || matches!(d.at, file::DecayPlaceFile::Centre))
         })
