@@ -68,7 +68,7 @@ fn a_session_to_be_killed() {
     let spec = Spec::phantom_omni();
     let head = HeadFile {
         version: record::VERSION,
-        typodont_version: "test".into(),
+        typodont_version: env!("CARGO_PKG_VERSION").into(),
         scenario_id: scenario.id.clone(),
         scenario_sha256: scenario.sha256.clone(),
         participant: String::new(),
