@@ -337,6 +337,12 @@ fn parts_that_do_not_fit_together() {
         &[("unknown-tooth", "/scene/jaw/tooth/fdi"), ("unknown-form", "/scene/jaw/tooth/fdi")],
     );
     check(
+        "a zone beside the tooth",
+        "/zones/0/region",
+        json!({ "sphere": { "centre_mm": [60, 60, 60], "radius_mm": 1 } }),
+        &[("empty-region", "/zones/0/region")],
+    );
+    check(
         "an inverted box",
         "/zones/0/region",
         json!({ "box": { "min_mm": [1, 0, 0], "max_mm": [0, 1, 1] } }),

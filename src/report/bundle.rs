@@ -171,9 +171,9 @@ pub fn verify(bundle: &Path, templates: &Templates) -> Result<Judgement, String>
     complaints.extend(compare_files(bundle, &bytes, &session));
     complaints.extend(compare_results(&recording, &scored, &session));
     let mut unjudged = Vec::new();
-    let anew = derive(&recording, &bytes, &scored, templates)?;
-    complaints.extend(strangers(bundle, &anew));
+    complaints.extend(strangers(bundle, &session));
     if complaints.is_empty() {
+        let anew = derive(&recording, &bytes, &scored, templates)?;
         let is_our_page = session.template_sha256 == sha256(templates.report.as_bytes());
         complaints.extend(compare_derived(bundle, &session, &anew, &written, is_our_page));
         if !is_our_page {
@@ -183,13 +183,13 @@ pub fn verify(bundle: &Path, templates: &Templates) -> Result<Judgement, String>
     Ok(Judgement { complaints, unjudged })
 }
 
-/// Files that no bundle has.
-fn strangers(bundle: &Path, anew: &BTreeMap<String, Vec<u8>>) -> Vec<String> {
+/// Files that the result does not name.
+fn strangers(bundle: &Path, session: &SessionFile) -> Vec<String> {
     let in_folder = |folder: &str| -> Vec<String> {
         let entries = fs::read_dir(bundle.join(folder)).into_iter().flatten().flatten();
         entries.map(|e| format!("{folder}{}", e.file_name().to_string_lossy())).collect()
     };
-    let is_ours = |name: &String| anew.contains_key(name) || name == record::FILE_NAME || name == "views";
+    let is_ours = |name: &String| session.digests.contains_key(name) || name == SESSION_FILE || name == "views";
     let mut found: Vec<String> = in_folder("").into_iter().chain(in_folder("views/")).collect();
     found.retain(|name| !is_ours(name));
     found.sort();

@@ -17,6 +17,7 @@ pub use schema::schema_text;
 pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
 
 use crate::content::{InstrumentEntry, TissueTable};
+use crate::frame::Vec3;
 use crate::touch::{Carving, Vibration};
 use crate::volume::{Label, Volume};
 use file::{SurfaceFile, ZoneRole};
@@ -131,6 +132,20 @@ pub enum Region {
 }
 
 impl Region {
+    /// Corners of the smallest box around a region of a given shape, tooth space, mm; `None` where matter decides.
+    pub fn extent(&self) -> Option<[Vec3; 2]> {
+        let around = |a: [f32; 3], b: [f32; 3], radius: f32| {
+            let (a, b) = (Vec3::from(a), Vec3::from(b));
+            [a.min(b) - radius, a.max(b) + radius]
+        };
+        match self {
+            Region::Sphere { centre, radius } => Some(around(*centre, *centre, *radius)),
+            Region::Box { min, max } => Some(around(*min, *max, 0.0)),
+            Region::Cylinder { from, to, radius } => Some(around(*from, *to, *radius)),
+            Region::Tissue(_) | Region::Around { .. } | Region::Mask(_) => None,
+        }
+    }
+
     /// The size of the label map that marks the region, if one does.
     pub fn map_dims(&self) -> Option<[u32; 3]> {
         if let Region::Mask(mask) = self { Some(mask.dims) } else { None }

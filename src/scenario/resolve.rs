@@ -12,6 +12,7 @@ use crate::anatomy;
 use crate::content::json::{self, Places};
 use crate::content::{self, InstrumentEntry, InstrumentTable, Library, TissueTable};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
+use crate::frame::Vec3;
 use crate::touch::{Carving, Vibration};
 use crate::volume::{Label, Volume};
 use sha2::{Digest, Sha256};
@@ -60,7 +61,10 @@ pub fn resolve(source: Arc<Source>, library: &Library, forms: Forms) -> Result<S
 
 /// Makes the workpiece once: what only shows in the matter itself (a decay outside its tooth) is told to the author too.
 fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, found: &mut Vec<Diagnostic>) {
-    let Err(problem) = Workpiece::make(scenario, 0) else { return };
+    let problem = match Workpiece::make(scenario, 0) {
+        Ok(workpiece) => return find_zones_outside(scenario, &workpiece, places, found),
+        Err(problem) => problem,
+    };
     let (path, help) = match &problem {
         Unmakeable::DecayOutside { tooth, decay } => (
             format!("{}/decay/{decay}", tooth_path(&written.scene, *tooth)),
@@ -76,6 +80,20 @@ fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, fou
         Unmakeable::TooLarge { .. } | Unmakeable::OnlyRecorded => ("/scene".to_string(), "choose a larger spacing_mm"),
     };
     found.push(places.complain(&path, "impossible-scene", problem.to_string(), Some(help.into())));
+}
+
+/// A zone that no tooth reaches would never matter, and its author would never know.
+fn find_zones_outside(scenario: &Scenario, workpiece: &Workpiece, places: &Places, found: &mut Vec<Diagnostic>) {
+    let low = workpiece.teeth.iter().map(|t| t.low).reduce(Vec3::min).unwrap_or_default();
+    let high = workpiece.teeth.iter().map(|t| t.high).reduce(Vec3::max).unwrap_or_default();
+    for (index, zone) in scenario.zones.iter().enumerate() {
+        let is_outside = |[from, to]: [Vec3; 2]| from.cmpgt(high).any() || to.cmplt(low).any();
+        if zone.region.extent().is_some_and(is_outside) {
+            let message = format!("the zone \"{}\" lies outside the tooth", zone.id);
+            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm: buccal, distal, occlusal");
+            found.push(places.complain(&format!("/zones/{index}/region"), "empty-region", message, Some(help)));
+        }
+    }
 }
 
 fn written_teeth(scene: &file::SceneFile) -> Vec<&file::ToothFile> {
