@@ -21,9 +21,15 @@ pub struct FiveMinutes {
     pub score_s: Figures,
 }
 
+/// Ticks of the measured session.
+const FIVE_MINUTES: usize = 300_000;
+
 /// The careful operator at work until the exercise's five minutes are over.
 pub fn five_minutes(tooth: Volume) -> Result<FiveMinutes, String> {
     let recording = played(tooth)?;
+    if recording.len() < FIVE_MINUTES {
+        return Err(format!("the measured session ended after {} ticks, not {FIVE_MINUTES}", recording.len()));
+    }
     let mut seen = None;
     let mut failed = None;
     let replay_s = repeated(1.0, || match score::watch(&recording, Watch::Nothing) {
