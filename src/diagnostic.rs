@@ -130,6 +130,11 @@ pub fn did_you_mean<'a>(written: &str, known: impl IntoIterator<Item = &'a str> 
     }
 }
 
+/// Complaints in a line each.
+pub fn headlines(found: &[Diagnostic]) -> String {
+    found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,13 +2,15 @@
 //! where, and what to do, quickly and without taking more memory than an honest file of its size.
 
 mod volume_text;
+mod folder;
 
 use flate2::{Compress, Compression, FlushCompress};
+use folder::folder;
 use std::io::Write;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use typodont::content::nrrd;
-use volume_text::{Text, folder, gzip};
+use volume_text::{Text, gzip};
 
 /// A broken file and what its complaint has to mention.
 struct Case {

@@ -3,8 +3,10 @@
 //! Needs `TYPODONT_PYTHON` and `TYPODONT_GLTF_VALIDATOR`, as `scripts/test` sets them.
 
 mod bundle;
+mod folder;
 
 use bundle::*;
+use folder::folder;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,8 +1,10 @@
 //! The ten dentists of the thesis (Table 8.1), entered as sessions, come out with the means the thesis prints.
 
 mod bundle;
+mod folder;
 
 use bundle::*;
+use folder::folder;
 use serde_json::{Value, json};
 use std::path::Path;
 

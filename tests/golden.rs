@@ -45,7 +45,7 @@ fn a_single_tick_that_differs_is_named() {
     // Aim: the comparison of the test above can fail. Method: another reading in one tick.
     let mut recording = Recording::read(Path::new(GOLDEN)).unwrap();
     recording.ticks[7_000].reading.pose.position.x += 0.01;
-    let replay = record::replay(&recording, Watch::Everything, |_, _, _, _| ()).unwrap();
+    let replay = record::replay(&recording, recording.workpiece().unwrap(), Watch::Everything, |_, _, _, _| ());
     let difference = replay.difference.expect("the digests know the reading").to_string();
     let tick: u64 = difference.split("tick ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((7_000..=8_000).contains(&tick), "{difference}");

@@ -1,11 +1,13 @@
 //! Volumes as different programs write them, all to be read, and written so that they are read again.
 
 mod volume_text;
+mod folder;
 
+use folder::folder;
 use glam::DVec3;
 use proptest::prelude::*;
 use typodont::content::nrrd::{self, Axis, Encoding, Geometry, Image, Samples, Space};
-use volume_text::{Text, folder, gzip};
+use volume_text::{Text, gzip};
 
 fn check(text: Text) -> Image {
     let bytes = text.bytes();

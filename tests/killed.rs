@@ -1,9 +1,10 @@
 //! A session killed with SIGKILL leaves everything up to its last 200 ms.
 
 mod bundle;
+mod folder;
 
 use bundle::*;
-use std::collections::BTreeMap;
+use folder::folder;
 use std::fs::{self, File};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -12,11 +13,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use typodont::content::{self, Library};
 use typodont::device::{Reading, Spec};
-use typodont::record::{self, HeadFile, Recorder, SpecFile, Unwritable};
+use typodont::record::{HeadFile, Recorder, Unwritable};
 use typodont::scenario::{self, Forms, Workpiece};
 use typodont::session::{self, Effect, Input, Observer, Operator, OperatorFile, Session};
 use typodont::sim::{Command as Order, Simulation, Step};
-use typodont::tick::{TICK_S, Tick};
+use typodont::tick::Tick;
 use typodont::volume::Edit;
 
 /// Names the folder to the process that is to be killed.
@@ -66,19 +67,7 @@ fn a_session_to_be_killed() {
     let scenario = Arc::new(scenario::resolve(source, &library, Forms::Made).unwrap());
     let workpiece = Arc::new(Workpiece::make(&scenario, 1).unwrap());
     let spec = Spec::phantom_omni();
-    let head = HeadFile {
-        version: record::VERSION,
-        typodont_version: env!("CARGO_PKG_VERSION").into(),
-        scenario_id: scenario.id.clone(),
-        scenario_sha256: scenario.sha256.clone(),
-        participant: String::new(),
-        seed: 1,
-        tick_s: TICK_S,
-        started: "1970-01-01T00:00:00Z".into(),
-        operator: None,
-        device: SpecFile::from(&spec),
-        digests: BTreeMap::new(),
-    };
+    let head = HeadFile::of(&scenario, &spec, 1);
     let recorder = Recorder::create(&folder.join("recording.mcap"), &head, &scenario, &workpiece.volume).unwrap();
     let progress = File::create(folder.join("progress")).unwrap();
     let mut session = Session::new(scenario.clone(), &workpiece);

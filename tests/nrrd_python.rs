@@ -3,7 +3,9 @@
 //! Needs a Python with both, named by the environment variable `TYPODONT_PYTHON`.
 
 mod volume_text;
+mod folder;
 
+use folder::folder;
 use glam::DVec3;
 use serde_json::{Value, json};
 use std::io::Write;
@@ -11,7 +13,6 @@ use std::path::Path;
 use std::process::Command;
 use typodont::content::nrrd::segmentation::{self, Segment, Segmentation};
 use typodont::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
-use volume_text::folder;
 
 /// A Python that has what the script imports; without one the test says loudly that it did nothing.
 struct Python(std::ffi::OsString);

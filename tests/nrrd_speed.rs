@@ -1,13 +1,14 @@
 //! What an ordinary large scan costs: `cargo test --release --test nrrd_speed -- --ignored --nocapture`.
 
 mod volume_text;
+mod folder;
 
+use folder::folder;
 use glam::DVec3;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use typodont::content::nrrd::segmentation::{self, Segment, Segmentation};
 use typodont::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
-use volume_text::folder;
 
 const DIMS: [u32; 3] = [512, 512, 322];
 

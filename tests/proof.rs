@@ -1,8 +1,10 @@
 //! A recording is a proof: whatever is changed afterwards shows, and what was written survives a kill.
 
 mod bundle;
+mod folder;
 
 use bundle::*;
+use folder::folder;
 use mcap::{Attachment, MessageStream, WriteOptions};
 use sha2::{Digest, Sha256};
 use std::borrow::Cow;

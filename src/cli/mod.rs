@@ -15,7 +15,7 @@ mod run;
 mod score;
 mod verify;
 
-use crate::diagnostic::Diagnostic;
+use crate::diagnostic::{Diagnostic, headlines};
 use clap::{Parser, Subcommand};
 use std::fmt;
 use std::io::Write;
@@ -95,7 +95,7 @@ impl Failure {
     /// What is wrong, a line for each complaint.
     fn lines(&self) -> String {
         match self {
-            Failure::Complaints(found) => found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n"),
+            Failure::Complaints(found) => headlines(found),
             Failure::Wrong(what) | Failure::Misuse(what) => what.clone(),
             Failure::Told => String::new(),
         }

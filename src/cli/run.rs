@@ -3,12 +3,11 @@
 use super::{Failure, SESSIONS, check, say};
 use crate::content::{self, Library, nrrd, scan};
 use crate::device::Spec;
-use crate::record::{self, EndFile, HeadFile, Recorder, ServoFile, SpecFile};
+use crate::record::{self, EndFile, HeadFile, Recorder, ServoFile};
 use crate::report::bundle;
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece, hex};
 use crate::session::{self, Operator, OperatorFile, Progress, Session};
 use crate::sim::Simulation;
-use crate::tick::TICK_S;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
@@ -136,17 +135,11 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
     let spec = Spec::phantom_omni();
     let now = jiff::Timestamp::now();
     let head = HeadFile {
-        version: record::VERSION,
-        typodont_version: env!("CARGO_PKG_VERSION").to_string(),
-        scenario_id: scenario.id.clone(),
-        scenario_sha256: scenario.sha256.clone(),
         participant: participant.to_string(),
-        seed: *seed,
-        tick_s: TICK_S,
         started: format!("{:.0}", now),
         operator: Some(operator.id.clone()),
-        device: SpecFile::from(&spec),
         digests: digests.clone(),
+        ..HeadFile::of(scenario, &spec, *seed)
     };
     let name = bundle_name(&head, now);
     // A page that cannot be made should be known before the work, not after.
@@ -174,24 +167,13 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
         Progress::Complete => "complete".to_string(),
         Progress::DeviceGone(gone) => gone.to_string(),
     };
-    recorder.finish(&EndFile { reason, servo: servo(&simulation) }).map_err(&stopped)?;
+    recorder.finish(&EndFile { reason, servo: ServoFile::of(&simulation) }).map_err(&stopped)?;
     // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
     drop((session, simulation, trainee, workpiece));
     let bar = spinner("scoring and drawing");
     let bundle = unfinished.complete(&templates).map_err(Failure::wrong);
     bar.finish_and_clear();
     bundle
-}
-
-/// What the beat came to: a headless run has no clock to be late by.
-fn servo(simulation: &Simulation) -> ServoFile {
-    let gate = simulation.gate();
-    ServoFile {
-        ticks: simulation.tick().0,
-        faults: gate.faults(),
-        clamped: gate.clamped_forces,
-        ..ServoFile::default()
-    }
 }
 
 /// `exercise_time_digest`: sorts by exercise and time, and two sessions of one second differ. It names nobody.

@@ -2,8 +2,10 @@
 
 use crate::device::Spec;
 use crate::frame::Vec3;
+use crate::scenario::Scenario;
 use crate::session::{Answer, EndedBy, Input};
-use crate::sim::Command;
+use crate::sim::{Command, Simulation};
+use crate::tick::TICK_S;
 use crate::volume::Label;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -36,6 +38,25 @@ pub struct HeadFile {
     pub digests: BTreeMap<String, String>,
 }
 
+impl HeadFile {
+    /// The head of a session that this program runs; whose it is, who plays and when it begins are left blank.
+    pub fn of(scenario: &Scenario, device: &Spec, seed: u64) -> HeadFile {
+        HeadFile {
+            version: VERSION,
+            typodont_version: env!("CARGO_PKG_VERSION").to_string(),
+            scenario_id: scenario.id.clone(),
+            scenario_sha256: scenario.sha256.clone(),
+            participant: String::new(),
+            seed,
+            tick_s: TICK_S,
+            started: String::new(),
+            operator: None,
+            device: SpecFile::from(device),
+            digests: BTreeMap::new(),
+        }
+    }
+}
+
 /// What is known after the last tick.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EndFile {
@@ -56,6 +77,20 @@ pub struct ServoFile {
     pub faults: u64,
     /// Forces shortened to the device's limit.
     pub clamped: u64,
+}
+
+impl ServoFile {
+    /// What a simulation counts itself; a live beat adds how late it was.
+    pub fn of(simulation: &Simulation) -> ServoFile {
+        let gate = simulation.gate();
+        let (ticks, faults, clamped) = (simulation.tick().0, gate.faults(), gate.clamped_forces);
+        ServoFile { ticks, faults, clamped, ..ServoFile::default() }
+    }
+
+    /// True when the simulations counted the same, however their beats were kept.
+    pub fn counts_like(&self, other: &ServoFile) -> bool {
+        (self.ticks, self.faults, self.clamped) == (other.ticks, other.faults, other.clamped)
+    }
 }
 
 /// A device's spec with its units.

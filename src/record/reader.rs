@@ -6,7 +6,7 @@ use super::records;
 use super::replay::Running;
 use super::volume;
 use crate::content::Library;
-use crate::diagnostic::{Diagnostic, Source};
+use crate::diagnostic::{Diagnostic, Source, headlines};
 use crate::scenario::{self, Forms, Scenario, Workpiece};
 use crate::session::Input;
 use crate::sim::Command;
@@ -65,10 +65,7 @@ impl fmt::Display for Unreadable {
                 )
             }
             Unreadable::Damaged { name, what } => write!(f, "{name}: damaged-recording: {what}"),
-            Unreadable::Scenario(found) => {
-                let lines: Vec<String> = found.iter().map(Diagnostic::headline).collect();
-                f.write_str(&lines.join("\n"))
-            }
+            Unreadable::Scenario(found) => f.write_str(&headlines(found)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Turning a recording's readings again.
 
-use super::file::{END, SpecFile};
+use super::file::{END, ServoFile, SpecFile};
 use super::haptic::Haptic;
 use super::reader::Recording;
 use super::writer::DIGEST_TICKS;
@@ -102,13 +102,13 @@ pub enum Watch {
 
 /// Turns a recording again; `visit` sees every tick.
 ///
-/// Stops comparing, but not turning, at the first difference. `Err` when the workpiece cannot be made.
+/// `workpiece` is the recording's own. Stops comparing, but not turning, at the first difference.
 pub fn replay(
     recording: &Recording,
+    workpiece: Workpiece,
     watch: Watch,
     mut visit: impl FnMut(&Haptic, &Step, &[Edit], &Session),
-) -> Result<Replay, String> {
-    let workpiece = recording.workpiece()?;
+) -> Replay {
     let spec = Spec::from(&recording.head.device as &SpecFile);
     let mut simulation = Simulation::new(session::setup(&recording.scenario, &workpiece, spec.clone()));
     let mut session = Session::new(recording.scenario.clone(), &workpiece);
@@ -142,12 +142,10 @@ pub fn replay(
     for (at, command) in commands {
         witness.command(last, told.matches(*at, command));
     }
-    let is_counted = recording.end.as_ref().is_none_or(|end| {
-        let gate = simulation.gate();
-        (end.servo.ticks, end.servo.faults, end.servo.clamped) == (last.0, gate.faults(), gate.clamped_forces)
-    });
+    let counted = ServoFile::of(&simulation);
+    let is_counted = recording.end.as_ref().is_none_or(|end| end.servo.counts_like(&counted));
     let difference = witness.conclude(last, told.is_empty(), is_counted);
-    Ok(Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference })
+    Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference }
 }
 
 /// Commands the session has given that the recording must have as well, in this order and at these ticks.

@@ -199,8 +199,8 @@ fn strangers(bundle: &Path, session: &SessionFile) -> Vec<String> {
 /// [`verify`] for a recording without a bundle: whether it replays to what it says.
 pub fn verify_recording(path: &Path) -> Result<Judgement, String> {
     let recording = Recording::read(path).map_err(|e| e.to_string())?;
-    let replay = record::replay(&recording, Watch::Everything, |_, _, _, _| ());
-    let replay = replay.map_err(|e| format!("{}: {e}", path.display()))?;
+    let workpiece = recording.workpiece().map_err(|e| format!("{}: {e}", path.display()))?;
+    let replay = record::replay(&recording, workpiece, Watch::Everything, |_, _, _, _| ());
     let complaints = replay.difference.iter().map(ToString::to_string).collect();
     Ok(Judgement { complaints, ..Judgement::default() })
 }

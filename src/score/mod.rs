@@ -53,10 +53,11 @@ pub fn score(recording: &Recording, watch: Watch) -> Result<Scored, String> {
 
 /// The first half of scoring: turns a recording again and sees every tick.
 pub fn watch(recording: &Recording, watch: Watch) -> Result<Watched, String> {
-    let mut watcher = process::Watcher::new(recording)?;
-    let replay = record::replay(recording, watch, |haptic, step, edits, session| {
+    let workpiece = recording.workpiece()?;
+    let mut watcher = process::Watcher::new(recording, &workpiece);
+    let replay = record::replay(recording, workpiece, watch, |haptic, step, edits, session| {
         watcher.see(haptic, step, edits, session);
-    })?;
+    });
     Ok(Watched { replay, seen: watcher.conclude() })
 }
 

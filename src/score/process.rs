@@ -5,6 +5,7 @@ use super::shape::Danger;
 use crate::content::Role;
 use crate::frame::{Pose, Vec3};
 use crate::record::{Haptic, Recording};
+use crate::scenario::Workpiece;
 use crate::session::Session;
 use crate::sim::Step;
 use crate::tick::{TICK_S, Tick};
@@ -109,12 +110,11 @@ pub struct Watcher {
 }
 
 impl Watcher {
-    pub fn new(recording: &Recording) -> Result<Watcher, String> {
-        let workpiece = recording.workpiece()?;
+    pub fn new(recording: &Recording, workpiece: &Workpiece) -> Watcher {
         let scenario = &recording.scenario;
         let roles = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
         let now = Sample { at: Tick::ZERO, force: 0.0, speed: 0.0, cleared: 0.0, touched: false, cutting: false };
-        Ok(Watcher {
+        Watcher {
             tooth_from_world: workpiece.world_from_tooth.inverse(),
             roles,
             cuts: scenario.instruments.iter().map(|i| i.cuts).collect(),
@@ -139,7 +139,7 @@ impl Watcher {
             now,
             spells: Vec::new(),
             fallen: Vec::new(),
-        })
+        }
     }
 
     pub fn see(&mut self, haptic: &Haptic, step: &Step, edits: &[Edit], session: &Session) {

@@ -6,16 +6,6 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// An empty folder of this name, for one test.
-pub fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if folder.exists() {
-        std::fs::remove_dir_all(&folder).unwrap();
-    }
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
 /// The program, started in the repository's root. Whole sessions are played by the release program where there is one, named
 /// by `TYPODONT_RELEASE`: it says the same, sooner.
 pub fn typodont(arguments: &[&str]) -> Output {

@@ -4,7 +4,6 @@
 
 use flate2::{Compression, GzBuilder};
 use std::io::Write;
-use std::path::{Path, PathBuf};
 
 /// A header's lines and what follows them.
 #[derive(Clone)]
@@ -81,14 +80,4 @@ pub fn gzip(data: &[u8]) -> Vec<u8> {
     let mut gzip = GzBuilder::new().mtime(0).write(Vec::new(), Compression::best());
     gzip.write_all(data).unwrap();
     gzip.finish().unwrap()
-}
-
-/// An empty folder of this name, for one test.
-pub fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if folder.exists() {
-        std::fs::remove_dir_all(&folder).unwrap();
-    }
-    std::fs::create_dir_all(&folder).unwrap();
-    folder
 }

@@ -1,16 +1,16 @@
 //! Whole sessions: what five minutes cost to replay and to score, and the most memory one holds.
 
 use super::figures::{Figures, repeated};
-use super::work::{SEED, Scratch, exercise, grinding, lines};
+use super::work::{SEED, Scratch, exercise, grinding};
 use super::{DIMS, grown, name_of};
 use crate::cli::run::{Run, perform};
 use crate::content::Library;
 use crate::device::Spec;
-use crate::record::{self, EndFile, HeadFile, Recorder, Recording, ServoFile, SpecFile, Watch};
+use crate::diagnostic::headlines;
+use crate::record::{EndFile, HeadFile, Recorder, Recording, ServoFile, Watch};
 use crate::score;
 use crate::session::{self, ActionFile, Operator, OperatorFile, Session};
 use crate::sim::Simulation;
-use crate::tick::TICK_S;
 use crate::volume::Volume;
 use std::collections::BTreeMap;
 use std::process::Command;
@@ -56,27 +56,16 @@ fn played(tooth: Volume) -> Result<Recording, String> {
     let mut operator = careful()?;
     keep_cutting(&mut operator);
     let spec = Spec::phantom_omni();
-    let head = HeadFile {
-        version: record::VERSION,
-        typodont_version: env!("CARGO_PKG_VERSION").to_string(),
-        scenario_id: scenario.id.clone(),
-        scenario_sha256: scenario.sha256.clone(),
-        participant: String::new(),
-        seed: SEED,
-        tick_s: TICK_S,
-        started: "1970-01-01T00:00:00Z".to_string(),
-        operator: Some(operator.id.clone()),
-        device: SpecFile::from(&spec),
-        digests: BTreeMap::new(),
-    };
+    let head = HeadFile::of(&scenario, &spec, SEED);
     let file = Scratch::new("mcap");
     let mut recorder = Recorder::create(&file.0, &head, &scenario, &workpiece.volume).map_err(|e| e.to_string())?;
     let mut session = Session::new(scenario.clone(), &workpiece);
     let mut simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
     let mut trainee = Operator::new(operator, scenario, workpiece, spec, SEED);
     session::run(&mut session, &mut simulation, &mut trainee, &mut recorder).map_err(|e| e.to_string())?;
-    let servo = ServoFile { ticks: simulation.tick().0, ..ServoFile::default() };
-    recorder.finish(&EndFile { reason: "complete".into(), servo }).map_err(|e| e.to_string())?;
+    recorder
+        .finish(&EndFile { reason: "complete".into(), servo: ServoFile::of(&simulation) })
+        .map_err(|e| e.to_string())?;
     drop((session, simulation, trainee));
     Recording::read(&file.0).map_err(|e| e.to_string())
 }
@@ -118,7 +107,7 @@ pub fn print_peak(dims: &str) -> Result<(), String> {
 }
 
 fn careful() -> Result<OperatorFile, String> {
-    OperatorFile::read(&Library::shipped(), "careful").map_err(lines)
+    OperatorFile::read(&Library::shipped(), "careful").map_err(|found| headlines(&found))
 }
 
 /// The highest resident memory so far, MiB. Linux tells it; elsewhere there is no figure.

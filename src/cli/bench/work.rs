@@ -4,7 +4,7 @@ use super::figures::{Figures, repeated};
 use crate::anatomy::Tissues;
 use crate::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
 use crate::content::{Library, TissueTable};
-use crate::diagnostic::{Diagnostic, Source};
+use crate::diagnostic::{Source, headlines};
 use crate::frame::Vec3;
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece};
 use crate::volume::march::{self, Camera, Shot, Side};
@@ -23,7 +23,8 @@ pub const SEED: u64 = 1;
 /// The grinding exercise on a given tooth.
 pub fn exercise(tooth: Volume) -> Result<Scenario, String> {
     let source = Source::new(GRINDING.0, GRINDING.1);
-    let mut scenario = scenario::resolve(source, &Library::shipped(), Forms::Made).map_err(lines)?;
+    let mut scenario =
+        scenario::resolve(source, &Library::shipped(), Forms::Made).map_err(|found| headlines(&found))?;
     let tooth = Arc::new(tooth);
     for each in &mut scenario.scene.teeth {
         each.form = Form::Given(tooth.clone());
@@ -43,11 +44,7 @@ pub fn grinding(tooth: Volume) -> Result<(Arc<Scenario>, Arc<Workpiece>), String
 
 /// The labels of the shipped table.
 pub fn tissues() -> Result<Tissues, String> {
-    Ok(scenario::anatomy_tissues(&TissueTable::read(&Library::shipped()).map_err(lines)?))
-}
-
-pub fn lines(found: Vec<Diagnostic>) -> String {
-    found.iter().map(Diagnostic::headline).collect::<Vec<_>>().join("\n")
+    Ok(scenario::anatomy_tissues(&TissueTable::read(&Library::shipped()).map_err(|found| headlines(&found))?))
 }
 
 pub struct Work {
