@@ -73,7 +73,7 @@ fn bounce(speed: f32, phase: f32) -> f32 {
     let mut told = Vec3::ZERO;
     let mut deepest = 0.0f32;
     for _ in 0..10_000 {
-        let reading = hand.turn(&typodont::device::Output { force: told });
+        let reading = hand.turn(&typodont::device::Output { force: told, ..Default::default() });
         told = sim.step(&reading).force;
         deepest = deepest.min(hand.position().z);
         if hand.position().z > 1.2 {

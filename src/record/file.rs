@@ -10,8 +10,9 @@ use crate::volume::Label;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Version of the recording's format. A reader refuses a newer one.
-pub const VERSION: u32 = 1;
+/// Version of the recording's format. A reader refuses a newer one, and turns an older one as its program did:
+/// 1 had no torque, no ramp at the start of touch and no second hand.
+pub const VERSION: u32 = 2;
 
 /// Names of the metadata records: what is known before the first tick, and after the last.
 pub(super) const HEAD: &str = "session";
@@ -99,6 +100,8 @@ pub struct SpecFile {
     pub name: String,
     pub max_force_n: f32,
     pub continuous_force_n: f32,
+    #[serde(default)]
+    pub max_torque_nmm: f32,
     pub max_stiffness_n_per_mm: f32,
     pub max_damping_n_s_per_mm: f32,
     pub resolution_mm: f32,
@@ -112,6 +115,7 @@ impl From<&Spec> for SpecFile {
             name: spec.name.clone(),
             max_force_n: spec.max_force,
             continuous_force_n: spec.continuous_force,
+            max_torque_nmm: spec.max_torque,
             max_stiffness_n_per_mm: spec.max_stiffness,
             max_damping_n_s_per_mm: spec.max_damping,
             resolution_mm: spec.resolution,
@@ -127,6 +131,7 @@ impl From<&SpecFile> for Spec {
             name: file.name.clone(),
             max_force: file.max_force_n,
             continuous_force: file.continuous_force_n,
+            max_torque: file.max_torque_nmm,
             max_stiffness: file.max_stiffness_n_per_mm,
             max_damping: file.max_damping_n_s_per_mm,
             resolution: file.resolution_mm,

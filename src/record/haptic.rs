@@ -8,7 +8,7 @@ use crate::tick::Tick;
 /// Name of the message type.
 pub const SCHEMA_NAME: &str = "typodont_msgs/msg/Haptic";
 
-/// The message's definition, `ros2msg` encoding.
+/// The message's definition, `ros2msg` encoding. Recordings of version 1 end before `torque_nmm`.
 pub const SCHEMA: &str = "\
 # One tick of the haptic loop. World space: x right, y up, z toward the user; mm, N.
 uint64 tick
@@ -30,13 +30,47 @@ uint8 touched
 uint8 instrument
 # True while matter was being cut.
 bool cutting
+# What it was told to render about the tip.
+float32[3] torque_nmm
 ";
 
 /// Little-endian CDR without options.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
-/// Bytes of a message: encapsulation, 8 for the tick, 16 words of 4, 3 single bytes.
-pub const LENGTH: usize = 4 + 8 + 16 * 4 + 3;
+/// Bytes of a message of version 1: encapsulation, 8 for the tick, 16 words of 4, 3 single bytes.
+const LENGTH_1: usize = 4 + 8 + 16 * 4 + 3;
+
+/// Bytes of a message: one for alignment and 3 words more.
+const LENGTH: usize = LENGTH_1 + 1 + 3 * 4;
+
+/// How a message lies in a recording of a version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    length: usize,
+}
+
+impl Layout {
+    pub const NEWEST: Layout = Layout { length: LENGTH };
+
+    /// The layout of recordings of a version.
+    pub fn of(version: u32) -> Layout {
+        if version < 2 { Layout { length: LENGTH_1 } } else { Layout::NEWEST }
+    }
+}
+
+/// A message as it lies in a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Bytes {
+    bytes: [u8; LENGTH],
+    layout: Layout,
+}
+
+impl std::ops::Deref for Bytes {
+    type Target = [u8];
+    fn deref(&self) -> &[u8] {
+        &self.bytes[..self.layout.length]
+    }
+}
 
 /// One tick as recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,6 +78,8 @@ pub struct Haptic {
     pub tick: Tick,
     pub reading: Reading,
     pub force: Vec3,
+    /// N·mm; zero in recordings of version 1.
+    pub torque: Vec3,
     pub tip: Vec3,
     pub spring: f32,
     pub removed: u32,
@@ -58,6 +94,7 @@ impl Haptic {
             tick: step.tick,
             reading: *reading,
             force: step.force,
+            torque: step.torque,
             tip: step.tip,
             spring: step.touch.map_or(0.0, |t| t.spring),
             removed: step.removed,
@@ -67,7 +104,7 @@ impl Haptic {
         }
     }
 
-    pub fn bytes(&self) -> [u8; LENGTH] {
+    pub fn bytes(&self, layout: Layout) -> Bytes {
         let Pose { position: p, orientation: q } = self.reading.pose;
         let floats = [p.x, p.y, p.z, q.x, q.y, q.z, q.w].map(f32::to_bits);
         let (f, t) = (self.force, self.tip);
@@ -76,33 +113,41 @@ impl Haptic {
         let mut bytes = [0; LENGTH];
         bytes[..4].copy_from_slice(&ENCAPSULATION);
         bytes[4..12].copy_from_slice(&self.tick.0.to_le_bytes());
-        for (to, word) in bytes[12..].chunks_exact_mut(4).zip(words) {
+        for (to, word) in bytes[12..LENGTH_1 - 3].chunks_exact_mut(4).zip(words) {
             to.copy_from_slice(&word.to_le_bytes());
         }
-        bytes[LENGTH - 3..].copy_from_slice(&[self.touched, self.instrument, u8::from(self.cutting)]);
-        bytes
+        bytes[LENGTH_1 - 3..LENGTH_1].copy_from_slice(&[self.touched, self.instrument, u8::from(self.cutting)]);
+        for (to, torque) in bytes[LENGTH_1 + 1..].chunks_exact_mut(4).zip(self.torque.to_array()) {
+            to.copy_from_slice(&torque.to_bits().to_le_bytes());
+        }
+        Bytes { bytes, layout }
     }
 
     /// `None` for bytes that are not such a message.
-    pub fn parse(bytes: &[u8]) -> Option<Haptic> {
-        let bytes: &[u8; LENGTH] = bytes.try_into().ok()?;
-        if bytes[..4] != ENCAPSULATION {
+    pub fn parse(bytes: &[u8], layout: Layout) -> Option<Haptic> {
+        if bytes.len() != layout.length || bytes[..4] != ENCAPSULATION {
             return None;
         }
-        let word = |i: usize| u32::from_le_bytes(std::array::from_fn(|b| bytes[12 + 4 * i + b]));
+        let word_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|b| bytes[at + b]));
+        let word = |i: usize| word_at(12 + 4 * i);
         let float = |i: usize| f32::from_bits(word(i));
+        let torque = match layout.length == LENGTH {
+            true => Vec3::from_array(std::array::from_fn(|i| f32::from_bits(word_at(LENGTH_1 + 1 + 4 * i)))),
+            false => Vec3::ZERO,
+        };
         let vector = |i: usize| Vec3::new(float(i), float(i + 1), float(i + 2));
         let orientation = Quat::from_xyzw(float(3), float(4), float(5), float(6));
         Some(Haptic {
             tick: Tick(u64::from_le_bytes(std::array::from_fn(|b| bytes[4 + b]))),
             reading: Reading { pose: Pose { position: vector(0), orientation }, buttons: word(7) },
             force: vector(8),
+            torque,
             tip: vector(11),
             spring: float(14),
             removed: word(15),
-            touched: bytes[LENGTH - 3],
-            instrument: bytes[LENGTH - 2],
-            cutting: bytes[LENGTH - 1] != 0,
+            touched: bytes[LENGTH_1 - 3],
+            instrument: bytes[LENGTH_1 - 2],
+            cutting: bytes[LENGTH_1 - 1] != 0,
         })
     }
 }
@@ -118,6 +163,7 @@ mod tests {
             tick: Tick(123_456_789_012),
             reading: Reading { pose, buttons: 5 },
             force: Vec3::new(0.1, 0.2, -0.0),
+            torque: Vec3::new(1.0, -2.0, 3.5),
             tip: Vec3::splat(7.0),
             spring: 1.25,
             removed: 77,
@@ -125,8 +171,14 @@ mod tests {
             instrument: 2,
             cutting: true,
         };
-        let bytes = haptic.bytes();
-        assert_eq!(Haptic::parse(&bytes).map(|h| h.bytes()), Some(bytes));
-        assert_eq!(Haptic::parse(&bytes[1..]), None);
+        let check = |layout, torque| {
+            let bytes = haptic.bytes(layout);
+            let again = Haptic::parse(&bytes, layout).unwrap();
+            assert_eq!((&*again.bytes(layout), again.torque), (&*bytes, torque));
+            assert_eq!(Haptic::parse(&bytes[1..], layout), None);
+        };
+        check(Layout::NEWEST, haptic.torque);
+        check(Layout::of(1), Vec3::ZERO);
+        assert_eq!(Haptic::parse(&haptic.bytes(Layout::of(1)), Layout::NEWEST), None);
     }
 }

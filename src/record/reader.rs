@@ -1,7 +1,7 @@
 //! Reading a recording, whole or cut off.
 
 use super::file::{DigestFile, END, EndFile, EventFile, HEAD, HeadFile, InputFile, VERSION, WhatFile};
-use super::haptic::Haptic;
+use super::haptic::{Haptic, Layout};
 use super::records;
 use super::replay::Running;
 use super::volume;
@@ -157,7 +157,12 @@ impl Found {
 
     fn add_tick(&mut self, data: &[u8]) -> Result<(), String> {
         let next = self.ticks.len() as u64;
-        let tick = Haptic::parse(data).ok_or(format!("tick {next} is not understood"))?;
+        let version = self.head.as_ref().map_or(VERSION, |head| head.version);
+        if version > VERSION {
+            // Refused as a whole once everything is read: what a newer program wrote cannot be judged here.
+            return Ok(());
+        }
+        let tick = Haptic::parse(data, Layout::of(version)).ok_or(format!("tick {next} is not understood"))?;
         if tick.tick.0 != next {
             return Err(format!("tick {} stands where tick {next} belongs", tick.tick.0));
         }
@@ -166,6 +171,9 @@ impl Found {
     }
 
     fn add_event(&mut self, data: &[u8]) -> Result<(), String> {
+        if self.head.as_ref().is_some_and(|head| head.version > VERSION) {
+            return Ok(());
+        }
         let event: EventFile = serde_json::from_slice(data).map_err(|e| format!("an event: {e}"))?;
         let tick = Tick(event.tick);
         if self.events.last().is_some_and(|(before, _)| *before > tick) || tick.0 > self.ticks.len() as u64 {

@@ -1,7 +1,7 @@
 //! Turning a recording's readings again.
 
 use super::file::{END, ServoFile, SpecFile};
-use super::haptic::Haptic;
+use super::haptic::{Haptic, Layout};
 use super::reader::Recording;
 use super::writer::DIGEST_TICKS;
 use crate::device::{Device, Output, Playback, Spec};
@@ -110,7 +110,11 @@ pub fn replay(
     mut visit: impl FnMut(&Haptic, &Step, &[Edit], &Session),
 ) -> Replay {
     let spec = Spec::from(&recording.head.device as &SpecFile);
-    let mut simulation = Simulation::new(session::setup(&recording.scenario, &workpiece, spec.clone()));
+    let mut setup = session::setup(&recording.scenario, &workpiece, spec.clone());
+    if recording.head.version < 2 {
+        setup.ramp = 0;
+    }
+    let mut simulation = Simulation::new(setup);
     let mut session = Session::new(recording.scenario.clone(), &workpiece);
     let mut told = Told::default();
     told.expect(Tick::ZERO, &session.begin());
@@ -130,7 +134,7 @@ pub fn replay(
         }
         let Ok(reading) = hand.exchange(&output) else { break };
         let step = simulation.step(&reading);
-        output = Output { force: step.force };
+        output = step.output();
         witness.tick(haptic, &step, simulation.edits());
         visit(haptic, &step, simulation.edits(), &session);
         told.expect(tick.next(), &session.advance(Event::Tick { step: &step, edits: simulation.edits() }));
@@ -171,6 +175,7 @@ impl Told {
 struct Witness<'a> {
     recording: &'a Recording,
     watch: Watch,
+    layout: Layout,
     running: Running,
     events_seen: usize,
     digests_seen: usize,
@@ -182,6 +187,7 @@ impl<'a> Witness<'a> {
         Witness {
             recording,
             watch,
+            layout: Layout::of(recording.head.version),
             running: recording.begun.clone(),
             events_seen: 0,
             digests_seen: 0,
@@ -210,7 +216,7 @@ impl<'a> Witness<'a> {
             self.difference = Some(Difference::Tick { tick, what });
             return;
         }
-        self.running.tick(&again.bytes(), edits);
+        self.running.tick(&again.bytes(self.layout), edits);
         let turned = tick.0 + 1;
         if turned.is_multiple_of(DIGEST_TICKS) {
             self.see_digest(Tick(turned));

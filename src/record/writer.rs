@@ -3,7 +3,7 @@
 use super::file::{
     CommandFile, DigestFile, END, EndFile, EventFile, HEAD, HeadFile, InputFile, WhatFile, ended_by_name,
 };
-use super::haptic::{self, Haptic};
+use super::haptic::{self, Haptic, Layout};
 use super::{replay::Running, volume};
 use crate::device::Reading;
 use crate::scenario::Scenario;
@@ -155,7 +155,7 @@ impl Observer for Recorder {
     }
 
     fn turned(&mut self, reading: &Reading, step: &Step, edits: &[Edit]) -> Result<(), Unwritable> {
-        let bytes = Haptic::of(reading, step).bytes();
+        let bytes = Haptic::of(reading, step).bytes(Layout::NEWEST);
         self.running.tick(&bytes, edits);
         self.write(self.haptic, step.tick, &bytes)?;
         let turned = step.tick.0 + 1;

@@ -14,7 +14,7 @@ pub use run::{Observer, Progress, Trainee, run};
 use crate::content::Role;
 use crate::device::Spec;
 use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
-use crate::sim::{Command, Setup, Step};
+use crate::sim::{Command, RAMP_TICKS, Setup, Step};
 use crate::tick::Tick;
 use crate::touch::Matter;
 use crate::volume::{Edit, Label, Volume};
@@ -30,6 +30,7 @@ pub fn setup(scenario: &Scenario, workpiece: &Workpiece, device: Spec) -> Setup 
         vibration: scenario.vibration,
         world_from_tooth: workpiece.world_from_tooth,
         device,
+        ramp: RAMP_TICKS,
     }
 }
 

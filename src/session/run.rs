@@ -64,7 +64,7 @@ pub fn run<O: Observer>(
             Err(gone) => return Ok(Progress::DeviceGone(gone)),
         };
         let step = simulation.step(&reading);
-        output = Output { force: step.force };
+        output = step.output();
         observer.turned(&reading, &step, simulation.edits())?;
         tick = step.tick.next();
         screen = Some(step);

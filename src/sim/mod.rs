@@ -3,7 +3,7 @@
 //! Takes readings, gives forces and edits: live session, headless run, replay, tests and benchmarks all turn the same
 //! [`Simulation::step`]. Never reads a clock, draws an unseeded number, knows a scenario, or allocates in a step.
 
-use crate::device::{Reading, Spec};
+use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
@@ -23,7 +23,13 @@ pub struct Setup {
     pub vibration: Vibration,
     pub world_from_tooth: Pose,
     pub device: Spec,
+    /// Ticks over which forces come in after the hand was let go: at the start, after another instrument was taken, after a
+    /// reading that could not be trusted.
+    pub ramp: u32,
 }
+
+/// Half a second: long enough for a hand to notice and yield, short enough not to hide a touch.
+pub const RAMP_TICKS: u32 = 500;
 
 /// What the session may change between two ticks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +48,8 @@ pub struct Step {
     pub tick: Tick,
     /// To be rendered by the device, N.
     pub force: Vec3,
+    /// To be rendered about the tip, N·mm.
+    pub torque: Vec3,
     /// Where the hand is, mm; the last trusted place when the reading was refused.
     pub hand: Vec3,
     /// Where the working end is, mm.
@@ -53,6 +61,13 @@ pub struct Step {
     pub removed: u32,
     /// Index of the instrument in the hand.
     pub instrument: usize,
+}
+
+impl Step {
+    /// What the device is told.
+    pub fn output(&self) -> Output {
+        Output { force: self.force, torque: self.torque }
+    }
 }
 
 /// What the working end touches.
@@ -82,6 +97,9 @@ pub struct Simulation {
     /// False until the working end has been out of matter once: whoever starts or changes instruments inside a tooth
     /// feels nothing until then, instead of being thrown out.
     is_out: bool,
+    ramp: u32,
+    /// Ticks since the hand was let go, up to `ramp`.
+    eased: u32,
     hand: Pose,
     proxy: Proxy,
     law: Law,
@@ -95,7 +113,7 @@ impl Simulation {
     /// # Panics
     /// Without any instrument: a scenario that resolved has one.
     pub fn new(setup: Setup) -> Simulation {
-        let Setup { matter, materials, instruments, carving, vibration, world_from_tooth, device } = setup;
+        let Setup { matter, materials, instruments, carving, vibration, world_from_tooth, device, ramp } = setup;
         assert!(!instruments.is_empty(), "a hand holds something");
         let spring = SpringLimit {
             max_stiffness: device.max_stiffness,
@@ -116,6 +134,8 @@ impl Simulation {
             instrument: 0,
             bur_runs: true,
             is_out: false,
+            ramp,
+            eased: 0,
             hand: Pose::IDENTITY,
             proxy,
             law: Law::new(spring),
@@ -156,7 +176,8 @@ impl Simulation {
             }
         };
         let tremble = if cutting { self.vibration.force(tick) } else { Vec3::ZERO };
-        let force = self.gate.emit(self.world_from_tooth.turn(pull.force) + tremble, &self.force_limit);
+        let eased = self.ease_in();
+        let force = self.gate.emit((self.world_from_tooth.turn(pull.force) + tremble) * eased, &self.force_limit);
         let touch = contact.map(|Contact { label, normal, .. }| Touch {
             label,
             spring: pull.spring,
@@ -165,6 +186,7 @@ impl Simulation {
         Step {
             tick,
             force,
+            torque: Vec3::ZERO,
             hand: pose.position,
             tip: self.world_from_tooth * tip,
             touch,
@@ -174,14 +196,25 @@ impl Simulation {
         }
     }
 
+    /// Share of a force that the hand is given: rises from 0 to 1 after it was let go.
+    fn ease_in(&mut self) -> f32 {
+        if self.eased >= self.ramp {
+            return 1.0;
+        }
+        self.eased += 1;
+        self.eased as f32 / self.ramp as f32
+    }
+
     /// Zero force, nothing touched, nothing cut.
     fn let_go(&mut self, tick: Tick) -> Step {
+        self.eased = 0;
         self.carver.rest();
         self.law.forget();
         self.proxy.let_go(self.tooth_from_world * self.hand.position);
         Step {
             tick,
             force: Vec3::ZERO,
+            torque: Vec3::ZERO,
             hand: self.hand.position,
             tip: self.hand.position,
             touch: None,

@@ -37,6 +37,7 @@ pub fn setup(volume: Volume, end: WorkingEnd, cuts: bool) -> Setup {
         vibration: Vibration::NONE,
         world_from_tooth: Pose::IDENTITY,
         device: ideal_device(),
+        ramp: 0,
     }
 }
 
@@ -46,7 +47,7 @@ pub fn follow(sim: &mut Simulation, places: impl Iterator<Item = Vec3>) -> Vec<S
 }
 
 pub fn output(step: &Step) -> Output {
-    Output { force: step.force }
+    step.output()
 }
 
 /// The value below which a share of the values lies.

@@ -1,0 +1,7 @@
+//! Every driver against a fake that speaks its device's protocol, through one suite (`suite.rs`).
+//!
+//! A fake has a physical hand behind it (mass, damping, encoder steps, one tick of delay) and speaks the real protocol
+//! over the real transport where there is one here: shared libraries, sockets, a pair of pseudo-terminals.
+
+mod rig;
+mod suite;
