@@ -5,6 +5,12 @@
 
 #[path = "../phantom/mod.rs"]
 mod phantom;
+mod live;
 mod rig;
 mod simulated;
 mod suite;
+
+#[test]
+fn a_simulated_device_passes_the_suite() {
+    suite::check(&mut simulated::Simulated::new());
+}

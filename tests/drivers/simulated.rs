@@ -2,7 +2,6 @@
 //! servo's own tests hold.
 
 use crate::rig::{Abilities, Misbehaviour, Rig, SharedHand};
-use crate::suite;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -102,9 +101,4 @@ impl Wire for Turning {
     fn close(&mut self) {
         self.hand.turn(Output::NONE);
     }
-}
-
-#[test]
-fn a_simulated_device_passes_the_suite() {
-    suite::check(&mut Simulated::new());
 }
