@@ -113,7 +113,7 @@ fn turn_for(
     duration: Duration,
     mut at_ms: impl FnMut(u64, &mut Servo),
 ) -> (Vec<Turn>, Ended, Duration) {
-    let mut servo = Servo::start(Simulation::new(world()), Box::new(device), Beats::default()).unwrap();
+    let mut servo = Servo::start(Simulation::new(world()), Box::new(device), None, Beats::default()).unwrap();
     let start = Instant::now();
     let (mut turns, mut edits) = (Vec::new(), Vec::new());
     let mut fetch = |servo: &mut Servo| {

@@ -4,11 +4,11 @@
 //! in pictures.
 
 use super::{Failure, say};
-use crate::device::{Device, Driver, Trouble};
+use crate::device::{Device, Driver, Link, Trouble};
 use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
 use crate::scenario::{QuestionKind, Scenario};
 use crate::session::{Answer, Broken, Effect, Heard, Input, Live, Session};
-use crate::sim::Simulation;
+use crate::sim::{Assist, AssistNews, Second, Simulation};
 use std::fmt::Write;
 use std::io::BufRead;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
@@ -19,6 +19,42 @@ pub struct Held {
     pub device: Box<dyn Device + Send>,
     pub driver: &'static dyn Driver,
     pub argument: Option<String>,
+    pub second: Option<SecondHand>,
+}
+
+/// Another hand that follows the first one, and leads it while its button is held.
+pub struct SecondHand {
+    end: Second,
+    /// Its own servo, if its device is plugged in here.
+    assist: Option<Assist>,
+}
+
+/// Where a second hand comes from.
+pub enum From<'a> {
+    /// Another device at this machine.
+    Device(&'a str),
+    /// Another machine that has the key; the address is ours.
+    Network { at: &'a str, key: &'a str },
+}
+
+/// Lets a second hand join.
+pub fn join(held: &mut Held, from: &From) -> Result<(), Failure> {
+    let max_damping = held.device.spec().max_damping;
+    let (link, assist) = match from {
+        From::Device(name) => {
+            let (ours, theirs) = Link::pair();
+            let assist = Assist::start(open(name)?.device, theirs).map_err(Failure::Wrong)?;
+            (ours, Some(assist))
+        }
+        From::Network { at, key } => {
+            let (link, address) = Link::listen(at, key)
+                .map_err(|e| Failure::Wrong(format!("{at}: cannot-listen: {e}; name an address of this machine")))?;
+            speak(format!("a second hand may join at {address}: typodont assist --device NAME --to {address} --key …"));
+            (link, None)
+        }
+    };
+    held.second = Some(SecondHand { end: Second::new(link, max_damping), assist });
+    Ok(())
 }
 
 /// Opens the device that `--device NAME[:ARGUMENT]` names.
@@ -34,7 +70,7 @@ pub fn open(name: &str) -> Result<Held, Failure> {
         )));
     };
     let device = driver.open(argument.as_deref()).map_err(|trouble| no_device(name, &trouble))?;
-    Ok(Held { device, driver, argument })
+    Ok(Held { device, driver, argument, second: None })
 }
 
 fn no_device(name: &str, trouble: &Trouble) -> Failure {
@@ -57,9 +93,10 @@ pub fn play(
     held: Held,
     recorder: &mut Recorder,
 ) -> Result<EndFile, Stopped> {
-    let Held { device, driver, argument } = held;
+    let Held { device, driver, argument, second } = held;
+    let (second, mut assist) = second.map_or((None, None), |s| (Some(s.end), s.assist));
     let lines = typed_lines();
-    let (mut live, heard) = Live::begin(session, simulation, device, recorder)?;
+    let (mut live, heard) = Live::begin(session, simulation, device, second, recorder)?;
     tell(&heard, session);
     let mut looked = Instant::now();
     let mut is_listening = true;
@@ -67,6 +104,9 @@ pub fn play(
         std::thread::sleep(LISTEN_EVERY);
         let heard = live.listen(session, recorder)?;
         tell(&heard, session);
+        while let Some(news) = assist.as_mut().and_then(Assist::next_news) {
+            speak(format!("second hand: {}", assist_text(news)));
+        }
         if live.is_waiting() && looked.elapsed() > LOOK_EVERY {
             looked = Instant::now();
             if let Ok(device) = driver.open(argument.as_deref()) {
@@ -100,7 +140,7 @@ pub fn play(
 }
 
 /// Lines as they are typed; the channel closes when there will be no more.
-fn typed_lines() -> Receiver<String> {
+pub fn typed_lines() -> Receiver<String> {
     let (post, lines) = mpsc::channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
@@ -113,7 +153,7 @@ fn typed_lines() -> Receiver<String> {
 }
 
 /// Prints; a terminal that is gone does not end a session.
-fn speak(text: impl std::fmt::Display) {
+pub fn speak(text: impl std::fmt::Display) {
     let _ = say(text);
 }
 
@@ -130,6 +170,18 @@ fn tell(heard: &[Heard], session: &Session) {
             Heard::Device(state) => speak(format!("time stands still: {state}")),
             Heard::Gone(gone) => speak(format!("time stands still: {gone}; plug it in again and the session goes on")),
         }
+    }
+}
+
+/// What the second hand's servo tells, in words.
+pub fn assist_text(news: AssistNews) -> String {
+    match news {
+        AssistNews::Device(state) => format!("the device is {state}"),
+        AssistNews::Gone(gone) => gone.to_string(),
+        AssistNews::First { is_there: true } => "the first hand is there; hold the button to lead it".to_string(),
+        AssistNews::First { is_there: false } => "the first hand has fallen silent".to_string(),
+        AssistNews::Leading(true) => "leads".to_string(),
+        AssistNews::Leading(false) => "follows".to_string(),
     }
 }
 
@@ -166,7 +218,11 @@ fn questionnaire_text(scenario: &Scenario) -> String {
     let Some(questionnaire) = &scenario.questionnaire else { return "the exercise is over".to_string() };
     let mut text = format!(
         "the exercise is over\n{}\n{}\n  1 = {}, {} = {}\n",
-        questionnaire.title, questionnaire.instruction, questionnaire.lowest, questionnaire.steps, questionnaire.highest
+        questionnaire.title,
+        questionnaire.instruction,
+        questionnaire.lowest,
+        questionnaire.steps,
+        questionnaire.highest
     );
     for item in questionnaire.items() {
         let _ = writeln!(text, "  rate {} 1…{}     {}", item.id, questionnaire.steps, item.text);

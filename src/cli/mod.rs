@@ -3,6 +3,7 @@
 //! Takes arguments. Gives files, lines and an exit status: 0 done, 1 the input is wrong or the check fails, 2 misuse. Never
 //! decides anything a library call could not.
 
+mod assist;
 mod bench;
 mod check;
 mod cohort;
@@ -45,6 +46,8 @@ enum Command {
     Preview(preview::Arguments),
     /// List the devices that can be used
     Devices,
+    /// Join another machine's session as the instructor's hand
+    Assist(assist::Arguments),
     /// Turn a bundle's recording again and compare everything
     Verify(verify::Arguments),
     /// Make the bundle of a session that was cut off
@@ -127,6 +130,7 @@ pub fn main() -> ExitCode {
         Command::Schema => say(crate::scenario::schema_text().trim_end()),
         Command::Preview(arguments) => preview::run(&arguments),
         Command::Devices => devices::run(),
+        Command::Assist(arguments) => assist::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Finish(arguments) => finish::run(&arguments),
         Command::Score(arguments) => score::run(&arguments),

@@ -32,6 +32,15 @@ pub struct Arguments {
     /// The device a person holds; see `typodont devices`
     #[arg(long, value_name = "NAME[:WHICH]", default_value = SCRIPTED)]
     device: String,
+    /// A second device here: it follows the first hand, and leads it while its button is held
+    #[arg(long, value_name = "NAME[:WHICH]", conflicts_with = "second_at")]
+    second: Option<String>,
+    /// Lets a second hand join from another machine, at this address of ours
+    #[arg(long, value_name = "ADDRESS:PORT", requires = "second_key")]
+    second_at: Option<String>,
+    /// What that machine must know: a word of at least 8 letters
+    #[arg(long, value_name = "KEY", requires = "second_at", value_parser = key)]
+    second_key: Option<String>,
     /// Decides what the exercise leaves to chance; drawn from the clock if left out
     #[arg(long)]
     seed: Option<u64>,
@@ -53,6 +62,14 @@ pub fn spacing(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(mm) if (0.01..=2.0).contains(&mm) => Ok(mm),
         _ => Err("a distance between voxels lies between 0.01 and 2 mm".into()),
+    }
+}
+
+/// Long enough not to be guessed by somebody who tries a thousand times a second.
+fn key(text: &str) -> Result<String, String> {
+    match text.len() >= 8 {
+        true => Ok(text.to_string()),
+        false => Err("a key has at least 8 letters: it lets another machine push a person's hand".into()),
     }
 }
 
@@ -100,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let player = match is_scripted {
         true => Player::Script(Box::new(operator(&arguments.operator, &library)?)),
-        false => Player::Person(live::open(&arguments.device)?),
+        false => Player::Person(held(arguments)?),
     };
     let run = Run {
         scenario: Arc::new(scenario),
@@ -111,6 +128,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         digests,
     };
     say(perform(run)?.display())
+}
+
+/// The device a person holds, and the second hand if one is to join.
+fn held(arguments: &Arguments) -> Result<live::Held, Failure> {
+    let mut held = live::open(&arguments.device)?;
+    if let Some(name) = &arguments.second {
+        live::join(&mut held, &live::From::Device(name))?;
+    }
+    if let Some((at, key)) = arguments.second_at.as_deref().zip(arguments.second_key.as_deref()) {
+        live::join(&mut held, &live::From::Network { at, key })?;
+    }
+    Ok(held)
 }
 
 /// Puts a scan in the place of every tooth; returns the scan's SHA-256.

@@ -55,6 +55,11 @@ impl Hand {
         self.velocity
     }
 
+    /// Takes another grip, from where the hand is.
+    pub fn set_model(&mut self, model: HandModel) {
+        self.model = model;
+    }
+
     /// Throws the hand at a speed: for tests of impact.
     pub fn set_velocity(&mut self, velocity: Vec3) {
         self.velocity = velocity;

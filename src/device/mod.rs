@@ -3,14 +3,19 @@
 //! Takes a force, gives a reading; units and axes are converted inside each driver, so that everyone else sees world
 //! space: x to the right, y up, z toward the user, mm, N. Never knows what the hand holds or touches.
 
+mod coupling;
 mod driver;
 mod hand;
+mod link;
 mod playback;
+pub mod realtime;
 mod relay;
 mod scripted;
 
+pub use coupling::{Coupling, Far, Tie};
 pub use driver::{DRIVERS, Driver, Found, Trouble, driver};
 pub use hand::{Hand, HandModel};
+pub use link::{Link, Mate};
 pub use playback::Playback;
 pub use relay::{FORCE_LIFE, Relay, Report, Wire};
 pub use scripted::{Felt, Move, Scripted, Tremor};

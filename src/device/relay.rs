@@ -4,7 +4,7 @@
 //! The servo meets it at two slots where the newest wins: forces out, reports in. So the servo never waits on anyone, and a
 //! servo that is late is noticed on the other side: a force that is older than [`FORCE_LIFE`] is not sent any more.
 
-use super::{Beat, Device, Gone, Output, Reading, Spec, State};
+use super::{Beat, Device, Gone, Output, Reading, Spec, State, realtime};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::mailbox::{self, Newest, Receiver, Sender};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -254,6 +254,8 @@ impl Shared {
 
 /// The wire's thread. A panic in a driver lets the hand go like any other failure.
 fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>, mut callers: Receiver<Thread>) {
+    // What was granted shows in how late the beats come; the servo asks for itself.
+    let _ = realtime::raise();
     let mut caller: Option<Thread> = None;
     let mut wake = move || {
         caller = std::iter::from_fn(|| callers.try_recv()).last().or(caller.take());

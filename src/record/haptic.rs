@@ -32,6 +32,8 @@ uint8 instrument
 bool cutting
 # What it was told to render about the tip.
 float32[3] torque_nmm
+# How another hand led this one, part of the force.
+float32[3] lead_n
 ";
 
 /// Little-endian CDR without options.
@@ -40,8 +42,8 @@ const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 /// Bytes of a message of version 1: encapsulation, 8 for the tick, 16 words of 4, 3 single bytes.
 const LENGTH_1: usize = 4 + 8 + 16 * 4 + 3;
 
-/// Bytes of a message: one for alignment and 3 words more.
-const LENGTH: usize = LENGTH_1 + 1 + 3 * 4;
+/// Bytes of a message: one for alignment and 6 words more.
+const LENGTH: usize = LENGTH_1 + 1 + 6 * 4;
 
 /// How a message lies in a recording of a version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +82,8 @@ pub struct Haptic {
     pub force: Vec3,
     /// N·mm; zero in recordings of version 1.
     pub torque: Vec3,
+    /// N; zero in recordings of version 1.
+    pub lead: Vec3,
     pub tip: Vec3,
     pub spring: f32,
     pub removed: u32,
@@ -95,6 +99,7 @@ impl Haptic {
             reading: *reading,
             force: step.force,
             torque: step.torque,
+            lead: step.lead,
             tip: step.tip,
             spring: step.touch.map_or(0.0, |t| t.spring),
             removed: step.removed,
@@ -117,8 +122,9 @@ impl Haptic {
             to.copy_from_slice(&word.to_le_bytes());
         }
         bytes[LENGTH_1 - 3..LENGTH_1].copy_from_slice(&[self.touched, self.instrument, u8::from(self.cutting)]);
-        for (to, torque) in bytes[LENGTH_1 + 1..].chunks_exact_mut(4).zip(self.torque.to_array()) {
-            to.copy_from_slice(&torque.to_bits().to_le_bytes());
+        let added = self.torque.to_array().into_iter().chain(self.lead.to_array());
+        for (to, number) in bytes[LENGTH_1 + 1..].chunks_exact_mut(4).zip(added) {
+            to.copy_from_slice(&number.to_le_bytes());
         }
         Bytes { bytes, layout }
     }
@@ -131,8 +137,8 @@ impl Haptic {
         let word_at = |at: usize| u32::from_le_bytes(std::array::from_fn(|b| bytes[at + b]));
         let word = |i: usize| word_at(12 + 4 * i);
         let float = |i: usize| f32::from_bits(word(i));
-        let torque = match layout.length == LENGTH {
-            true => Vec3::from_array(std::array::from_fn(|i| f32::from_bits(word_at(LENGTH_1 + 1 + 4 * i)))),
+        let added = |first: usize| match layout.length == LENGTH {
+            true => Vec3::from_array(std::array::from_fn(|i| f32::from_bits(word_at(LENGTH_1 + 1 + 4 * (first + i))))),
             false => Vec3::ZERO,
         };
         let vector = |i: usize| Vec3::new(float(i), float(i + 1), float(i + 2));
@@ -141,7 +147,8 @@ impl Haptic {
             tick: Tick(u64::from_le_bytes(std::array::from_fn(|b| bytes[4 + b]))),
             reading: Reading { pose: Pose { position: vector(0), orientation }, buttons: word(7) },
             force: vector(8),
-            torque,
+            torque: added(0),
+            lead: added(3),
             tip: vector(11),
             spring: float(14),
             removed: word(15),
@@ -164,6 +171,7 @@ mod tests {
             reading: Reading { pose, buttons: 5 },
             force: Vec3::new(0.1, 0.2, -0.0),
             torque: Vec3::new(1.0, -2.0, 3.5),
+            lead: Vec3::new(0.0, -0.5, 0.25),
             tip: Vec3::splat(7.0),
             spring: 1.25,
             removed: 77,
@@ -171,14 +179,14 @@ mod tests {
             instrument: 2,
             cutting: true,
         };
-        let check = |layout, torque| {
+        let check = |layout, torque, lead| {
             let bytes = haptic.bytes(layout);
             let again = Haptic::parse(&bytes, layout).unwrap();
-            assert_eq!((&*again.bytes(layout), again.torque), (&*bytes, torque));
+            assert_eq!((&*again.bytes(layout), again.torque, again.lead), (&*bytes, torque, lead));
             assert_eq!(Haptic::parse(&bytes[1..], layout), None);
         };
-        check(Layout::NEWEST, haptic.torque);
-        check(Layout::of(1), Vec3::ZERO);
+        check(Layout::NEWEST, haptic.torque, haptic.lead);
+        check(Layout::of(1), Vec3::ZERO, Vec3::ZERO);
         assert_eq!(Haptic::parse(&haptic.bytes(Layout::of(1)), Layout::NEWEST), None);
     }
 }

@@ -134,6 +134,7 @@ pub fn replay(
             simulation.apply(command);
         }
         let Ok(reading) = hand.exchange(&output) else { break };
+        simulation.lead(haptic.lead);
         let step = simulation.step(&reading);
         output = step.output();
         witness.tick(haptic, &step, simulation.edits());

@@ -6,7 +6,7 @@
 
 use super::{Effect, Event, Input, Observer, Session};
 use crate::device::{Device, Gone, State};
-use crate::sim::{BeatSummary, Beats, Command, Ended, Letter, Order, Servo, Simulation, Step, Turn};
+use crate::sim::{BeatSummary, Beats, Command, Ended, Letter, Order, Second, Servo, Simulation, Step, Turn};
 use crate::tick::Tick;
 use crate::touch::Gate;
 use crate::volume::Edit;
@@ -45,8 +45,22 @@ pub struct Live {
 enum Work {
     Servo(Servo),
     /// Nobody turns it: the device is gone.
-    Waiting(Box<(Simulation, Beats)>),
+    Waiting(Box<Left>),
     Over,
+}
+
+/// What goes on with the next servo.
+struct Left {
+    simulation: Simulation,
+    second: Option<Second>,
+    beats: Beats,
+}
+
+impl From<Ended> for Left {
+    fn from(ended: Ended) -> Left {
+        let Ended { simulation, second, beats, .. } = ended;
+        Left { simulation, second, beats }
+    }
 }
 
 /// What a live session leaves: how its beat was kept, and what the gates changed in what was recorded.
@@ -80,6 +94,7 @@ impl Live {
         session: &mut Session,
         mut simulation: Simulation,
         device: Box<dyn Device + Send>,
+        second: Option<Second>,
         observer: &mut O,
     ) -> Result<(Live, Vec<Heard>), Broken<O::Error>> {
         let mut live = Live {
@@ -103,7 +118,7 @@ impl Live {
             observer.effect(live.tick, &effect, session)?;
             heard.push(Heard::Effect(effect));
         }
-        live.start(simulation, device, Beats::default())?;
+        live.start(simulation, device, second, Beats::default())?;
         Ok((live, heard))
     }
 
@@ -111,9 +126,10 @@ impl Live {
         &mut self,
         simulation: Simulation,
         device: Box<dyn Device + Send>,
+        second: Option<Second>,
         beats: Beats,
     ) -> Result<(), Broken<E>> {
-        let mut servo = Servo::start(simulation, device, beats).map_err(Broken::Servo)?;
+        let mut servo = Servo::start(simulation, device, second, beats).map_err(Broken::Servo)?;
         for command in &self.given {
             servo.order(Order::Command(*command));
         }
@@ -124,7 +140,10 @@ impl Live {
     /// Goes on after the device was gone, with the same or another one of its kind.
     pub fn go_on<O: Observer>(&mut self, device: Box<dyn Device + Send>) -> Result<(), Broken<O::Error>> {
         match std::mem::replace(&mut self.at_work, Work::Over) {
-            Work::Waiting(left) => self.start(left.0, device, left.1),
+            Work::Waiting(left) => {
+                let Left { simulation, second, beats } = *left;
+                self.start(simulation, device, second, beats)
+            }
             other => {
                 self.at_work = other;
                 Ok(())
@@ -161,7 +180,7 @@ impl Live {
         } else if has_ended && let Some(ended) = self.stop()? {
             self.interruptions += 1;
             heard.push(Heard::Gone(ended.gone.unwrap_or(Gone::Ended)));
-            self.at_work = Work::Waiting(Box::new((ended.simulation, ended.beats)));
+            self.at_work = Work::Waiting(Box::new(Left::from(ended)));
         }
         Ok(heard)
     }
@@ -174,7 +193,8 @@ impl Live {
         heard: &mut Vec<Heard>,
     ) -> Result<(), Broken<O::Error>> {
         if turn.step.tick != self.tick {
-            let lost = "ticks were lost because this machine stood still for too long; what was recorded up to then is kept";
+            let lost =
+                "ticks were lost because this machine stood still for too long; what was recorded up to then is kept";
             return Err(Broken::Servo(lost.into()));
         }
         let mut edits = std::mem::take(&mut self.edits);
@@ -255,7 +275,7 @@ impl Live {
     pub fn beats(&self) -> Option<BeatSummary> {
         match &self.at_work {
             Work::Servo(servo) => servo.beats(),
-            Work::Waiting(left) => Some(left.1.summary()),
+            Work::Waiting(left) => Some(left.beats.summary()),
             Work::Over => self.kept_beats,
         }
     }

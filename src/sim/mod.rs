@@ -5,11 +5,12 @@
 //! an unseeded number, knows a scenario, or allocates.
 
 mod beats;
-mod realtime;
+mod assist;
+mod pace;
 mod servo;
 
+pub use assist::{Assist, AssistNews, Second};
 pub use beats::{BeatSummary, Beats, Histogram};
-pub use realtime::Priority;
 pub use servo::{Ended, Letter, Order, Servo, Turn};
 
 use crate::device::{Output, Reading, Spec};
@@ -68,6 +69,8 @@ pub struct Step {
     pub cutting: bool,
     /// Voxels that became air.
     pub removed: u32,
+    /// How another hand led this one, N: part of `force`.
+    pub lead: Vec3,
     /// Index of the instrument in the hand.
     pub instrument: usize,
 }
@@ -109,6 +112,7 @@ pub struct Simulation {
     ramp: u32,
     /// Ticks since the hand was let go, up to `ramp`.
     eased: u32,
+    lead: Vec3,
     hand: Pose,
     proxy: Proxy,
     law: Law,
@@ -145,6 +149,7 @@ impl Simulation {
             is_out: false,
             ramp,
             eased: 0,
+            lead: Vec3::ZERO,
             hand: Pose::IDENTITY,
             proxy,
             law: Law::new(spring),
@@ -186,7 +191,11 @@ impl Simulation {
         };
         let tremble = if cutting { self.vibration.force(tick) } else { Vec3::ZERO };
         let eased = self.ease_in();
-        let force = self.gate.emit((self.world_from_tooth.turn(pull.force) + tremble) * eased, &self.force_limit);
+        let mut force = (self.world_from_tooth.turn(pull.force) + tremble) * eased;
+        if self.lead != Vec3::ZERO {
+            force += self.lead;
+        }
+        let force = self.gate.emit(force, &self.force_limit);
         let touch = contact.map(|Contact { label, normal, .. }| Touch {
             label,
             spring: pull.spring,
@@ -201,6 +210,7 @@ impl Simulation {
             touch,
             cutting,
             removed: self.carver.edits().iter().filter(|e| e.removes()).count() as u32,
+            lead: self.lead,
             instrument: self.instrument,
         }
     }
@@ -229,8 +239,14 @@ impl Simulation {
             touch: None,
             cutting: false,
             removed: 0,
+            lead: Vec3::ZERO,
             instrument: self.instrument,
         }
+    }
+
+    /// Another hand leads this one with a force, N, world space, from the next tick on. A force that is not finite is none.
+    pub fn lead(&mut self, force: Vec3) {
+        self.lead = if force.is_finite() { force } else { Vec3::ZERO };
     }
 
     /// Carries out a command before the next tick. Unknown instruments are ignored: the hand keeps what it holds.

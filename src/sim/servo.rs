@@ -7,12 +7,14 @@
 //! Failing means letting go: a late beat, a device that is not ready or gone, and a reading that is none all turn the world
 //! with [`Reading::ABSENT`], which gives zero force and lets forces come back over half a second.
 
+use super::assist::Second;
 use super::beats::{BeatSummary, Beats};
-use super::realtime::{self, Priority};
+use super::pace::Pace;
 use super::{Command, Simulation, Step};
-use crate::device::{Beat, Device, Gone, Output, Reading, State};
+use crate::device::realtime::{self, Priority};
+use crate::device::{Device, Gone, Output, Reading, State};
 use crate::mailbox::{self, Newest, Receiver, Sender};
-use crate::tick::{TICK_S, Tick};
+use crate::tick::Tick;
 use crate::touch::Gate;
 use crate::volume::Edit;
 use std::sync::Arc;
@@ -64,6 +66,7 @@ pub struct Servo {
 pub struct Ended {
     pub simulation: Simulation,
     pub device: Box<dyn Device + Send>,
+    pub second: Option<Second>,
     pub beats: Beats,
     pub priority: Priority,
     /// Why the device gives no more readings, if that is why.
@@ -86,20 +89,23 @@ const LATE_MAX: Duration = Duration::from_millis(10);
 /// Ticks between two summaries of the beats.
 const SUMMARY_TICKS: u64 = 500;
 
-const BEAT: Duration = Duration::from_micros((TICK_S * 1e6) as u64);
-
 impl Servo {
     /// Starts turning a simulation with a device.
     ///
-    /// `beats` are those of the same session so far: a session goes on with another servo after its device was plugged in
+    /// `second` is another hand that sees this one and may lead it. `beats` are those of the same session so far: a session goes on with another servo after its device was plugged in
     /// again.
-    pub fn start(simulation: Simulation, device: Box<dyn Device + Send>, beats: Beats) -> Result<Servo, String> {
+    pub fn start(
+        simulation: Simulation,
+        device: Box<dyn Device + Send>,
+        second: Option<Second>,
+        beats: Beats,
+    ) -> Result<Servo, String> {
         let (orders, inbox) = mailbox::ordered(ORDERS_MAX);
         let (post, letters) = mailbox::ordered(LETTERS_MAX);
         let (edit_post, edits) = mailbox::ordered(EDITS_MAX);
         let summary = Arc::new(Newest::new());
         let post = Post { letters: post, edits: edit_post, beats, summary: summary.clone() };
-        let turning = move || turn(simulation, device, inbox, post);
+        let turning = move || turn(simulation, device, second, inbox, post);
         let thread = thread::Builder::new().name("servo".into()).spawn(turning);
         let thread = thread.map_err(|e| format!("the system gives no thread for the servo: {e}"))?;
         Ok(Servo { orders, letters, edits, beats: summary, thread })
@@ -176,6 +182,7 @@ impl Post {
 fn turn(
     mut simulation: Simulation,
     mut device: Box<dyn Device + Send>,
+    mut second: Option<Second>,
     mut orders: Receiver<Order>,
     mut post: Post,
 ) -> Ended {
@@ -230,6 +237,9 @@ fn turn(
         post.beats.let_go += u64::from(is_late);
         let reading = if is_late { Reading::ABSENT } else { reading };
         is_held = true;
+        if let Some(second) = &mut second {
+            simulation.lead(second.lead(&reading));
+        }
         let begun = Instant::now();
         let step = simulation.step(&reading);
         post.beats.work.add(begun.elapsed());
@@ -241,54 +251,5 @@ fn turn(
         let _ = device.exchange(&Output::NONE);
     }
     post.summary.write(post.beats.summary().words());
-    Ended { simulation, device, beats: post.beats, priority, gone }
-}
-
-/// Keeps the beat, or measures it where the device keeps it.
-struct Pace {
-    beat: Beat,
-    /// End of a wait that is spun instead of slept.
-    spin: Duration,
-    /// When the next beat is due.
-    due: Instant,
-}
-
-/// With priority the last stretch of a wait is spun: waking takes 30–100 µs and varies. Without it spinning is punished by
-/// the scheduler (measured: p99 of 2.5 ms against 0.1 ms), so nothing is.
-const SPIN: Duration = Duration::from_micros(80);
-
-impl Pace {
-    fn new(beat: Beat, priority: Priority) -> Pace {
-        let spin = if priority == Priority::Realtime { SPIN } else { Duration::ZERO };
-        Pace { beat, spin, due: Instant::now() + BEAT }
-    }
-
-    /// Waits until the next beat is due, where the device does not do that.
-    fn wait(&self) {
-        if self.beat == Beat::Device {
-            return;
-        }
-        let left = self.due.saturating_duration_since(Instant::now());
-        if left > self.spin {
-            thread::sleep(left - self.spin);
-        }
-        while Instant::now() < self.due {
-            std::hint::spin_loop();
-        }
-    }
-
-    /// A beat has come: counts how late, and says so.
-    fn beat(&mut self, beats: &mut Beats) -> Duration {
-        let now = Instant::now();
-        let late = now.saturating_duration_since(self.due);
-        beats.late.add(late);
-        let whole = (late.as_secs_f64() / TICK_S) as u32;
-        beats.missed += u64::from(whole);
-        self.due = match self.beat {
-            // Beats that never came are not made up for: the hand has moved on.
-            Beat::Ours => self.due + BEAT * (whole + 1),
-            Beat::Device => now + BEAT,
-        };
-        late
-    }
+    Ended { simulation, device, second, beats: post.beats, priority, gone }
 }

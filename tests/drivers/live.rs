@@ -1,24 +1,29 @@
 //! A live session on a wire: what the servo did is what a replay does, even when the cable was pulled in the middle.
 
-use crate::rig::{Misbehaviour, Rig};
+use crate::rig::{Misbehaviour, Rig, SharedHand};
 use crate::simulated::Simulated;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use typodont::content::Library;
+use typodont::device::Link;
 use typodont::diagnostic::Source;
 use typodont::frame::Vec3;
 use typodont::record::{EndFile, HeadFile, Recorder, Recording, ServoFile, Watch, replay};
-use typodont::scenario::{self, Forms, Workpiece};
+use typodont::scenario::{self, Forms, Scenario, Workpiece};
 use typodont::session::{self, Heard, Input, Live, Session};
-use typodont::sim::Simulation;
+use typodont::sim::{Assist, Second, Simulation};
+
+fn grinding() -> Arc<Scenario> {
+    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let source = Source::new("5-grinding.json", text);
+    Arc::new(scenario::resolve(source, &Library::shipped(), Forms::Made).unwrap())
+}
 
 #[test]
 fn a_live_session_holds_when_turned_again() {
     // Aim: a recording of a person's session is a proof like a script's. Method: the grinding exercise on a simulated wire,
     // an instrument taken, the cable pulled while cutting, plugged in again, said to be done; then verified.
-    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
-    let source = Source::new("5-grinding.json", text);
-    let scenario = Arc::new(scenario::resolve(source, &Library::shipped(), Forms::Made).unwrap());
+    let scenario = grinding();
     let workpiece = Workpiece::make(&scenario, 4).unwrap();
     let mut rig = Simulated::new();
     let hand = rig.hand();
@@ -29,7 +34,7 @@ fn a_live_session_holds_when_turned_again() {
     let mut recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
     let mut session = Session::new(scenario.clone(), &workpiece);
     let simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
-    let (mut live, _) = Live::begin(&mut session, simulation, device, &mut recorder).unwrap();
+    let (mut live, _) = Live::begin(&mut session, simulation, device, None, &mut recorder).unwrap();
     // Above the decay, then onto it.
     let decay = workpiece.world_from_tooth * workpiece.lesions[0].centre;
     let start = Instant::now();
@@ -78,4 +83,68 @@ fn a_live_session_holds_when_turned_again() {
     assert_eq!(again.difference, None, "{}", again.difference.as_ref().unwrap());
     assert!(removed > 100, "{removed} voxels fell");
     assert!(!again.outcome.aborted);
+}
+
+#[test]
+fn an_instructor_leads_the_trainee_and_feels_them() {
+    // Aim: two hands on two devices, here and over the network: the second follows the first, leads it while its button is
+    // held, and what it did is in the recording. Method: two simulated wires, a link of each kind.
+    let network = || {
+        let (here, address) = Link::listen("127.0.0.1:0", "a word of theirs").unwrap();
+        (here, Link::connect(address, "a word of theirs").unwrap())
+    };
+    for (kind, (here, there)) in [("in one process", Link::pair()), ("over the network", network())] {
+        let (mut first, mut second) = (Simulated::new(), Simulated::new());
+        let (trainee, instructor) = (first.hand(), second.hand());
+        trainee.reach(Vec3::Y * 8.0);
+        instructor.let_loose();
+        let device = first.open().unwrap();
+        let scenario = grinding();
+        let workpiece = Workpiece::make(&scenario, 4).unwrap();
+        let head = HeadFile { live: true, ..HeadFile::of(&scenario, device.spec(), 4) };
+        let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("led.mcap");
+        let mut recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
+        let mut session = Session::new(scenario.clone(), &workpiece);
+        let simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
+        let end = Second::new(here, device.spec().max_damping);
+        let (mut live, _) = Live::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();
+        let assist = Assist::start(second.open().unwrap(), there).unwrap();
+        let mut turn_until = |holds: &mut dyn FnMut() -> bool, what: &str| {
+            let start = Instant::now();
+            while !holds() {
+                live.listen(&mut session, &mut recorder).unwrap();
+                assert!(start.elapsed() < Duration::from_secs(20), "{kind}: {what}");
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        };
+        trainee.reach(Vec3::new(6.0, 9.0, 0.0));
+        let near = |a: &SharedHand, b: &SharedHand| a.position().distance(b.position()) < 1.0;
+        turn_until(
+            &mut || near(&instructor, &trainee) && trainee.position().x > 5.0,
+            "the second hand does not follow",
+        );
+        assert_eq!(trainee.felt().force, Vec3::ZERO, "{kind}: nobody leads yet");
+        // The trainee holds loosely; the instructor takes the lead.
+        trainee.let_loose();
+        instructor.hold_tight();
+        instructor.press_buttons(1);
+        instructor.reach(Vec3::new(-6.0, 10.0, 2.0));
+        let mut led = || near(&instructor, &trainee) && trainee.position().x < -4.0;
+        turn_until(&mut led, "the first hand is not led");
+        instructor.press_buttons(0);
+        turn_until(&mut || trainee.felt().force == Vec3::ZERO, "the lead does not end");
+        drop(assist);
+        live.say(&Input::Confirm, &mut session, &mut recorder).unwrap();
+        let kept = live.end::<Recorder>().unwrap();
+        recorder.finish(&EndFile { reason: "complete".into(), servo: ServoFile::of_live(&kept) }).unwrap();
+        let recording = Recording::read(&file).unwrap();
+        let mut most = 0.0f32;
+        let again = replay(&recording, recording.workpiece().unwrap(), Watch::Everything, |haptic, step, _, _| {
+            most = most.max(step.lead.length());
+            assert_eq!(haptic.lead, step.lead);
+        });
+        assert_eq!(again.difference, None, "{kind}");
+        println!("{kind}: led with up to {most} N");
+        assert!((0.1..=1.5001).contains(&most), "{kind}: led with {most} N");
+    }
 }

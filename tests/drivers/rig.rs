@@ -62,6 +62,8 @@ pub struct SharedHand(Arc<Mutex<Held>>);
 
 struct Held {
     hand: Hand,
+    /// Encoder step, mm.
+    step: f32,
     orientation: Quat,
     buttons: u32,
     felt: Output,
@@ -78,6 +80,7 @@ impl SharedHand {
         let hand = Hand::resting_at(HandModel::holding(0.05, encoder_step), Vec3::ZERO);
         SharedHand(Arc::new(Mutex::new(Held {
             hand,
+            step: encoder_step,
             orientation: UPRIGHT,
             buttons: 0,
             felt: Output::NONE,
@@ -108,6 +111,20 @@ impl SharedHand {
     /// For the test: where the person wants the handle.
     pub fn reach(&self, goal: Vec3) {
         self.held().hand.goal = goal;
+    }
+
+    /// Holds so loosely that a spring leads the hand: its own weight and a little friction are left.
+    pub fn let_loose(&self) {
+        let mut held = self.held();
+        let model = HandModel { grip_stiffness: 0.0, grip_damping: 0.001, ..HandModel::holding(0.05, held.step) };
+        held.hand.set_model(model);
+    }
+
+    pub fn hold_tight(&self) {
+        let mut held = self.held();
+        let model = HandModel::holding(0.05, held.step);
+        held.hand.goal = held.hand.position();
+        held.hand.set_model(model);
     }
 
     pub fn goal(&self) -> Vec3 {

@@ -111,7 +111,7 @@ fn a_stalled_program_lets_go(rig: &mut dyn Rig) {
 fn contact_is_stable(rig: &mut dyn Rig) {
     let hand = rig.hand();
     let device = ready_above(rig);
-    let mut servo = Servo::start(Simulation::new(wall(&device, HARD, false)), device, Beats::default()).unwrap();
+    let mut servo = Servo::start(Simulation::new(wall(&device, HARD, false)), device, None, Beats::default()).unwrap();
     lean(&hand, -1.0);
     listen(&mut servo, PATIENCE, || hand.felt().force.y > 0.1);
     let mut heights = Vec::new();
@@ -150,7 +150,7 @@ fn trouble_lets_go_and_passes(rig: &mut dyn Rig, how: Misbehaviour) {
     let has_force = rig.abilities().force;
     let device = ready_above(rig);
     let setup = wall(&device, SOFT, true);
-    let mut servo = Servo::start(Simulation::new(setup), device, Beats::default()).unwrap();
+    let mut servo = Servo::start(Simulation::new(setup), device, None, Beats::default()).unwrap();
     lean(&hand, -0.8);
     let cutting = |heard: &Heard| heard.cut > 0 || rig.abilities().is_rate;
     let mut heard = listen_for(&mut servo, PATIENCE, cutting, || format!("{}: never cuts", rig.name()));
@@ -189,7 +189,7 @@ fn trouble_lets_go_and_passes(rig: &mut dyn Rig, how: Misbehaviour) {
         None => device,
     };
     let turned = simulation.tick();
-    let mut servo = Servo::start(simulation, device, beats).unwrap();
+    let mut servo = Servo::start(simulation, device, None, beats).unwrap();
     let above = |heard: &Heard| heard.ticks > 50;
     listen_for(&mut servo, PATIENCE, above, || format!("{}: {how:?}: does not go on", rig.name()));
     lean(&hand, -1.5);

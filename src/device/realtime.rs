@@ -1,10 +1,10 @@
-//! Priority for the servo's thread, as much as the system grants.
+//! Priority for the threads that keep the beat: the servo's and the wires', as much as the system grants.
 //!
 //! Gives what was granted, so that nobody believes to have what they have not.
 
 use std::fmt;
 
-/// What the system granted the servo's thread.
+/// What the system granted a thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Priority {
     /// Ahead of every ordinary thread (SCHED_FIFO on Linux; TIME_CRITICAL on Windows).
