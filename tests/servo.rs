@@ -1,79 +1,25 @@
 //! The servo keeps its beat, accounts for every beat it missed, travels light, and lets go when it is late.
 
+mod counting;
 #[path = "phantom/mod.rs"]
 mod phantom;
 #[path = "drivers/rig.rs"]
 mod rig;
 #[path = "drivers/simulated.rs"]
 mod simulated;
+#[path = "drivers/staged.rs"]
+mod staged;
 
 use phantom::{HARD, SOFT};
 use rig::{Rig, SharedHand};
 use simulated::Simulated;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use staged::Staged;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use typodont::device::{Beat, Device, Gone, Output, Reading, Spec, State};
+use typodont::device::{Device, Gone, Output, Reading, Spec};
 use typodont::frame::Vec3;
 use typodont::sim::{Beats, Command, Ended, Letter, Order, Servo, Setup, Simulation, Turn};
 use typodont::touch::{Instrument, WorkingEnd};
-
-/// Counts what a thread allocates while it is watched.
-struct Counting;
-
-thread_local! {
-    static WATCHED: Cell<bool> = const { Cell::new(false) };
-}
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: every call is passed on to the system's allocator as it came.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        if WATCHED.with(Cell::get) {
-            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        }
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        if WATCHED.with(Cell::get) {
-            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        }
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
-
-/// A device that changes what another one does at a beat of its choice.
-struct Staged<D, F> {
-    device: D,
-    beats: u64,
-    at_beat: F,
-}
-
-impl<D: Device, F: FnMut(u64)> Device for Staged<D, F> {
-    fn spec(&self) -> &Spec {
-        self.device.spec()
-    }
-
-    fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
-        (self.at_beat)(self.beats);
-        self.beats += 1;
-        self.device.exchange(output)
-    }
-
-    fn beat(&self) -> Beat {
-        self.device.beat()
-    }
-
-    fn state(&self) -> State {
-        self.device.state()
-    }
-}
 
 /// A hand without a wire, for beats that the servo keeps itself.
 struct InHand {
@@ -156,8 +102,8 @@ fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
     let hand = rig.hand();
     let device = rig.open().unwrap();
     let watch = |beat: u64| match beat {
-        300 => WATCHED.with(|w| w.set(true)),
-        10_800 => WATCHED.with(|w| w.set(false)),
+        300 => counting::watch(true),
+        10_800 => counting::watch(false),
         _ => {}
     };
     let device = Staged { device, beats: 0, at_beat: watch };
@@ -178,7 +124,7 @@ fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
             hand.reach(Vec3::Y * 4.0);
         }
     });
-    let allocated = ALLOCATIONS.load(Ordering::Relaxed);
+    let allocated = counting::allocations();
     let touched = turns.iter().filter(|t| t.step.touch.is_some()).count();
     let cut = turns.iter().filter(|t| t.step.cutting).count();
     let tools: std::collections::BTreeSet<_> = turns.iter().map(|t| t.step.instrument).collect();

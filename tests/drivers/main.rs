@@ -5,12 +5,21 @@
 
 #[path = "../phantom/mod.rs"]
 mod phantom;
+#[path = "../counting/mod.rs"]
+mod counting;
 mod live;
 mod rig;
 mod simulated;
+mod soak;
+mod staged;
 mod suite;
 
 #[test]
 fn a_simulated_device_passes_the_suite() {
     suite::check(&mut simulated::Simulated::new());
+}
+
+#[test]
+fn a_simulated_device_is_soaked() {
+    soak::soak(&mut simulated::Simulated::new());
 }
