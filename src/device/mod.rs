@@ -5,9 +5,11 @@
 
 mod driver;
 mod hand;
+mod haply;
 mod playback;
 mod relay;
 mod scripted;
+mod stream;
 
 pub use driver::{DRIVERS, Driver, Found, Trouble, driver};
 pub use hand::{Hand, HandModel};
