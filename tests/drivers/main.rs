@@ -3,5 +3,7 @@
 //! A fake has a physical hand behind it (mass, damping, encoder steps, one tick of delay) and speaks the real protocol
 //! over the real transport where there is one here: shared libraries, sockets, a pair of pseudo-terminals.
 
+mod haply;
 mod rig;
+mod stream;
 mod suite;
