@@ -4,6 +4,9 @@
 //! over the real transport where there is one here: shared libraries, sockets, a pair of pseudo-terminals.
 
 mod haply;
+#[path = "../phantom/mod.rs"]
+mod phantom;
 mod rig;
+mod simulated;
 mod stream;
 mod suite;

@@ -1,6 +1,7 @@
 //! A tracker, faked: a thread that sends the hand's pose over UDP about a thousand times a second.
 
 use crate::rig::{Abilities, Misbehaviour, Rig, SharedHand};
+use crate::suite;
 use std::net::UdpSocket;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -115,6 +116,11 @@ fn beat_until(device: &mut dyn Device, mut holds: impl FnMut(State, Result<Readi
         assert!(Instant::now() < until, "waited in vain; the device is {}, and {reading:?}", device.state());
         thread::sleep(Duration::from_millis(1));
     }
+}
+
+#[test]
+fn a_stream_passes_the_suite() {
+    suite::check(&mut Stream::plug_in());
 }
 
 #[test]

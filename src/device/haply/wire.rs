@@ -67,7 +67,7 @@ const TRIED_MAX: u32 = 50;
 /// How long to wait until both names are tried again, as after an emergency stop.
 const TRY_AGAIN: Duration = Duration::from_secs(1);
 
-/// Answers in a row that deny a force until it counts as cut: a tenth of a second, as long as a stop takes to be noticed.
+/// Answers in a row that deny a force, until the force counts as cut: a tenth of a second, as long as a stop takes to be noticed.
 const DENIALS_MAX: u32 = 100;
 
 /// Forces below this may vanish in the device's own filters, N.
@@ -264,7 +264,8 @@ impl Haply {
                 self.was_refused = true;
                 self.proof = Proof::Refused { since: Instant::now() };
             }
-            Proof::Proven { denials } if self.told.length() < DENIABLE || agrees => *denials = 0,
+            Proof::Proven { .. } if self.told.length() < DENIABLE => {}
+            Proof::Proven { denials } if agrees => *denials = 0,
             Proof::Proven { denials } if *denials < DENIALS_MAX => *denials += 1,
             Proof::Proven { .. } => {
                 self.was_refused = true;
