@@ -61,7 +61,13 @@ struct Listener {
     /// Whom to listen to, and when a pose last came from there.
     sender: Option<(SocketAddr, Instant)>,
     refused: i32,
-    refused_since: Option<Instant>,
+    row: Option<Row>,
+}
+
+/// Datagrams refused with no good one among them.
+struct Row {
+    since: Instant,
+    count: u32,
 }
 
 /// How long one wait lasts: half of what the relay asks of wires.
@@ -73,8 +79,9 @@ const DATAGRAM_MAX: usize = 2048;
 /// Datagrams read in one turn: more in the queue than this, and somebody floods the port.
 const DRAINED_MAX: usize = 256;
 
-/// How long datagrams may be refused with no good one among them, until that is said.
-const REFUSED_MAX: Duration = Duration::from_millis(200);
+/// How long and how many datagrams may be refused with no good one among them, until that is said. A few may be strays.
+const REFUSED_FOR: Duration = Duration::from_millis(200);
+const REFUSED_MAX: u32 = 10;
 
 /// How long a sender keeps the port to itself after its last pose: two hands in one stream would jump to and fro.
 const SENDER_LIFE: Duration = Duration::from_millis(100);
@@ -83,7 +90,7 @@ impl Listener {
     fn on(socket: UdpSocket) -> Listener {
         // No force is rendered; the simulation's own spring is the Omni's, so that the same hand cuts alike on both.
         let spec = Spec { name: "pose stream, no force".into(), ..Spec::phantom_omni() };
-        Listener { socket, spec, order: Order::default(), sender: None, refused: 0, refused_since: None }
+        Listener { socket, spec, order: Order::default(), sender: None, refused: 0, row: None }
     }
 }
 
@@ -101,7 +108,7 @@ impl Wire for Listener {
         if let Some(reading) = self.newest().map_err(|error| lost(&error))? {
             return Ok(Some(Report { reading, state: State::Ready }));
         }
-        if self.refused_since.is_some_and(|since| since.elapsed() > REFUSED_MAX) {
+        if self.row.as_ref().is_some_and(|row| row.count > REFUSED_MAX && row.since.elapsed() > REFUSED_FOR) {
             let why = "what arrives are no poses as content/devices/stream.md says; the code counts them";
             return Err(Gone::Lost { why, code: self.refused });
         }
@@ -135,14 +142,14 @@ impl Listener {
         let is_another = self.sender.is_some_and(|(sender, at)| sender != from && at.elapsed() < SENDER_LIFE);
         let (t_s, reading) = read(datagram).filter(|_| !is_another).or_else(|| {
             self.refused = self.refused.saturating_add(1);
-            self.refused_since.get_or_insert_with(Instant::now);
+            self.row.get_or_insert(Row { since: Instant::now(), count: 0 }).count += 1;
             None
         })?;
         if self.sender.is_none_or(|(sender, _)| sender != from) {
             self.order = Order::default();
         }
         self.sender = Some((from, Instant::now()));
-        self.refused_since = None;
+        self.row = None;
         self.order.is_next(t_s).then_some(reading)
     }
 }

@@ -180,7 +180,8 @@ fn greet(mut stream: TcpStream, shared: &Shared) {
         let version = shared.ways.lock().unwrap().version;
         let answer = match version {
             Some(version) => {
-                let body = json!({"ok": true, "data": {"project_name": "fake", "project_version": version}}).to_string();
+                let body =
+                    json!({"ok": true, "data": {"project_name": "fake", "project_version": version}}).to_string();
                 format!("HTTP/1.1 200 OK\r\nContent-Length: {}\r\n\r\n{body}", body.len())
             }
             None => "HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n".to_string(),
@@ -199,7 +200,7 @@ fn greet(mut stream: TcpStream, shared: &Shared) {
 fn serve(mut socket: WebSocket<TcpStream>, shared: &Shared) {
     socket.get_ref().set_read_timeout(Some(Duration::from_millis(5))).unwrap();
     let is_arm_late = shared.ways.lock().unwrap().is_arm_late;
-    let mut tick = Tick { number: 0, told: Vec3::ZERO, gives_full_state: !is_arm_late };
+    let mut tick = Tick { number: 0, told: Vec3::ZERO, has_rendered: false, gives_full_state: !is_arm_late };
     if socket.send(Message::text(tick.state(shared).to_string())).is_err() {
         return;
     }
@@ -247,7 +248,8 @@ fn garbage(number: u64, answer: &str) -> String {
     match number % 4 {
         0 => "<html>502 Bad Gateway</html>".into(),
         1 => answer[..answer.len() / 2].into(),
-        2 => r#"{"inverse3": [{"device_id": "04BA", "state": {"cursor_position": {"x": 1e300, "y": 0, "z": 0}}}]}"#.into(),
+        2 => r#"{"inverse3": [{"device_id": "04BA", "state": {"cursor_position": {"x": 1e300, "y": 0, "z": 0}}}]}"#
+            .into(),
         _ => String::new(),
     }
 }
@@ -256,6 +258,8 @@ struct Tick {
     number: u64,
     /// N, in the service's space, under the name that this service understands.
     told: Vec3,
+    /// The program can know that forces are understood.
+    has_rendered: bool,
     gives_full_state: bool,
 }
 
@@ -283,10 +287,16 @@ impl Tick {
                     shared.complain("a configuration after the first frame");
                 }
             }
-            let force = &device["commands"]["set_cursor_force"][ways.force_key];
-            let axis = |name: &str| force[name].as_f64().unwrap_or(0.0) as f32;
+            let force = |key: &str| {
+                let axis =
+                    |name: &str| device["commands"]["set_cursor_force"][key][name].as_f64().unwrap_or(0.0) as f32;
+                Vec3::new(axis("x"), axis("y"), axis("z"))
+            };
+            if !self.has_rendered && (force("values") + force("vector")).length() > 0.05 {
+                shared.complain("a force that can be felt before the first touch was answered");
+            }
             if ways.misbehaviour != Some(Misbehaviour::OverSpeed) {
-                self.told = Vec3::new(axis("x"), axis("y"), axis("z"));
+                self.told = force(ways.force_key);
             }
         }
     }
@@ -343,6 +353,7 @@ impl Tick {
             state["wireless_verse_grip"] = json!([grip]);
         }
         self.gives_full_state = false;
+        self.has_rendered |= self.told != Vec3::ZERO;
         state
     }
 }
@@ -415,7 +426,6 @@ fn a_force_arrives_whatever_the_service_calls_it() {
         let mut device = rig.open().unwrap();
         let hand = rig.hand();
         beat_until(&mut device, force, |device, _| device.state().is_ready());
-        assert!(hand.most_felt() < 0.05, "{key} {version:?}: a force before it was proven");
         beat_until(&mut device, force, |_, _| is_near(hand.felt().force, force, 1e-3));
         drop(device);
         assert_eq!(rig.seen().complaints, [""; 0], "{key} {version:?}");

@@ -247,7 +247,8 @@ mod tests {
 
     #[test]
     fn a_position_is_read_into_world_space() {
-        let text = r#"{"inverse3": [{"device_id": "04BA", "state": {"cursor_position": {"z": 0.21, "x": 0, "y": -0.17}}}]}"#;
+        let text =
+            r#"{"inverse3": [{"device_id": "04BA", "state": {"cursor_position": {"z": 0.21, "x": 0, "y": -0.17}}}]}"#;
         let position = frame(text).unwrap().arms[0].position.unwrap();
         // 10 mm above the middle and 20 mm nearer to the user.
         assert!((position - Vec3::new(0.0, 10.0, 20.0)).length() < 1e-3, "{position}");
@@ -263,7 +264,8 @@ mod tests {
         for text in ["", "<html>", "[]", r#"{"inverse3": "none"}"#, r#"{"inverse3": [{"state": {}}]}"#] {
             assert_eq!(frame(text), None, "{text}");
         }
-        let limp = r#"{"verse_grip": [{"device_id": "1", "state": {"orientation": {"x": 0, "y": 0, "z": 0, "w": 0}}}]}"#;
+        let limp =
+            r#"{"verse_grip": [{"device_id": "1", "state": {"orientation": {"x": 0, "y": 0, "z": 0, "w": 0}}}]}"#;
         assert_eq!(frame(limp), None);
     }
 

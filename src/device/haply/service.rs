@@ -37,7 +37,10 @@ impl Service {
     /// Connects, and reads the snapshot with which the service greets.
     pub fn connect(address: &str) -> Result<(Service, Frame), Trouble> {
         let candidates: Vec<SocketAddr> = address.to_socket_addrs().map(Iterator::collect).map_err(|error| {
-            Trouble::new(format!("\"{address}\" is no address ({error})"), "write host:port, as in haply:localhost:10001")
+            Trouble::new(
+                format!("\"{address}\" is no address ({error})"),
+                "write host:port, as in haply:localhost:10001",
+            )
         })?;
         let version = version(&candidates, address);
         if version.is_some_and(|v| v < OLDEST) {
@@ -46,7 +49,8 @@ impl Service {
             return Err(Trouble::new(format!("the Inverse Service is of version {major}.{minor}"), help));
         }
         let stream = reach(&candidates).map_err(|error| {
-            let help = "start the Inverse Service (Haply's Device Manager does, or systemctl start haply-inverse-service)";
+            let help =
+                "start the Inverse Service (Haply's Device Manager does, or systemctl start haply-inverse-service)";
             Trouble::new(format!("no Inverse Service answers at {address} ({error})"), help)
         })?;
         let no_service = |what: &dyn std::fmt::Display| {
@@ -166,7 +170,8 @@ const VERSION_MAX: u64 = 16 * 1024;
 /// What `GET /version` says. Services before 3.5 answer on another port or not at all: that is no trouble.
 fn version(candidates: &[SocketAddr], host: &str) -> Option<(u32, u32)> {
     let mut stream = reach(candidates).ok()?;
-    let request = format!("GET /version HTTP/1.1\r\nHost: {host}\r\nAccept: application/json\r\nConnection: close\r\n\r\n");
+    let request =
+        format!("GET /version HTTP/1.1\r\nHost: {host}\r\nAccept: application/json\r\nConnection: close\r\n\r\n");
     stream.write_all(request.as_bytes()).ok()?;
     let mut answer = Vec::new();
     // A server that keeps the connection open runs into the time-out, with its answer already here.

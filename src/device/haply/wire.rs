@@ -38,10 +38,17 @@ pub struct Haply {
 /// Whether the service renders what it is told.
 enum Proof {
     /// Answers without a sign of the tiny force, under the name that is tried now.
-    Trying { answers: u32, is_other_name: bool },
+    Trying {
+        answers: u32,
+        is_other_name: bool,
+    },
     /// Answers in a row that deny the force that was told.
-    Proven { denials: u32 },
-    Refused { since: Instant },
+    Proven {
+        denials: u32,
+    },
+    Refused {
+        since: Instant,
+    },
 }
 
 impl Proof {
@@ -173,7 +180,9 @@ impl Haply {
             return Some(State::ForceOff { why: "the arm has no power: plug in its power supply" });
         }
         if calibrated == Some(false) {
-            return Some(State::Calibrate { how: "turn the arm as Haply's Device Manager shows until its light is steady" });
+            return Some(State::Calibrate {
+                how: "turn the arm as Haply's Device Manager shows until its light is steady",
+            });
         }
         if ready == Some(false) {
             return Some(State::Homing { what: "the Inverse Service starts the arm" });
