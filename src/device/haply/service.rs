@@ -61,7 +61,9 @@ impl Service {
         let mut service = Service { socket, version, asked: Some(Instant::now()) };
         let snapshot = service.answer_within(OPEN_WAIT).map_err(|e| no_service(&e))?;
         let snapshot = protocol::frame(&snapshot).ok_or_else(|| no_service(&"it greets with something else"))?;
-        service.socket.get_ref().set_read_timeout(Some(HEAR_WAIT)).map_err(|e| no_service(&e))?;
+        let stream = service.socket.get_ref();
+        stream.set_read_timeout(Some(HEAR_WAIT)).map_err(|e| no_service(&e))?;
+        stream.set_write_timeout(Some(HEAR_WAIT)).map_err(|e| no_service(&e))?;
         Ok((service, snapshot))
     }
 
