@@ -157,10 +157,10 @@ impl Listener {
 /// What a datagram says; `None` if anything in it is unknown, missing or no number.
 fn read(datagram: &[u8]) -> Option<(f64, Reading)> {
     let Datagram { t_s, position_mm, orientation_xyzw, buttons } = serde_json::from_slice(datagram).ok()?;
-    let orientation = orientation_xyzw.map_or(UPRIGHT, Quat::from_array);
-    let pose = Pose { position: Vec3::from(position_mm), orientation };
-    let is_sound = t_s.is_finite() && pose.is_sound();
-    is_sound.then(|| (t_s, Reading { pose: Pose { orientation: orientation.normalize(), ..pose }, buttons }))
+    let given = orientation_xyzw.map(Quat::from_array);
+    let is_unit = given.is_none_or(|turn| (turn.length() - 1.0).abs() < 0.01);
+    let pose = Pose { position: Vec3::from(position_mm), orientation: given.map_or(UPRIGHT, Quat::normalize) };
+    (is_unit && t_s.is_finite() && pose.is_sound()).then_some((t_s, Reading { pose, buttons }))
 }
 
 /// Which of the sender's times is newest.

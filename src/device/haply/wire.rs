@@ -77,8 +77,8 @@ const TRY_AGAIN: Duration = Duration::from_secs(1);
 /// Answers in a row that deny a force, until the force counts as cut: a tenth of a second, as long as a stop takes to be noticed.
 const DENIALS_MAX: u32 = 100;
 
-/// Forces below this may vanish in the device's own filters, N.
-const DENIABLE: f32 = 0.1;
+/// Forces below this may vanish in the device's own filters, N. The first touch, twice as much, did not.
+const DENIABLE: f32 = 0.01;
 
 /// An answer after this is too late to be pushed by: the relay too lets go then.
 const LATE: Duration = Duration::from_millis(20);
