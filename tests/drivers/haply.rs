@@ -547,7 +547,8 @@ fn late_answers_let_go_and_are_never_overtaken() {
 #[test]
 fn a_broken_line_or_broken_words_end_with_a_reason() {
     // Aim: each way of losing the service says what happened, lets go, and a new connection works.
-    let break_it: [(&str, fn(&mut Haply)); 3] = [
+    type Break = fn(&mut Haply);
+    let break_it: [(&str, Break); 3] = [
         ("ended the connection", |rig| rig.ways().drops_mid_tick = true),
         ("the Inverse Service", |rig| rig.misbehave(Misbehaviour::Unplug)),
         ("cannot be read", |rig| rig.misbehave(Misbehaviour::Garbage)),
