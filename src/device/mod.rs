@@ -7,10 +7,12 @@ mod coupling;
 mod driver;
 mod hand;
 mod link;
+mod haply;
 mod playback;
 pub mod realtime;
 mod relay;
 mod scripted;
+mod stream;
 
 pub use coupling::{Coupling, Far, Tie};
 pub use driver::{DRIVERS, Driver, Found, Trouble, driver};

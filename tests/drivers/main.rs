@@ -3,6 +3,7 @@
 //! A fake has a physical hand behind it (mass, damping, encoder steps, one tick of delay) and speaks the real protocol
 //! over the real transport where there is one here: shared libraries, sockets, a pair of pseudo-terminals.
 
+mod haply;
 #[path = "../phantom/mod.rs"]
 mod phantom;
 #[path = "../counting/mod.rs"]
@@ -12,6 +13,7 @@ mod rig;
 mod simulated;
 mod soak;
 mod staged;
+mod stream;
 mod suite;
 
 #[test]
