@@ -11,6 +11,8 @@ use crate::session::{Answer, Broken, Effect, Heard, Input, Live, Session};
 use crate::sim::{Assist, AssistNews, Second, Simulation};
 use std::fmt::Write;
 use std::io::BufRead;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
@@ -96,6 +98,7 @@ pub fn play(
     let Held { device, driver, argument, second } = held;
     let (second, mut assist) = second.map_or((None, None), |s| (Some(s.end), s.assist));
     let lines = typed_lines();
+    let is_interrupted = interruptions();
     let (mut live, heard) = Live::begin(session, simulation, device, second, recorder)?;
     tell(&heard, session);
     let mut looked = Instant::now();
@@ -113,6 +116,11 @@ pub fn play(
                 live.go_on::<Recorder>(device)?;
                 speak("the device is back; take the instrument out of the tooth, then go on");
             }
+        }
+        if is_interrupted.swap(false, Ordering::Relaxed) {
+            let heard = live.say(&Input::Abort, session, recorder)?;
+            tell(&heard, session);
+            break;
         }
         match lines.try_recv() {
             Ok(line) => match understood(&line, session, &live) {
@@ -137,6 +145,21 @@ pub fn play(
     let reason = if session.outcome().aborted { "aborted" } else { "complete" };
     let kept = live.end::<Recorder>()?;
     Ok(EndFile { reason: reason.into(), servo: ServoFile::of_live(&kept) })
+}
+
+/// Whether somebody asked the program to stop (Ctrl-C): the session is aborted then, its hand let go and its bundle made.
+/// A second time ends the program at once.
+fn interruptions() -> Arc<AtomicBool> {
+    let is_asked = Arc::new(AtomicBool::new(false));
+    let (asked, was_asked) = (is_asked.clone(), AtomicBool::new(false));
+    // Where it cannot be caught, the program ends as it would have; the device lets go when no force comes any more.
+    let _ = ctrlc::set_handler(move || {
+        asked.store(true, Ordering::Relaxed);
+        if was_asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    });
+    is_asked
 }
 
 /// Lines as they are typed; the channel closes when there will be no more.
