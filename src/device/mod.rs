@@ -4,10 +4,13 @@
 //! space: x to the right, y up, z toward the user, mm, N. Never knows what the hand holds or touches.
 
 mod driver;
+mod forcedimension;
 mod hand;
+mod openhaptics;
 mod playback;
 mod relay;
 mod scripted;
+mod shared_library;
 
 pub use driver::{DRIVERS, Driver, Found, Trouble, driver};
 pub use hand::{Hand, HandModel};
