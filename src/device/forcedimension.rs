@@ -367,7 +367,8 @@ impl Robot {
     fn new(sdk: Sdk, id: Id) -> Robot {
         let kind = sdk.system_type.map_or(0, |kind| kind(id));
         let says = |question: Option<extern "system" fn(Id) -> u8>| question.map(|asked| asked(id) != 0);
-        let has_wrist = says(sdk.has_wrist).unwrap_or(HAVE_WRIST.contains(&kind));
+        let can_tell = sdk.pose.is_some() || sdk.orientation.is_some();
+        let has_wrist = can_tell && says(sdk.has_wrist).unwrap_or(HAVE_WRIST.contains(&kind));
         let renders_torque = says(sdk.has_active_wrist).unwrap_or(false) && sdk.set_all.is_some();
         let has_gripper = says(sdk.has_gripper).unwrap_or(false) && sdk.gripper_angle.is_some();
         let sign = if says(sdk.is_left_handed).unwrap_or(false) { -1.0 } else { 1.0 };

@@ -6,6 +6,7 @@
 #[path = "../phantom/mod.rs"]
 mod phantom;
 mod live;
+mod native;
 mod rig;
 mod simulated;
 mod suite;
