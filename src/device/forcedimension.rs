@@ -14,8 +14,7 @@ use super::{
     Beat, Device, Driver, Found, Gone, Output, Reading, Relay, Report, Spec, State, Trouble, UPRIGHT, Wire,
     shared_library,
 };
-use crate::frame::{Pose, Quat, Vec3};
-use glam::Mat3;
+use crate::frame::{Pose, Vec3, rotation_near};
 use libloading::Library;
 use std::ffi::{CStr, OsStr, c_char, c_int, c_uint};
 use std::mem::ManuallyDrop;
@@ -456,10 +455,10 @@ impl Robot {
 
     /// Forces are told even while they are off: gravity compensation and watchdog hang on it.
     fn tell(&mut self, told: &Output) -> Result<(), Gone> {
-        let Output { force, torque } = if self.state.is_ready() { *told } else { Output::NONE };
-        let force = device_from_world(within(force, self.spec.max_force)).map(f64::from);
+        let Output { force, torque } = if self.state.is_ready() { told.within(&self.spec) } else { Output::NONE };
+        let force = device_from_world(force).map(f64::from);
         // The SDK takes N·m.
-        let torque = device_from_world(within(torque, self.spec.max_torque) / 1000.0).map(f64::from);
+        let torque = device_from_world(torque / 1000.0).map(f64::from);
         let ([fx, fy, fz], [tx, ty, tz]) = (force, torque);
         let code = match self.sdk.set_all {
             Some(set_all) if self.spec.max_torque > 0.0 => set_all(fx, fy, fz, tx, ty, tz, 0.0, self.id),
@@ -529,8 +528,7 @@ impl Robot {
         let orientation = match self.has_wrist {
             true => {
                 let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = rows.map(|row| row.map(|x| x as f32));
-                let columns = [[yy, zy, xy], [yz, zz, xz], [yx, zx, xx]].map(Vec3::from_array);
-                rotation(columns)?
+                rotation_near(Vec3::new(yy, zy, xy), Vec3::new(yz, zz, xz), Vec3::new(yx, zx, xx))?
             }
             false => UPRIGHT,
         };
@@ -629,17 +627,6 @@ impl Gripper {
 /// x, y, z of the device, which point toward the user, to the right and up.
 fn device_from_world(v: Vec3) -> [f32; 3] {
     [v.z, v.x, v.y]
-}
-
-/// No longer than so; nothing if it is no number.
-fn within(force: Vec3, most: f32) -> Vec3 {
-    if force.is_finite() { force.clamp_length_max(most) } else { Vec3::ZERO }
-}
-
-/// `None` if the columns are not near a rotation.
-fn rotation([x, y, z]: [Vec3; 3]) -> Option<Quat> {
-    let matrix = Mat3::from_cols(x, y, z);
-    ((matrix.determinant() - 1.0).abs() < 0.1).then(|| Quat::from_mat3(&matrix).normalize())
 }
 
 /// System types of omega.6 and .7, sigma.7, lambda.6 and .7, right and left: for SDKs that cannot be asked for a wrist.

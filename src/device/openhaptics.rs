@@ -14,9 +14,8 @@ use super::{
     Beat, Device, Driver, FORCE_LIFE, Found, Gone, Output, Reading, Relay, Report, Spec, State, Trouble, UPRIGHT, Wire,
     shared_library,
 };
-use crate::frame::{Pose, Quat, Vec3};
+use crate::frame::{Pose, Vec3, rotation_near};
 use crate::mailbox::Newest;
-use glam::Mat3;
 use libloading::Library;
 use std::ffi::{CStr, OsStr, c_char, c_ulong, c_void};
 use std::mem::ManuallyDrop;
@@ -496,7 +495,7 @@ const NONSENSE_MAX: u32 = 500;
 /// Frames in a row that the library refuses before it counts as broken.
 const REFUSALS_MAX: u32 = 100;
 
-/// Of the greatest force, what is asked for at most: the last bit of a rounded sum must not count as too much.
+/// Of every force, what is asked for: the last bit of a rounded sum must not count as more than the device allows.
 const FORCE_SHARE: f32 = 0.999;
 
 impl Arm {
@@ -573,9 +572,8 @@ impl Arm {
     }
 
     fn tell(&self, told: &Output) {
-        let Output { force, torque } = if self.state.is_ready() { *told } else { Output::NONE };
-        let force = within(force, self.spec.max_force * FORCE_SHARE);
-        let torque = within(torque, self.spec.max_torque * FORCE_SHARE);
+        let Output { force, torque } = if self.state.is_ready() { told.within(&self.spec) } else { Output::NONE };
+        let (force, torque) = (force * FORCE_SHARE, torque * FORCE_SHARE);
         let [a, b, c, d, e, f] = [force.x, force.y, force.z, torque.x, torque.y, torque.z].map(f32::to_bits);
         let now = self.meeting.now_us();
         self.meeting.told.write([a, b, c, d, e, f, now as u32, (now >> 32) as u32]);
@@ -635,11 +633,11 @@ impl Arm {
 
     /// The stylus in world space: HDAPI's axes are those of the world, and so are its stylus's those of a handle.
     fn pose(&self, words: [u32; REPORT_WORDS]) -> Option<Pose> {
-        let [c0, c1, c2, origin] =
+        let [x, y, z, origin] =
             std::array::from_fn(|i| Vec3::from_array(std::array::from_fn(|j| f32::from_bits(words[3 * i + j]))));
         let position = origin - self.middle;
         let is_reachable = position.is_finite() && (position.abs().cmple(self.spec.workspace_half * REACH)).all();
-        let orientation = if self.senses_orientation { rotation(c0, c1, c2)? } else { UPRIGHT };
+        let orientation = if self.senses_orientation { rotation_near(x, y, z)? } else { UPRIGHT };
         let pose = Pose { position, orientation };
         (is_reachable && pose.is_sound()).then_some(pose)
     }
@@ -709,19 +707,6 @@ impl Wire for Arm {
 
 /// How long closing waits for the last beat: a servo that does not turn by then renders nothing either.
 const CLOSE_WAIT: Duration = Duration::from_millis(100);
-
-/// The rotation nearest to a matrix that HDAPI gives slightly skewed; `None` if it is not near one. The shaft, z, is kept.
-fn rotation(c0: Vec3, c1: Vec3, c2: Vec3) -> Option<Quat> {
-    let is_near = Mat3::from_cols(c0, c1, c2).determinant() > 0.5;
-    let z = c2.try_normalize()?;
-    let x = (c0 - z * z.dot(c0)).try_normalize()?;
-    is_near.then(|| Quat::from_mat3(&Mat3::from_cols(x, z.cross(x), z)).normalize())
-}
-
-/// No longer than so; nothing if it is no number.
-fn within(force: Vec3, most: f32) -> Vec3 {
-    if force.is_finite() { force.clamp_length_max(most) } else { Vec3::ZERO }
-}
 
 fn lost(why: &'static str, code: u32) -> Gone {
     Gone::Lost { why, code: code.cast_signed() }
@@ -866,22 +851,5 @@ fn spec(hd: &Hd, workspace_half: Option<Vec3>) -> Spec {
         workspace_half: workspace_half.unwrap_or(Vec3::splat(model.radius)),
         apparent_mass: model.apparent_mass,
         name,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_skewed_transform_becomes_a_rotation() {
-        // Aim: HDAPI's matrices are a little off; quaternions must not be. Method: skew a known turn by a hundredth.
-        let turn = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(-0.4);
-        let m = Mat3::from_quat(turn);
-        let skewed = rotation(m.x_axis * 1.01 + m.y_axis * 0.01, m.y_axis * 0.99, m.z_axis * 1.005).unwrap();
-        assert!((skewed.length() - 1.0).abs() < 1e-6);
-        assert!(skewed.angle_between(turn) < 0.02, "{skewed} for {turn}");
-        assert_eq!(rotation(Vec3::ZERO, Vec3::ZERO, Vec3::ZERO), None);
-        assert_eq!(rotation(-m.x_axis, m.y_axis, m.z_axis), None, "a mirror is no turn");
     }
 }

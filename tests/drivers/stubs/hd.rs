@@ -4,7 +4,6 @@
 //! Its servo turns once a millisecond: callbacks, then the hand for one step under the force that the last frame left.
 //! `stub_*` are for the test: they connect the hand and make the device misbehave.
 
-use std::cell::Cell;
 use std::ffi::{c_char, c_ulong, c_void};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -86,9 +85,8 @@ static DEVICE: Mutex<Device> = Mutex::new(Device {
 static SERVO: Mutex<Option<JoinHandle<()>>> = Mutex::new(None);
 static LIVES: AtomicBool = AtomicBool::new(false);
 
-thread_local! {
-    static IS_SERVO: Cell<bool> = const { Cell::new(false) };
-}
+/// Held while callbacks run.
+static TURNING: Mutex<()> = Mutex::new(());
 
 const INVALID: u32 = 0xFFFF_FFFF;
 const CALIBRATION_OK: u32 = 0x5000;
@@ -123,7 +121,6 @@ pub extern "C" fn stub_connect(hand: Hand, context: *mut c_void) {
     LIVES.store(true, Ordering::Release);
     let context = context as usize;
     let servo = std::thread::spawn(move || {
-        IS_SERVO.set(true);
         while LIVES.load(Ordering::Acquire) {
             let late = device().is_late;
             std::thread::sleep(Duration::from_millis(if late { 50 } else { 1 }));
@@ -146,6 +143,7 @@ pub extern "C" fn stub_connect(hand: Hand, context: *mut c_void) {
 }
 
 fn turn_callbacks() {
+    let _turning = TURNING.lock().unwrap_or_else(|e| e.into_inner());
     let scheduled = {
         let mut d = device();
         d.framed_this_tick = false;
@@ -480,9 +478,7 @@ pub extern "system" fn hdStopScheduler() {
     d.is_running = false;
     d.rendered = [0.0; 6];
     drop(d);
-    if !IS_SERVO.get() {
-        std::thread::sleep(Duration::from_millis(3));
-    }
+    let _waited = TURNING.lock().unwrap_or_else(|e| e.into_inner());
 }
 
 #[unsafe(no_mangle)]
