@@ -50,10 +50,7 @@ impl fmt::Display for Trouble {
 }
 
 /// Every driver, in the order in which `typodont devices` lists them.
-pub static DRIVERS: &[&dyn Driver] = &[
-    &super::openhaptics::OpenHaptics,
-    &super::forcedimension::ForceDimension,
-];
+pub static DRIVERS: &[&dyn Driver] = &[&super::openhaptics::OpenHaptics, &super::forcedimension::ForceDimension];
 
 /// The driver of a name.
 pub fn driver(name: &str) -> Option<&'static dyn Driver> {

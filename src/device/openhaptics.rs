@@ -646,7 +646,8 @@ impl Arm {
 /// The usable workspace is a box within a larger shape; so many times its half are still places an arm may be.
 const REACH: f32 = 10.0;
 
-const HOLD_NEUTRAL: &str = "hold the arm in its neutral pose, all joints at right angles, and press the stylus's button";
+const HOLD_NEUTRAL: &str =
+    "hold the arm in its neutral pose, all joints at right angles, and press the stylus's button";
 
 impl Wire for Arm {
     fn spec(&self) -> &Spec {

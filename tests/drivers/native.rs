@@ -60,9 +60,12 @@ fn an_omni_that_lost_its_place_asks_for_its_inkwell() {
     let mut device = rig.opened().unwrap();
     let push = Output { force: Vec3::Y, ..Output::NONE };
     rig.hand.most_felt();
-    wait(&mut device, push, "a call for the inkwell", |state, _| {
-        matches!(state, State::Calibrate { how } if how.contains("inkwell"))
-    });
+    wait(
+        &mut device,
+        push,
+        "a call for the inkwell",
+        |state, _| matches!(state, State::Calibrate { how } if how.contains("inkwell")),
+    );
     assert_eq!(rig.ask::<u32>("stub_updates"), 0, "never without the stylus in");
     rig.set("stub_dock", true);
     wait(&mut device, push, "docked, without force", |state, reading| {
@@ -82,6 +85,8 @@ fn an_arm_without_zero_waits_for_a_person() {
     rig.order("stub_six_axes");
     rig.calibration(1, true);
     rig.hand.press_buttons(1);
+    let turns = rig.hand.turns();
+    eventually("the button is down", || rig.hand.turns() > turns + 2);
     let mut device = rig.opened().unwrap();
     let asks = |state: State| matches!(state, State::Calibrate { how } if how.contains("neutral"));
     wait(&mut device, Output::NONE, "a call for the neutral pose", |state, _| asks(state));
@@ -176,7 +181,8 @@ fn libraries_are_found_by_their_usual_names() {
     // Aim: what is installed is found without an argument. Method: this test again, in a process whose loader looks into a
     // folder with the stubs under the vendors' names.
     if std::env::var_os(IN_CHILD).is_some() {
-        let titles = ["openhaptics", "forcedimension"].map(|name| driver(name).unwrap().find().unwrap()[0].title.clone());
+        let titles =
+            ["openhaptics", "forcedimension"].map(|name| driver(name).unwrap().find().unwrap()[0].title.clone());
         assert_eq!(titles, ["PHANTOM Omni STUB-0001", "omega.6"]);
         return;
     }
@@ -564,12 +570,7 @@ fn ready(rig: &Native) -> Box<dyn Device + Send> {
     device
 }
 
-fn wait(
-    device: &mut Box<dyn Device + Send>,
-    told: Output,
-    what: &str,
-    holds: impl Fn(State, Reading) -> bool,
-) {
+fn wait(device: &mut Box<dyn Device + Send>, told: Output, what: &str, holds: impl Fn(State, Reading) -> bool) {
     let start = Instant::now();
     loop {
         let reading = device.exchange(&told).unwrap_or_else(|gone| panic!("waiting for {what}: {gone}"));
