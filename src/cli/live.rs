@@ -166,11 +166,7 @@ fn questionnaire_text(scenario: &Scenario) -> String {
     let Some(questionnaire) = &scenario.questionnaire else { return "the exercise is over".to_string() };
     let mut text = format!(
         "the exercise is over\n{}\n{}\n  1 = {}, {} = {}\n",
-        questionnaire.title,
-        questionnaire.instruction,
-        questionnaire.lowest,
-        questionnaire.steps,
-        questionnaire.highest
+        questionnaire.title, questionnaire.instruction, questionnaire.lowest, questionnaire.steps, questionnaire.highest
     );
     for item in questionnaire.items() {
         let _ = writeln!(text, "  rate {} 1…{}     {}", item.id, questionnaire.steps, item.text);

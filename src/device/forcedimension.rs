@@ -655,7 +655,7 @@ fn spec(sdk: &Sdk, id: Id, kind: c_int, renders_torque: bool) -> Spec {
         max_force,
         continuous_force: max_force,
         max_torque: if renders_torque { torque } else { 0.0 },
-        max_stiffness: (stiffness / 2.0).min(STIFFEST),
+        max_stiffness: STIFFEST.min(stiffness / 2.0),
         max_damping: damping,
         resolution,
         workspace_half: Vec3::splat(radius),

@@ -7,9 +7,9 @@ use crate::session::{Answer, EndedBy, Input, Kept};
 use crate::sim::{Command, Simulation};
 use crate::tick::TICK_S;
 use crate::volume::Label;
-use core::time::Duration;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use core::time::Duration;
 
 /// Version of the recording's format. A reader refuses a newer one, and turns an older one as its program did:
 /// 1 had no torque, no ramp at the start of touch and no second hand.

@@ -174,8 +174,7 @@ impl Live {
         heard: &mut Vec<Heard>,
     ) -> Result<(), Broken<O::Error>> {
         if turn.step.tick != self.tick {
-            let lost =
-                "ticks were lost because this machine stood still for too long; what was recorded up to then is kept";
+            let lost = "ticks were lost because this machine stood still for too long; what was recorded up to then is kept";
             return Err(Broken::Servo(lost.into()));
         }
         let mut edits = std::mem::take(&mut self.edits);
