@@ -353,6 +353,9 @@ const STATUS_TURNS: u32 = 10;
 /// The device drops its force if none is told for so long, in units of 125 µs: 20 ms, as the relay does for silence.
 const WATCHDOG: u8 = 160;
 
+/// A read that takes longer may have let the watchdog bite: the status is asked for at once.
+const SLOW: Duration = Duration::from_millis(10);
+
 /// How long forces stay off after the device dropped them: long enough to settle.
 const OFF_LIFE: Duration = Duration::from_millis(500);
 
@@ -437,7 +440,11 @@ impl Robot {
     /// The force first: reading may block, and what was told before it is old after it.
     fn run(&mut self, told: &Output) -> Result<Option<Report>, Gone> {
         self.tell(told)?;
+        let asked = Instant::now();
         let Some((place, rows)) = self.sdk.pose(self.id) else { return self.refused() };
+        if asked.elapsed() > SLOW {
+            self.turns = STATUS_TURNS;
+        }
         self.look_after_force()?;
         let Some(pose) = self.world_pose(place, rows) else {
             self.nonsense += 1;
@@ -508,7 +515,7 @@ impl Robot {
             _ if status[STATUS_POWER] == 0 => State::ForceOff { why: "it has no power; switch it on" },
             CAUSE_BUTTON => State::ForceOff { why: "forces were switched off at the device; press its force button" },
             CAUSE_VELOCITY => State::ForceOff { why: "it moved too fast; hold it still for a moment" },
-            CAUSE_WATCHDOG => State::ForceOff { why: "the program was late; hold on for a moment" },
+            CAUSE_WATCHDOG => State::ForceOff { why: "it or the program was late; hold on for a moment" },
             CAUSE_DEADMAN => State::ForceOff { why: "nobody holds the handle; take it in the hand" },
             _ => State::ForceOff { why: "the device switched its forces off; hold on for a moment" },
         };
