@@ -50,7 +50,12 @@ impl fmt::Display for Trouble {
 }
 
 /// Every driver, in the order in which `typodont devices` lists them.
-pub static DRIVERS: &[&dyn Driver] = &[&super::haply::Haply, &super::stream::Stream];
+pub static DRIVERS: &[&dyn Driver] = &[
+    &super::openhaptics::OpenHaptics,
+    &super::forcedimension::ForceDimension,
+    &super::haply::Haply,
+    &super::stream::Stream,
+];
 
 /// The driver of a name.
 pub fn driver(name: &str) -> Option<&'static dyn Driver> {

@@ -5,14 +5,17 @@
 
 mod coupling;
 mod driver;
+mod forcedimension;
 mod hand;
 mod link;
 mod haply;
+mod openhaptics;
 mod playback;
 pub mod realtime;
 mod relay;
 mod scripted;
 mod stream;
+mod shared_library;
 
 pub use coupling::{Coupling, Far, Tie};
 pub use driver::{DRIVERS, Driver, Found, Trouble, driver};
@@ -104,6 +107,12 @@ pub struct Output {
 impl Output {
     /// Nothing: the hand is free.
     pub const NONE: Output = Output { force: Vec3::ZERO, torque: Vec3::ZERO };
+
+    /// No more than a device can render; nothing of what is no number.
+    pub fn within(&self, spec: &Spec) -> Output {
+        let no_longer = |v: Vec3, most: f32| if v.is_finite() { v.clamp_length_max(most) } else { Vec3::ZERO };
+        Output { force: no_longer(self.force, spec.max_force), torque: no_longer(self.torque, spec.max_torque) }
+    }
 }
 
 /// Anything that stands in a hand.

@@ -9,6 +9,7 @@ mod phantom;
 #[path = "../counting/mod.rs"]
 mod counting;
 mod live;
+mod native;
 mod rig;
 mod simulated;
 mod soak;
