@@ -50,7 +50,12 @@ impl fmt::Display for Trouble {
 }
 
 /// Every driver, in the order in which `typodont devices` lists them.
-pub static DRIVERS: &[&dyn Driver] = &[];
+pub static DRIVERS: &[&dyn Driver] = &[
+    &super::mouse::MouseDriver,
+    &super::spacemouse::SpaceMouseDriver,
+    &super::polhem::Polhem,
+    &super::open_handle::OpenHandleDriver,
+];
 
 /// The driver of a name.
 pub fn driver(name: &str) -> Option<&'static dyn Driver> {

@@ -5,9 +5,15 @@
 
 mod driver;
 mod hand;
+pub mod hid;
+pub mod mouse;
+pub mod open_handle;
 mod playback;
+pub mod polhem;
 mod relay;
 mod scripted;
+pub mod spacemouse;
+mod trust;
 
 pub use driver::{DRIVERS, Driver, Found, Trouble, driver};
 pub use hand::{Hand, HandModel};
