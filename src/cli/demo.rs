@@ -1,6 +1,6 @@
 //! `typodont demo`: the whole way, from the shipped exercises to a page about them.
 
-use super::run::{Run, operator, perform};
+use super::run::{Player, Run, operator, perform};
 use super::{Failure, SESSIONS, cohort, say};
 use crate::content::Library;
 use crate::diagnostic::Source;
@@ -41,13 +41,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         say(format!("{}: {}", scenario.id, scenario.title))?;
         let run = Run {
             scenario: Arc::new(scenario),
-            operator: operator.clone(),
+            player: Player::Script(Box::new(operator.clone())),
             seed: SEED,
             participant: "demo",
             out: &arguments.out,
             digests: BTreeMap::new(),
         };
-        say(format!("  {}", perform(&run)?.join("report.html").display()))?;
+        say(format!("  {}", perform(run)?.join("report.html").display()))?;
     }
     let cohort = Cohort::read(&arguments.out);
     let page = arguments.out.join("cohort.html");

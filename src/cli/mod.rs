@@ -10,6 +10,7 @@ mod demo;
 mod devices;
 mod finish;
 mod import;
+mod live;
 mod preview;
 mod run;
 mod score;

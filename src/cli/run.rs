@@ -1,19 +1,23 @@
 //! `typodont run`: one exercise, one bundle.
 
-use super::{Failure, SESSIONS, check, say};
+use super::{Failure, SESSIONS, check, live, say};
 use crate::content::{self, Library, nrrd, scan};
 use crate::device::Spec;
-use crate::record::{self, EndFile, HeadFile, Recorder, ServoFile};
+use crate::record::{EndFile, HeadFile, Recorder, ServoFile};
 use crate::report::bundle;
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece, hex};
-use crate::session::{self, Operator, OperatorFile, Progress, Session};
+use crate::session::{self, Broken, Operator, OperatorFile, Progress, Session};
 use crate::sim::Simulation;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// The device that no person holds.
+const SCRIPTED: &str = "scripted";
 
 #[derive(Args)]
 pub struct Arguments {
@@ -25,8 +29,8 @@ pub struct Arguments {
     /// Who plays the trainee: careful, expert, hasty, timid, or a file
     #[arg(long, value_name = "NAME|FILE.json", default_value = "careful")]
     operator: String,
-    /// The device the hand holds; see `typodont devices`
-    #[arg(long, value_name = "NAME", default_value = "scripted")]
+    /// The device a person holds; see `typodont devices`
+    #[arg(long, value_name = "NAME[:WHICH]", default_value = SCRIPTED)]
     device: String,
     /// Decides what the exercise leaves to chance; drawn from the clock if left out
     #[arg(long)]
@@ -63,7 +67,7 @@ fn participant(text: &str) -> Result<String, String> {
 /// What a run needs, whoever asks for it.
 pub struct Run<'a> {
     pub scenario: Arc<Scenario>,
-    pub operator: OperatorFile,
+    pub player: Player,
     pub seed: u64,
     pub participant: &'a str,
     pub out: &'a Path,
@@ -71,13 +75,21 @@ pub struct Run<'a> {
     pub digests: BTreeMap<String, String>,
 }
 
+/// Who moves the hand.
+pub enum Player {
+    /// A script on a simulated device, as fast as the machine can.
+    Script(Box<OperatorFile>),
+    /// A person with a device, in real time.
+    Person(live::Held),
+}
+
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    if !arguments.headless {
-        return Err(Failure::misuse("no-window: this version runs exercises without a window only; add --headless"));
-    }
-    if arguments.device != "scripted" {
-        let what = format!("unknown-device: no device is named \"{}\"; see `typodont devices`", arguments.device);
-        return Err(Failure::Misuse(what));
+    let is_scripted = arguments.device == SCRIPTED;
+    if is_scripted && !arguments.headless {
+        return Err(Failure::misuse(
+            "no-window: this version has no window yet; add --headless for a scripted run, or --device NAME to work with a \
+             device at the terminal (see `typodont devices`)",
+        ));
     }
     let source = content::read_text(&arguments.scenario)?;
     let library = check::library_for(&arguments.scenario);
@@ -86,16 +98,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.tooth {
         digests.insert("tooth".to_string(), replace_teeth(&mut scenario, path, arguments.tooth_spacing_mm)?);
     }
-    let operator = operator(&arguments.operator, &library)?;
+    let player = match is_scripted {
+        true => Player::Script(Box::new(operator(&arguments.operator, &library)?)),
+        false => Player::Person(live::open(&arguments.device)?),
+    };
     let run = Run {
         scenario: Arc::new(scenario),
-        operator,
+        player,
         seed: arguments.seed.unwrap_or_else(seed_from_clock),
         participant: &arguments.participant,
         out: &arguments.out,
         digests,
     };
-    say(perform(&run)?.display())
+    say(perform(run)?.display())
 }
 
 /// Puts a scan in the place of every tooth; returns the scan's SHA-256.
@@ -127,25 +142,29 @@ pub fn operator(name: &str, library: &Library) -> Result<OperatorFile, Failure> 
 }
 
 /// Runs, records, scores and reports; returns the bundle's path.
-pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
-    let Run { scenario, operator, seed, participant, out, digests } = run;
-    let workpiece = Workpiece::make(scenario, *seed)
+pub fn perform(run: Run) -> Result<PathBuf, Failure> {
+    let Run { scenario, player, seed, participant, out, digests } = run;
+    let workpiece = Workpiece::make(&scenario, seed)
         .map_err(|e| Failure::Wrong(format!("{}: impossible-scene: {e}", scenario.id)))?;
     let workpiece = Arc::new(workpiece);
-    let spec = Spec::phantom_omni();
+    let (spec, operator) = match &player {
+        Player::Script(operator) => (Spec::phantom_omni(), Some(operator.id.clone())),
+        Player::Person(held) => (held.device.spec().clone(), None),
+    };
     let now = jiff::Timestamp::now();
     let head = HeadFile {
         participant: participant.to_string(),
         started: format!("{:.0}", now),
-        operator: Some(operator.id.clone()),
-        digests: digests.clone(),
-        ..HeadFile::of(scenario, &spec, *seed)
+        live: operator.is_none(),
+        operator,
+        digests,
+        ..HeadFile::of(&scenario, &spec, seed)
     };
     let name = bundle_name(&head, now);
     // A page that cannot be made should be known before the work, not after.
     let templates = super::templates()?;
     let unfinished = bundle::Unfinished::begin(out, &name).map_err(Failure::wrong)?;
-    let mut recorder = match Recorder::create(&unfinished.recording(), &head, scenario, &workpiece.volume) {
+    let mut recorder = match Recorder::create(&unfinished.recording(), &head, &scenario, &workpiece.volume) {
         Ok(recorder) => recorder,
         Err(error) => {
             unfinished.abandon();
@@ -153,23 +172,36 @@ pub fn perform(run: &Run) -> Result<PathBuf, Failure> {
         }
     };
     let mut session = Session::new(scenario.clone(), &workpiece);
-    let mut simulation = Simulation::new(session::setup(scenario, &workpiece, spec.clone()));
-    let mut trainee = Operator::new(operator.clone(), scenario.clone(), workpiece.clone(), spec, *seed);
+    let mut simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
     // What was recorded so far stays, and is told of.
-    let stopped = |error: record::Unwritable| {
+    let stopped = |error: &dyn fmt::Display| {
         let left = unfinished.recording();
         let folder = left.parent().unwrap_or(&left).display().to_string();
         Failure::Wrong(format!("{error}\nwhat was recorded is in {folder}; `typodont finish` makes a bundle of it"))
     };
-    let progress = session::run(&mut session, &mut simulation, &mut trainee, &mut recorder).map_err(&stopped)?;
-    let reason = match progress {
-        Progress::Complete if session.outcome().aborted => "aborted".to_string(),
-        Progress::Complete => "complete".to_string(),
-        Progress::DeviceGone(gone) => gone.to_string(),
+    let end = match player {
+        Player::Script(operator) => {
+            let mut trainee = Operator::new(*operator, scenario, workpiece.clone(), spec, seed);
+            let progress = session::run(&mut session, &mut simulation, &mut trainee, &mut recorder);
+            let reason = match progress.map_err(|e| stopped(&e))? {
+                Progress::Complete if session.outcome().aborted => "aborted".to_string(),
+                Progress::Complete => "complete".to_string(),
+                Progress::DeviceGone(gone) => gone.to_string(),
+            };
+            let end = EndFile { reason, servo: ServoFile::of(&simulation) };
+            // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
+            drop(simulation);
+            end
+        }
+        Player::Person(held) => {
+            live::play(&mut session, simulation, held, &mut recorder).map_err(|broken| match broken {
+                Broken::Observer(error) => stopped(&error),
+                Broken::Servo(what) => stopped(&what),
+            })?
+        }
     };
-    recorder.finish(&EndFile { reason, servo: ServoFile::of(&simulation) }).map_err(&stopped)?;
-    // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
-    drop((session, simulation, trainee, workpiece));
+    recorder.finish(&end).map_err(|e| stopped(&e))?;
+    drop((session, workpiece));
     let bar = spinner("scoring and drawing");
     let bundle = unfinished.complete(&templates).map_err(Failure::wrong);
     bar.finish_and_clear();

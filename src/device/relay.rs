@@ -8,9 +8,9 @@ use super::{Beat, Device, Gone, Output, Reading, Spec, State};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::mailbox::{self, Newest, Receiver, Sender};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
-use std::thread::{self, JoinHandle, Thread};
+use std::thread::{self, JoinHandle, Thread, ThreadId};
 use std::time::{Duration, Instant};
 
 /// How long a force may be sent after the servo gave it: ten beats. Longer, and a stalled program pushes a hand on; much
@@ -63,6 +63,8 @@ pub struct Relay {
     last_at: Option<Instant>,
     opened: Instant,
     news: Receiver<News>,
+    to_wake: Sender<Thread>,
+    caller: Option<ThreadId>,
     /// As of the last report that was fetched.
     state: State,
     /// As the wire told it last.
@@ -80,6 +82,9 @@ enum News {
 /// News that may wait for the servo. States change seldom; a servo that misses some hears of later ones.
 const NEWS_MAX: usize = 64;
 
+/// Threads that introduced themselves and are not known to the wire yet.
+const CALLERS_MAX: usize = 8;
+
 /// What both threads see.
 struct Shared {
     /// Force and torque, 6 floats; when they were told, µs since `epoch`, low and high word.
@@ -87,7 +92,6 @@ struct Shared {
     /// Position, orientation, buttons.
     report: Newest<8>,
     stop: AtomicBool,
-    servo: OnceLock<Thread>,
     epoch: Instant,
 }
 
@@ -104,13 +108,13 @@ impl Relay {
             told: Newest::new(),
             report: Newest::new(),
             stop: AtomicBool::new(false),
-            servo: OnceLock::new(),
             epoch: Instant::now(),
         });
         let (spec, beat) = (wire.spec().clone(), wire.beat());
         let there = shared.clone();
         let (post, news) = mailbox::ordered(NEWS_MAX);
-        let work = move || run(wire, &there, post);
+        let (to_wake, callers) = mailbox::ordered(CALLERS_MAX);
+        let work = move || run(wire, &there, post, callers);
         let thread = thread::Builder::new().name(format!("wire {}", spec.name)).spawn(work).ok();
         let no_thread = Gone::Lost { why: "the system gives no thread for the device", code: 0 };
         Relay {
@@ -122,6 +126,8 @@ impl Relay {
             last_at: None,
             opened: Instant::now(),
             news,
+            to_wake,
+            caller: None,
             state: State::Homing { what: "waiting for the device's first report" },
             told_state: State::Ready,
             gone: thread.is_none().then_some(no_thread),
@@ -150,6 +156,16 @@ impl Relay {
 }
 
 impl Relay {
+    /// Tells the wire which thread to wake; a device changes hands when a session goes on with another servo.
+    fn introduce(&mut self) {
+        let me = thread::current();
+        if self.caller != Some(me.id()) {
+            self.caller = Some(me.id());
+            // Without room nobody is woken, and each beat is found half a beat late.
+            let _ = self.to_wake.try_send(me);
+        }
+    }
+
     fn read_news(&mut self) {
         while let Some(news) = self.news.try_recv() {
             match news {
@@ -174,7 +190,7 @@ impl Device for Relay {
     }
 
     fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
-        self.shared.servo.get_or_init(thread::current);
+        self.introduce();
         self.shared.told.write(words_of_output(output, self.shared.now_us()));
         let report = self.await_report();
         self.read_news();
@@ -223,12 +239,6 @@ impl Drop for Relay {
 }
 
 impl Shared {
-    fn wake(&self) {
-        if let Some(servo) = self.servo.get() {
-            servo.unpark();
-        }
-    }
-
     /// The newest force, if it is young enough to be sent.
     fn force(&self) -> Output {
         match self.told.read() {
@@ -243,7 +253,14 @@ impl Shared {
 }
 
 /// The wire's thread. A panic in a driver lets the hand go like any other failure.
-fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>) {
+fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>, mut callers: Receiver<Thread>) {
+    let mut caller: Option<Thread> = None;
+    let mut wake = move || {
+        caller = std::iter::from_fn(|| callers.try_recv()).last().or(caller.take());
+        if let Some(caller) = &caller {
+            caller.unpark();
+        }
+    };
     let turning = AssertUnwindSafe(|| {
         let mut state = State::Ready;
         while !shared.stop.load(Ordering::Acquire) {
@@ -254,7 +271,7 @@ fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>) {
                         state = report.state;
                     }
                     shared.report.write(words_of_reading(&report.reading));
-                    shared.wake();
+                    wake();
                 }
                 Ok(None) => {}
                 Err(gone) => return Some(gone),
@@ -268,7 +285,7 @@ fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>) {
     let _ = catch_unwind(AssertUnwindSafe(|| wire.close()));
     if let Some(gone) = gone {
         let _ = post.try_send(News::Gone(gone));
-        shared.wake();
+        wake();
     }
 }
 

@@ -14,9 +14,12 @@ const LATE: Duration = Duration::from_millis(20);
 /// would kick.
 const IN_TIME: Duration = Duration::from_millis(200);
 
-/// Unsound reports in a row after which it is no device of ours: a twentieth of a second at 1 kHz, longer than a burst of
-/// noise on a cable.
+/// Unsound reports, less sound ones, after which it is no device of ours: a twentieth of a second at 1 kHz, longer than a
+/// burst of noise on a cable.
 const UNSOUND_MAX: u32 = 50;
+
+/// Unsound reports, less sound ones, up to which a sound one is believed. Of random numbers some look sound.
+const BELIEVED: u32 = 2;
 
 /// Fastest a hand moves, mm/s. Free reaching stays below 3 m/s; noise in a count's high byte jumps at 100 m/s.
 const SPEED_MAX: f32 = 5000.0;
@@ -57,8 +60,9 @@ impl Trust {
             self.late_at = Some(now);
         }
         self.last = Some((now, position));
-        self.unsound = 0;
-        Ok(true)
+        let is_believed = self.unsound <= BELIEVED;
+        self.unsound = self.unsound.saturating_sub(1);
+        Ok(is_believed)
     }
 
     /// Counts a report that is none of the protocol.
@@ -87,7 +91,7 @@ impl Trust {
         }
     }
 
-    /// Whether a force may be sent: the last report was sound and is young.
+    /// Whether a force may be sent: the last report was sound, like those before it, and is young.
     pub fn is_fresh(&self, now: Instant) -> bool {
         let is_young = self.last.is_some_and(|(at, _)| now.saturating_duration_since(at) <= LATE);
         is_young && self.unsound == 0 && self.state(now).is_ready()

@@ -3,12 +3,13 @@
 use crate::device::Spec;
 use crate::frame::Vec3;
 use crate::scenario::Scenario;
-use crate::session::{Answer, EndedBy, Input};
+use crate::session::{Answer, EndedBy, Input, Kept};
 use crate::sim::{Command, Simulation};
 use crate::tick::TICK_S;
 use crate::volume::Label;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use core::time::Duration;
 
 /// Version of the recording's format. A reader refuses a newer one, and turns an older one as its program did:
 /// 1 had no torque, no ramp at the start of touch and no second hand.
@@ -34,6 +35,10 @@ pub struct HeadFile {
     pub started: String,
     /// Who moved the hand, if it was a script.
     pub operator: Option<String>,
+    /// A person moved it: the session listened to the servo from another thread, and a command was carried out some ticks
+    /// after it was given.
+    #[serde(default)]
+    pub live: bool,
     pub device: SpecFile,
     /// SHA-256 of what the session was made from, by name.
     pub digests: BTreeMap<String, String>,
@@ -52,6 +57,7 @@ impl HeadFile {
             tick_s: TICK_S,
             started: String::new(),
             operator: None,
+            live: false,
             device: SpecFile::from(device),
             digests: BTreeMap::new(),
         }
@@ -66,14 +72,27 @@ pub struct EndFile {
     pub servo: ServoFile,
 }
 
-/// How well the beat was kept. A headless run has no clock to be late by.
+/// How well the beat was kept, µs. A headless run has no clock to be late by.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ServoFile {
     pub ticks: u64,
+    #[serde(default)]
+    pub late_p50_us: Option<f64>,
     pub late_p99_us: Option<f64>,
     pub late_max_us: Option<f64>,
+    /// Longest work of a tick.
+    #[serde(default)]
+    pub work_max_us: Option<f64>,
+    /// Beats that never came.
     pub missed: u64,
+    /// Ticks that the session never heard of; with any, the recording is not whole.
     pub dropped: u64,
+    /// Times the hand was let go because a beat came too late.
+    #[serde(default)]
+    pub let_go: u64,
+    /// Times the device was gone or not ready in the middle; time stood still.
+    #[serde(default)]
+    pub interruptions: u64,
     /// Readings refused and forces that were not finite.
     pub faults: u64,
     /// Forces shortened to the device's limit.
@@ -81,7 +100,27 @@ pub struct ServoFile {
 }
 
 impl ServoFile {
-    /// What a simulation counts itself; a live beat adds how late it was.
+    /// What a live session leaves.
+    pub fn of_live(kept: &Kept) -> ServoFile {
+        let Kept { ticks, gate, beats, interruptions } = kept;
+        let beats = beats.unwrap_or_default();
+        let us = |d: Duration| Some(d.as_secs_f64() * 1e6);
+        ServoFile {
+            ticks: *ticks,
+            late_p50_us: us(beats.late_p50),
+            late_p99_us: us(beats.late_p99),
+            late_max_us: us(beats.late_max),
+            work_max_us: us(beats.work_max),
+            missed: beats.missed,
+            dropped: beats.dropped,
+            let_go: beats.let_go,
+            interruptions: *interruptions,
+            faults: gate.faults(),
+            clamped: gate.clamped_forces,
+        }
+    }
+
+    /// What a simulation counts itself, without any beat.
     pub fn of(simulation: &Simulation) -> ServoFile {
         let gate = simulation.gate();
         let (ticks, faults, clamped) = (simulation.tick().0, gate.faults(), gate.clamped_forces);

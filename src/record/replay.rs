@@ -6,7 +6,7 @@ use super::reader::Recording;
 use super::writer::DIGEST_TICKS;
 use crate::device::{Device, Output, Playback, Spec};
 use crate::scenario::Workpiece;
-use crate::session::{self, Effect, Event, Outcome, Session};
+use crate::session::{self, COMMAND_LAG_TICKS, Effect, Event, Outcome, Session};
 use crate::sim::{Command, Simulation, Step};
 use crate::tick::Tick;
 use crate::volume::{Edit, Volume};
@@ -116,7 +116,8 @@ pub fn replay(
     }
     let mut simulation = Simulation::new(setup);
     let mut session = Session::new(recording.scenario.clone(), &workpiece);
-    let mut told = Told::default();
+    let lag = if recording.head.live { COMMAND_LAG_TICKS } else { 0 };
+    let mut told = Told { expected: VecDeque::new(), lag };
     told.expect(Tick::ZERO, &session.begin());
     let mut witness = Witness::new(recording, watch);
     let mut hand = Playback::new(spec, recording.ticks.iter().map(|t| t.reading));
@@ -152,22 +153,26 @@ pub fn replay(
     Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference }
 }
 
-/// Commands the session has given that the recording must have as well, in this order and at these ticks.
-#[derive(Default)]
-struct Told(VecDeque<(Tick, Command)>);
+/// Commands the session has given that the recording must have as well, in this order and at these ticks, or up to so many
+/// ticks later where the session was live.
+struct Told {
+    expected: VecDeque<(Tick, Command)>,
+    lag: u64,
+}
 
 impl Told {
     fn expect(&mut self, at: Tick, effects: &[Effect]) {
         let told = effects.iter().filter_map(|e| if let Effect::Tell(command) = e { Some(*command) } else { None });
-        self.0.extend(told.map(|command| (at, command)));
+        self.expected.extend(told.map(|command| (at, command)));
     }
 
     fn matches(&mut self, at: Tick, command: &Command) -> bool {
-        self.0.pop_front() == Some((at, *command))
+        let Some((given, expected)) = self.expected.pop_front() else { return false };
+        expected == *command && (given..=Tick(given.0 + self.lag)).contains(&at)
     }
 
     fn is_empty(&self) -> bool {
-        self.0.is_empty()
+        self.expected.is_empty()
     }
 }
 

@@ -4,9 +4,11 @@
 //! (time is the tick of the events), never touches a device, a file or the screen.
 
 mod run;
+mod live;
 mod operator;
 mod operator_file;
 
+pub use live::{Broken, COMMAND_LAG_TICKS, Heard, Kept, Live};
 pub use operator::Operator;
 pub use operator_file::{ActionFile, OperatorFile};
 pub use run::{Observer, Progress, Trainee, run};

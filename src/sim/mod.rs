@@ -1,7 +1,16 @@
 //! The world of one session, turned one tick at a time.
 //!
 //! Takes readings, gives forces and edits: live session, headless run, replay, tests and benchmarks all turn the same
-//! [`Simulation::step`]. Never reads a clock, draws an unseeded number, knows a scenario, or allocates in a step.
+//! [`Simulation::step`], and [`Servo`] turns it at 1 kHz with a device in somebody's hand. A step never reads a clock, draws
+//! an unseeded number, knows a scenario, or allocates.
+
+mod beats;
+mod realtime;
+mod servo;
+
+pub use beats::{BeatSummary, Beats, Histogram};
+pub use realtime::Priority;
+pub use servo::{Ended, Letter, Order, Servo, Turn};
 
 use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};

@@ -3,5 +3,19 @@
 //! A fake has a physical hand behind it (mass, damping, encoder steps, one tick of delay) and speaks the real protocol
 //! over the real transport where there is one here: shared libraries, sockets, a pair of pseudo-terminals.
 
+#[path = "../phantom/mod.rs"]
+mod phantom;
+mod live;
+mod mouse;
+mod open_handle;
+mod pipe;
+mod polhem;
 mod rig;
+mod simulated;
+mod spacemouse;
 mod suite;
+
+#[test]
+fn a_simulated_device_passes_the_suite() {
+    suite::check(&mut simulated::Simulated::new());
+}

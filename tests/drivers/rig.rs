@@ -4,7 +4,7 @@
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use typodont::device::{Device, Hand, HandModel, Output, Reading};
+use typodont::device::{Device, Hand, HandModel, Output, Reading, UPRIGHT};
 use typodont::frame::{Pose, Quat, Vec3};
 
 /// A fake device of one kind, plugged in.
@@ -78,7 +78,7 @@ impl SharedHand {
         let hand = Hand::resting_at(HandModel::holding(0.05, encoder_step), Vec3::ZERO);
         SharedHand(Arc::new(Mutex::new(Held {
             hand,
-            orientation: Quat::IDENTITY,
+            orientation: UPRIGHT,
             buttons: 0,
             felt: Output::NONE,
             most: 0.0,
@@ -108,6 +108,10 @@ impl SharedHand {
     /// For the test: where the person wants the handle.
     pub fn reach(&self, goal: Vec3) {
         self.held().hand.goal = goal;
+    }
+
+    pub fn goal(&self) -> Vec3 {
+        self.held().hand.goal
     }
 
     pub fn turn_to(&self, orientation: Quat) {

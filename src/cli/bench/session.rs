@@ -3,7 +3,7 @@
 use super::figures::{Figures, repeated};
 use super::work::{SEED, Scratch, exercise, grinding};
 use super::{DIMS, grown, name_of};
-use crate::cli::run::{Run, perform};
+use crate::cli::run::{Player, Run, perform};
 use crate::content::Library;
 use crate::device::Spec;
 use crate::diagnostic::headlines;
@@ -95,13 +95,13 @@ pub fn print_peak(dims: &str) -> Result<(), String> {
     let folder = Scratch::new("session");
     let run = Run {
         scenario: Arc::new(exercise(grown(dims)?)?),
-        operator: careful()?,
+        player: Player::Script(Box::new(careful()?)),
         seed: SEED,
         participant: "",
         out: &folder.0,
         digests: BTreeMap::new(),
     };
-    perform(&run).map_err(|failure| failure.lines())?;
+    perform(run).map_err(|failure| failure.lines())?;
     println!("{:.1}", peak_of_this_process()?);
     Ok(())
 }

@@ -17,6 +17,10 @@ const CURRENT_MAX: f64 = 1999.0;
 /// How long one turn waits for the answer to its report.
 const ANSWER: Duration = Duration::from_millis(10);
 
+/// After this long without an answer a report counts as lost, and the arm is spoken to again. Speaking more often would
+/// let a slow arm answer in time to what is long past.
+const LOST: Duration = Duration::from_millis(100);
+
 /// Encoders and `info`: what counts in a report, however long it is.
 const HEARD: usize = 14;
 
@@ -51,6 +55,10 @@ pub struct Arm<T> {
     /// What the last sound report said; none before the first, which only an all-zero report brings about.
     heard: Option<Heard>,
     was_pressed: bool,
+    /// When the report was sent that the arm has not answered.
+    asked: Option<Instant>,
+    /// It was late, and has been told to let go.
+    is_hushed: bool,
 }
 
 /// A report of the arm.
@@ -66,10 +74,10 @@ impl<T: Transport> Arm<T> {
     pub fn new(transport: T, config: &'static Config, report_length: usize) -> Arm<T> {
         let trust = Trust::new(REACH, "what it sends is not what a Polhem sends; is it another device on a Teensy?");
         let spec = spec(config);
-        Arm { transport, config, report_length, spec, trust, heard: None, was_pressed: false }
+        Arm { transport, config, report_length, spec, trust, heard: None, was_pressed: false, asked: None, is_hushed: false }
     }
 
-    /// Sends four words: currents and a command, or a preset.
+    /// Sends currents and a command, or a preset.
     fn tell(&mut self, words: [i16; 7]) -> Result<(), Gone> {
         let mut report = [0; REPORT_MAX];
         for (two, word) in report[1..].chunks_exact_mut(2).zip(words) {
@@ -89,7 +97,10 @@ impl<T: Transport> Arm<T> {
         }
         let angles = self.config.angles(heard.joints);
         let amperes = self.config.currents(angles, force.to_array().map(f64::from));
-        amperes.map(|a| (a * 1000.0).round().clamp(-CURRENT_MAX, CURRENT_MAX) as i16)
+        // All three are cut down alike: one alone would turn the force aside.
+        let most = amperes.iter().fold(0.0, |most: f64, a| most.max(a.abs() * 1000.0));
+        let share = if most > CURRENT_MAX { CURRENT_MAX / most } else { 1.0 };
+        amperes.map(|a| (a * 1000.0 * share).round() as i16)
     }
 
     /// Tells an arm that asks for it where its encoders are, when the person says that it is in place.
@@ -131,13 +142,21 @@ impl<T: Transport> Wire for Arm<T> {
     }
 
     fn turn(&mut self, told: &Output) -> Result<Option<Report>, Gone> {
-        let [a, b, c] = self.currents(told, Instant::now());
-        self.tell([a, b, c, CURRENTS, 0, 0, 0])?;
+        let now = Instant::now();
+        if self.asked.is_none_or(|at| now.saturating_duration_since(at) > LOST) {
+            let [a, b, c] = if self.asked.is_none() { self.currents(told, now) } else { [0; 3] };
+            self.tell([a, b, c, CURRENTS, 0, 0, 0])?;
+            self.asked = Some(now);
+        }
         let mut report = [0; REPORT_MAX];
         let length = self.transport.newest(&mut report, ANSWER)?;
         if length == 0 {
+            if !std::mem::replace(&mut self.is_hushed, true) {
+                self.tell([0; 7])?;
+            }
             return Ok(None);
         }
+        (self.asked, self.is_hushed) = (None, false);
         let Some(heard) = Heard::of(&report[..length]) else {
             self.trust.unsound()?;
             return Ok(None);

@@ -1,0 +1,254 @@
+//! An exercise with a device in somebody's hand, at a terminal: what is asked is printed, what is typed is an answer.
+//!
+//! Takes an open device and lines of text. Gives a recorded session. The window of the desktop program says the same things
+//! in pictures.
+
+use super::{Failure, say};
+use crate::device::{Device, Driver, Trouble};
+use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
+use crate::scenario::{QuestionKind, Scenario};
+use crate::session::{Answer, Broken, Effect, Heard, Input, Live, Session};
+use crate::sim::Simulation;
+use std::fmt::Write;
+use std::io::BufRead;
+use std::sync::mpsc::{self, Receiver, TryRecvError};
+use std::time::{Duration, Instant};
+
+/// The device a person holds, and how to find it again.
+pub struct Held {
+    pub device: Box<dyn Device + Send>,
+    pub driver: &'static dyn Driver,
+    pub argument: Option<String>,
+}
+
+/// Opens the device that `--device NAME[:ARGUMENT]` names.
+pub fn open(name: &str) -> Result<Held, Failure> {
+    let (name, argument) = match name.split_once(':') {
+        Some((name, argument)) => (name, Some(argument.to_string())),
+        None => (name, None),
+    };
+    let Some(driver) = crate::device::driver(name) else {
+        let known = crate::device::DRIVERS.iter().map(|d| d.name()).collect::<Vec<_>>().join(", ");
+        return Err(Failure::Misuse(format!(
+            "unknown-device: no device is named \"{name}\"; known: scripted, {known} (see `typodont devices`)"
+        )));
+    };
+    let device = driver.open(argument.as_deref()).map_err(|trouble| no_device(name, &trouble))?;
+    Ok(Held { device, driver, argument })
+}
+
+fn no_device(name: &str, trouble: &Trouble) -> Failure {
+    Failure::Wrong(format!("{name}: no-device: {trouble}"))
+}
+
+/// How often letters are fetched: a person at a terminal sees nothing faster.
+const LISTEN_EVERY: Duration = Duration::from_millis(4);
+
+/// How often a device that is gone is looked for.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// What ended a session at the terminal.
+type Stopped = Broken<Unwritable>;
+
+/// Plays a session to its end; returns what is written at the end of its recording.
+pub fn play(
+    session: &mut Session,
+    simulation: Simulation,
+    held: Held,
+    recorder: &mut Recorder,
+) -> Result<EndFile, Stopped> {
+    let Held { device, driver, argument } = held;
+    let lines = typed_lines();
+    let (mut live, heard) = Live::begin(session, simulation, device, recorder)?;
+    tell(&heard, session);
+    let mut looked = Instant::now();
+    let mut is_listening = true;
+    while !session.is_complete() {
+        std::thread::sleep(LISTEN_EVERY);
+        let heard = live.listen(session, recorder)?;
+        tell(&heard, session);
+        if live.is_waiting() && looked.elapsed() > LOOK_EVERY {
+            looked = Instant::now();
+            if let Ok(device) = driver.open(argument.as_deref()) {
+                live.go_on::<Recorder>(device)?;
+                speak("the device is back; take the instrument out of the tooth, then go on");
+            }
+        }
+        match lines.try_recv() {
+            Ok(line) => match understood(&line, session, &live) {
+                Said::Input(input) => {
+                    let heard = live.say(&input, session, recorder)?;
+                    tell(&heard, session);
+                }
+                Said::Pause(is_paused) => live.pause(is_paused),
+                Said::End if session.are_stages_over() => break,
+                Said::End => speak("the exercise is not over; abort ends it before its time"),
+                Said::Show(text) => speak(text),
+                Said::Nothing => {}
+            },
+            Err(TryRecvError::Disconnected) if is_listening => is_listening = false,
+            Err(_) => {}
+        }
+        if session.are_stages_over() && !is_listening {
+            // Nobody is there to answer the questionnaire.
+            break;
+        }
+    }
+    let reason = if session.outcome().aborted { "aborted" } else { "complete" };
+    let kept = live.end::<Recorder>()?;
+    Ok(EndFile { reason: reason.into(), servo: ServoFile::of_live(&kept) })
+}
+
+/// Lines as they are typed; the channel closes when there will be no more.
+fn typed_lines() -> Receiver<String> {
+    let (post, lines) = mpsc::channel();
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if post.send(line).is_err() {
+                break;
+            }
+        }
+    });
+    lines
+}
+
+/// Prints; a terminal that is gone does not end a session.
+fn speak(text: impl std::fmt::Display) {
+    let _ = say(text);
+}
+
+fn tell(heard: &[Heard], session: &Session) {
+    for one in heard {
+        match one {
+            Heard::Effect(Effect::StageStarted { stage }) => speak(stage_text(session.scenario(), *stage)),
+            Heard::Effect(Effect::StageEnded { .. }) => speak("this stage is over\n"),
+            Heard::Effect(Effect::StagesOver) => speak(questionnaire_text(session.scenario())),
+            Heard::Effect(Effect::Refused { why }) => speak(format!("not taken: {why}")),
+            Heard::Effect(Effect::Answered { .. }) => speak("noted"),
+            Heard::Effect(Effect::Tell(_) | Effect::StepStarted { .. }) => {}
+            Heard::Device(state) if state.is_ready() => speak("the device is ready"),
+            Heard::Device(state) => speak(format!("time stands still: {state}")),
+            Heard::Gone(gone) => speak(format!("time stands still: {gone}; plug it in again and the session goes on")),
+        }
+    }
+}
+
+/// What a stage asks for, and the words that answer.
+fn stage_text(scenario: &Scenario, stage: usize) -> String {
+    let stage = &scenario.stages[stage];
+    let mut text = format!("\n{}\n{}\n", stage.title, stage.instruction);
+    let tray = stage.instruments.iter().map(|i| scenario.instruments[*i].id.as_str()).collect::<Vec<_>>().join(", ");
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "  take NAME         instruments: {tray}");
+    for question in &stage.ask {
+        let answer = match &question.kind {
+            QuestionKind::ToothWith { .. } => {
+                scenario.scene.teeth.iter().map(|t| t.id.as_str()).collect::<Vec<_>>().join(", ")
+            }
+            QuestionKind::QuadrantOf { .. } => "1 to 4".to_string(),
+            QuestionKind::Choice { options, .. } => {
+                options.iter().map(|(id, _)| id.as_str()).collect::<Vec<_>>().join(", ")
+            }
+            QuestionKind::YesNo { .. } => "yes or no".to_string(),
+            QuestionKind::Number { .. } => "a number".to_string(),
+            QuestionKind::Text => "a text".to_string(),
+        };
+        let _ = writeln!(text, "  answer {} …     {} ({answer})", question.id, question.text);
+    }
+    if stage.ends.confirmed {
+        let _ = writeln!(text, "  done              ends this stage");
+    }
+    text.push_str("  pause, resume, abort, status");
+    text
+}
+
+fn questionnaire_text(scenario: &Scenario) -> String {
+    let Some(questionnaire) = &scenario.questionnaire else { return "the exercise is over".to_string() };
+    let mut text = format!(
+        "the exercise is over\n{}\n{}\n  1 = {}, {} = {}\n",
+        questionnaire.title, questionnaire.instruction, questionnaire.lowest, questionnaire.steps, questionnaire.highest
+    );
+    for item in questionnaire.items() {
+        let _ = writeln!(text, "  rate {} 1…{}     {}", item.id, questionnaire.steps, item.text);
+    }
+    text.push_str("  end               leaves the rest unanswered");
+    text
+}
+
+enum Said {
+    Input(Input),
+    Pause(bool),
+    /// Leaves the rest of the questionnaire.
+    End,
+    Show(String),
+    Nothing,
+}
+
+/// What a typed line means.
+fn understood(line: &str, session: &Session, live: &Live) -> Said {
+    let mut words = line.split_whitespace();
+    let scenario = session.scenario();
+    let unknown = || Said::Show(format!("not understood: \"{line}\""));
+    match (words.next(), words.next()) {
+        (None, _) => Said::Nothing,
+        (Some("done"), None) => Said::Input(Input::Confirm),
+        (Some("abort"), None) => Said::Input(Input::Abort),
+        (Some("end"), None) => Said::End,
+        (Some("pause"), None) => Said::Pause(true),
+        (Some("resume"), None) => Said::Pause(false),
+        (Some("status"), None) => Said::Show(status(session, live)),
+        (Some("take"), Some(name)) => match scenario.instruments.iter().position(|i| i.id == name) {
+            Some(instrument) => Said::Input(Input::Take { instrument }),
+            None => Said::Show(format!("no instrument is named \"{name}\"")),
+        },
+        (Some("rate"), Some(item)) => match words.next().and_then(|value| value.parse().ok()) {
+            Some(value) => Said::Input(Input::Rate { item: item.to_string(), value }),
+            None => unknown(),
+        },
+        (Some("answer"), Some(question)) => {
+            let value = words.collect::<Vec<_>>().join(" ");
+            let asked = session.stage().and_then(|(_, stage)| stage.ask.iter().find(|q| q.id == question));
+            let answer = match asked.map(|q| &q.kind) {
+                Some(QuestionKind::QuadrantOf { .. }) => value.parse().ok().map(Answer::Quadrant),
+                Some(QuestionKind::YesNo { .. }) => match value.as_str() {
+                    "yes" => Some(Answer::YesNo(true)),
+                    "no" => Some(Answer::YesNo(false)),
+                    _ => None,
+                },
+                Some(QuestionKind::Number { .. }) => value.parse().ok().map(Answer::Number),
+                Some(_) => Some(Answer::Word(value)),
+                None => None,
+            };
+            match answer {
+                Some(value) => Said::Input(Input::Answer { question: question.to_string(), value }),
+                None => unknown(),
+            }
+        }
+        _ => unknown(),
+    }
+}
+
+/// Where the session stands, and how its beat is kept.
+fn status(session: &Session, live: &Live) -> String {
+    let mut text = match session.stage() {
+        Some((_, stage)) => format!("{}: {:.0} s", stage.title, session.stage_seconds()),
+        None => "the stages are over".to_string(),
+    };
+    if let Some(beats) = live.beats() {
+        let us = |d: Duration| d.as_micros();
+        let _ = write!(
+            text,
+            "; {} ticks, late {} / {} / {} µs (p50 / p99 / max), {} missed, {} dropped",
+            beats.ticks,
+            us(beats.late_p50),
+            us(beats.late_p99),
+            us(beats.late_max),
+            beats.missed,
+            beats.dropped
+        );
+    }
+    if let Some(touch) = live.screen().and_then(|step| step.touch) {
+        let _ = write!(text, "; {:.2} N on tissue {}", touch.spring, touch.label.0);
+    }
+    text
+}

@@ -1,0 +1,81 @@
+//! A live session on a wire: what the servo did is what a replay does, even when the cable was pulled in the middle.
+
+use crate::rig::{Misbehaviour, Rig};
+use crate::simulated::Simulated;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use typodont::content::Library;
+use typodont::diagnostic::Source;
+use typodont::frame::Vec3;
+use typodont::record::{EndFile, HeadFile, Recorder, Recording, ServoFile, Watch, replay};
+use typodont::scenario::{self, Forms, Workpiece};
+use typodont::session::{self, Heard, Input, Live, Session};
+use typodont::sim::Simulation;
+
+#[test]
+fn a_live_session_holds_when_turned_again() {
+    // Aim: a recording of a person's session is a proof like a script's. Method: the grinding exercise on a simulated wire,
+    // an instrument taken, the cable pulled while cutting, plugged in again, said to be done; then verified.
+    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let source = Source::new("5-grinding.json", text);
+    let scenario = Arc::new(scenario::resolve(source, &Library::shipped(), Forms::Made).unwrap());
+    let workpiece = Workpiece::make(&scenario, 4).unwrap();
+    let mut rig = Simulated::new();
+    let hand = rig.hand();
+    hand.reach(Vec3::Y * 8.0);
+    let device = rig.open().unwrap();
+    let head = HeadFile { live: true, ..HeadFile::of(&scenario, device.spec(), 4) };
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("live.mcap");
+    let mut recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
+    let mut session = Session::new(scenario.clone(), &workpiece);
+    let simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
+    let (mut live, _) = Live::begin(&mut session, simulation, device, &mut recorder).unwrap();
+    // Above the decay, then onto it.
+    let decay = workpiece.world_from_tooth * workpiece.lesions[0].centre;
+    let start = Instant::now();
+    let (mut cut, mut gone, mut was_pulled, mut done) = (0, 0, false, false);
+    let mut back_at = None;
+    while !session.are_stages_over() {
+        assert!(start.elapsed() < Duration::from_secs(60), "cut {cut}, gone {gone}");
+        let heard = live.listen(&mut session, &mut recorder).unwrap();
+        gone += heard.iter().filter(|h| matches!(h, Heard::Gone(_))).count();
+        cut += usize::from(live.screen().is_some_and(|s| s.cutting));
+        let seconds = start.elapsed().as_secs_f32();
+        let height = if back_at.is_some_and(|at: Instant| at.elapsed() < Duration::from_secs(1)) {
+            6.0
+        } else {
+            (6.0 - 3.0 * seconds).max(-1.5)
+        };
+        hand.reach(decay + Vec3::Y * height);
+        if cut > 50 && !was_pulled {
+            let heard = live.say(&Input::Take { instrument: 1 }, &mut session, &mut recorder).unwrap();
+            assert!(!heard.is_empty());
+            rig.misbehave(Misbehaviour::Unplug);
+            was_pulled = true;
+        }
+        if live.is_waiting() {
+            rig.recover();
+            live.go_on::<Recorder>(rig.open().unwrap()).unwrap();
+            back_at = Some(Instant::now());
+        }
+        if cut > 400 && gone == 1 && !done {
+            done = true;
+            live.say(&Input::Confirm, &mut session, &mut recorder).unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(3));
+    }
+    let kept = live.end::<Recorder>().unwrap();
+    let servo = ServoFile::of_live(&kept);
+    recorder.finish(&EndFile { reason: "complete".into(), servo: servo.clone() }).unwrap();
+    println!("{servo:?}");
+    assert_eq!((servo.interruptions, servo.dropped), (1, 0));
+    let recording = Recording::read(&file).unwrap();
+    assert!(recording.head.live);
+    let mut removed = 0;
+    let again = replay(&recording, recording.workpiece().unwrap(), Watch::Everything, |_, step, _, _| {
+        removed += step.removed;
+    });
+    assert_eq!(again.difference, None, "{}", again.difference.as_ref().unwrap());
+    assert!(removed > 100, "{removed} voxels fell");
+    assert!(!again.outcome.aborted);
+}

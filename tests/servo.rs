@@ -1,0 +1,254 @@
+//! The servo keeps its beat, accounts for every beat it missed, travels light, and lets go when it is late.
+
+#[path = "phantom/mod.rs"]
+mod phantom;
+#[path = "drivers/rig.rs"]
+mod rig;
+#[path = "drivers/simulated.rs"]
+mod simulated;
+
+use phantom::{HARD, SOFT};
+use rig::{Rig, SharedHand};
+use simulated::Simulated;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+use typodont::device::{Beat, Device, Gone, Output, Reading, Spec, State};
+use typodont::frame::Vec3;
+use typodont::sim::{Beats, Command, Ended, Letter, Order, Servo, Setup, Simulation, Turn};
+use typodont::touch::{Instrument, WorkingEnd};
+
+/// Counts what a thread allocates while it is watched.
+struct Counting;
+
+thread_local! {
+    static WATCHED: Cell<bool> = const { Cell::new(false) };
+}
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: every call is passed on to the system's allocator as it came.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if WATCHED.with(Cell::get) {
+            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        }
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        if WATCHED.with(Cell::get) {
+            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        }
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// A device that changes what another one does at a beat of its choice.
+struct Staged<D, F> {
+    device: D,
+    beats: u64,
+    at_beat: F,
+}
+
+impl<D: Device, F: FnMut(u64)> Device for Staged<D, F> {
+    fn spec(&self) -> &Spec {
+        self.device.spec()
+    }
+
+    fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
+        (self.at_beat)(self.beats);
+        self.beats += 1;
+        self.device.exchange(output)
+    }
+
+    fn beat(&self) -> Beat {
+        self.device.beat()
+    }
+
+    fn state(&self) -> State {
+        self.device.state()
+    }
+}
+
+/// A hand without a wire, for beats that the servo keeps itself.
+struct InHand {
+    hand: SharedHand,
+    spec: Spec,
+}
+
+impl InHand {
+    fn new(hand: &SharedHand) -> InHand {
+        InHand { hand: hand.clone(), spec: Spec::phantom_omni() }
+    }
+}
+
+impl Device for InHand {
+    fn spec(&self) -> &Spec {
+        &self.spec
+    }
+
+    fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
+        Ok(self.hand.turn(*output))
+    }
+}
+
+/// A half space below y = 0: hard on the left, soft on the right; a bur and an explorer on the tray.
+fn world() -> Setup {
+    let tissue = |p: Vec3| if p.x < 0.0 { HARD } else { SOFT };
+    let volume = phantom::volume([80, 80, 80], 0.2, |p| (p.y, tissue(p)));
+    let bur = WorkingEnd::Ball { radius: 0.7 };
+    let explorer = Instrument::new(WorkingEnd::Point, false);
+    let setup = phantom::setup(volume, bur, true);
+    Setup { instruments: vec![Instrument::new(bur, true), explorer], device: Spec::phantom_omni(), ramp: 200, ..setup }
+}
+
+/// Turns for a while; `at_ms` moves the hand and gives orders once a millisecond. Returns every tick that was told.
+fn turn_for(
+    device: impl Device + Send + 'static,
+    duration: Duration,
+    mut at_ms: impl FnMut(u64, &mut Servo),
+) -> (Vec<Turn>, Ended, Duration) {
+    let mut servo = Servo::start(Simulation::new(world()), Box::new(device), Beats::default()).unwrap();
+    let start = Instant::now();
+    let (mut turns, mut edits) = (Vec::new(), Vec::new());
+    let mut fetch = |servo: &mut Servo| {
+        while let Some(letter) = servo.next_letter() {
+            if let Letter::Turned(turn) = letter {
+                edits.clear();
+                servo.take_edits(&turn, &mut edits);
+                assert_eq!(edits.len(), turn.edits);
+                turns.push(turn);
+            }
+        }
+    };
+    let mut told = 0;
+    while start.elapsed() < duration {
+        let now = start.elapsed().as_millis() as u64;
+        (told..now).for_each(|ms| at_ms(ms, &mut servo));
+        told = now.max(told);
+        fetch(&mut servo);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    servo.order(Order::Pause);
+    let elapsed = start.elapsed();
+    std::thread::sleep(Duration::from_millis(20));
+    fetch(&mut servo);
+    (turns, servo.stop().unwrap(), elapsed)
+}
+
+/// Where the hand goes: leans on the left, wanders to the right and back once in four seconds.
+fn wander(hand: &SharedHand, ms: u64) {
+    let phase = (ms % 4000) as f32 / 4000.0;
+    let x = 3.0 - 12.0 * (phase - 0.5).abs();
+    hand.reach(Vec3::new(x, -0.9, 0.0));
+}
+
+#[test]
+fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
+    // Aim: the servo's thread travels light. Method: from its 300th beat on every allocation and release of that thread is
+    // counted, through contact, cutting, a change of tool, of stiffness and of the bur, and a pause.
+    let mut rig = Simulated::new();
+    let hand = rig.hand();
+    let device = rig.open().unwrap();
+    let watch = |beat: u64| match beat {
+        300 => WATCHED.with(|w| w.set(true)),
+        10_800 => WATCHED.with(|w| w.set(false)),
+        _ => {}
+    };
+    let device = Staged { device, beats: 0, at_beat: watch };
+    hand.reach(Vec3::Y * 3.0);
+    let (turns, ended, _) = turn_for(device, Duration::from_secs(14), |ms, servo| {
+        wander(&hand, ms);
+        let command = |servo: &mut Servo, command| assert!(servo.order(Order::Command(command)));
+        match ms {
+            6000 => command(servo, Command::Take { instrument: 1 }),
+            6200 => hand.reach(Vec3::Y * 4.0),
+            8000 => command(servo, Command::Take { instrument: 0 }),
+            8500 => command(servo, Command::SetStiffness { label: SOFT, stiffness: 0.2 }),
+            9000 => command(servo, Command::RunBur { running: false }),
+            9300 => command(servo, Command::RunBur { running: true }),
+            _ => {}
+        }
+        if (6000..6300).contains(&ms) || (8000..8300).contains(&ms) {
+            hand.reach(Vec3::Y * 4.0);
+        }
+    });
+    let allocated = ALLOCATIONS.load(Ordering::Relaxed);
+    let touched = turns.iter().filter(|t| t.step.touch.is_some()).count();
+    let cut = turns.iter().filter(|t| t.step.cutting).count();
+    let tools: std::collections::BTreeSet<_> = turns.iter().map(|t| t.step.instrument).collect();
+    println!("{} ticks, {touched} touching, {cut} cutting, tools {tools:?}: {allocated} allocations", turns.len());
+    assert!(turns.len() > 10_000, "{}", turns.len());
+    assert!(touched > 2000 && cut > 1000 && tools.len() == 2, "{touched} {cut} {tools:?}");
+    assert_eq!(allocated, 0);
+    assert_eq!(ended.beats.dropped, 0);
+}
+
+#[test]
+fn every_beat_that_is_missed_is_counted() {
+    // Aim: ticks and missed beats together are the time that passed. Method: three stalls of 5, 15 and 40 ms in contact.
+    let hand = SharedHand::at_rest(0.0);
+    let stall = |beat: u64| {
+        let ms = match beat {
+            1000 => 5,
+            1500 => 15,
+            2000 => 40,
+            _ => 0,
+        };
+        std::thread::sleep(Duration::from_millis(ms));
+    };
+    hand.reach(Vec3::Y * 3.0);
+    let device = Staged { device: InHand::new(&hand), beats: 0, at_beat: stall };
+    let (turns, ended, elapsed) = turn_for(device, Duration::from_secs(3), |ms, _| {
+        hand.reach(Vec3::new(-2.0, if ms < 300 { 3.0 } else { -0.8 }, 0.0));
+    });
+    let beats = ended.beats.summary();
+    let accounted = (turns.len() as u64 + beats.missed) as f64;
+    println!("{:.1} ms: {} ticks, {beats:?}", elapsed.as_secs_f64() * 1e3, turns.len());
+    assert!((accounted - elapsed.as_secs_f64() * 1e3).abs() < 12.0, "{accounted} of {elapsed:?}");
+    assert!(beats.missed >= 5 + 15 + 40 - 6, "{beats:?}");
+    // The two longer stalls let the hand go; each such tick is one that no reading was trusted in.
+    let absent = turns.iter().filter(|t| !t.reading.pose.is_sound()).count() as u64;
+    assert!(beats.let_go >= 2, "{beats:?}");
+    assert!(absent >= beats.let_go, "{absent} {beats:?}");
+    for (place, turn) in turns.iter().enumerate().filter(|(_, t)| !t.reading.pose.is_sound()) {
+        assert_eq!(turn.step.force, Vec3::ZERO);
+        // The hand still stands in the wall: it feels nothing until it has been out.
+        assert!(turns[place..].iter().take(3).all(|t| t.step.force == Vec3::ZERO));
+    }
+}
+
+#[test]
+fn a_busy_machine_lets_go_rather_than_holds() {
+    // Aim: with every core taken the hand is never pushed by a force that is old, and what came late is counted. Method:
+    // four busy threads; the wire's end of the relay says how old the forces were that it passed on.
+    let mut rig = Simulated::new();
+    let hand = rig.hand();
+    let device = rig.open().unwrap();
+    let most = device.spec().max_force;
+    let stop = std::sync::Arc::new(AtomicBool::new(false));
+    let busy: Vec<_> = (0..4)
+        .map(|_| {
+            let stop = stop.clone();
+            std::thread::spawn(move || while !stop.load(Ordering::Relaxed) {})
+        })
+        .collect();
+    hand.reach(Vec3::Y * 3.0);
+    let (turns, ended, elapsed) = turn_for(device, Duration::from_secs(8), |ms, _| wander(&hand, ms));
+    stop.store(true, Ordering::Relaxed);
+    busy.into_iter().for_each(|thread| thread.join().unwrap());
+    let beats = ended.beats.summary();
+    println!("{} ticks in {elapsed:?} with {}: {beats:?}", turns.len(), ended.priority);
+    assert!(!turns.is_empty());
+    assert!(hand.most_felt() <= most * 1.001);
+    assert!(turns.iter().all(|t| t.step.force.is_finite() && t.step.force.length() <= most * 1.001));
+    let is_late = beats.late_max > Duration::from_millis(12);
+    let was_let_go = beats.let_go > 0 || turns.iter().any(|t| !t.reading.pose.is_sound());
+    assert!(!is_late || was_let_go, "late by {:?} and never let go", beats.late_max);
+    assert_eq!(beats.dropped, 0);
+}
