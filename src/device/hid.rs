@@ -113,7 +113,9 @@ pub fn refusal(plugged: &Plugged, reason: &str) -> Trouble {
              control --reload` and plug the device in again",
             udev_rule(*vendor)
         ),
-        false => "close other programs that use it (a 3Dconnexion or vendor's service may), then plug it in again".into(),
+        false => {
+            "close other programs that use it (a 3Dconnexion or vendor's service may), then plug it in again".into()
+        }
     };
     Trouble::new(what, help)
 }

@@ -46,11 +46,8 @@ struct Shared {
 impl Mouse {
     /// A mouse and the device that it moves; the hand is in the middle.
     pub fn new() -> (Mouse, Handle) {
-        let shared = Arc::new(Shared {
-            pointer: Default::default(),
-            buttons: AtomicU32::new(0),
-            spring: Newest::new(),
-        });
+        let shared =
+            Arc::new(Shared { pointer: Default::default(), buttons: AtomicU32::new(0), spring: Newest::new() });
         let handle = Handle { shared: shared.clone(), spec: spec(), hand: Vec3::ZERO };
         (Mouse(shared), handle)
     }

@@ -248,7 +248,9 @@ fn state(state: u8, cause: u8) -> State {
         (4, 2) => State::ForceOff { why: "its motors are too warm; let it rest for some minutes" },
         (4, 3) => State::ForceOff { why: "the hand was too fast; hold the handle still for a moment" },
         (4, 4) => State::ForceOff { why: "its force is switched off; press the switch on the handle" },
-        (4, 5) => State::ForceOff { why: "it found a fault in its motors or sensors; switch it off and have it checked" },
+        (4, 5) => {
+            State::ForceOff { why: "it found a fault in its motors or sensors; switch it off and have it checked" }
+        }
         _ => State::ForceOff { why: "its state is not known to this program; is its firmware newer?" },
     }
 }

@@ -74,7 +74,17 @@ impl<T: Transport> Arm<T> {
     pub fn new(transport: T, config: &'static Config, report_length: usize) -> Arm<T> {
         let trust = Trust::new(REACH, "what it sends is not what a Polhem sends; is it another device on a Teensy?");
         let spec = spec(config);
-        Arm { transport, config, report_length, spec, trust, heard: None, was_pressed: false, asked: None, is_hushed: false }
+        Arm {
+            transport,
+            config,
+            report_length,
+            spec,
+            trust,
+            heard: None,
+            was_pressed: false,
+            asked: None,
+            is_hushed: false,
+        }
     }
 
     /// Sends currents and a command, or a preset.

@@ -54,12 +54,7 @@ const WOODY: Config = Config {
 pub const CONFIGS: &[Config] = &[
     WOODY,
     Config { name: "woodenhaptics_v2015", is_aligned: [false; 3], ..WOODY },
-    Config {
-        name: "woodenhaptics_v2019",
-        is_aligned: [false; 3],
-        torque_constant: [0.321, 0.0603, 0.0603],
-        ..WOODY
-    },
+    Config { name: "woodenhaptics_v2019", is_aligned: [false; 3], torque_constant: [0.321, 0.0603, 0.0603], ..WOODY },
     Config {
         name: "polhem_v1",
         body: [0.180, 0.100, 0.100],

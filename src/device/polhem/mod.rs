@@ -92,7 +92,10 @@ fn arms() -> Result<Vec<Plugged>, Trouble> {
 fn open_arm(name: &str) -> Result<Box<dyn Device + Send>, Trouble> {
     let config = config(name)?;
     let plugged = arms()?.into_iter().next().ok_or_else(|| {
-        Trouble::new("no Polhem is plugged in as a HID device", "plug it in and switch its motors on, or try polhem:serial:PORT")
+        Trouble::new(
+            "no Polhem is plugged in as a HID device",
+            "plug it in and switch its motors on, or try polhem:serial:PORT",
+        )
     })?;
     let report_length = arm::report_length(plugged.vendor);
     Ok(Box::new(Relay::start(arm::Arm::new(hid::open(&plugged)?, config, report_length))))

@@ -45,7 +45,9 @@ pub fn open(port: &str) -> Result<Records, Trouble> {
     let opened = SerialPort::open(port, BAUD).and_then(Records::new);
     opened.map_err(|error| {
         let help = match error.kind() {
-            ErrorKind::PermissionDenied => "join the group that owns it (`sudo usermod -aG dialout $USER`) and log in again",
+            ErrorKind::PermissionDenied => {
+                "join the group that owns it (`sudo usermod -aG dialout $USER`) and log in again"
+            }
             ErrorKind::NotFound => "plug the arm in; `typodont devices` lists the serial ports there are",
             _ => "close other programs that use the port",
         };
@@ -78,7 +80,8 @@ impl Records {
     pub fn new(mut port: SerialPort) -> std::io::Result<Records> {
         port.set_read_timeout(LOOK)?;
         port.set_write_timeout(ANSWER)?;
-        let trust = Trust::new(REACH, "what it sends is not what a Polhem sends; is another device on this serial port?");
+        let trust =
+            Trust::new(REACH, "what it sends is not what a Polhem sends; is another device on this serial port?");
         Ok(Records {
             port,
             spec: spec(),
@@ -162,6 +165,7 @@ impl Records {
         let mut newest = None;
         while let Some((record, rest)) = self.heard.split_first_chunk::<RECORD>() {
             if record[RECORD - 1] != END {
+                self.trust.unsound()?;
                 return Ok(None);
             }
             newest = Some(*record);
@@ -253,8 +257,7 @@ impl Numbers {
         let [a, lambda, d, e] = self.angles;
         let fore = Quat::from_rotation_z(a) * Quat::from_rotation_y(-lambda);
         let hand = Quat::from_rotation_x(d) * Quat::from_rotation_y(e);
-        let pose =
-            Pose { position: to_world(self.position), orientation: turn_to_world((fore * hand).normalize()) };
+        let pose = Pose { position: to_world(self.position), orientation: turn_to_world((fore * hand).normalize()) };
         Reading { pose, buttons: 0 }
     }
 }
