@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use typodont::device::open_handle::OpenHandle;
-use typodont::device::{Device, Output, Relay, State, UPRIGHT};
+use typodont::device::{Device, Output, Relay, UPRIGHT};
 use typodont::frame::{Quat, Vec3};
 
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -89,7 +89,7 @@ fn checksum(bytes: &[u8]) -> u32 {
 }
 
 fn sealed(kind: u8, number: u16, body: &[u8]) -> Vec<u8> {
-    let mut report = [b"TH", &[1, kind], &number.to_le_bytes()[..], body].concat();
+    let mut report = [&b"TH"[..], &[1, kind], &number.to_le_bytes(), body].concat();
     report.resize(60, 0);
     report.extend(checksum(&report).to_le_bytes());
     report

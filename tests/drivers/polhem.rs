@@ -10,7 +10,6 @@ use glam::{DMat3, DQuat, DVec3};
 use serial2::SerialPort;
 use std::collections::VecDeque;
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::io::{Read, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
 use std::time::{Duration, Instant};

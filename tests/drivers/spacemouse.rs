@@ -83,8 +83,8 @@ fn firmware(device: DeviceEnd, hand: &SharedHand, is_plugged: &AtomicBool, is_wi
         if zeros <= 3 {
             let bytes = counts.map(i16::to_le_bytes).concat();
             match (is_wireless, second) {
-                (true, _) => device.send(&[&[1], &bytes[..], &[0; 6]].concat()),
-                (false, false) => device.send(&[&[1], &bytes[..]].concat()),
+                (true, _) => device.send(&[&[1][..], &bytes, &[0; 6]].concat()),
+                (false, false) => device.send(&[&[1][..], &bytes].concat()),
                 (false, true) => device.send(&[2, 0, 0, 0, 0, 0, 0]),
             }
             second = !second;
