@@ -257,20 +257,21 @@ fn state(state: u8, cause: u8) -> State {
 
 /// What a handle says that it is, and whether it senses how it is turned.
 fn introduction(report: &[u8; REPORT]) -> Result<(Spec, bool), Trouble> {
-    let in_units_of = |unit: f32, at: usize| f32::from(u16_at(report, at)) * unit;
+    // Divided, so that 20 µm become the number nearest to 0.02 mm.
+    let per = |units: f32, at: usize| f32::from(u16_at(report, at)) / units;
     let abilities = report[26];
     let (has_force, has_torque, has_orientation) = (abilities & 1 != 0, abilities & 2 != 0, abilities & 4 != 0);
     let name = String::from_utf8_lossy(&report[28..60]).trim_end_matches('\0').trim().to_string();
     let spec = Spec {
         name: if name.is_empty() { PRODUCT.into() } else { name },
-        max_force: in_units_of(0.001, 6),
-        continuous_force: in_units_of(0.001, 8),
-        max_torque: if has_torque { in_units_of(0.1, 10) } else { 0.0 },
-        max_stiffness: in_units_of(0.001, 12),
-        max_damping: in_units_of(1e-5, 14),
-        resolution: in_units_of(1e-4, 16),
-        workspace_half: Vec3::new(in_units_of(0.1, 18), in_units_of(0.1, 20), in_units_of(0.1, 22)),
-        apparent_mass: in_units_of(0.001, 24),
+        max_force: per(1000.0, 6),
+        continuous_force: per(1000.0, 8),
+        max_torque: if has_torque { per(10.0, 10) } else { 0.0 },
+        max_stiffness: per(1000.0, 12),
+        max_damping: per(100_000.0, 14),
+        resolution: per(10_000.0, 16),
+        workspace_half: Vec3::new(per(10.0, 18), per(10.0, 20), per(10.0, 22)),
+        apparent_mass: per(1000.0, 24),
     };
     let is_whole = has_force && spec.max_force > 0.0 && spec.max_stiffness > 0.0;
     if !is_whole || spec.resolution <= 0.0 || spec.workspace_half.min_element() <= 0.0 {

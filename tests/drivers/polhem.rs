@@ -187,8 +187,8 @@ fn firmware(device: DeviceEnd, hand: &SharedHand, faults: &Faults) {
                     match word(3) {
                         0 => {
                             let milliamperes = [word(0), word(1), word(2)];
-                            assert!(milliamperes.iter().all(|mA| mA.abs() <= 1999), "{milliamperes:?}");
-                            currents = DVec3::from_array(milliamperes.map(|mA| f64::from(mA) / 1000.0));
+                            assert!(milliamperes.iter().all(|n| n.abs() <= 1999), "{milliamperes:?}");
+                            currents = DVec3::from_array(milliamperes.map(|n| f64::from(n) / 1000.0));
                         }
                         1 => {
                             faults.preset.store(word(6).into(), Ordering::Release);
