@@ -51,9 +51,13 @@ impl fmt::Display for Trouble {
 
 /// Every driver, in the order in which `typodont devices` lists them.
 pub static DRIVERS: &[&dyn Driver] = &[
+    &super::mouse::MouseDriver,
+    &super::spacemouse::SpaceMouseDriver,
     &super::openhaptics::OpenHaptics,
     &super::forcedimension::ForceDimension,
     &super::haply::Haply,
+    &super::polhem::Polhem,
+    &super::open_handle::OpenHandleDriver,
     &super::stream::Stream,
 ];
 

@@ -192,6 +192,9 @@ impl Device for Relay {
     fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
         self.introduce();
         self.shared.told.write(words_of_output(output, self.shared.now_us()));
+        if let Some(thread) = &self.thread {
+            thread.thread().unpark();
+        }
         let report = self.await_report();
         self.read_news();
         if let Some(gone) = self.gone {
@@ -238,7 +241,27 @@ impl Drop for Relay {
     }
 }
 
+/// How long a wire that keeps the beat waits for the servo's answer to its report, so that the force it takes along is not a
+/// beat older than it need be. A tick's work takes a tenth of that; a servo that is late costs the wire no beat.
+const ANSWER_WAIT: Duration = Duration::from_micros(400);
+
 impl Shared {
+    fn told_count(&self) -> u64 {
+        self.told.read().map_or(0, |(count, _)| count)
+    }
+
+    /// Waits until the servo has told another force than the one of this count.
+    fn await_answer(&self, told: u64) {
+        let until = Instant::now() + ANSWER_WAIT;
+        while self.told_count() == told {
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return;
+            }
+            thread::park_timeout(left);
+        }
+    }
+
     /// The newest force, if it is young enough to be sent.
     fn force(&self) -> Output {
         match self.told.read() {
@@ -262,7 +285,9 @@ fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>, mut callers
         if let Some(caller) = &caller {
             caller.unpark();
         }
+        caller.is_some()
     };
+    let beat = wire.beat();
     let turning = AssertUnwindSafe(|| {
         let mut state = State::Ready;
         while !shared.stop.load(Ordering::Acquire) {
@@ -272,8 +297,11 @@ fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>, mut callers
                     if report.state != state && post.try_send(News::State(report.state)).is_ok() {
                         state = report.state;
                     }
+                    let told = shared.told_count();
                     shared.report.write(words_of_reading(&report.reading));
-                    wake();
+                    if wake() && beat == Beat::Device {
+                        shared.await_answer(told);
+                    }
                 }
                 Ok(None) => {}
                 Err(gone) => return Some(gone),

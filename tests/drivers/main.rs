@@ -3,16 +3,21 @@
 //! A fake has a physical hand behind it (mass, damping, encoder steps, one tick of delay) and speaks the real protocol
 //! over the real transport where there is one here: shared libraries, sockets, a pair of pseudo-terminals.
 
-mod haply;
-#[path = "../phantom/mod.rs"]
-mod phantom;
 #[path = "../counting/mod.rs"]
 mod counting;
+mod haply;
 mod live;
+mod mouse;
 mod native;
+mod open_handle;
+#[path = "../phantom/mod.rs"]
+mod phantom;
+mod pipe;
+mod polhem;
 mod rig;
 mod simulated;
 mod soak;
+mod spacemouse;
 mod staged;
 mod stream;
 mod suite;
