@@ -326,7 +326,7 @@ fn an_old_library_without_optional_functions_serves() {
 }
 
 /// A fake device behind a shared library.
-struct Native {
+pub struct Native {
     driver: &'static str,
     abilities: Abilities,
     hand: SharedHand,
@@ -374,11 +374,11 @@ const OMEGA: Abilities = Abilities {
 };
 
 impl Native {
-    fn omni() -> Native {
+    pub fn omni() -> Native {
         Native::new("openhaptics", &built("hd", &[]), feel_hd, OMNI)
     }
 
-    fn omega() -> Native {
+    pub fn omega() -> Native {
         Native::new("forcedimension", &built("drd", &[]), feel_dhd, OMEGA)
     }
 

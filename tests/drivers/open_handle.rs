@@ -13,7 +13,7 @@ use typodont::frame::{Quat, Vec3};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
-struct Rigged {
+pub struct Rigged {
     hand: SharedHand,
     faults: Arc<Faults>,
 }
@@ -32,7 +32,7 @@ impl Faults {
 }
 
 impl Rigged {
-    fn new() -> Rigged {
+    pub fn new() -> Rigged {
         let rigged = Rigged { hand: SharedHand::at_rest(0.0), faults: Arc::default() };
         rigged.faults.state.store(3, Ordering::Release);
         rigged

@@ -118,13 +118,13 @@ fn handle_in_arm(q: Quat) -> DMat3 {
     DMat3::from_cols(axis(world.z_axis), axis(world.x_axis), axis(world.y_axis))
 }
 
-struct HidRig {
+pub struct HidRig {
     hand: SharedHand,
     faults: Arc<Faults>,
 }
 
 impl HidRig {
-    fn new() -> HidRig {
+    pub fn new() -> HidRig {
         HidRig { hand: SharedHand::at_rest(0.0), faults: Arc::default() }
     }
 }
@@ -304,13 +304,13 @@ fn the_wrist_is_read_in_its_own_order() {
     });
 }
 
-struct SerialRig {
+pub struct SerialRig {
     hand: SharedHand,
     faults: Arc<Faults>,
 }
 
 impl SerialRig {
-    fn new() -> SerialRig {
+    pub fn new() -> SerialRig {
         SerialRig { hand: SharedHand::at_rest(0.0), faults: Arc::default() }
     }
 }

@@ -13,14 +13,14 @@ use typodont::frame::Vec3;
 /// How far the hand pushes the cap to its stop, mm.
 const STOP: f32 = 10.0;
 
-struct Rigged {
+pub struct Rigged {
     hand: SharedHand,
     is_wireless: bool,
     is_plugged: Arc<AtomicBool>,
 }
 
 impl Rigged {
-    fn new(is_wireless: bool) -> Rigged {
+    pub fn new(is_wireless: bool) -> Rigged {
         Rigged { hand: SharedHand::at_rest(0.0), is_wireless, is_plugged: Arc::new(AtomicBool::new(true)) }
     }
 }
