@@ -5,6 +5,7 @@
 pub mod json;
 mod syntax;
 pub mod nrrd;
+pub mod obj;
 pub mod scan;
 mod library;
 mod tissues;

@@ -101,7 +101,44 @@ fn four_mm() -> f32 {
 pub struct JawFile {
     /// The tooth that is worked on.
     pub tooth: ToothFile,
+    /// What stands around it, as closed meshes; without it a plain gum and two plain neighbours, and nothing for an empty
+    /// list.
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub around: Option<Vec<ObstacleFile>>,
 }
+
+/// Something that can be touched but is never carved.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObstacleFile {
+    /// Wavefront OBJ file of a closed surface in millimetres, relative to the scenario's folder.
+    #[schemars(length(min = 1, max = 500))]
+    pub mesh: String,
+    /// Tissue that it feels like.
+    pub tissue: String,
+    /// Where the mesh's origin lies in tooth space: buccal, distal, occlusal, from the crown's middle at the neck.
+    #[serde(default = "ObstacleFile::origin")]
+    pub position_mm: [CoordinateFile; 3],
+    /// How far the mesh is turned about tooth space's x, then y, then z.
+    #[serde(default = "ObstacleFile::unturned")]
+    pub orientation_deg: [AngleFile; 3],
+}
+
+impl ObstacleFile {
+    fn origin() -> [CoordinateFile; 3] {
+        [CoordinateFile(0.0); 3]
+    }
+
+    fn unturned() -> [AngleFile; 3] {
+        [AngleFile(0.0); 3]
+    }
+}
+
+/// degrees, -180 to 180.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct AngleFile(#[schemars(range(min = -180.0, max = 180.0))] pub f32);
 
 /// A tooth made of voxels.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -464,7 +501,7 @@ pub struct LabelsRegionFile {
 }
 
 /// mm, -60 to 60.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct CoordinateFile(#[schemars(range(min = -60.0, max = 60.0))] pub f32);
 

@@ -18,7 +18,7 @@ pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
 
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
-use crate::touch::{Carving, Vibration};
+use crate::touch::{Carving, Shape, Vibration};
 use crate::volume::{Label, Volume};
 use file::{SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
@@ -56,6 +56,8 @@ pub struct Scene {
     pub layout: Layout,
     /// One tooth, or two from left to right.
     pub teeth: Vec<Tooth>,
+    /// What stands around a tooth in its jaw, tooth space; `None` for plain shapes of average size.
+    pub around: Option<Vec<Shape>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,8 +12,8 @@ use crate::anatomy;
 use crate::content::json::{self, Places};
 use crate::content::{self, InstrumentEntry, InstrumentTable, Library, TissueTable};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
-use crate::frame::Vec3;
-use crate::touch::{Carving, Vibration};
+use crate::frame::{Pose, Quat, Vec3};
+use crate::touch::{self, Carving, Obstacle, Shape, Vibration};
 use crate::volume::{Label, Volume};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -227,7 +227,49 @@ impl Resolver<'_> {
         let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
         self.unique(decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id"))));
         let teeth: Vec<Option<Tooth>> = teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path)).collect();
-        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()? })
+        let around = match written {
+            file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+        };
+        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, around })
+    }
+
+    /// What stands around a tooth; an obstacle that cannot be read is complained about and left out.
+    fn obstacles(&mut self, written: &[file::ObstacleFile]) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        for (index, obstacle) in written.iter().enumerate() {
+            let path = format!("/scene/jaw/around/{index}");
+            let label = self.label(&obstacle.tissue, &format!("{path}/tissue"));
+            let Some(form) = self.mesh(&obstacle.mesh, &format!("{path}/mesh")) else { continue };
+            let position = Vec3::from(obstacle.position_mm.map(|c| c.0));
+            let [x, y, z] = obstacle.orientation_deg.map(|a| a.0.to_radians());
+            let orientation = Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x);
+            shapes.push(Shape { label, tooth_from_shape: Pose { position, orientation }, form });
+        }
+        shapes
+    }
+
+    /// Reads a mesh, and keeps its bytes for the recording.
+    fn mesh(&mut self, name: &str, path: &str) -> Option<touch::Form> {
+        let unclosed = content::obj::Unusable::Open { edges: 0 };
+        let read = self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
+            let mesh = content::obj::parse(&bytes).map_err(told)?;
+            let obstacle = Obstacle::new(&mesh).ok_or_else(|| told(unclosed))?;
+            Ok((bytes, obstacle))
+        });
+        fn told(unusable: content::obj::Unusable) -> (&'static str, String, Option<String>) {
+            (unusable.code(), unusable.to_string(), Some(unusable.help().into()))
+        }
+        match read {
+            Ok((bytes, obstacle)) => {
+                self.files.insert(name.to_string(), bytes);
+                Some(touch::Form::Mesh(Arc::new(obstacle)))
+            }
+            Err((code, message, help)) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
+        }
     }
 
     fn tooth(&mut self, written: &file::ToothFile, path: &str) -> Option<Tooth> {

@@ -4,6 +4,7 @@
 //! that fell. Never reads a clock, a file or a device; never allocates once made.
 
 mod matter;
+mod obstacle;
 mod instrument;
 mod material;
 mod planes;
@@ -20,5 +21,6 @@ pub use instrument::{Instrument, WorkingEnd};
 pub use law::{Law, Pull, SpringLimit};
 pub use material::{Material, Materials};
 pub use matter::{Form, Matter, Shape};
+pub use obstacle::Obstacle;
 pub use proxy::{Contact, Proxy};
 pub use vibration::Vibration;
