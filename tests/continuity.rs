@@ -13,6 +13,10 @@ const DENTINE: Label = Label(3);
 /// Most that the force may change within one tick, N: half of what is felt as a click.
 const STEP: f32 = 0.08;
 
+/// Most of it that may be ours, N, where the hand's own way stretches the spring by more: 0.1 N a tick at 100 mm/s and
+/// 1 N/mm, whenever friction or an edge holds the tip.
+const OURS: f32 = 0.03;
+
 /// Enamel, dentine and decay side by side, level.
 fn borders(spacing: f32) -> Volume {
     let dims = [(16.0 / spacing) as u32, (6.0 / spacing) as u32, (6.0 / spacing) as u32];
@@ -86,7 +90,7 @@ fn check(name: &str, volume: fn(f32) -> Volume, law: Option<CuttingLaw>) {
                     println!(
                         "{name} {end:?} {spacing} mm, {speed} mm/s, μ {friction}: {worst:.4} N at {place:.2}, most {most:.2} N"
                     );
-                    if worst >= STEP {
+                    if worst >= STEP.max(speed * 1e-3 + OURS) {
                         failed.push(format!("{end:?} {spacing} mm, {speed} mm/s, μ {friction}: {worst} N at {place}"));
                     }
                 }
