@@ -74,27 +74,29 @@ impl Obstacle {
 
     /// Signed distance of a point from the surface, mm; negative inside.
     pub fn distance(&self, point: Vec3) -> f32 {
-        self.nearest(point).distance
+        let (place, triangle, location) = self.nearest_place(point);
+        let out = point - place;
+        if out.dot(self.facing(triangle, location)) < 0.0 { -out.length() } else { out.length() }
     }
 
     /// The nearest place of the surface.
     pub(super) fn nearest(&self, point: Vec3) -> Meeting {
+        let (place, triangle, location) = self.nearest_place(point);
+        self.meeting(point, place, triangle, location)
+    }
+
+    fn nearest_place(&self, point: Vec3) -> (Vec3, u32, TrianglePointLocation) {
         let (projection, (triangle, location)) =
             self.surface.project_local_point_and_get_location(to_library(point), false);
-        self.meeting(point, from_library(projection.point), triangle, location)
+        (from_library(projection.point), triangle, location)
     }
 
     /// Every place of the surface that is nearer than all its surroundings, up to a distance, the nearest
     /// [`MEETINGS_MAX`] of them: where a ball about the point would meet it.
     pub(super) fn meet(&self, point: Vec3, within: f32, mut each: impl FnMut(Meeting)) {
-        let nearest = self.nearest(point);
-        if nearest.distance < -SKIN || nearest.distance >= within {
-            // Inside, the nearest place is the way out, and every other would hold the point in.
-            if nearest.distance < within {
-                each(nearest);
-            }
-            return;
-        }
+        let (way_out, triangle, location) = self.nearest_place(point);
+        let nearest = self.meeting(point, way_out, triangle, location);
+        let is_inside = nearest.distance < -SKIN;
         let mut found = [Meeting { distance: f32::INFINITY, normal: Vec3::ZERO }; MEETINGS_MAX];
         let mut count = 0;
         let at = to_library(point);
@@ -108,8 +110,9 @@ impl Obstacle {
                 continue;
             }
             let meeting = self.meeting(point, place, triangle, location);
-            // Neighbours tell of the same edge or corner; a surface that faces away lies behind matter.
-            if meeting.distance < -SKIN || found[..count].iter().any(|m| is_same(m, &meeting)) {
+            // Neighbours tell of the same edge or corner; a surface that faces away lies behind matter. Inside, the nearest place is the way out, and every other would hold the point in.
+            let is_hidden = if is_inside { place.distance(way_out) > CLOSE } else { meeting.distance < -SKIN };
+            if is_hidden || found[..count].iter().any(|m| is_same(m, &meeting)) {
                 continue;
             }
             match found[..count].iter().enumerate().max_by(|a, b| a.1.distance.total_cmp(&b.1.distance)) {
@@ -124,7 +127,7 @@ impl Obstacle {
                 }
             }
         }
-        if count == 0 {
+        if count == 0 && nearest.distance < within {
             (found[0], count) = (nearest, 1);
         }
         found[..count].iter().for_each(|m| each(*m));
@@ -155,24 +158,31 @@ impl Obstacle {
         let out = point - place;
         let facing = self.facing(triangle, location);
         let length = out.length();
-        let sign = if out.dot(facing) < 0.0 { -1.0 } else { 1.0 };
         let is_on_face = matches!(location, TrianglePointLocation::OnFace(..));
-        let normal = if is_on_face || length < CLOSE { facing } else { out * (sign / length) };
-        Meeting { distance: sign * length, normal }
+        if is_on_face || length < CLOSE || out.dot(facing) < 0.0 {
+            // From inside, an edge is met only where the surface is hollow: there each of its faces holds for itself.
+            let normal = self.normal(triangle);
+            return Meeting { distance: out.dot(normal), normal };
+        }
+        Meeting { distance: length, normal: out / length }
+    }
+
+    fn normal(&self, triangle: u32) -> Vec3 {
+        from_library(self.surface.triangle(triangle).scaled_normal()).try_normalize().unwrap_or(Vec3::Z)
     }
 
     /// The surface's outward normal at a place: on an edge or a corner the mean of its faces' (Bærentzen & Aanæs 2005).
     fn facing(&self, triangle: u32, location: TrianglePointLocation) -> Vec3 {
         let index = triangle as usize;
         let means = self.surface.pseudo_normals();
-        let normal = match (location, means) {
+        let mean = match (location, means) {
             (TrianglePointLocation::OnEdge(edge, _), Some(means)) => means.edges_pseudo_normal[index][edge as usize],
             (TrianglePointLocation::OnVertex(corner), Some(means)) => {
                 means.vertices_pseudo_normal[self.surface.indices()[index][corner as usize] as usize]
             }
-            _ => self.surface.triangle(triangle).scaled_normal(),
+            _ => return self.normal(triangle),
         };
-        from_library(normal).try_normalize().unwrap_or(Vec3::Z)
+        from_library(mean).try_normalize().unwrap_or(Vec3::Z)
     }
 }
 
