@@ -194,7 +194,7 @@ mod tests {
     #[test]
     fn only_closed_surfaces_facing_outward_are_read() {
         check(TETRAHEDRON, Ok(64.0 / 6.0));
-        check(&TETRAHEDRON.replace('4', "-3"), Err("wrong-mesh"));
+        check(&TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"), Err("wrong-mesh"));
         check(&TETRAHEDRON.replace("f 2 3 4", ""), Err("open-mesh"));
         check(&TETRAHEDRON.replace("f 2 3 4", "f 3 2 4"), Err("inconsistent-mesh"));
         check(&format!("{TETRAHEDRON}f 2 3 4\n"), Err("inconsistent-mesh"));
