@@ -371,6 +371,43 @@ fn parts_that_do_not_fit_together() {
 }
 
 #[test]
+fn laws_patients_and_hardness() {
+    let rate = |rpm: Value, grit: Value| json!({ "law": { "rate": { "rpm": rpm, "grit": grit } } });
+    check("the rate law", "/carving", rate(json!(200_000), json!(1.0)), &[]);
+    check("the thresholds by name", "/carving", json!({ "law": "threshold" }), &[]);
+    check(
+        "a bur that runs backward",
+        "/carving",
+        rate(json!(-1), json!(1)),
+        &[("out-of-range", "/carving/law/rate/rpm")],
+    );
+    check("grit of a rock", "/carving", rate(json!(1), json!(90)), &[("out-of-range", "/carving/law/rate/grit")]);
+    check("no speed", "/carving", json!({ "law": { "rate": {} } }), &[("missing-key", "/carving/law/rate")]);
+    check("an unknown law", "/carving", json!({ "law": "ohm" }), &[("unknown-word", "/carving/law")]);
+    check("a patient", "/patient", json!({ "age_years": 45 }), &[]);
+    check("an unborn patient", "/patient", json!({ "age_years": 0 }), &[("out-of-range", "/patient/age_years")]);
+    check(
+        "a nameless patient",
+        "/patient",
+        json!({ "name": "x" }),
+        &[("missing-key", "/patient"), ("unknown-key", "/patient/name")],
+    );
+    check(
+        "soft as nothing",
+        "/tissues",
+        json!({ "caries": { "hardness_hv": 0 } }),
+        &[("out-of-range", "/tissues/caries/hardness_hv")],
+    );
+    let mut root: Value = serde_json::from_str(&shipped("5-grinding.json")).unwrap();
+    root["carving"] = rate(json!(200_000), json!(1));
+    root["new_tissues"] = json!([{ "id": 20, "name": "cement", "title": "Cement", "role": "material", "color": "#ffffff",
+        "stiffness": 0.5, "damping": 0.5, "static_friction": 0.3, "dynamic_friction": 0.3, "cut_force_n": 1.0 }]);
+    check_text("a tissue without hardness", &root.to_string(), &[("no-hardness", "/carving/law/rate")]);
+    root["new_tissues"][0]["hardness_hv"] = json!(40);
+    check_text("the same with it", &root.to_string(), &[]);
+}
+
+#[test]
 fn all_mistakes_are_told_at_once_in_order_of_place() {
     let mut root: Value = serde_json::from_str(&shipped("5-grinding.json")).unwrap();
     root["instruments"][0] = json!("bur");
@@ -396,7 +433,8 @@ fn a_complaint_reads_like_this() {
             "exercise.json:{line}:19: unknown-instrument: /instruments/0: no instrument is named \"round_bur_14\"\n   |\n\
              {line} |   \"instruments\": [\"round_bur_14\", \"round_bur_010\", \"explorer\"],\n   |                   ^^^^^^^^^^^^^^\n  \
              = help: did you mean \"round_bur_014\"? known: explorer, round_bur_006, round_bur_010, round_bur_014, \
-             round_bur_018, round_bur_023\n"
+             round_bur_018, round_bur_023, explorer_steel, steel_round_014, carbide_round_010, carbide_round_014, \
+             diamond_round_010, diamond_round_014, diamond_round_014_fine, diamond_round_014_coarse\n"
         )
     );
 }

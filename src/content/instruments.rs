@@ -21,12 +21,29 @@ pub struct InstrumentEntry {
     pub end: EndEntry,
     /// True for a rotating bur.
     pub cuts: bool,
+    /// Of what kind it is: how tissues feel through it (`content/touch.json`); without it as the table of tissues says.
+    #[serde(default)]
+    pub kind: Option<ToolKind>,
+    /// How many times more it takes than a medium diamond by the rate law of carving, 0.05 to 10; without it 1.
+    #[serde(default)]
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub grit: Option<f32>,
     /// ISO 6360 number: material, shank, shape, grit, greatest diameter in tenths of a millimetre.
     #[serde(default)]
     pub iso_6360: Option<String>,
     /// US number of the same bur.
     #[serde(default)]
     pub us_number: Option<String>,
+}
+
+/// Kinds of tool that feel and cut differently.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ToolKind {
+    SteelExplorer,
+    SteelBur,
+    CarbideBur,
+    DiamondBur,
 }
 
 /// The shape of a working end.
@@ -84,6 +101,11 @@ impl InstrumentTable {
             if entries[..index].iter().any(|e| e.id == entry.id) {
                 let message = format!("there is already an instrument \"{}\"", entry.id);
                 found.push(read.places.complain(&format!("/instruments/{index}/id"), "duplicate-id", message, None));
+            }
+            if entry.kind.is_some_and(|kind| (kind == ToolKind::SteelExplorer) == entry.cuts) {
+                let message = format!("\"{}\" does not cut as its kind does", entry.id);
+                let help = Some("an explorer never cuts, a bur always does".to_string());
+                found.push(read.places.complain(&format!("/instruments/{index}/kind"), "wrong-kind", message, help));
             }
             if matches!(entry.end, EndEntry::Point) && entry.cuts {
                 let message = format!("\"{}\" cuts with a point", entry.id);

@@ -22,6 +22,7 @@ pub struct Library {
 const SHIPPED: &[(&str, &str)] = &[
     ("content/tissues.json", include_str!("../../content/tissues.json")),
     ("content/instruments.json", include_str!("../../content/instruments.json")),
+    ("content/touch.json", include_str!("../../content/touch.json")),
     ("content/operators/careful.json", include_str!("../../content/operators/careful.json")),
     ("content/operators/expert.json", include_str!("../../content/operators/expert.json")),
     ("content/operators/hasty.json", include_str!("../../content/operators/hasty.json")),

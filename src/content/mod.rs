@@ -5,11 +5,14 @@
 pub mod json;
 mod syntax;
 pub mod nrrd;
+pub mod obj;
 pub mod scan;
 mod library;
 mod tissues;
 mod instruments;
+mod feel;
 
-pub use instruments::{InstrumentEntry, InstrumentTable};
+pub use feel::{AgeBand, FeelTable};
+pub use instruments::{InstrumentEntry, InstrumentTable, ToolKind};
 pub use library::{Library, read_file, read_text};
 pub use tissues::{Role, TissueEntry, TissueTable, parse_color};

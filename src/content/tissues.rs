@@ -59,6 +59,12 @@ pub struct TissueEntry {
     /// Spring force from which a bur takes the tissue away, N; null: it cannot be cut.
     #[schemars(range(min = 0.01, max = 50.0))]
     pub cut_force_n: Option<f32>,
+    /// Vickers hardness, HV, for the rate law of carving; null: it is not worn away. Enamel 270 to 360, dentine 50 to 70
+    /// (Gutiérrez-Salazar and Reyes-Gasga 2003), soft carious dentine 5 to 30 (Fusayama 1979), amalgam 100 to 120,
+    /// composite 50 to 90.
+    #[serde(default)]
+    #[schemars(range(min = 0.1, max = 2000.0))]
+    pub hardness_hv: Option<f32>,
 }
 
 impl TissueEntry {
@@ -78,6 +84,7 @@ impl TissueEntry {
             static_friction: self.static_friction,
             dynamic_friction: self.dynamic_friction,
             cut_force: self.cut_force_n,
+            hardness: self.hardness_hv,
         }
     }
 }

@@ -37,6 +37,9 @@ pub struct ScenarioFile {
     /// Sets one tissue's stiffness as a fraction of another's.
     #[serde(default)]
     pub stiffness_ratio: Option<StiffnessRatio>,
+    /// Whose mouth it is; without it tissues feel as their table says.
+    #[serde(default)]
+    pub patient: Option<PatientFile>,
     /// How a bur takes matter away.
     #[serde(default)]
     pub carving: CarvingFile,
@@ -101,7 +104,44 @@ fn four_mm() -> f32 {
 pub struct JawFile {
     /// The tooth that is worked on.
     pub tooth: ToothFile,
+    /// What stands around it, as closed meshes; without it a plain gum and two plain neighbours, and nothing for an empty
+    /// list.
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub around: Option<Vec<ObstacleFile>>,
 }
+
+/// Something that can be touched but is never carved.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ObstacleFile {
+    /// Wavefront OBJ file of a closed surface in millimetres, relative to the scenario's folder.
+    #[schemars(length(min = 1, max = 500))]
+    pub mesh: String,
+    /// Tissue that it feels like.
+    pub tissue: String,
+    /// Where the mesh's origin lies in tooth space: buccal, distal, occlusal, from the crown's middle at the neck.
+    #[serde(default = "ObstacleFile::origin")]
+    pub position_mm: [CoordinateFile; 3],
+    /// How far the mesh is turned about tooth space's x, then y, then z.
+    #[serde(default = "ObstacleFile::unturned")]
+    pub orientation_deg: [AngleFile; 3],
+}
+
+impl ObstacleFile {
+    fn origin() -> [CoordinateFile; 3] {
+        [CoordinateFile(0.0); 3]
+    }
+
+    fn unturned() -> [AngleFile; 3] {
+        [AngleFile(0.0); 3]
+    }
+}
+
+/// degrees, -180 to 180.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(transparent)]
+pub struct AngleFile(#[schemars(range(min = -180.0, max = 180.0))] pub f32);
 
 /// A tooth made of voxels.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -289,6 +329,10 @@ pub struct TissueChange {
     #[serde(default)]
     #[schemars(range(min = 0.01, max = 50.0))]
     pub cut_force_n: Option<f32>,
+    /// Vickers hardness for the rate law of carving, HV: 0.1 to 2000.
+    #[serde(default)]
+    #[schemars(range(min = 0.1, max = 2000.0))]
+    pub hardness_hv: Option<f32>,
 }
 
 /// One tissue's stiffness as a fraction of another's.
@@ -302,6 +346,16 @@ pub struct StiffnessRatio {
     /// How many times stiffer the first is: 1 to 100. Measured between enamel and dentine: about 5.
     #[schemars(range(min = 1.0, max = 100.0))]
     pub ratio: f32,
+}
+
+/// Whose mouth it is.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PatientFile {
+    /// Age in years, 3 to 110: a child below 18, a young adult below 36, an adult below 61, then old. What age makes of a
+    /// tissue is in `content/touch.json`.
+    #[schemars(range(min = 3.0, max = 110.0))]
+    pub age_years: f32,
 }
 
 /// How a bur takes matter away.
@@ -320,6 +374,39 @@ pub struct CarvingFile {
     #[serde(default = "CarvingFile::max_feed")]
     #[schemars(range(min = 0.1, max = 100.0))]
     pub max_feed_mm_s: f32,
+    /// What decides how far a bur advances.
+    #[serde(default)]
+    pub law: CuttingLawFile,
+}
+
+/// What decides how far a bur advances.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CuttingLawFile {
+    /// The tissues' cutting forces: beyond them a bur advances as far as the hand has pushed; dwell lowers them.
+    #[default]
+    Threshold,
+    /// The bur's work: volume per second grows with force and surface speed and falls with the tissue's hardness; there is
+    /// no least force and no dwell.
+    Rate(RateFile),
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RateFile {
+    /// Turns of the bur, 1/min: 0 (it stands still) to 500 000. Air turbines under load: 150 000 to 300 000.
+    #[schemars(range(min = 0.0, max = 500_000.0))]
+    pub rpm: f32,
+    /// How many times more than a medium diamond all burs take, 0.05 to 10, besides their own "grit".
+    #[serde(default = "RateFile::grit")]
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub grit: f32,
+}
+
+impl RateFile {
+    fn grit() -> f32 {
+        1.0
+    }
 }
 
 impl CarvingFile {
@@ -338,7 +425,12 @@ impl CarvingFile {
 
 impl Default for CarvingFile {
     fn default() -> Self {
-        CarvingFile { dwell_s: Self::dwell(), dwell_share: Self::dwell_share(), max_feed_mm_s: Self::max_feed() }
+        CarvingFile {
+            dwell_s: Self::dwell(),
+            dwell_share: Self::dwell_share(),
+            max_feed_mm_s: Self::max_feed(),
+            law: CuttingLawFile::default(),
+        }
     }
 }
 
@@ -464,7 +556,7 @@ pub struct LabelsRegionFile {
 }
 
 /// mm, -60 to 60.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(transparent)]
 pub struct CoordinateFile(#[schemars(range(min = -60.0, max = 60.0))] pub f32);
 

@@ -18,7 +18,7 @@ pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
 
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
-use crate::touch::{Carving, Vibration};
+use crate::touch::{Carving, Factors, Shape, Vibration};
 use crate::volume::{Label, Volume};
 use file::{SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
@@ -43,6 +43,8 @@ pub struct Scenario {
     pub vibration: Vibration,
     /// The tray; stages and results refer to it by index.
     pub instruments: Vec<InstrumentEntry>,
+    /// What each of them and the patient's age make of the tissues.
+    pub factors: Vec<Factors>,
     pub zones: Vec<Zone>,
     pub stages: Vec<Stage>,
     pub measures: Measures,
@@ -56,6 +58,8 @@ pub struct Scene {
     pub layout: Layout,
     /// One tooth, or two from left to right.
     pub teeth: Vec<Tooth>,
+    /// What stands around a tooth in its jaw, tooth space; `None` for plain shapes of average size.
+    pub around: Option<Vec<Shape>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,10 +10,10 @@ use super::{
 };
 use crate::anatomy;
 use crate::content::json::{self, Places};
-use crate::content::{self, InstrumentEntry, InstrumentTable, Library, TissueTable};
+use crate::content::{self, AgeBand, FeelTable, InstrumentEntry, InstrumentTable, Library, TissueEntry, TissueTable};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
-use crate::frame::Vec3;
-use crate::touch::{Carving, Vibration};
+use crate::frame::{Pose, Quat, Vec3};
+use crate::touch::{self, Carving, CuttingLaw, Factor, Factors, Obstacle, Rate, Shape, Vibration};
 use crate::volume::{Label, Volume};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -40,9 +40,14 @@ pub fn resolve(source: Arc<Source>, library: &Library, forms: Forms) -> Result<S
     let tissues = TissueTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
     let instruments = InstrumentTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
     let (Ok(tissues), Ok(instruments)) = (tissues, instruments) else { return Err(found) };
-    let files = [TissueTable::NAME, InstrumentTable::NAME];
+    let feel = FeelTable::read(library);
+    let files = [TissueTable::NAME, InstrumentTable::NAME, FeelTable::NAME];
     let files = files.iter().filter_map(|name| Some((name.to_string(), library.bytes(name).ok()?))).collect();
-    let mut resolver = Resolver { library, places: &read.places, forms, tissues, instruments, files, found };
+    let feel = feel.unwrap_or_else(|mut complaints| {
+        found.append(&mut complaints);
+        None
+    });
+    let mut resolver = Resolver { library, feel, places: &read.places, forms, tissues, instruments, files, found };
     let scenario = resolver.scenario(&read.value, &source.text);
     let mut found = resolver.found;
     if found.is_empty()
@@ -118,6 +123,8 @@ struct Resolver<'a> {
     forms: Forms,
     tissues: TissueTable,
     instruments: InstrumentTable,
+    /// `None` in recordings made before there was such a table.
+    feel: Option<FeelTable>,
     /// Files that the scenario was made from, scans apart.
     files: BTreeMap<String, Arc<[u8]>>,
     found: Vec<Diagnostic>,
@@ -141,7 +148,8 @@ impl Resolver<'_> {
         let has_decay = written_teeth(&written.scene).iter().any(|t| !t.decay.is_empty());
         let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, has_decay));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
-        let file::CarvingFile { dwell_s, dwell_share, max_feed_mm_s } = written.carving;
+        let factors = self.factors(written, &instruments);
+        let carving = self.carving(&written.carving);
         Some(Scenario {
             id: written.id.clone(),
             title: written.title.clone(),
@@ -151,13 +159,14 @@ impl Resolver<'_> {
             files: std::mem::take(&mut self.files),
             scene: scene?,
             tissues: self.tissues.clone(),
-            carving: Carving { dwell: dwell_s, dwell_share, max_feed: max_feed_mm_s },
+            carving,
             vibration: Vibration {
                 frequency: written.vibration.frequency_hz,
                 amplitude: written.vibration.amplitude_n,
                 axis: crate::frame::Vec3::Y,
             },
             instruments,
+            factors,
             zones,
             stages,
             measures: Measures {
@@ -204,6 +213,7 @@ impl Resolver<'_> {
                 entry.static_friction = change.static_friction.unwrap_or(entry.static_friction);
                 entry.dynamic_friction = change.dynamic_friction.unwrap_or(entry.dynamic_friction);
                 entry.cut_force_n = change.cut_force_n.or(entry.cut_force_n);
+                entry.hardness_hv = change.hardness_hv.or(entry.hardness_hv);
             }
         }
         if let Some(ratio) = &written.stiffness_ratio {
@@ -227,7 +237,49 @@ impl Resolver<'_> {
         let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
         self.unique(decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id"))));
         let teeth: Vec<Option<Tooth>> = teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path)).collect();
-        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()? })
+        let around = match written {
+            file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+        };
+        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, around })
+    }
+
+    /// What stands around a tooth; an obstacle that cannot be read is complained about and left out.
+    fn obstacles(&mut self, written: &[file::ObstacleFile]) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        for (index, obstacle) in written.iter().enumerate() {
+            let path = format!("/scene/jaw/around/{index}");
+            let label = self.label(&obstacle.tissue, &format!("{path}/tissue"));
+            let Some(form) = self.mesh(&obstacle.mesh, &format!("{path}/mesh")) else { continue };
+            let position = Vec3::from(obstacle.position_mm.map(|c| c.0));
+            let [x, y, z] = obstacle.orientation_deg.map(|a| a.0.to_radians());
+            let orientation = Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x);
+            shapes.push(Shape { label, tooth_from_shape: Pose { position, orientation }, form });
+        }
+        shapes
+    }
+
+    /// Reads a mesh, and keeps its bytes for the recording.
+    fn mesh(&mut self, name: &str, path: &str) -> Option<touch::Form> {
+        let unclosed = content::obj::Unusable::Open { edges: 0 };
+        let read = self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
+            let mesh = content::obj::parse(&bytes).map_err(told)?;
+            let obstacle = Obstacle::new(&mesh).ok_or_else(|| told(unclosed))?;
+            Ok((bytes, obstacle))
+        });
+        fn told(unusable: content::obj::Unusable) -> (&'static str, String, Option<String>) {
+            (unusable.code(), unusable.to_string(), Some(unusable.help().into()))
+        }
+        match read {
+            Ok((bytes, obstacle)) => {
+                self.files.insert(name.to_string(), bytes);
+                Some(touch::Form::Mesh(Arc::new(obstacle)))
+            }
+            Err((code, message, help)) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
+        }
     }
 
     fn tooth(&mut self, written: &file::ToothFile, path: &str) -> Option<Tooth> {
@@ -385,6 +437,47 @@ impl Resolver<'_> {
             }
         }
         tray
+    }
+
+    /// What each instrument of the tray and the patient's age make of the tissues.
+    fn factors(&mut self, written: &ScenarioFile, tray: &[InstrumentEntry]) -> Vec<Factors> {
+        let band = written.patient.as_ref().map(|p| AgeBand::of(p.age_years));
+        let Some(feel) = &self.feel else {
+            if band.is_some() || tray.iter().any(|i| i.kind.is_some()) {
+                let message = "there is no table of what age and tools make of tissues";
+                self.complain("/patient", "missing-file", message, format!("looked for {}", FeelTable::NAME));
+            }
+            return Vec::new();
+        };
+        tray.iter()
+            .map(|instrument| {
+                let grit = Factor { hardness: 1.0 / instrument.grit.unwrap_or(1.0), ..Factor::ONE };
+                let all = self
+                    .tissues
+                    .entries()
+                    .iter()
+                    .map(|tissue| (tissue.label(), feel.factor(&tissue.name, instrument.kind, band).times(grit)));
+                all.filter(|(_, factor)| *factor != Factor::ONE)
+                    .fold(Factors::default(), |known, (label, factor)| known.with(label, factor))
+            })
+            .collect()
+    }
+
+    fn carving(&mut self, written: &file::CarvingFile) -> Carving {
+        let &file::CarvingFile { dwell_s: dwell, dwell_share, max_feed_mm_s: max_feed, law } = written;
+        let law = match law {
+            file::CuttingLawFile::Threshold => CuttingLaw::Threshold,
+            file::CuttingLawFile::Rate(file::RateFile { rpm, grit }) => {
+                let has_none = |e: &&TissueEntry| e.cut_force_n.is_some() && e.hardness_hv.is_none();
+                let soft: Vec<&str> = self.tissues.entries().iter().filter(has_none).map(|e| e.name.as_str()).collect();
+                if !soft.is_empty() {
+                    let message = format!("the rate law needs the hardness of {}", soft.join(", "));
+                    self.complain("/carving/law/rate", "no-hardness", message, "give each of them \"hardness_hv\"");
+                }
+                CuttingLaw::Rate(Rate { rpm, grit })
+            }
+        };
+        Carving { dwell, dwell_share, max_feed, law }
     }
 
     fn zones(&mut self, written: &[file::ZoneFile]) -> Vec<Zone> {

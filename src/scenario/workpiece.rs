@@ -127,9 +127,10 @@ impl Workpiece {
             lesions.extend(tooth.decay.iter().map(|decay| locate(decay, index, &place, &volume, side, seed)));
             teeth.push(place);
         }
-        let around = match scenario.scene.layout {
-            Layout::Jaw => surroundings(&teeth[0], &scenario.tissues),
-            Layout::Single | Layout::Pair { .. } => Vec::new(),
+        let around = match (scenario.scene.layout, &scenario.scene.around) {
+            (Layout::Jaw, Some(meshes)) => meshes.clone(),
+            (Layout::Jaw, None) => surroundings(&teeth[0], &scenario.tissues),
+            (Layout::Single | Layout::Pair { .. }, _) => Vec::new(),
         };
         let low = teeth.iter().map(|t| t.crown_low).reduce(Vec3::min).unwrap_or_default();
         let high = teeth.iter().map(|t| t.crown_high).reduce(Vec3::max).unwrap_or_default();

@@ -27,6 +27,7 @@ pub fn setup(scenario: &Scenario, workpiece: &Workpiece, device: Spec) -> Setup 
     Setup {
         matter: Matter { volume: Volume::clone(&workpiece.volume), around: workpiece.around.clone() },
         materials: scenario.tissues.materials(),
+        factors: scenario.factors.clone(),
         instruments: scenario.instruments.iter().map(|i| i.make()).collect(),
         carving: scenario.carving,
         vibration: scenario.vibration,

@@ -17,7 +17,7 @@ use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
-    Carver, Carving, Contact, ForceLimit, Gate, Instrument, Law, Materials, Matter, Press, Proxy, SpringLimit,
+    Carver, Carving, Contact, Factors, ForceLimit, Gate, Instrument, Law, Materials, Matter, Press, Proxy, SpringLimit,
     Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
@@ -27,6 +27,8 @@ use crate::volume::{Edit, Label, Volume};
 pub struct Setup {
     pub matter: Matter,
     pub materials: Materials,
+    /// What each instrument makes of them, in the instruments' order; nothing for those beyond the list.
+    pub factors: Vec<Factors>,
     /// In the order in which [`Command::Take`] counts them; the first is in the hand at start.
     pub instruments: Vec<Instrument>,
     pub carving: Carving,
@@ -97,7 +99,9 @@ pub struct Touch {
 #[derive(Clone, Debug)]
 pub struct Simulation {
     matter: Matter,
-    materials: Materials,
+    /// How the tissues answer each instrument.
+    materials: Vec<Materials>,
+    factors: Vec<Factors>,
     instruments: Vec<Instrument>,
     vibration: Vibration,
     world_from_tooth: Pose,
@@ -126,8 +130,10 @@ impl Simulation {
     /// # Panics
     /// Without any instrument: a scenario that resolved has one.
     pub fn new(setup: Setup) -> Simulation {
-        let Setup { matter, materials, instruments, carving, vibration, world_from_tooth, device, ramp } = setup;
+        let Setup { matter, materials, mut factors, instruments, carving, vibration, world_from_tooth, device, ramp } =
+            setup;
         assert!(!instruments.is_empty(), "a hand holds something");
+        factors.resize(instruments.len(), Factors::default());
         let spring = SpringLimit {
             max_stiffness: device.max_stiffness,
             max_damping: device.max_damping,
@@ -137,7 +143,8 @@ impl Simulation {
         let proxy = Proxy::new(&matter, &instruments, tooth_from_world * Vec3::ZERO);
         Simulation {
             matter,
-            materials,
+            materials: factors.iter().map(|f| materials.clone().times(f)).collect(),
+            factors,
             instruments,
             vibration,
             world_from_tooth,
@@ -175,14 +182,15 @@ impl Simulation {
             self.is_out = Proxy::is_free_at(&self.matter, instrument, hand);
             return self.let_go(tick);
         }
-        self.proxy.follow(&self.matter, instrument, &self.materials, hand);
+        let materials = &self.materials[self.instrument];
+        self.proxy.follow(&self.matter, instrument, materials, hand);
         let tip = self.proxy.tip();
         let contact = self.proxy.contact().copied();
         let pull = self.law.pull(hand, tip, contact.as_ref());
         let cutting = match contact {
             Some(_) if instrument.cuts && self.bur_runs => {
                 let press = Press { tip, hand, pull };
-                self.carver.cut(&mut self.matter.volume, instrument, &self.materials, &press)
+                self.carver.cut(&mut self.matter.volume, instrument, materials, &press)
             }
             _ => {
                 self.carver.rest();
@@ -258,9 +266,11 @@ impl Simulation {
             }
             Command::Take { .. } => {}
             Command::SetStiffness { label, stiffness } => {
-                let mut material = *self.materials.get(label);
-                material.stiffness = stiffness.clamp(0.0, 1.0);
-                self.materials.set(label, material);
+                for (materials, factors) in self.materials.iter_mut().zip(&self.factors) {
+                    let mut material = *materials.get(label);
+                    material.stiffness = (stiffness * factors.get(label).stiffness).clamp(0.0, 1.0);
+                    materials.set(label, material);
+                }
             }
             Command::RunBur { running } => self.bur_runs = running,
         }
@@ -289,8 +299,9 @@ impl Simulation {
         &self.matter
     }
 
+    /// How the tissues answer the instrument in the hand.
     pub fn materials(&self) -> &Materials {
-        &self.materials
+        &self.materials[self.instrument]
     }
 
     pub fn world_from_tooth(&self) -> &Pose {

@@ -2,7 +2,7 @@
 //!
 //! Takes the bur's tip, the hand's pull and the tissues' thresholds. Gives the changed voxels, in order.
 //!
-//! The law is the thesis's (5.3), made smooth: where the spring force exceeds a tissue's threshold, the bur advances
+//! Two laws say how much. The rate law is in [`super::rate`]. The other is the thesis's (5.3), made smooth: where the spring force exceeds a tissue's threshold, the bur advances
 //! into that tissue until the force is back at the threshold; after resting on one spot for a while a third of the
 //! threshold suffices, because the bur rotates. The thesis set whole voxels to zero; here the bur's surface is cut into
 //! the density itself, so what falls does not depend on the voxels' size. Neither does how much: the advance per tick
@@ -11,6 +11,7 @@
 use super::instrument::Instrument;
 use super::law::Pull;
 use super::material::Materials;
+use super::rate::{Account, Rate};
 use crate::frame::Vec3;
 use crate::tick::TICK_S;
 use crate::volume::{Density, Edit, Volume, Voxel, ramp};
@@ -24,6 +25,17 @@ pub struct Carving {
     pub dwell_share: f32,
     /// Fastest advance into matter, mm/s: what a bur can clear away.
     pub max_feed: f32,
+    pub law: CuttingLaw,
+}
+
+/// What decides how far a bur advances.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum CuttingLaw {
+    /// The thesis's thresholds of force, with dwell.
+    #[default]
+    Threshold,
+    /// The bur's work, by the tissue's hardness.
+    Rate(Rate),
 }
 
 /// A hand that has moved less than this rests, mm: it neither wanders nor tries to push in.
@@ -53,6 +65,8 @@ pub struct Carver {
     biting: Option<(Bite, u32)>,
     /// Where the last bite should have let the tip go.
     owed: Option<Vec3>,
+    /// What the rate law has to spend.
+    account: Account,
     edits: Vec<Edit>,
     /// How far the bur advances into each tissue in this bite, mm.
     advance: [f32; 256],
@@ -66,6 +80,7 @@ impl Carver {
             rested_ticks: 0,
             biting: None,
             owed: None,
+            account: Account::default(),
             edits: Vec::with_capacity(EDITS_MAX),
             advance: [0.0; 256],
         }
@@ -82,15 +97,23 @@ impl Carver {
         self.rested_ticks = 0;
         self.biting = None;
         self.owed = None;
+        self.account.close();
     }
 
     /// Cuts with a tip in contact. True while matter is being cut.
     pub fn cut(&mut self, volume: &mut Volume, instrument: &Instrument, materials: &Materials, press: &Press) -> bool {
         self.edits.clear();
         let share = self.threshold_share(press.hand);
+        let is_wearing = match self.carving.law {
+            CuttingLaw::Threshold => false,
+            CuttingLaw::Rate(rate) => self.account.save(&rate, instrument.radius(), press.pull.spring),
+        };
         let planned = self.biting.or_else(|| Some((self.plan(volume, instrument, materials, press, share)?, 0)));
-        let Some((bite, done)) = planned else { return false };
+        let Some((bite, done)) = planned else { return is_wearing };
         self.carve(volume, &bite, done);
+        if let CuttingLaw::Rate(_) = self.carving.law {
+            self.account.pay(&self.edits, materials, volume.grid().voxel_mm3() as f32);
+        }
         self.biting = (done + 1 < SHARES).then_some((bite, done + 1));
         true
     }
@@ -105,14 +128,23 @@ impl Carver {
         share: f32,
     ) -> Option<Bite> {
         let Press { tip, hand, pull } = *press;
-        let deepest = self.plan_advance(materials, &pull, share);
+        let (deepest, run_out) = match self.carving.law {
+            CuttingLaw::Threshold => (self.plan_advance(materials, &pull, share), RUN_OUT),
+            CuttingLaw::Rate(_) => {
+                let most = self.most();
+                let deepest = self.account.plan(&mut self.advance, materials, most);
+                // What run-out clears is paid for as well: a slow bite clears less of it.
+                (deepest, RUN_OUT.min(deepest))
+            }
+        };
         if deepest <= 0.0 {
             self.owed = None;
             return None;
         }
         let way = (hand - tip).normalize_or_zero() * deepest + self.arrears(tip, volume.band());
-        self.owed = Some(tip + way);
-        Some(Bite { tip, way, deepest, radius: instrument.radius() + RUN_OUT })
+        // The rate law's account already remembers what a bite was too short for.
+        self.owed = matches!(self.carving.law, CuttingLaw::Threshold).then_some(tip + way);
+        Some(Bite { tip, way, deepest, radius: instrument.radius() + run_out })
     }
 
     /// What the last bite owes to the tip: the part of its way that was too short to change a stored density.
@@ -134,9 +166,14 @@ impl Carver {
         if rested > self.carving.dwell { self.carving.dwell_share } else { 1.0 }
     }
 
+    /// Farthest that a bite may advance, mm.
+    fn most(&self) -> f32 {
+        self.carving.max_feed * TICK_S as f32 * SHARES as f32
+    }
+
     /// Fills `advance` for every tissue; returns the greatest.
     fn plan_advance(&mut self, materials: &Materials, pull: &Pull, share: f32) -> f32 {
-        let most = self.carving.max_feed * TICK_S as f32 * SHARES as f32;
+        let most = self.most();
         let stiffness = pull.stiffness.max(1e-6);
         let mut deepest = 0.0;
         for (label, material) in materials.known() {

@@ -129,6 +129,7 @@ impl Law {
             static_friction: toward(now.static_friction, touched.static_friction),
             dynamic_friction: toward(now.dynamic_friction, touched.dynamic_friction),
             cut_force: None,
+            hardness: None,
         };
         self.in_effect = Some(next);
         next

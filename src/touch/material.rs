@@ -2,7 +2,7 @@
 
 use crate::volume::Label;
 
-/// A tissue's answer, as the four coefficients of the thesis (Table 2.4) and its carving threshold (5.3).
+/// A tissue's answer: the four coefficients of the thesis (Table 2.4), its carving threshold (5.3), its hardness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Spring stiffness as a share (0–1) of the stiffest the device can render.
@@ -15,12 +15,32 @@ pub struct Material {
     pub dynamic_friction: f32,
     /// Spring force from which a rotating bur takes this tissue away, N; `None`: it cannot be cut.
     pub cut_force: Option<f32>,
+    /// Vickers hardness, HV: what the rate law divides by; `None`: no work wears it away.
+    pub hardness: Option<f32>,
 }
 
 impl Material {
     /// Feels like nothing.
-    pub const NOTHING: Material =
-        Material { stiffness: 0.0, damping: 0.0, static_friction: 0.0, dynamic_friction: 0.0, cut_force: None };
+    pub const NOTHING: Material = Material {
+        stiffness: 0.0,
+        damping: 0.0,
+        static_friction: 0.0,
+        dynamic_friction: 0.0,
+        cut_force: None,
+        hardness: None,
+    };
+
+    /// The same tissue as another tool or another patient makes it feel; within what coefficients may be.
+    fn times(self, factor: &Factor) -> Material {
+        Material {
+            stiffness: (self.stiffness * factor.stiffness).clamp(0.0, 1.0),
+            damping: (self.damping * factor.damping).clamp(0.0, 1.0),
+            static_friction: (self.static_friction * factor.static_friction).clamp(0.0, FRICTION_MAX),
+            dynamic_friction: (self.dynamic_friction * factor.dynamic_friction).clamp(0.0, FRICTION_MAX),
+            cut_force: self.cut_force,
+            hardness: self.hardness.map(|hv| hv * factor.hardness),
+        }
+    }
 
     fn weighted(self, weight: f32) -> Material {
         Material {
@@ -29,6 +49,7 @@ impl Material {
             static_friction: self.static_friction * weight,
             dynamic_friction: self.dynamic_friction * weight,
             cut_force: None,
+            hardness: None,
         }
     }
 
@@ -39,7 +60,57 @@ impl Material {
             static_friction: self.static_friction + other.static_friction,
             dynamic_friction: self.dynamic_friction + other.dynamic_friction,
             cut_force: None,
+            hardness: None,
         }
+    }
+}
+
+/// Greatest coefficient of friction: beyond it nothing slides.
+const FRICTION_MAX: f32 = 2.0;
+
+/// What a tool or a patient makes of a tissue, as multiples of its coefficients.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factor {
+    pub stiffness: f32,
+    pub damping: f32,
+    pub static_friction: f32,
+    pub dynamic_friction: f32,
+    pub hardness: f32,
+}
+
+impl Factor {
+    /// Changes nothing, to the last bit.
+    pub const ONE: Factor =
+        Factor { stiffness: 1.0, damping: 1.0, static_friction: 1.0, dynamic_friction: 1.0, hardness: 1.0 };
+
+    /// Both together.
+    pub fn times(self, other: Factor) -> Factor {
+        Factor {
+            stiffness: self.stiffness * other.stiffness,
+            damping: self.damping * other.damping,
+            static_friction: self.static_friction * other.static_friction,
+            dynamic_friction: self.dynamic_friction * other.dynamic_friction,
+            hardness: self.hardness * other.hardness,
+        }
+    }
+}
+
+/// What the tissues' coefficients are multiplied by for one instrument; 1 where nothing is said.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Factors(Vec<(Label, Factor)>);
+
+impl Factors {
+    pub fn get(&self, label: Label) -> Factor {
+        self.0.iter().find(|(l, _)| *l == label).map_or(Factor::ONE, |(_, factor)| *factor)
+    }
+
+    /// Multiplies what is known of a tissue by one factor more.
+    pub fn with(mut self, label: Label, factor: Factor) -> Factors {
+        match self.0.iter_mut().find(|(l, _)| *l == label) {
+            Some((_, known)) => *known = known.times(factor),
+            None => self.0.push((label, factor)),
+        }
+        self
     }
 }
 
@@ -100,6 +171,15 @@ impl Materials {
 
     pub fn with(mut self, label: Label, material: Material) -> Materials {
         self.set(label, material);
+        self
+    }
+
+    /// How the tissues answer an instrument.
+    pub fn times(mut self, factors: &Factors) -> Materials {
+        for &label in &self.known {
+            let material = &mut self.of_label[usize::from(label.0)];
+            *material = material.times(&factors.get(label));
+        }
         self
     }
 }

@@ -1,7 +1,9 @@
 //! Everything that can be touched: the voxel tooth, and plain shapes around it that are never carved.
 
+use super::obstacle::{Meeting, Obstacle};
 use crate::frame::{Pose, Vec3};
 use crate::volume::{Label, Volume};
+use std::sync::Arc;
 
 /// The touchable world, in tooth space.
 #[derive(Clone, Debug)]
@@ -11,8 +13,8 @@ pub struct Matter {
     pub around: Vec<Shape>,
 }
 
-/// A solid described by a formula.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A solid described by a formula, or by its surface.
+#[derive(Clone, Debug)]
 pub struct Shape {
     pub label: Label,
     pub tooth_from_shape: Pose,
@@ -20,7 +22,7 @@ pub struct Shape {
 }
 
 /// What a [`Shape`] looks like about its own origin; lengths in mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub enum Form {
     Ball {
         radius: f32,
@@ -35,32 +37,54 @@ pub enum Form {
         half_length: f32,
         radius: f32,
     },
+    /// Whatever a closed mesh encloses.
+    Mesh(Arc<Obstacle>),
 }
 
 impl Shape {
     /// Signed distance in mm (negative inside) of a point of tooth space from the shape's surface.
     pub fn distance(&self, point_in_tooth: Vec3) -> f32 {
         let p = self.tooth_from_shape.inverse() * point_in_tooth;
-        match self.form {
-            Form::Ball { radius } => p.length() - radius,
-            Form::RoundBox { half, rounding } => {
+        match &self.form {
+            &Form::Ball { radius } => p.length() - radius,
+            &Form::RoundBox { half, rounding } => {
                 let q = p.abs() - (half - rounding);
                 q.max(Vec3::ZERO).length() + q.max_element().min(0.0) - rounding
             }
-            Form::Capsule { half_length, radius } => {
+            &Form::Capsule { half_length, radius } => {
                 (p - Vec3::Z * p.z.clamp(-half_length, half_length)).length() - radius
             }
+            Form::Mesh(obstacle) => obstacle.distance(p),
         }
     }
 
     /// Distance as [`Shape::distance`], and the outward unit normal there.
     pub fn distance_and_normal(&self, point_in_tooth: Vec3) -> (f32, Vec3) {
+        if let Form::Mesh(obstacle) = &self.form {
+            let Meeting { distance, normal } = obstacle.nearest(self.tooth_from_shape.inverse() * point_in_tooth);
+            return (distance, self.tooth_from_shape.turn(normal));
+        }
         /// Small against every shape we model, large against f32 rounding at 100 mm.
         const STEP: f32 = 0.01;
         let along =
             |axis: Vec3| self.distance(point_in_tooth + axis * STEP) - self.distance(point_in_tooth - axis * STEP);
         let slope = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
         (self.distance(point_in_tooth), slope.try_normalize().unwrap_or(Vec3::Z))
+    }
+
+    /// Signed distance and outward normal of every place where a ball about a point may meet the shape: one for a convex
+    /// form, for a mesh all up to a distance.
+    pub(super) fn meet(&self, point_in_tooth: Vec3, within: f32, mut each: impl FnMut(f32, Vec3)) {
+        match &self.form {
+            Form::Ball { .. } | Form::RoundBox { .. } | Form::Capsule { .. } => {
+                let (distance, normal) = self.distance_and_normal(point_in_tooth);
+                each(distance, normal);
+            }
+            Form::Mesh(obstacle) => {
+                let point = self.tooth_from_shape.inverse() * point_in_tooth;
+                obstacle.meet(point, within, |m| each(m.distance, self.tooth_from_shape.turn(m.normal)));
+            }
+        }
     }
 }
 
@@ -103,8 +127,9 @@ mod tests {
         let at = Pose::at(Vec3::new(1.0, 0.0, 0.0));
         let shape = |form| Shape { label: Label(1), tooth_from_shape: at, form };
         let check = |form, p: Vec3, expected: f32| {
-            let (distance, normal) = shape(form).distance_and_normal(p);
-            assert!((distance - expected).abs() < 1e-4, "{form:?} at {p}: {distance}");
+            let shape = shape(form);
+            let (distance, normal) = shape.distance_and_normal(p);
+            assert!((distance - expected).abs() < 1e-4, "{shape:?} at {p}: {distance}");
             assert!((normal.length() - 1.0).abs() < 1e-4);
         };
         check(Form::Ball { radius: 2.0 }, Vec3::new(6.0, 0.0, 0.0), 3.0);

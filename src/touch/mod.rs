@@ -4,21 +4,25 @@
 //! that fell. Never reads a clock, a file or a device; never allocates once made.
 
 mod matter;
+mod obstacle;
 mod instrument;
 mod material;
 mod planes;
 mod walls;
 mod proxy;
 mod law;
+mod rate;
 mod carve;
 mod vibration;
 mod gate;
 
-pub use carve::{Carver, Carving, Press};
+pub use carve::{Carver, Carving, CuttingLaw, Press};
 pub use gate::{ForceLimit, Gate};
 pub use instrument::{Instrument, WorkingEnd};
 pub use law::{Law, Pull, SpringLimit};
-pub use material::{Material, Materials};
+pub use material::{Factor, Factors, Material, Materials};
 pub use matter::{Form, Matter, Shape};
+pub use obstacle::Obstacle;
 pub use proxy::{Contact, Proxy};
+pub use rate::Rate;
 pub use vibration::Vibration;

@@ -7,6 +7,7 @@
 use super::instrument::Instrument;
 use super::material::{Blend, Material, Materials};
 use super::matter::Matter;
+use super::obstacle::MEETINGS_MAX;
 use super::planes::{Held, Plane, Touched, nearest_allowed};
 use super::walls;
 use crate::frame::Vec3;
@@ -66,7 +67,7 @@ impl Proxy {
             hand: tip,
             contact: None,
             grip: 1.0,
-            planes: Vec::with_capacity(feelers + 1 + matter.around.len()),
+            planes: Vec::with_capacity(feelers + 1 + matter.around.len() * MEETINGS_MAX),
         }
     }
 

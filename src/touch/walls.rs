@@ -68,16 +68,17 @@ pub(super) fn find(planes: &mut Vec<Plane>, matter: &Matter, instrument: &Instru
         });
     }
     for (index, shape) in matter.around.iter().enumerate() {
-        let (distance, normal) = shape.distance_and_normal(tip);
-        let clearance = distance - radius;
-        if clearance < reach {
-            planes.push(Plane {
-                normal,
-                offset: normal.dot(tip) - clearance,
-                at: tip - normal * distance,
-                touched: Touched::Shape(index),
-            });
-        }
+        shape.meet(tip, radius + reach, |distance, normal| {
+            let clearance = distance - radius;
+            if clearance < reach {
+                planes.push(Plane {
+                    normal,
+                    offset: normal.dot(tip) - clearance,
+                    at: tip - normal * distance,
+                    touched: Touched::Shape(index),
+                });
+            }
+        });
     }
 }
 

@@ -5,7 +5,7 @@
 use typodont::device::{Output, Reading, Spec};
 use typodont::frame::{Pose, Vec3};
 use typodont::sim::{Setup, Simulation, Step};
-use typodont::touch::{Carving, Instrument, Material, Materials, Matter, Vibration, WorkingEnd};
+use typodont::touch::{Carving, CuttingLaw, Instrument, Material, Materials, Matter, Vibration, WorkingEnd};
 use typodont::volume::{Grid, Label, Volume};
 
 pub const HARD: Label = Label(1);
@@ -13,9 +13,15 @@ pub const SOFT: Label = Label(2);
 
 /// Enamel and decay as the thesis tuned them (Table 2.4), friction left out unless a test brings it.
 pub fn materials() -> Materials {
-    let hard =
-        Material { stiffness: 1.0, damping: 1.0, static_friction: 0.0, dynamic_friction: 0.0, cut_force: Some(2.0) };
-    let soft = Material { stiffness: 0.09, damping: 0.3, cut_force: Some(0.2), ..hard };
+    let hard = Material {
+        stiffness: 1.0,
+        damping: 1.0,
+        static_friction: 0.0,
+        dynamic_friction: 0.0,
+        cut_force: Some(2.0),
+        hardness: Some(300.0),
+    };
+    let soft = Material { stiffness: 0.09, damping: 0.3, cut_force: Some(0.2), hardness: Some(15.0), ..hard };
     Materials::new().with(HARD, hard).with(SOFT, soft)
 }
 
@@ -32,8 +38,9 @@ pub fn setup(volume: Volume, end: WorkingEnd, cuts: bool) -> Setup {
     Setup {
         matter: Matter { volume, around: Vec::new() },
         materials: materials(),
+        factors: Vec::new(),
         instruments: vec![Instrument::new(end, cuts)],
-        carving: Carving { dwell: 0.3, dwell_share: 1.0 / 3.0, max_feed: 30.0 },
+        carving: Carving { dwell: 0.3, dwell_share: 1.0 / 3.0, max_feed: 30.0, law: CuttingLaw::Threshold },
         vibration: Vibration::NONE,
         world_from_tooth: Pose::IDENTITY,
         device: ideal_device(),

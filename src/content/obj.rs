@@ -1,0 +1,218 @@
+//! Wavefront OBJ files of closed surfaces.
+//!
+//! Takes a file's bytes. Gives one closed mesh in millimetres, facing outward, or the first thing that is wrong with it.
+//! Corners at the very same place are one; what a file says of materials and colours is not read.
+
+use crate::frame::Vec3;
+use crate::mesh::Mesh;
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Most triangles of a mesh. A scanned arch has about 200 000; more cost memory and feel no different.
+pub const TRIANGLES_MAX: usize = 300_000;
+
+/// Longest side of the box around a mesh, mm: smaller than a clamp or larger than a head is another unit.
+const EXTENT: std::ops::RangeInclusive<f32> = 0.5..=400.0;
+
+/// Why a mesh cannot be used.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Unusable {
+    /// The text is not OBJ.
+    Syntax {
+        what: String,
+    },
+    Empty,
+    NotFinite,
+    TooLarge {
+        triangles: usize,
+    },
+    /// Its longest side, mm.
+    Size {
+        extent: f32,
+    },
+    /// So many edges belong to one triangle only.
+    Open {
+        edges: usize,
+    },
+    /// So many edges belong to three triangles or more.
+    Tangled {
+        edges: usize,
+    },
+    /// So many edges have two triangles that face opposite ways.
+    Inconsistent {
+        edges: usize,
+    },
+    /// All triangles face inward.
+    InsideOut,
+}
+
+impl Unusable {
+    /// Name of the rule, for complaints.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Unusable::Syntax { .. } | Unusable::NotFinite => "wrong-mesh",
+            Unusable::Empty => "empty-mesh",
+            Unusable::TooLarge { .. } => "too-large",
+            Unusable::Size { .. } => "wrong-size",
+            Unusable::Open { .. } => "open-mesh",
+            Unusable::Tangled { .. } | Unusable::Inconsistent { .. } | Unusable::InsideOut => "inconsistent-mesh",
+        }
+    }
+
+    /// What would be right.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Unusable::Syntax { .. } => "export the surface as Wavefront OBJ (.obj), as text",
+            Unusable::NotFinite => "every coordinate is a finite number in millimetres",
+            Unusable::Empty => "the file needs faces: lines that begin with \"f\"",
+            Unusable::TooLarge { .. } => "thin it out in a mesh program to at most 300 000 triangles",
+            Unusable::Size { .. } => "export it in millimetres: its longest side is to be 0.5 to 400 mm",
+            Unusable::Open { .. } => "close the surface's holes: only what is closed has an inside",
+            Unusable::Tangled { .. } => "remove inner walls and doubled faces: two faces meet at each edge",
+            Unusable::Inconsistent { .. } => "make all faces face outward (\"recalculate normals\" in a mesh program)",
+            Unusable::InsideOut => "turn all faces around: seen from outside their corners run counter-clockwise",
+        }
+    }
+}
+
+impl fmt::Display for Unusable {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Unusable::Syntax { what } => write!(f, "this is not a Wavefront OBJ file: {what}"),
+            Unusable::Empty => f.write_str("the mesh has no triangles"),
+            Unusable::NotFinite => f.write_str("a coordinate is not a finite number"),
+            Unusable::TooLarge { triangles } => write!(f, "the mesh has {triangles} triangles"),
+            Unusable::Size { extent } => write!(f, "the mesh's longest side is {extent} mm"),
+            Unusable::Open { edges } => write!(f, "the surface is not closed: {edges} edges have one face only"),
+            Unusable::Tangled { edges } => write!(f, "{edges} edges have more than two faces"),
+            Unusable::Inconsistent { edges } => {
+                write!(f, "at {edges} edges the faces on both sides face opposite ways")
+            }
+            Unusable::InsideOut => f.write_str("the surface faces inward"),
+        }
+    }
+}
+
+/// Reads a closed mesh; all objects of the file together.
+pub fn parse(bytes: &[u8]) -> Result<Mesh, Unusable> {
+    let options =
+        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let materials = |_: &std::path::Path| Err(tobj::LoadError::GenericFailure);
+    let (models, _) = tobj::load_obj_buf(&mut &bytes[..], &options, materials)
+        .map_err(|e| Unusable::Syntax { what: e.to_string() })?;
+    let triangles = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
+    if triangles > TRIANGLES_MAX {
+        return Err(Unusable::TooLarge { triangles });
+    }
+    let mesh = welded(&models);
+    if mesh.triangles.is_empty() {
+        return Err(Unusable::Empty);
+    }
+    if mesh.positions.iter().any(|p| !p.is_finite()) {
+        return Err(Unusable::NotFinite);
+    }
+    let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+    let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+    let extent = (high - low).max_element();
+    if !EXTENT.contains(&extent) {
+        return Err(Unusable::Size { extent });
+    }
+    check_edges(&mesh)?;
+    if mesh.volume_mm3() <= 0.0 {
+        return Err(Unusable::InsideOut);
+    }
+    Ok(mesh)
+}
+
+/// One mesh in which every place is one corner; triangles that have lost a side by that are left out.
+fn welded(models: &[tobj::Model]) -> Mesh {
+    let mut corners = BTreeMap::new();
+    let mut mesh = Mesh::default();
+    for tobj::Mesh { positions, indices, .. } in models.iter().map(|m| &m.mesh) {
+        let mut corner = |index: u32| {
+            let at = 3 * index as usize;
+            // Adding zero makes -0 the same place as 0.
+            let place = Vec3::new(positions[at], positions[at + 1], positions[at + 2]) + Vec3::ZERO;
+            *corners.entry(place.to_array().map(f32::to_bits)).or_insert_with(|| {
+                mesh.positions.push(place);
+                mesh.positions.len() as u32 - 1
+            })
+        };
+        let triangles = indices.chunks_exact(3).map(|t| [corner(t[0]), corner(t[1]), corner(t[2])]);
+        let whole = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect::<Vec<_>>();
+        mesh.triangles.extend(whole);
+    }
+    mesh.normals = normals(&mesh);
+    mesh
+}
+
+/// Outward normals of the corners, weighted by the area of their faces.
+fn normals(mesh: &Mesh) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; mesh.positions.len()];
+    for &triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
+        triangle.iter().for_each(|&i| normals[i as usize] += (b - a).cross(c - a));
+    }
+    normals.iter().map(|n| n.normalize_or_zero()).collect()
+}
+
+/// Two faces at every edge, running along it in opposite directions.
+fn check_edges(mesh: &Mesh) -> Result<(), Unusable> {
+    let directed = mesh.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+    let mut edges: Vec<([u32; 2], bool)> = directed.map(|[a, b]| ([a.min(b), a.max(b)], a < b)).collect();
+    edges.sort_unstable();
+    let (mut open, mut tangled, mut inconsistent) = (0, 0, 0);
+    for faces in edges.chunk_by(|a, b| a.0 == b.0) {
+        match faces {
+            [_] => open += 1,
+            [a, b] => inconsistent += usize::from(a.1 == b.1),
+            _ => tangled += 1,
+        }
+    }
+    match (open, tangled, inconsistent) {
+        (0, 0, 0) => Ok(()),
+        (0, 0, edges) => Err(Unusable::Inconsistent { edges }),
+        (0, edges, _) => Err(Unusable::Tangled { edges }),
+        (edges, ..) => Err(Unusable::Open { edges }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TETRAHEDRON: &str = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+    fn check(text: &str, expected: Result<f64, &str>) {
+        let found = parse(text.as_bytes()).map(|m| m.volume_mm3()).map_err(|u| u.code());
+        match (found, expected) {
+            (Ok(volume), Ok(wanted)) => assert!((volume - wanted).abs() < 1e-4, "{volume}"),
+            (found, expected) => assert_eq!(found.err(), expected.err(), "{text}"),
+        }
+    }
+
+    #[test]
+    fn only_closed_surfaces_facing_outward_are_read() {
+        check(TETRAHEDRON, Ok(64.0 / 6.0));
+        check(&TETRAHEDRON.replace("f 2 3 4", "f 2 3 9"), Err("wrong-mesh"));
+        check(&TETRAHEDRON.replace("f 2 3 4", ""), Err("open-mesh"));
+        check(&TETRAHEDRON.replace("f 2 3 4", "f 3 2 4"), Err("inconsistent-mesh"));
+        check(&format!("{TETRAHEDRON}f 2 3 4\n"), Err("inconsistent-mesh"));
+        check("v 0 0 0\nv 4 0 0\nv 0 4 0\nv 0 0 4\nf 1 2 3\nf 1 4 2\nf 1 3 4\nf 2 4 3\n", Err("inconsistent-mesh"));
+        check(&TETRAHEDRON.replace('f', "#"), Err("empty-mesh"));
+        check(&TETRAHEDRON.replace("v 4 0 0", "v NaN 0 0"), Err("wrong-mesh"));
+        check(&TETRAHEDRON.replace("v 4 0 0", "v 4000 0 0"), Err("wrong-size"));
+        check("PK\u{3}\u{4}", Err("empty-mesh"));
+        check("v a b c\nf 1 2 3", Err("wrong-mesh"));
+        check("f 1 2 3", Err("wrong-mesh"));
+    }
+
+    #[test]
+    fn corners_written_more_than_once_are_one() {
+        // Aim: programs that write three corners a triangle still give a closed surface.
+        let places = ["0 0 0", "4 0 0", "0 4 0", "0 0 4"];
+        let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+        let corners: String = faces.iter().flatten().map(|&i: &usize| format!("v {}\n", places[i])).collect();
+        check(&format!("{corners}f 1 2 3\nf 4 5 6\nf 7 8 9\nf 10 11 12\n"), Ok(64.0 / 6.0));
+    }
+}

@@ -1,0 +1,76 @@
+//! Age and tool change how a tissue feels, and nothing else does.
+
+mod phantom;
+
+use phantom::*;
+use serde_json::{Value, json};
+use typodont::content::Library;
+use typodont::device::Reading;
+use typodont::diagnostic::Source;
+use typodont::frame::Vec3;
+use typodont::scenario::{self, Forms, Scenario};
+use typodont::sim::{Command, Setup, Simulation};
+use typodont::touch::{Factor, Factors, Instrument, WorkingEnd};
+use typodont::volume::Label;
+
+/// N after a second half a millimetre deep in a wall.
+fn pressed(sim: &mut Simulation) -> f32 {
+    (0..2000)
+        .map(|tick| sim.step(&Reading::at(Vec3::Z * (0.5 - tick as f32 * 1e-3).max(-0.5))).force.length())
+        .last()
+        .unwrap()
+}
+
+#[test]
+fn an_instrument_feels_the_wall_through_its_own_factors() {
+    // Aim: a factor of a half halves the force of its instrument only, also after a tissue was given another stiffness.
+    let wall = volume([40, 40, 40], 0.1, |p| (p.z, HARD));
+    let world = setup(wall, WorkingEnd::Point, false);
+    let half = Factors::default().with(HARD, Factor { stiffness: 0.5, ..Factor::ONE });
+    let mut instruments = world.instruments.clone();
+    instruments.push(Instrument::new(WorkingEnd::Point, false));
+    let mut sim = Simulation::new(Setup { instruments, factors: vec![Factors::default(), half], ..world });
+    let mut check = |command: Option<Command>, expected: f32| {
+        command.iter().for_each(|c| sim.apply(c));
+        let force = pressed(&mut sim);
+        assert!((force - expected).abs() < 0.01, "{command:?}: {force} N, not {expected}");
+    };
+    check(None, 0.5);
+    check(Some(Command::Take { instrument: 1 }), 0.25);
+    check(Some(Command::SetStiffness { label: HARD, stiffness: 0.8 }), 0.2);
+    check(Some(Command::Take { instrument: 0 }), 0.4);
+}
+
+fn read(change: impl FnOnce(&mut Value)) -> Scenario {
+    let mut scenario: Value =
+        serde_json::from_str(&std::fs::read_to_string("scenarios/5-grinding.json").unwrap()).unwrap();
+    change(&mut scenario);
+    scenario::resolve(Source::new("x.json", scenario.to_string()), &Library::shipped(), Forms::Recorded).unwrap()
+}
+
+#[test]
+fn without_patient_and_kind_nothing_changes() {
+    // Aim: exercises written before feel as they did, to the last bit.
+    assert!(read(|_| ()).factors.iter().all(|f| *f == Factors::default()));
+}
+
+#[test]
+fn old_dentine_is_harder_and_a_diamond_drags_more() {
+    let (enamel, dentine) = (Label(1), Label(2));
+    let of = |age: f64, tool: &str| {
+        read(|s| {
+            s["patient"] = json!({ "age_years": age });
+            s["instruments"] = json!([tool]);
+        })
+        .factors[0]
+            .clone()
+    };
+    let (young, old) = (of(25.0, "round_bur_014"), of(70.0, "round_bur_014"));
+    assert_eq!(young.get(dentine), Factor::ONE);
+    assert!(old.get(dentine).hardness > 1.1 && old.get(dentine).stiffness > 1.0);
+    let (diamond, carbide) = (of(25.0, "diamond_round_014"), of(25.0, "carbide_round_014"));
+    assert!(diamond.get(enamel).dynamic_friction > carbide.get(enamel).dynamic_friction);
+    // A coarse grain takes more: the tissue is as if softer.
+    let (fine, coarse) = (of(25.0, "diamond_round_014_fine"), of(25.0, "diamond_round_014_coarse"));
+    assert!((fine.get(enamel).hardness / coarse.get(enamel).hardness - 4.0).abs() < 1e-4);
+}
