@@ -9,6 +9,7 @@ pub mod scan;
 mod library;
 mod tissues;
 mod instruments;
+pub mod measured;
 
 pub use instruments::{InstrumentEntry, InstrumentTable};
 pub use library::{Library, read_file, read_text};

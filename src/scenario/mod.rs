@@ -18,7 +18,7 @@ pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
 
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
-use crate::touch::{Carving, Vibration};
+use crate::touch::{Carving, Guidance, Vibration};
 use crate::volume::{Label, Volume};
 use file::{SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
@@ -44,6 +44,8 @@ pub struct Scenario {
     /// The tray; stages and results refer to it by index.
     pub instruments: Vec<InstrumentEntry>,
     pub zones: Vec<Zone>,
+    /// What leads the hand; stages refer to it by index.
+    pub guidances: Vec<Guidance>,
     pub stages: Vec<Stage>,
     pub measures: Measures,
     pub rubric: Option<Rubric>,
@@ -172,6 +174,8 @@ pub struct Stage {
     pub cutting: bool,
     pub show_decay: bool,
     pub steps: Option<StiffnessSteps>,
+    /// Index into [`Scenario::guidances`].
+    pub guidance: Option<usize>,
     pub ask: Vec<Question>,
     pub ends: Ends,
 }
