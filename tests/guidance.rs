@@ -78,8 +78,8 @@ fn what_was_felt_is_felt_again() {
 
 #[test]
 fn the_spring_pulls_as_it_says() {
-    // Aim: k times the way to the path, or to the tube's wall, up to the limit; nothing within the tube. Method: hands that
-    // rest beside a straight path and beyond its end.
+    // Aim: within the free radius nothing; at a depth d outside it k·d²/(2·0.3 mm) up to 0.3 mm, then k·(d − 0.15 mm) up to the
+    // limit, straight toward the path. Method: hands that rest beside a straight path and beyond its end.
     let line = || (0..=100).map(|i| Vec3::X * (i as f32 * 0.2));
     let check = |fixture: Fixture, hand_in_tooth: Vec3, expected: Vec3| {
         let mut sim = led(Guidance::Path(fixture), somewhere(), ideal_device());
@@ -91,13 +91,15 @@ fn the_spring_pulls_as_it_says() {
         assert!((force - expected).length() < 1e-4, "at {hand_in_tooth}: {force} for {expected}");
     };
     let up = Vec3::Z;
-    for offset in [0.1, 1.0, 3.0] {
-        check(follow(line()), Vec3::X + up * offset, up * (-0.2 * offset));
-    }
+    check(follow(line()), Vec3::X, Vec3::ZERO);
+    check(follow(line()), Vec3::X + up * 0.15, up * (-0.2 * 0.15 * 0.15 / 0.6));
+    check(follow(line()), Vec3::X + up, up * (-0.2 * 0.85));
+    check(follow(line()), Vec3::X + up * 3.0, up * (-0.2 * 2.85));
     check(follow(line()), Vec3::X + up * 8.0, up * -1.0);
-    check(follow(line()), Vec3::X * -2.0, Vec3::X * 0.4);
-    check(tube(line()), Vec3::X * 22.0, Vec3::X * -0.3);
-    check(tube(line()), Vec3::X * 9.0 + up * 2.5, up * -0.4);
+    check(follow(line()), Vec3::X * -2.0, Vec3::X * 0.37);
+    check(tube(line()), Vec3::X * 22.0, Vec3::X * -0.27);
+    check(tube(line()), Vec3::X * 9.0 + up * 2.5, up * -0.37);
+    check(tube(line()), Vec3::X * 9.0 + up * 0.65, up * (-0.2 * 0.15 * 0.15 / 0.6));
     check(tube(line()), Vec3::X * 9.0 + up * 12.0, up * -1.0);
     for inside in [Vec3::ZERO, Vec3::X * 7.7 + up * 0.49, Vec3::X * 20.0 + Vec3::Y * 0.3] {
         check(tube(line()), inside, Vec3::ZERO);
@@ -148,8 +150,7 @@ fn no_force_jumps() {
                             sim.apply(&Command::Guide { guidance: None });
                         }
                         // To and fro over 16 mm, slowly turning, so that every branch is met from every side.
-                        let way = speed * tick as f32 * 1e-3;
-                        let across = (way % 32.0 - 16.0).abs() - 8.0;
+                        let across = 8.0 * (speed * tick as f32 * 1e-3 / 8.0).sin();
                         let turn = tick as f32 * 2e-4;
                         let mut hand = Vec3::new(5.0 + across * turn.sin(), 1.5 + across * turn.cos(), 0.4);
                         let is_refused = tick == 3000;
@@ -207,9 +208,10 @@ fn thrown(fixture: Fixture, from: Vec3, velocity: Vec3, encoder_step: f32) -> [f
 fn a_fixture_gives_no_energy() {
     // Aim: whatever hits it, a fixture gives a hand no more than it took; what was thrown comes to rest or leaves slower.
     // Method: the barest hand there is, 45 g without grip or friction, thrown along, across and at a slant, through the
-    // stiffest and softest springs, onto a straight path and one that crosses itself, with ideal and coarse encoders.
+    // stiffest and softest springs, onto a straight path and one that crosses itself, with ideal and coarse encoders. What
+    // stands between two of an encoder's steps (q) nobody can know: energy of k·q² is allowed for.
     let line = || (0..=200).map(|i| Vec3::X * (i as f32 * 0.2 - 20.0));
-    let mut worst = 0.0f64;
+    let (mut worst, mut wrong) = (0.0f64, Vec::new());
     for encoder_step in [0.0, 0.055] {
         for stiffness in [0.05, 0.2, 1.0] {
             let springs = |fixture: Fixture| Fixture { stiffness, damping: 0.005 * stiffness, ..fixture };
@@ -224,17 +226,20 @@ fn a_fixture_gives_no_energy() {
             for (name, fixture, from) in fixtures {
                 for direction in [Vec3::Z, Vec3::new(0.6, 0.0, 0.8), Vec3::new(0.7, 0.7, 0.14), Vec3::NEG_X] {
                     for speed in [5.0, 20.0, 60.0, 150.0] {
-                        let thrown = thrown(springs(fixture.clone()), from, direction * speed, encoder_step);
-                        let [given, before, after] = thrown;
+                        let [given, before, after] =
+                            thrown(springs(fixture.clone()), from, direction * speed, encoder_step);
+                        let allowed = 0.02 * before + f64::from(stiffness * encoder_step * encoder_step);
                         let what = format!("{name}, {stiffness} N/mm, {direction} at {speed} mm/s, {encoder_step} mm");
-                        assert!(given < 0.02 * before + 1e-5, "{what}: gave {given} mJ of {before}");
-                        assert!(after < 1.02 * before, "{what}: {after} mJ of {before}");
-                        worst = worst.max(given / before);
+                        if given > allowed || after > before + allowed {
+                            wrong.push(format!("{what}: gave {given:.6}, left {after:.6} of {before:.6} mJ"));
+                        }
+                        worst = worst.max(given / (before + allowed));
                     }
                 }
             }
         }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     println!("greatest energy given beyond what was taken: {:.3} % of the throw", 100.0 * worst);
 }
 
@@ -293,6 +298,7 @@ fn a_guided_session_is_a_proof() {
         assert!(recording.scenario.files.contains_key(table), "{:?}", recording.scenario.files.keys());
         let commands: Vec<_> = recording.commands.iter().filter(|(_, c)| matches!(c, Command::Guide { .. })).collect();
         let stages = &session(&bundle)["stages"];
+        assert_eq!([0, 1, 2].map(|i| stages[i]["guided"].as_bool()), [None, Some(true), None]);
         let tick = |key: &str| (stages[1][key].as_f64().unwrap() * 1e3).round() as u64;
         let expected = [(tick("started_s"), Some(0)), (tick("ended_s"), None)];
         let told = commands.iter().map(|(at, c)| match c {

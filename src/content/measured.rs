@@ -256,7 +256,7 @@ mod tests {
         check_forces(&format!("{head}0,0,0,0"), &[(0, 0, "too-short")]);
         check_forces(&format!("{head}0,0,0\n1,0,0,0,0\n"), &[(2, 1, "wrong-count"), (3, 1, "wrong-count")]);
         check_forces(&format!("{head}0,0,x,\n"), &[(2, 5, "wrong-number"), (2, 7, "wrong-number")]);
-        check_forces(&format!("{head}0,NaN,0,inf\n"), &[(2, 3, "wrong-number"), (2, 7, "wrong-number")]);
+        check_forces(&format!("{head}0,NaN,0,inf\n"), &[(2, 3, "wrong-number"), (2, 9, "wrong-number")]);
         check_forces(&format!("{head}0,0,0,0\n-1,0,0,0\n"), &[(3, 1, "out-of-range")]);
         check_forces(&format!("{head}0,0,0,0\n1,0, 5.5,0\n"), &[(3, 6, "out-of-range")]);
         check_forces(&format!("{head}0,0,0,0\n1,4,4,0\n"), &[(3, 1, "out-of-range")]);

@@ -546,6 +546,7 @@ pub struct FixtureFile {
     /// Where on the path the hand is drawn to.
     pub kind: FixtureKind,
     /// Distance from the path within which the hand is free, mm: 0 to 20; without it 0.5 for a tube, 0 for a path to follow.
+    /// The spring comes in over the first 0.3 mm outside.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 20.0))]
     pub radius_mm: Option<f32>,
