@@ -6,7 +6,7 @@ use phantom::*;
 use typodont::device::Reading;
 use typodont::frame::Vec3;
 use typodont::sim::{Command, Simulation};
-use typodont::touch::{Form, Instrument, Shape, WorkingEnd};
+use typodont::touch::{Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Shape, Space, WorkingEnd};
 use typodont::volume::Label;
 
 #[test]
@@ -18,12 +18,26 @@ fn a_step_never_allocates() {
     let form = Form::RoundBox { half: Vec3::splat(2.0), rounding: 0.5 };
     setup.matter.around =
         vec![Shape { label: Label(9), tooth_from_shape: typodont::frame::Pose::at(Vec3::Y * 7.0), form }];
+    let path = std::sync::Arc::new(Path::through((0..2000).map(|i| {
+        let turn = i as f32 * 0.01;
+        Vec3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.01 * turn)
+    })));
+    let tube = Fixture { path, kind: Kind::Tube, radius: 0.2, stiffness: 0.2, damping: 0.001, max_force: 1.0 };
+    let follow = Fixture { kind: Kind::Follow { look_ahead: 2.0, speed: Some(5.0) }, ..tube.clone() };
+    let rows = (0..100).map(|i| ForceRow { time: f64::from(i) * 0.01, force: Vec3::X * (i as f32 * 0.01) }).collect();
+    let forces = Forces { rows, repeat: true, scale: 1.0, space: Space::Tooth };
+    setup.guidances = vec![Guidance::Path(tube), Guidance::Path(follow), Guidance::Forces(forces)];
     let mut sim = Simulation::new(setup);
     let mut cut = 0;
     let mut touched = 0;
+    let mut led = 0;
     let counted = allocation_counter::measure(|| {
         for tick in 0..20_000u32 {
             match tick {
+                2_000 => sim.apply(&Command::Guide { guidance: Some(0) }),
+                6_000 => sim.apply(&Command::Guide { guidance: Some(1) }),
+                10_000 => sim.apply(&Command::Guide { guidance: Some(2) }),
+                18_000 => sim.apply(&Command::Guide { guidance: None }),
                 8_000 => sim.apply(&Command::Take { instrument: 1 }),
                 12_000 => sim.apply(&Command::Take { instrument: 2 }),
                 15_000 => sim.apply(&Command::SetStiffness { label: SOFT, stiffness: 0.4 }),
@@ -38,8 +52,10 @@ fn a_step_never_allocates() {
             let step = sim.step(&Reading::at(hand));
             cut += u32::from(step.cutting);
             touched += u32::from(step.touch.is_some());
+            led += u32::from(step.guidance != Vec3::ZERO);
         }
     });
     assert!(cut > 500 && touched > 2_000, "the course must do what is measured: {cut} cut, {touched} touched");
+    assert!(led > 10_000, "led in {led} ticks");
     assert_eq!(counted.count_total, 0, "{counted:?}");
 }

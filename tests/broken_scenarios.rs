@@ -63,7 +63,8 @@ fn removed(name: &str, pointer: &str, expected: &[(&str, &str)]) {
 
 #[test]
 fn the_shipped_exercises_have_no_complaints() {
-    for file in ["1-introduction.json", "2-decay.json", "3-detection.json", "4-diagnosis.json", "5-grinding.json"] {
+    let files = ["1-introduction.json", "2-decay.json", "3-detection.json", "4-diagnosis.json", "5-grinding.json"];
+    for file in files {
         check_text(file, &shipped(file), &[]);
     }
 }
@@ -368,6 +369,69 @@ fn parts_that_do_not_fit_together() {
     check("a new tissue that clashes", "/new_tissues", tissue, &[("wrong-form", "/new_tissues/0/color")]);
     let pair = edited("2-decay.json", "/scene/pair/right/form/procedural/spacing_mm", Some(json!(0.2)));
     check_text("teeth of two grains", &pair, &[("impossible-scene", "/scene")]);
+}
+
+/// The grinding exercise with its stage guided and a table beside it; complaints as (file, line, code, path).
+fn check_guided(name: &str, table: &str, guidance: Value, expected: &[(&str, usize, &str, &str)]) {
+    let text = edited("5-grinding.json", "/stages/0/guidance", Some(guidance));
+    let mut library = Library::shipped();
+    library.hold("table.csv", table.as_bytes().to_vec());
+    let found = scenario::resolve(Source::new("exercise.json", text), &library, Forms::Made).err().unwrap_or_default();
+    let line = |d: &Diagnostic| d.line_and_column().map_or(0, |(line, _)| line);
+    let in_table = |d: &Diagnostic| if d.source.name == "table.csv" { line(d) } else { 0 };
+    let told: Vec<_> = found.iter().map(|d| (d.source.name.as_str(), in_table(d), d.code, d.path.as_str())).collect();
+    assert_eq!(told, expected, "{name}\n{}", found.iter().map(|d| d.to_string()).collect::<String>());
+}
+
+#[test]
+fn guidance_that_leads_astray() {
+    // Aim: each mistake in a guidance and in its table. Lines are those of the table.
+    let path = "x_mm,y_mm,z_mm\n0,-4,7\n0,4,7\n";
+    let felt = "time_s,fx_n,fy_n,fz_n\n0,0,0,1\n1,0,0,2\n";
+    let at = "/stages/0/guidance";
+    let tube = |more: Value| {
+        let mut tube = json!({ "file": "table.csv", "kind": "tube" });
+        tube.as_object_mut().unwrap().append(&mut more.as_object().unwrap().clone());
+        json!({ "path": tube })
+    };
+    let forces = |scale: f64| json!({ "forces": { "file": "table.csv", "scale": scale, "space": "tooth" } });
+    check_guided("a tube", path, tube(json!({})), &[]);
+    check_guided("forces", felt, forces(2.5), &[]);
+    fn mine<'a>(code: &'a str, path: &'a str) -> [(&'a str, usize, &'a str, &'a str); 1] {
+        [("exercise.json", 0, code, path)]
+    }
+    let missing = json!({ "forces": { "file": "felt.csv", "space": "world" } });
+    check_guided("no table", felt, missing, &mine("missing-file", &format!("{at}/forces/file")));
+    let outside = tube(json!({ "file": "../table.csv" }));
+    check_guided("a table elsewhere", path, outside, &mine("outside-folder", &format!("{at}/path/file")));
+    let json = tube(json!({ "file": "scenario.json" }));
+    check_guided("a table that is none", path, json, &mine("wrong-form", &format!("{at}/path/file")));
+    let spaceless = json!({ "forces": { "file": "table.csv" } });
+    check_guided("no space", felt, spaceless, &mine("missing-key", &format!("{at}/forces")));
+    let both = json!({ "forces": {}, "path": {} });
+    check_guided("two at once", path, both, &mine("wrong-type", at));
+    let pipe = tube(json!({ "kind": "pipe" }));
+    check_guided("another kind", path, pipe, &mine("unknown-word", &format!("{at}/path/kind")));
+    let strong = tube(json!({ "max_force_n": 30 }));
+    check_guided("stronger than a hand", path, strong, &mine("out-of-range", &format!("{at}/path/max_force_n")));
+    let ahead = tube(json!({ "look_ahead_mm": 1, "speed_mm_s": 5 }));
+    let unused = [format!("{at}/path/look_ahead_mm"), format!("{at}/path/speed_mm_s")];
+    let unused = unused.each_ref().map(|path| ("exercise.json", 0, "unused-key", path.as_str()));
+    check_guided("a tube that leads on", path, ahead, &unused);
+    let bare = tube(json!({ "stiffness_n_per_mm": 0.5, "damping_n_s_per_mm": 0.001 }));
+    check_guided("too little damping", path, bare, &mine("unstable-spring", &format!("{at}/path/damping_n_s_per_mm")));
+    check_guided("stronger than measured", felt, forces(2.6), &mine("out-of-range", &format!("{at}/forces/scale")));
+    let away = "x_mm,y_mm,z_mm\n0,-4,50\n0,4,50\n";
+    check_guided("a path elsewhere", away, tube(json!({})), &mine("wrong-place", &format!("{at}/path/file")));
+    let theirs = |line, code| [("table.csv", line, code, "")];
+    check_guided("forces for a path", felt, tube(json!({})), &theirs(1, "wrong-header"));
+    check_guided("a path for forces", path, forces(1.0), &theirs(1, "wrong-header"));
+    check_guided("metres", "x_mm,y_mm,z_mm\n0,0,0.007\n0,0.004,0.007\n", tube(json!({})), &theirs(0, "empty-path"));
+    check_guided("a word", &felt.replace("1,0,0,2", "1,0,none,2"), forces(1.0), &theirs(3, "wrong-number"));
+    check_guided("a decimal comma", &felt.replace("0,0,0,1", "0,0,0,1,5"), forces(1.0), &theirs(2, "wrong-count"));
+    check_guided("back in time", &felt.replace("1,0,0,2", "-0,0,0,2"), forces(1.0), &theirs(3, "wrong-order"));
+    check_guided("kilonewtons", &felt.replace("1,0,0,2", "1,0,0,2000"), forces(1.0), &theirs(3, "out-of-range"));
+    check_guided("an empty table", "", forces(1.0), &theirs(0, "wrong-header"));
 }
 
 #[test]

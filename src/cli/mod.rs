@@ -12,6 +12,7 @@ mod devices;
 mod finish;
 mod import;
 mod live;
+mod path;
 mod preview;
 mod run;
 mod score;
@@ -44,6 +45,8 @@ enum Command {
     Schema,
     /// Draw what the trainee of an exercise will see, decay marked
     Preview(preview::Arguments),
+    /// Take a path or forces out of a session, for an exercise that guides the hand
+    Path(path::Arguments),
     /// List the devices that can be used
     Devices,
     /// Join another machine's session as the instructor's hand
@@ -129,6 +132,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::run(&arguments),
         Command::Schema => say(crate::scenario::schema_text().trim_end()),
         Command::Preview(arguments) => preview::run(&arguments),
+        Command::Path(arguments) => path::run(&arguments),
         Command::Devices => devices::run(),
         Command::Assist(arguments) => assist::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

@@ -11,6 +11,7 @@ mod library;
 mod tissues;
 mod instruments;
 mod feel;
+pub mod measured;
 
 pub use feel::{AgeBand, FeelTable};
 pub use instruments::{InstrumentEntry, InstrumentTable, ToolKind};

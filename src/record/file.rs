@@ -261,6 +261,7 @@ pub enum CommandFile {
     Take { instrument: usize },
     SetStiffness { label: u8, stiffness: f32 },
     RunBur { running: bool },
+    Guide { guidance: Option<usize> },
 }
 
 impl From<&Command> for CommandFile {
@@ -269,6 +270,7 @@ impl From<&Command> for CommandFile {
             Command::Take { instrument } => CommandFile::Take { instrument },
             Command::SetStiffness { label, stiffness } => CommandFile::SetStiffness { label: label.0, stiffness },
             Command::RunBur { running } => CommandFile::RunBur { running },
+            Command::Guide { guidance } => CommandFile::Guide { guidance },
         }
     }
 }
@@ -279,6 +281,7 @@ impl From<&CommandFile> for Command {
             CommandFile::Take { instrument } => Command::Take { instrument },
             CommandFile::SetStiffness { label, stiffness } => Command::SetStiffness { label: Label(label), stiffness },
             CommandFile::RunBur { running } => Command::RunBur { running },
+            CommandFile::Guide { guidance } => Command::Guide { guidance },
         }
     }
 }

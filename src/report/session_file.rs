@@ -78,6 +78,9 @@ pub struct StageFile {
     pub started_s: f64,
     pub ended_s: f64,
     pub ended_by: String,
+    /// The exercise led the trainee's hand; left out where it did not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub guided: bool,
     pub answers: Vec<AnswerFile>,
 }
 
@@ -251,6 +254,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
             started_s: result.started.seconds(),
             ended_s: result.ended.seconds(),
             ended_by: ended_by_name(result.ended_by).to_string(),
+            guided: stage.guidance.is_some(),
             answers: answers.collect(),
         }
     };

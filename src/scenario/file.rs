@@ -590,6 +590,9 @@ pub struct StageFile {
     /// Stiffness that falls in steps until the trainee answers.
     #[serde(default)]
     pub stiffness_steps: Option<StiffnessStepsFile>,
+    /// What leads the trainee's hand during the stage.
+    #[serde(default)]
+    pub guidance: Option<GuidanceFile>,
     /// What the trainee is asked; can be answered at any time during the stage.
     #[serde(default)]
     #[schemars(length(max = 20))]
@@ -612,6 +615,107 @@ pub struct StiffnessStepsFile {
     /// How long each step lasts, s: 1 to 3600.
     #[schemars(range(min = 1.0, max = 3600.0))]
     pub step_time_s: f64,
+}
+
+/// What leads a hand.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GuidanceFile {
+    /// A spring to a path, such as an expert's.
+    Path(FixtureFile),
+    /// Forces as somebody felt them, played from the stage's beginning.
+    Forces(ForcesFile),
+}
+
+/// A spring to a path.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FixtureFile {
+    /// CSV file with the header x_mm,y_mm,z_mm (time_s may come first), relative to the scenario's folder; tooth space: x
+    /// buccal, y distal, z occlusal. `typodont path` makes one of a session.
+    #[schemars(length(min = 1, max = 500), regex(pattern = r"\.csv$"))]
+    pub file: String,
+    /// Where on the path the hand is drawn to.
+    pub kind: FixtureKind,
+    /// Distance from the path within which the hand is free, mm: 0 to 20; without it 0.5 for a tube, 0 for a path to follow.
+    /// The spring comes in over the first 0.3 mm outside.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub radius_mm: Option<f32>,
+    /// N/mm, 0.01 to 1.
+    #[serde(default = "FixtureFile::stiffness")]
+    #[schemars(range(min = 0.01, max = 1.0))]
+    pub stiffness_n_per_mm: f32,
+    /// N·s/mm, up to 0.01; without it 0.005 s times the stiffness. At least 0.004 s times the stiffness: less would push the hand about.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 0.01))]
+    pub damping_n_s_per_mm: Option<f32>,
+    /// Most that the spring pulls, N: 0.05 to 3. A hand must be able to win.
+    #[serde(default = "FixtureFile::max_force")]
+    #[schemars(range(min = 0.05, max = 3.0))]
+    pub max_force_n: f32,
+    /// Only to follow: how much of the path may be left out at once, mm: 0.2 to 20; 2 without it. Less than the distance, along
+    /// the path, between places where it crosses or meets itself.
+    #[serde(default)]
+    #[schemars(range(min = 0.2, max = 20.0))]
+    pub look_ahead_mm: Option<f32>,
+    /// Only to follow: speed at which the hand is pulled along, mm/s: 0.1 to 100; without it the hand sets the pace.
+    #[serde(default)]
+    #[schemars(range(min = 0.1, max = 100.0))]
+    pub speed_mm_s: Option<f32>,
+}
+
+impl FixtureFile {
+    fn stiffness() -> f32 {
+        0.2
+    }
+
+    fn max_force() -> f32 {
+        1.0
+    }
+}
+
+/// Where on a path the hand is drawn to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FixtureKind {
+    /// From the path's beginning to its end: to the nearest place from where the hand has come so far.
+    Follow,
+    /// To the nearest place, back and forth as the hand likes.
+    Tube,
+}
+
+/// Forces over time.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ForcesFile {
+    /// CSV file with the header time_s,fx_n,fy_n,fz_n, relative to the scenario's folder. The first row is the stage's
+    /// beginning; between rows forces change evenly.
+    #[schemars(length(min = 1, max = 500), regex(pattern = r"\.csv$"))]
+    pub file: String,
+    /// Whether the forces begin again, half a second after the last row.
+    #[serde(default)]
+    pub repeat: bool,
+    /// Factor for all forces, 0.01 to 100; no force may then be more than 5 N.
+    #[serde(default = "one")]
+    #[schemars(range(min = 0.01, max = 100.0))]
+    pub scale: f32,
+    /// Space in which the forces are written.
+    pub space: SpaceFile,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+/// A space in which forces are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SpaceFile {
+    /// x right, y up, z toward the trainee.
+    World,
+    /// x buccal, y distal, z occlusal.
+    Tooth,
 }
 
 /// 0 to 1.

@@ -18,7 +18,7 @@ pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
 
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
-use crate::touch::{Carving, Factors, Shape, Vibration};
+use crate::touch::{Carving, Factors, Guidance, Shape, Vibration};
 use crate::volume::{Label, Volume};
 use file::{SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
@@ -46,6 +46,8 @@ pub struct Scenario {
     /// What each of them and the patient's age make of the tissues.
     pub factors: Vec<Factors>,
     pub zones: Vec<Zone>,
+    /// What leads the hand; stages refer to it by index.
+    pub guidances: Vec<Guidance>,
     pub stages: Vec<Stage>,
     pub measures: Measures,
     pub rubric: Option<Rubric>,
@@ -176,6 +178,8 @@ pub struct Stage {
     pub cutting: bool,
     pub show_decay: bool,
     pub steps: Option<StiffnessSteps>,
+    /// Index into [`Scenario::guidances`].
+    pub guidance: Option<usize>,
     pub ask: Vec<Question>,
     pub ends: Ends,
 }

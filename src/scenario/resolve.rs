@@ -13,7 +13,10 @@ use crate::content::json::{self, Places};
 use crate::content::{self, AgeBand, FeelTable, InstrumentEntry, InstrumentTable, Library, TissueEntry, TissueTable};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
 use crate::frame::{Pose, Quat, Vec3};
-use crate::touch::{self, Carving, CuttingLaw, Factor, Factors, Obstacle, Rate, Shape, Vibration};
+use crate::touch::{
+    self, Carving, CuttingLaw, DAMPING_TIME, Factor, Factors, Fixture, Forces, Guidance, Kind, Obstacle, Rate, Shape,
+    Space, Vibration,
+};
 use crate::volume::{Label, Volume};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -21,6 +24,12 @@ use std::sync::Arc;
 
 /// Points of all rubric items together.
 const POINTS: f64 = 100.0;
+
+/// Damping of a fixture whose author leaves it open, as a share of its stiffness, s: somewhat more than it needs.
+const USUAL_DAMPING_TIME: f32 = 1.25 * DAMPING_TIME;
+
+/// A path further from the teeth than this leads nowhere, mm.
+const PATH_AWAY: f32 = 10.0;
 
 /// Whether the teeth's forms are wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +56,9 @@ pub fn resolve(source: Arc<Source>, library: &Library, forms: Forms) -> Result<S
         found.append(&mut complaints);
         None
     });
-    let mut resolver = Resolver { library, feel, places: &read.places, forms, tissues, instruments, files, found };
+    let guidances = Vec::new();
+    let mut resolver =
+        Resolver { library, feel, places: &read.places, forms, tissues, instruments, files, guidances, found };
     let scenario = resolver.scenario(&read.value, &source.text);
     let mut found = resolver.found;
     if found.is_empty()
@@ -67,7 +78,10 @@ pub fn resolve(source: Arc<Source>, library: &Library, forms: Forms) -> Result<S
 /// Makes the workpiece once: what only shows in the matter itself (a decay outside its tooth) is told to the author too.
 fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, found: &mut Vec<Diagnostic>) {
     let problem = match Workpiece::make(scenario, 0) {
-        Ok(workpiece) => return find_zones_outside(scenario, &workpiece, places, found),
+        Ok(workpiece) => {
+            find_paths_away(scenario, &workpiece, places, found);
+            return find_zones_outside(scenario, &workpiece, places, found);
+        }
         Err(problem) => problem,
     };
     let (path, help) = match &problem {
@@ -89,8 +103,7 @@ fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, fou
 
 /// A zone that no tooth reaches would never matter, and its author would never know.
 fn find_zones_outside(scenario: &Scenario, workpiece: &Workpiece, places: &Places, found: &mut Vec<Diagnostic>) {
-    let low = workpiece.teeth.iter().map(|t| t.low).reduce(Vec3::min).unwrap_or_default();
-    let high = workpiece.teeth.iter().map(|t| t.high).reduce(Vec3::max).unwrap_or_default();
+    let [low, high] = corners(workpiece);
     for (index, zone) in scenario.zones.iter().enumerate() {
         let is_outside = |[from, to]: [Vec3; 2]| from.cmpgt(high).any() || to.cmplt(low).any();
         if zone.region.extent().is_some_and(is_outside) {
@@ -99,6 +112,29 @@ fn find_zones_outside(scenario: &Scenario, workpiece: &Workpiece, places: &Place
             found.push(places.complain(&format!("/zones/{index}/region"), "empty-region", message, Some(help)));
         }
     }
+}
+
+/// A path far from every tooth is one in another space or another unit.
+fn find_paths_away(scenario: &Scenario, workpiece: &Workpiece, places: &Places, found: &mut Vec<Diagnostic>) {
+    let [low, high] = corners(workpiece);
+    let is_near = |p: &Vec3| p.distance(p.clamp(low, high)) <= PATH_AWAY;
+    for (index, stage) in scenario.stages.iter().enumerate() {
+        if let Some(Guidance::Path(fixture)) = stage.guidance.and_then(|g| scenario.guidances.get(g))
+            && !fixture.path.points().iter().any(is_near)
+        {
+            let message = format!("the path stays more than {PATH_AWAY} mm away from the tooth");
+            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm: buccal, distal, occlusal");
+            let path = format!("/stages/{index}/guidance/path/file");
+            found.push(places.complain(&path, "wrong-place", message, Some(help)));
+        }
+    }
+}
+
+/// Corners of the box around all teeth, tooth space, mm.
+fn corners(workpiece: &Workpiece) -> [Vec3; 2] {
+    let low = workpiece.teeth.iter().map(|t| t.low).reduce(Vec3::min).unwrap_or_default();
+    let high = workpiece.teeth.iter().map(|t| t.high).reduce(Vec3::max).unwrap_or_default();
+    [low, high]
 }
 
 fn written_teeth(scene: &file::SceneFile) -> Vec<&file::ToothFile> {
@@ -127,6 +163,8 @@ struct Resolver<'a> {
     feel: Option<FeelTable>,
     /// Files that the scenario was made from, scans apart.
     files: BTreeMap<String, Arc<[u8]>>,
+    /// What leads the hand, in the order of the stages.
+    guidances: Vec<Guidance>,
     found: Vec<Diagnostic>,
 }
 
@@ -168,6 +206,7 @@ impl Resolver<'_> {
             instruments,
             factors,
             zones,
+            guidances: std::mem::take(&mut self.guidances),
             stages,
             measures: Measures {
                 near: written.measures.near_mm,
@@ -614,6 +653,7 @@ impl Resolver<'_> {
             coefficients: steps.coefficients.iter().map(|c| c.0).collect(),
             step_time: steps.step_time_s,
         });
+        let guidance = written.guidance.as_ref().and_then(|g| self.guidance(g, &format!("{path}/guidance")));
         let ask = written
             .ask
             .iter()
@@ -629,8 +669,90 @@ impl Resolver<'_> {
             cutting: written.cutting,
             show_decay: written.show_decay,
             steps,
+            guidance,
             ask,
             ends,
+        }
+    }
+
+    /// Index of what leads the hand; `None` only when it was complained about.
+    fn guidance(&mut self, written: &file::GuidanceFile, path: &str) -> Option<usize> {
+        let guidance = match written {
+            file::GuidanceFile::Path(fixture) => Guidance::Path(self.fixture(fixture, &format!("{path}/path"))?),
+            file::GuidanceFile::Forces(forces) => Guidance::Forces(self.forces(forces, &format!("{path}/forces"))?),
+        };
+        self.guidances.push(guidance);
+        Some(self.guidances.len() - 1)
+    }
+
+    fn fixture(&mut self, written: &file::FixtureFile, path: &str) -> Option<Fixture> {
+        let is_tube = written.kind == file::FixtureKind::Tube;
+        let of_follow =
+            [("look_ahead_mm", written.look_ahead_mm.is_some()), ("speed_mm_s", written.speed_mm_s.is_some())];
+        for (key, _) in of_follow.iter().filter(|(_, is_written)| *is_written && is_tube) {
+            let message = format!("a tube has no {key}");
+            self.complain(
+                &format!("{path}/{key}"),
+                "unused-key",
+                message,
+                "leave it out, or set \"kind\" to \"follow\"",
+            );
+        }
+        let stiffness = written.stiffness_n_per_mm;
+        let damping = written.damping_n_s_per_mm.unwrap_or(USUAL_DAMPING_TIME * stiffness);
+        if damping < DAMPING_TIME * stiffness {
+            let message = format!("a spring of {stiffness} N/mm would shake with so little damping");
+            let help = format!("at least {:.4}, or leave it out", DAMPING_TIME * stiffness);
+            self.complain(&format!("{path}/damping_n_s_per_mm"), "unstable-spring", message, help);
+        }
+        let kind = match written.kind {
+            file::FixtureKind::Tube => Kind::Tube,
+            file::FixtureKind::Follow => {
+                Kind::Follow { look_ahead: written.look_ahead_mm.unwrap_or(2.0), speed: written.speed_mm_s }
+            }
+        };
+        Some(Fixture {
+            path: Arc::new(self.measured(&written.file, &format!("{path}/file"), content::measured::path)?),
+            kind,
+            radius: written.radius_mm.unwrap_or(if is_tube { 0.5 } else { 0.0 }),
+            stiffness,
+            damping,
+            max_force: written.max_force_n,
+        })
+    }
+
+    fn forces(&mut self, written: &file::ForcesFile, path: &str) -> Option<Forces> {
+        let rows = self.measured(&written.file, &format!("{path}/file"), content::measured::forces)?;
+        let strongest = rows.iter().map(|row| row.force.length()).fold(0.0, f32::max) * written.scale;
+        if strongest > content::measured::FORCE_MAX {
+            let message = format!("scaled, the greatest force is {strongest:.1} N");
+            let help = format!("at most {} N are played", content::measured::FORCE_MAX);
+            self.complain(&format!("{path}/scale"), "out-of-range", message, help);
+        }
+        let space = match written.space {
+            file::SpaceFile::World => Space::World,
+            file::SpaceFile::Tooth => Space::Tooth,
+        };
+        Some(Forces { rows: rows.into(), repeat: written.repeat, scale: written.scale, space })
+    }
+
+    /// A table of measured numbers beside the scenario. A missing file is the scenario's mistake, a broken one the table's.
+    fn measured<T>(
+        &mut self,
+        name: &str,
+        path: &str,
+        read: impl FnOnce(Arc<Source>) -> Result<T, Vec<Diagnostic>>,
+    ) -> Option<T> {
+        let bytes = self.library.bytes(name).and_then(|bytes| Ok((bytes, self.library.text(name)?)));
+        match bytes {
+            Ok((bytes, text)) => {
+                self.files.insert(name.to_string(), bytes);
+                read(text).map_err(|mut complaints| self.found.append(&mut complaints)).ok()
+            }
+            Err(Diagnostic { code, message, help, .. }) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
         }
     }
 

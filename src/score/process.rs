@@ -151,13 +151,15 @@ impl Watcher {
         self.now.cutting |= step.cutting;
         self.was_touched |= step.touch.is_some();
         if let Some(touch) = &step.touch {
-            let force = f64::from(step.force.length());
+            // How the exercise leads the hand is not how hard the trainee presses.
+            let pressed = if step.guidance == Vec3::ZERO { step.force } else { step.force - step.guidance };
+            let force = f64::from(pressed.length());
             self.seen.contact_ticks += 1;
             self.seen.force.add(force, tick, place);
             if self.danger.is_near(place) {
                 self.seen.force_near.add(force, tick, place);
             }
-            self.now.force = self.now.force.max(step.force.length());
+            self.now.force = self.now.force.max(pressed.length());
             self.now.touched = true;
             let is_running = self.cuts[step.instrument] && session.stage().is_some_and(|(_, s)| s.cutting);
             match self.roles[usize::from(touch.label.0)] {

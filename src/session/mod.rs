@@ -31,6 +31,7 @@ pub fn setup(scenario: &Scenario, workpiece: &Workpiece, device: Spec) -> Setup 
         instruments: scenario.instruments.iter().map(|i| i.make()).collect(),
         carving: scenario.carving,
         vibration: scenario.vibration,
+        guidances: scenario.guidances.clone(),
         world_from_tooth: workpiece.world_from_tooth,
         device,
         ramp: RAMP_TICKS,
@@ -281,6 +282,9 @@ impl Session {
             self.instrument = stage.instruments[0];
             effects.push(Effect::Tell(Command::Take { instrument: self.instrument }));
         }
+        if stage.guidance.is_some() {
+            effects.push(Effect::Tell(Command::Guide { guidance: stage.guidance }));
+        }
         if stage.steps.is_some() {
             self.start_step(0, stage, &mut effects);
         }
@@ -300,6 +304,9 @@ impl Session {
         let result = self.result(by);
         self.outcome.stages.push(result);
         let mut effects = vec![Effect::StageEnded { stage: index, by }];
+        if self.scenario.stages[index].guidance.is_some() {
+            effects.push(Effect::Tell(Command::Guide { guidance: None }));
+        }
         if let Some(steps) = &self.scenario.stages[index].steps
             && let Some(entry) = self.scenario.tissues.by_label(steps.label)
         {

@@ -17,8 +17,8 @@ use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
-    Carver, Carving, Contact, Factors, ForceLimit, Gate, Instrument, Law, Materials, Matter, Press, Proxy, SpringLimit,
-    Vibration,
+    Carver, Carving, Contact, Factors, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials, Matter, Press,
+    Proxy, SpringLimit, Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
 
@@ -33,6 +33,8 @@ pub struct Setup {
     pub instruments: Vec<Instrument>,
     pub carving: Carving,
     pub vibration: Vibration,
+    /// In the order in which [`Command::Guide`] counts them.
+    pub guidances: Vec<Guidance>,
     pub world_from_tooth: Pose,
     pub device: Spec,
     /// Ticks over which forces come in after the hand was let go: at the start, after another instrument was taken, after a
@@ -52,6 +54,8 @@ pub enum Command {
     SetStiffness { label: Label, stiffness: f32 },
     /// Lets burs run, or stops them.
     RunBur { running: bool },
+    /// Leads the hand by a guidance from its beginning, or by none.
+    Guide { guidance: Option<usize> },
 }
 
 /// What one tick came to. Positions and forces in world space.
@@ -73,6 +77,8 @@ pub struct Step {
     pub removed: u32,
     /// How another hand led this one, N: part of `force`.
     pub lead: Vec3,
+    /// How the exercise led the hand, N: part of `force`.
+    pub guidance: Vec3,
     /// Index of the instrument in the hand.
     pub instrument: usize,
 }
@@ -104,6 +110,7 @@ pub struct Simulation {
     factors: Vec<Factors>,
     instruments: Vec<Instrument>,
     vibration: Vibration,
+    guide: Guide,
     world_from_tooth: Pose,
     tooth_from_world: Pose,
     force_limit: ForceLimit,
@@ -130,8 +137,18 @@ impl Simulation {
     /// # Panics
     /// Without any instrument: a scenario that resolved has one.
     pub fn new(setup: Setup) -> Simulation {
-        let Setup { matter, materials, mut factors, instruments, carving, vibration, world_from_tooth, device, ramp } =
-            setup;
+        let Setup {
+            matter,
+            materials,
+            mut factors,
+            instruments,
+            carving,
+            vibration,
+            guidances,
+            world_from_tooth,
+            device,
+            ramp,
+        } = setup;
         assert!(!instruments.is_empty(), "a hand holds something");
         factors.resize(instruments.len(), Factors::default());
         let spring = SpringLimit {
@@ -147,6 +164,7 @@ impl Simulation {
             factors,
             instruments,
             vibration,
+            guide: Guide::new(guidances, &spring),
             world_from_tooth,
             tooth_from_world,
             force_limit: ForceLimit { max_force: device.max_force },
@@ -203,6 +221,10 @@ impl Simulation {
         if self.lead != Vec3::ZERO {
             force += self.lead;
         }
+        let guidance = self.guide.force(tick, hand, self.law.velocity(), &self.world_from_tooth);
+        if guidance != Vec3::ZERO {
+            force += guidance;
+        }
         let force = self.gate.emit(force, &self.force_limit);
         let touch = contact.map(|Contact { label, normal, .. }| Touch {
             label,
@@ -219,6 +241,7 @@ impl Simulation {
             cutting,
             removed: self.carver.edits().iter().filter(|e| e.removes()).count() as u32,
             lead: self.lead,
+            guidance,
             instrument: self.instrument,
         }
     }
@@ -237,6 +260,7 @@ impl Simulation {
         self.eased = 0;
         self.carver.rest();
         self.law.forget();
+        self.guide.let_go();
         self.proxy.let_go(self.tooth_from_world * self.hand.position);
         Step {
             tick,
@@ -248,6 +272,7 @@ impl Simulation {
             cutting: false,
             removed: 0,
             lead: Vec3::ZERO,
+            guidance: Vec3::ZERO,
             instrument: self.instrument,
         }
     }
@@ -273,6 +298,7 @@ impl Simulation {
                 }
             }
             Command::RunBur { running } => self.bur_runs = running,
+            Command::Guide { guidance } => self.guide.choose(guidance, self.tick),
         }
     }
 

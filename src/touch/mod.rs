@@ -14,10 +14,14 @@ mod law;
 mod rate;
 mod carve;
 mod vibration;
+mod guidance;
 mod gate;
 
 pub use carve::{Carver, Carving, CuttingLaw, Press};
 pub use gate::{ForceLimit, Gate};
+pub use guidance::{
+    DAMPING_TIME, EASE_S, Fixture, ForceRow, Forces, Guidance, Guide, Kind, POINT_DISTANCE, Path, Space,
+};
 pub use instrument::{Instrument, WorkingEnd};
 pub use law::{Law, Pull, SpringLimit};
 pub use material::{Factor, Factors, Material, Materials};
