@@ -8,10 +8,11 @@
 //! the density itself, so what falls does not depend on the voxels' size. Neither does how much: the advance per tick
 //! is limited in millimetres, never in voxels.
 
+use super::body::Body;
 use super::instrument::Instrument;
 use super::law::Pull;
 use super::material::Materials;
-use crate::frame::Vec3;
+use crate::frame::{Quat, Vec3};
 use crate::tick::TICK_S;
 use crate::volume::{Density, Edit, Volume, Voxel, ramp};
 
@@ -90,7 +91,10 @@ impl Carver {
         let share = self.threshold_share(press.hand);
         let planned = self.biting.or_else(|| Some((self.plan(volume, instrument, materials, press, share)?, 0)));
         let Some((bite, done)) = planned else { return false };
-        self.carve(volume, &bite, done);
+        match instrument.body() {
+            None => self.carve(volume, &bite, done),
+            Some(body) => self.carve_body(volume, body, &bite, done),
+        }
         self.biting = (done + 1 < SHARES).then_some((bite, done + 1));
         true
     }
@@ -104,7 +108,7 @@ impl Carver {
         press: &Press,
         share: f32,
     ) -> Option<Bite> {
-        let Press { tip, hand, pull } = *press;
+        let Press { tip, hand, orientation, pull } = *press;
         let deepest = self.plan_advance(materials, &pull, share);
         if deepest <= 0.0 {
             self.owed = None;
@@ -112,7 +116,7 @@ impl Carver {
         }
         let way = (hand - tip).normalize_or_zero() * deepest + self.arrears(tip, volume.band());
         self.owed = Some(tip + way);
-        Some(Bite { tip, way, deepest, radius: instrument.radius() + RUN_OUT })
+        Some(Bite { tip, way, deepest, radius: instrument.radius() + RUN_OUT, orientation })
     }
 
     /// What the last bite owes to the tip: the part of its way that was too short to change a stored density.
@@ -186,6 +190,59 @@ impl Carver {
         }
     }
 
+    /// Carries out one share of a bite with a working end of any shape.
+    fn carve_body(&mut self, volume: &mut Volume, body: &Body, bite: &Bite, share: u32) {
+        let (grid, band) = (*volume.grid(), volume.band());
+        let cylinder = Cylinder::of(body, bite, RUN_OUT + band);
+        let [low, high] = cylinder.extent();
+        let [xs, ys, zs] = grid.cells_within(low, high);
+        let to_steps = grid.spacing.x.recip();
+        for z in zs {
+            for y in ys.clone().filter(|y| (y + z) % SHARES == share) {
+                let first = grid.centre([xs.start, y, z]);
+                let Some([low, high]) = cylinder.cut(first) else { continue };
+                let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
+                let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
+                self.carve_body_run(volume, body, bite, [xs.start, y, z], steps);
+            }
+        }
+    }
+
+    /// Carves a part of a row, given in steps from one of its cells.
+    fn carve_body_run(
+        &mut self,
+        volume: &mut Volume,
+        body: &Body,
+        bite: &Bite,
+        row: [u32; 3],
+        steps: std::ops::Range<u32>,
+    ) {
+        let start = volume.grid().index(row);
+        let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
+        if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
+            return;
+        }
+        let [x, y, z] = row;
+        let (grid, band) = (*volume.grid(), volume.band());
+        let handle_from_tooth = glam::Mat3::from_quat(bite.orientation.conjugate());
+        let first = handle_from_tooth * (grid.centre(row) - bite.tip - bite.way);
+        let along = handle_from_tooth.x_axis * grid.spacing.x;
+        // Into a harder tissue the bur goes less far: there it is this much farther back for each lost share of its way.
+        let back = handle_from_tooth * bite.way;
+        for step in steps {
+            let before = volume.voxel(start + step as usize);
+            let advance = self.advance[usize::from(before.label.0)];
+            if before.density == Density::EMPTY || advance <= 0.0 {
+                continue;
+            }
+            let place = first + along * step as f32 + back * (1.0 - advance / bite.deepest);
+            let left = ramp(RUN_OUT - body.head_distance(place), band);
+            if left < before.density && self.edits.len() < EDITS_MAX {
+                self.edits.push(volume.set_cell([x + step, y, z], Voxel { density: left, ..before }));
+            }
+        }
+    }
+
     /// Carves a part of a row, given in steps from the row's first voxel.
     fn carve_run(&mut self, volume: &mut Volume, bite: &Bite, row: &Row, steps: std::ops::Range<u32>) {
         let (spacing, band) = (volume.grid().spacing.x, volume.band());
@@ -234,6 +291,8 @@ pub struct Press {
     pub tip: Vec3,
     /// Where the hand is, inside matter: the bur advances toward it.
     pub hand: Vec3,
+    /// `tooth_from_handle`.
+    pub orientation: Quat,
     pub pull: Pull,
 }
 
@@ -258,4 +317,59 @@ struct Bite {
     deepest: f32,
     /// mm
     radius: f32,
+    /// `tooth_from_handle`.
+    orientation: Quat,
+}
+
+/// What a bite can reach with a working end of any shape: a cylinder about its shaft, in tooth space.
+struct Cylinder {
+    middle: Vec3,
+    /// Unit.
+    axis: Vec3,
+    radius: f32,
+    half_length: f32,
+}
+
+impl Cylinder {
+    fn of(body: &Body, bite: &Bite, margin: f32) -> Cylinder {
+        let (radius, [low, high]) = body.head_cylinder();
+        let axis = bite.orientation * Vec3::Z;
+        // A harder tissue sees the end less advanced: half of the way lies on either side of the middle.
+        let middle = bite.tip + bite.way * 0.5 + axis * (0.5 * (low + high));
+        let margin = margin + 0.5 * bite.way.length();
+        Cylinder { middle, axis, radius: radius + margin, half_length: 0.5 * (high - low) + margin }
+    }
+
+    /// Lowest and highest corner of the box around it.
+    fn extent(&self) -> [Vec3; 2] {
+        let aside = |along: f32| self.half_length * along.abs() + self.radius * (1.0 - along * along).max(0.0).sqrt();
+        let half = Vec3::new(aside(self.axis.x), aside(self.axis.y), aside(self.axis.z));
+        [self.middle - half, self.middle + half]
+    }
+
+    /// Where a line along x from a place enters and leaves, as distances from that place.
+    fn cut(&self, from: Vec3) -> Option<[f32; 2]> {
+        let out = from - self.middle;
+        let (along, climb) = (out.dot(self.axis), self.axis.x);
+        let aside = out - self.axis * along;
+        let drift = Vec3::X - self.axis * climb;
+        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+        let (a, b, c) = (drift.length_squared(), drift.dot(aside), aside.length_squared() - self.radius * self.radius);
+        if a > 1e-6 {
+            let inside = b * b - a * c;
+            if inside <= 0.0 {
+                return None;
+            }
+            (low, high) = ((-b - inside.sqrt()) / a, (-b + inside.sqrt()) / a);
+        } else if c > 0.0 {
+            return None;
+        }
+        if climb.abs() > 1e-4 {
+            let (near, far) = ((-self.half_length - along) / climb, (self.half_length - along) / climb);
+            (low, high) = (low.max(near.min(far)), high.min(near.max(far)));
+        } else if along.abs() > self.half_length {
+            return None;
+        }
+        (low < high).then_some([low, high])
+    }
 }

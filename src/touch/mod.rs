@@ -1,24 +1,29 @@
 //! What a hand feels: where an instrument may be, how matter pushes back, what a bur takes away.
 //!
-//! Takes matter, an instrument and where the hand is. Gives where the tip may be, the pull on the hand and the voxels
+//! Takes matter, an instrument and how the hand holds it. Gives where the tip may be, the pull on the hand and the voxels
 //! that fell. Never reads a clock, a file or a device; never allocates once made.
 
 mod matter;
+mod profile;
+mod body;
 mod instrument;
 mod material;
 mod planes;
 mod walls;
+mod shell;
 mod proxy;
 mod law;
 mod carve;
 mod vibration;
 mod gate;
 
+pub use body::{Body, Node, Region, Shank};
 pub use carve::{Carver, Carving, Press};
 pub use gate::{ForceLimit, Gate};
 pub use instrument::{Instrument, WorkingEnd};
 pub use law::{Law, Pull, SpringLimit};
 pub use material::{Material, Materials};
 pub use matter::{Form, Matter, Shape};
+pub use profile::{EDGE, Nearest, Place, Profile};
 pub use proxy::{Contact, Proxy};
 pub use vibration::Vibration;
