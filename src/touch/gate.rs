@@ -95,7 +95,8 @@ mod tests {
     #[test]
     fn a_torque_stays_within_what_the_device_renders() {
         let mut gate = Gate::default();
-        let (none, some) = (ForceLimit { max_force: 3.3, max_torque: 0.0 }, ForceLimit { max_force: 3.3, max_torque: 50.0 });
+        let (none, some) =
+            (ForceLimit { max_force: 3.3, max_torque: 0.0 }, ForceLimit { max_force: 3.3, max_torque: 50.0 });
         assert_eq!(gate.emit_torque(Vec3::X * 20.0, &none), Vec3::ZERO);
         assert_eq!(gate.emit_torque(Vec3::X * f32::NAN, &some), Vec3::ZERO);
         assert_eq!(gate.emit_torque(Vec3::X * 20.0, &some), Vec3::X * 20.0);

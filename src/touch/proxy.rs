@@ -196,8 +196,8 @@ impl Proxy {
         // Where the end turns into matter its tip is pushed as far as the farthest point has swung.
         let (middle, radius) = held.body.enclosing_ball();
         let swung = self.turned.angle_between(held.tooth_from_handle) * (middle.length() + radius);
-        let leash = Leash { centre: self.tip + (hand - self.hand), length: SNAP.max(travelled).max(swung) };
-        let on_leash = self.contact.is_some();
+        let rein = Rein { from: self.tip, way: hand - self.hand, length: SNAP.max(0.5 * travelled).max(swung) };
+        let on_rein = self.contact.is_some();
         let mut last_length = f32::INFINITY;
         self.watch.forget();
         for _ in 0..MOVES_MAX {
@@ -209,8 +209,8 @@ impl Proxy {
             let length = way.length();
             let is_whole = length <= reach;
             let next = if is_whole { allowed } else { self.tip + way * (reach / length) };
-            if on_leash && leash.ends_before(next) {
-                self.tip = leash.end(self.tip, next);
+            if on_rein && rein.ends_before(next) {
+                self.tip = rein.end(self.tip, next);
                 break;
             }
             self.tip = next;
@@ -329,6 +329,37 @@ impl Leash {
         let (a, b, c) = (way.length_squared(), way.dot(out), out.length_squared() - self.length * self.length);
         let root = (b * b - a * c).max(0.0).sqrt();
         from + way * ((root - b) / a.max(1e-12)).clamp(0.0, 1.0)
+    }
+}
+
+/// How far the tip of a shell may stray within one tick from where it is and from where it would be had it moved exactly
+/// like the hand. Half the hand's way is what the steepest slope asks of it; more would be a snap.
+#[derive(Clone, Copy)]
+struct Rein {
+    from: Vec3,
+    way: Vec3,
+    length: f32,
+}
+
+impl Rein {
+    fn ends_before(&self, place: Vec3) -> bool {
+        let out = place - self.from;
+        let share = (out.dot(self.way) / self.way.length_squared().max(1e-12)).clamp(0.0, 1.0);
+        out.distance_squared(self.way * share) > self.length * self.length
+    }
+
+    /// The last place within reach on the way from a place within it to one beyond, to a thousandth of that way.
+    fn end(&self, from: Vec3, to: Vec3) -> Vec3 {
+        let (mut within, mut beyond) = (0.0, 1.0);
+        for _ in 0..10 {
+            let share = 0.5 * (within + beyond);
+            if self.ends_before(from.lerp(to, share)) {
+                beyond = share;
+            } else {
+                within = share;
+            }
+        }
+        from.lerp(to, within)
     }
 }
 
