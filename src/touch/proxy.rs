@@ -114,6 +114,7 @@ impl Proxy {
         self.hand = hand_in_tooth;
         self.contact = None;
         self.grip = 1.0;
+        self.watch.forget();
     }
 
     /// True when the instrument could be held so without entering matter; `hand` is `tooth_from_handle`.
@@ -196,7 +197,8 @@ impl Proxy {
         // Where the end turns into matter its tip is pushed as far as the farthest point has swung.
         let (middle, radius) = held.body.enclosing_ball();
         let swung = self.turned.angle_between(held.tooth_from_handle) * (middle.length() + radius);
-        let rein = Rein { from: self.tip, way: hand - self.hand, length: SNAP.max(0.5 * travelled).max(swung) };
+        let (from, hands_way, stretch) = (self.tip, hand - self.hand, self.tip.distance(self.hand));
+        let pushed = SNAP.max(0.5 * travelled).max(swung);
         let on_rein = self.contact.is_some();
         let mut last_length = f32::INFINITY;
         self.watch.forget();
@@ -209,6 +211,9 @@ impl Proxy {
             let length = way.length();
             let is_whole = length <= reach;
             let next = if is_whole { allowed } else { self.tip + way * (reach / length) };
+            // What matter pushes aside must get out of its way; what it lets go of has time.
+            let slackness = if next.distance(hand) < stretch { SNAP } else { pushed };
+            let rein = Rein { from, way: hands_way, length: slackness };
             if on_rein && rein.ends_before(next) {
                 self.tip = rein.end(self.tip, next);
                 break;
@@ -297,6 +302,9 @@ impl Proxy {
 
     /// Where a wall's push acts: a flat end rests on all walls that are as near and face alike, not on one of them.
     fn middle_of_push(&self, wall: &Plane) -> Vec3 {
+        if !self.watch.is_looking() {
+            return wall.at;
+        }
         let (mut sum, mut weight) = (Vec3::ZERO, 0.0);
         for plane in &self.planes {
             let alike = (plane.normal.dot(wall.normal) - ALIKE) / (1.0 - ALIKE);
@@ -333,7 +341,7 @@ impl Leash {
 }
 
 /// How far the tip of a shell may stray within one tick from where it is and from where it would be had it moved exactly
-/// like the hand. Half the hand's way is what the steepest slope asks of it; more would be a snap.
+/// like the hand. Half the hand's way is what the steepest slope asks of it.
 #[derive(Clone, Copy)]
 struct Rein {
     from: Vec3,

@@ -32,6 +32,11 @@ impl Watch {
         Watch { near: Vec::with_capacity(points), seen_from: None }
     }
 
+    /// True while it is a shell that is followed.
+    pub fn is_looking(&self) -> bool {
+        self.seen_from.is_some()
+    }
+
     /// The instrument has turned or is another: all points are looked at again.
     pub fn forget(&mut self) {
         self.seen_from = None;
