@@ -20,6 +20,10 @@ const GRAIN: f32 = 7.5e-5;
 /// Looks along the surface for the true place of contact. Three find it on every phantom; a fourth changes nothing felt.
 const LOOKS: usize = 3;
 
+/// Directions tried one after the other: where the end is curved one way and matter the other, the deepest place lies off
+/// the first.
+const TURNS: usize = 2;
+
 /// Which points have matter near, and from where that was seen.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
@@ -187,15 +191,24 @@ impl Glance {
 /// Looks along the surface around a point for the place where the end is deepest in matter: where the normals of both are
 /// opposite, or where the point's part of the surface ends.
 fn settled(volume: &Volume, stand: &Stand, node: &Node) -> Sight {
-    let first = Glance::from(volume, stand, node.at, node.outward);
-    let downhill = -first.normal - node.outward * -first.normal.dot(node.outward);
-    let along = downhill.normalize_or_zero();
-    if first.is_opposite() || along == Vec3::ZERO {
-        return first.sight(stand, -node.outward);
+    let mut found = Glance::from(volume, stand, node.at, node.outward);
+    let mut normal = -found.outward;
+    for _ in 0..TURNS {
+        let downhill = found.outward * found.normal.dot(found.outward) - found.normal;
+        let along = downhill.normalize_or_zero();
+        if found.is_opposite() || along == Vec3::ZERO {
+            break;
+        }
+        (found, normal) = deepest_along(volume, stand, node, &found, along);
     }
+    Sight { at: found.at, normal: stand.turn * normal, distance: found.distance }
+}
+
+/// The deepest place along one direction, and the normal of the contact there.
+fn deepest_along(volume: &Volume, stand: &Stand, node: &Node, first: &Glance, along: Vec3) -> (Glance, Vec3) {
     let reach = reach_along(node, along);
     let glance_at = |share: f32| {
-        let (at, outward) = stand.held.body.on_surface(node.at + along * (reach * share), node.region);
+        let (at, outward) = stand.held.body.on_surface(first.at + along * (reach * share), node.region);
         Glance::from(volume, stand, at, outward)
     };
     // False position between a place where it still gets deeper and one where it does so no more.
@@ -203,7 +216,6 @@ fn settled(volume: &Volume, stand: &Stand, node: &Node) -> Sight {
     let (mut high, mut found) = (1.0, glance_at(1.0));
     let mut high_slope = found.slope_beyond(along);
     let last = found;
-    let mut turned = (found.normal - first.normal).length();
     for _ in 1..LOOKS {
         if high_slope >= 0.0 || found.is_opposite() {
             break;
@@ -216,22 +228,18 @@ fn settled(volume: &Volume, stand: &Stand, node: &Node) -> Sight {
         } else {
             (high, high_slope) = (share, slope);
         }
-        turned = turned.max((found.normal - first.normal).length());
     }
     // Of two bodies that touch, the one that is flatter there tells the normal better.
     let bent = (last.outward - first.outward).length();
+    let turned = (last.normal - first.normal).length();
     let normal = (found.normal * bent - found.outward * turned).try_normalize().unwrap_or(-found.outward);
-    found.sight(stand, normal)
+    (found, normal)
 }
 
 impl Glance {
     /// The slope along what a direction has become on the surface here.
     fn slope_beyond(&self, along: Vec3) -> f32 {
         self.slope((along - self.outward * along.dot(self.outward)).normalize_or_zero())
-    }
-
-    fn sight(&self, stand: &Stand, normal_in_handle: Vec3) -> Sight {
-        Sight { at: self.at, normal: stand.turn * normal_in_handle, distance: self.distance }
     }
 }
 
