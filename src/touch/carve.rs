@@ -37,6 +37,10 @@ const RUN_OUT: f32 = 0.01;
 /// How far behind its centre a bur still clears its sides, as a share of its radius.
 const BEHIND: f32 = 0.2;
 
+/// A surface cuts that faces the way by more than this (cosine). The sides of a plunging fissure bur do not: what its tip has
+/// opened is wide enough, and cutting there again with every tremble of the hand would ream the hole out.
+const FACING: f32 = 0.02;
+
 /// A bite is carried out over this many ticks, every so many-th row of voxels in each: a bur at full contact changes
 /// thousands of fine voxels, and no single tick should bear them all. Rows interleave, so the surface sinks evenly.
 const SHARES: u32 = 3;
@@ -229,15 +233,22 @@ impl Carver {
         let along = handle_from_tooth.x_axis * grid.spacing.x;
         // Into a harder tissue the bur goes less far: there it is this much farther back for each lost share of its way.
         let back = handle_from_tooth * bite.way;
+        let far = bite.way.length();
         for step in steps {
             let before = volume.voxel(start + step as usize);
             let advance = self.advance[usize::from(before.label.0)];
             if before.density == Density::EMPTY || advance <= 0.0 {
                 continue;
             }
-            let place = first + along * step as f32 + back * (1.0 - advance / bite.deepest);
-            let left = ramp(RUN_OUT - body.head_distance(place), band);
-            if left < before.density && self.edits.len() < EDITS_MAX {
+            let share = advance / bite.deepest;
+            let here = first + along * step as f32;
+            let distance = body.head_distance(here + back * (1.0 - share));
+            let left = ramp(RUN_OUT - distance, band);
+            if left >= before.density || self.edits.len() >= EDITS_MAX {
+                continue;
+            }
+            let gained = body.head_distance(here + back) - distance;
+            if gained > FACING * far * share {
                 self.edits.push(volume.set_cell([x + step, y, z], Voxel { density: left, ..before }));
             }
         }
