@@ -79,7 +79,7 @@ const POINTS: f32 = 500.0;
 const APART: [f32; 2] = [0.08, 0.4];
 
 /// How much coarser the shank is watched than the head: it is met rarely, and by large surfaces.
-const SHANK_APART: f32 = 2.0;
+const SHANK_APART: f32 = 2.5;
 
 impl Body {
     /// A bur: a body of revolution with its tip at the origin, and its shank.
@@ -178,8 +178,8 @@ impl Body {
     /// The place on a region's surface nearest to a point of handle space, and the outward normal there.
     pub(super) fn on_surface(&self, point_in_handle: Vec3, region: Region) -> (Vec3, Vec3) {
         let turned = |profile: &Profile| {
-            let near = profile.nearest(Place::of(point_in_handle));
-            (near.on.beside(point_in_handle), near.normal.beside(point_in_handle))
+            let (on, normal) = profile.onto(Place::of(point_in_handle));
+            (on.beside(point_in_handle), normal.beside(point_in_handle))
         };
         match (region, &self.head, &self.shank) {
             (Region::Shank, _, Some(shank)) => turned(shank),

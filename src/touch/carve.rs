@@ -235,9 +235,12 @@ impl Carver {
         let back = handle_from_tooth * bite.way;
         let far = bite.way.length();
         for step in steps {
+            if volume.densities()[start + step as usize] == Density::EMPTY {
+                continue;
+            }
             let before = volume.voxel(start + step as usize);
             let advance = self.advance[usize::from(before.label.0)];
-            if before.density == Density::EMPTY || advance <= 0.0 {
+            if advance <= 0.0 {
                 continue;
             }
             let share = advance / bite.deepest;

@@ -162,19 +162,24 @@ impl Profile {
 
     /// The place of the outline nearest to a place.
     pub fn nearest(&self, at: Place) -> Nearest {
+        let (on, normal) = self.onto(at);
+        let far = on.distance_squared(at).sqrt();
+        Nearest { distance: if at.r < self.radius_at(at.z) { -far } else { far }, on, normal }
+    }
+
+    /// The same without the distance: the place and the outward normal there.
+    pub(super) fn onto(&self, at: Place) -> (Place, Place) {
         let mut least = f32::INFINITY;
-        let mut found = (at, 0);
-        for (index, piece) in self.pieces.iter().enumerate() {
+        let mut found = (at, None);
+        for piece in &self.pieces {
             let on = piece.nearest(at);
             let squared = on.distance_squared(at);
             if squared < least {
-                (least, found) = (squared, (on, index));
+                (least, found) = (squared, (on, Some(piece)));
             }
         }
-        let (on, index) = found;
-        let normal = self.pieces.get(index).map_or(Place { r: 1.0, z: 0.0 }, |p| p.normal(on));
-        let far = least.sqrt();
-        Nearest { distance: if at.r < self.radius_at(at.z) { -far } else { far }, on, normal }
+        let (on, piece) = found;
+        (on, piece.map_or(Place { r: 1.0, z: 0.0 }, |p| p.normal(on)))
     }
 
     /// Volume of the body, mm³: Simpson's rule over every piece.

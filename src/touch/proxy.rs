@@ -201,7 +201,7 @@ impl Proxy {
         let pushed = SNAP.max(0.5 * travelled).max(swung);
         let on_rein = self.contact.is_some();
         let mut last_length = f32::INFINITY;
-        self.watch.forget();
+        self.watch.swing(swung);
         for _ in 0..MOVES_MAX {
             let look = walls::Look { tip: self.tip, goal, reach };
             shell::find(&mut self.planes, &mut self.watch, matter, held, look);

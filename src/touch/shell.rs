@@ -12,10 +12,13 @@ use crate::frame::{Quat, Vec3};
 use crate::volume::{ISO, Volume};
 
 /// Distance below which a point may be what holds the tip, mm: it is looked at closely.
-const CLOSE: f32 = 0.025;
+const CLOSE: f32 = 0.018;
 
 /// Closer to opposite than this (1 − cos 0.7°) the end's and matter's normals are the same: what a voxel surface resolves.
 const GRAIN: f32 = 7.5e-5;
+
+/// What surely stays this far from matter in one tick's last moves is not looked at more closely, mm.
+const APART: f32 = 0.004;
 
 /// Looks along the surface for the true place of contact. Three find it on every phantom; a fourth changes nothing felt.
 const LOOKS: usize = 3;
@@ -24,16 +27,19 @@ const LOOKS: usize = 3;
 /// the first.
 const TURNS: usize = 2;
 
-/// Which points have matter near, and from where that was seen.
+/// Which points need no look yet: matter is too far from them for what the instrument has moved since.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
-    near: Vec<u32>,
+    /// Of each point, the way at which it may meet matter again, mm.
+    wake: Vec<f64>,
+    /// Farthest that any point can have moved since the watch began, mm.
+    way: f64,
     seen_from: Option<Vec3>,
 }
 
 impl Watch {
     pub fn with_capacity(points: usize) -> Watch {
-        Watch { near: Vec::with_capacity(points), seen_from: None }
+        Watch { wake: Vec::with_capacity(points), way: 0.0, seen_from: None }
     }
 
     /// True while it is a shell that is followed.
@@ -41,9 +47,26 @@ impl Watch {
         self.seen_from.is_some()
     }
 
-    /// The instrument has turned or is another: all points are looked at again.
+    /// The instrument is another or was put elsewhere: all points are looked at again.
     pub fn forget(&mut self) {
         self.seen_from = None;
+    }
+
+    /// The instrument has turned: no point has swung farther than this, mm.
+    pub fn swing(&mut self, most: f32) {
+        self.way += f64::from(most);
+    }
+
+    fn arrive(&mut self, points: usize, tip: Vec3) {
+        match self.seen_from {
+            Some(from) => self.way += f64::from(from.distance(tip)),
+            None => {
+                self.wake.clear();
+                self.wake.resize(points, 0.0);
+                self.way = 0.0;
+            }
+        }
+        self.seen_from = Some(tip);
     }
 }
 
@@ -84,25 +107,21 @@ pub(super) fn find(planes: &mut Vec<Plane>, watch: &mut Watch, matter: &Matter, 
             by: node.region,
         });
     };
-    // A point that saw nothing is a band or more away from matter: as long as the tip stays well within it, it need not
-    // be asked again.
-    let is_fresh = watch.seen_from.is_some_and(|from| from.distance(tip) + reach < band);
-    let density_at = |node: &Node| volume.density_at(tip + turn * node.at);
-    if is_fresh {
-        for &index in &watch.near {
-            let node = &held.body.shell()[index as usize];
-            wall(node, density_at(node));
+    watch.arrive(held.body.shell().len(), tip);
+    let grid = volume.grid();
+    let (tip_in_grid, to_grid) = (grid.from_tooth(tip), glam::Mat3::from_diagonal(grid.spacing.recip()) * turn);
+    for (node, wake) in held.body.shell().iter().zip(&mut watch.wake) {
+        if *wake > watch.way {
+            continue;
         }
-    } else {
-        watch.near.clear();
-        watch.seen_from = Some(tip);
-        for (index, node) in held.body.shell().iter().enumerate() {
-            let density = density_at(node);
-            if density > 0.0 {
-                watch.near.push(index as u32);
-                wall(node, density);
-            }
+        let density = volume.density_in_grid(tip_in_grid + to_grid * node.at);
+        if density > 0.0 {
+            wall(node, density);
+            continue;
         }
+        // What is cut away only makes room: this stays true.
+        let clear = matter.clear_of_volume(tip + turn * node.at).max(band);
+        *wake = watch.way + f64::from(clear - reach);
     }
     find_shapes(planes, matter, held, look);
 }
@@ -196,16 +215,23 @@ fn settled(volume: &Volume, stand: &Stand, node: &Node) -> Sight {
     for _ in 0..TURNS {
         let downhill = found.outward * found.normal.dot(found.outward) - found.normal;
         let along = downhill.normalize_or_zero();
-        if found.is_opposite() || along == Vec3::ZERO {
+        // Or even at its deepest, a patch's width farther on, it would not touch.
+        let is_clear = found.distance > found.slope(along) * reach_along(node, along) + APART;
+        if is_clear || found.is_opposite() || along == Vec3::ZERO {
             break;
         }
-        (found, normal) = deepest_along(volume, stand, node, &found, along);
+        let is_beyond;
+        (found, normal, is_beyond) = deepest_along(volume, stand, node, &found, along);
+        if is_beyond {
+            break;
+        }
     }
     Sight { at: found.at, normal: stand.turn * normal, distance: found.distance }
 }
 
-/// The deepest place along one direction, and the normal of the contact there.
-fn deepest_along(volume: &Volume, stand: &Stand, node: &Node, first: &Glance, along: Vec3) -> (Glance, Vec3) {
+/// The deepest place along one direction, the normal of the contact there, and whether it gets deeper still beyond the
+/// point's part of the surface: then the next point will tell.
+fn deepest_along(volume: &Volume, stand: &Stand, node: &Node, first: &Glance, along: Vec3) -> (Glance, Vec3, bool) {
     let reach = reach_along(node, along);
     let glance_at = |share: f32| {
         let (at, outward) = stand.held.body.on_surface(first.at + along * (reach * share), node.region);
@@ -233,7 +259,7 @@ fn deepest_along(volume: &Volume, stand: &Stand, node: &Node, first: &Glance, al
     let bent = (last.outward - first.outward).length();
     let turned = (last.normal - first.normal).length();
     let normal = (found.normal * bent - found.outward * turned).try_normalize().unwrap_or(-found.outward);
-    (found, normal)
+    (found, normal, last.slope_beyond(along) >= 0.0)
 }
 
 impl Glance {
