@@ -249,3 +249,40 @@ impl InstrumentTable {
         self.entries.iter().find(|e| e.id == id)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touch::Region;
+
+    fn end(json: &str) -> EndEntry {
+        serde_json::from_str(json).unwrap()
+    }
+
+    #[test]
+    fn every_shipped_instrument_can_be_made() {
+        // Aim: what the table offers has a shape, and burs that are no balls have a shank behind it.
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        let mut bodies = 0;
+        for id in table.ids() {
+            if let WorkingEnd::Shaped(body) = table.by_id(id).unwrap().make().end {
+                let shank = body.shell().iter().filter(|n| n.region == Region::Shank).count();
+                let head = body.shell().len() - shank;
+                assert!((200..1000).contains(&head) && shank > 50, "{id}: {head} and {shank} points");
+                bodies += 1;
+            }
+        }
+        assert!(bodies >= 6);
+    }
+
+    #[test]
+    fn shapes_that_cannot_be_are_seen() {
+        let pear =
+            |top: f32| end(&format!(r#"{{"pear":{{"diameter_mm":0.8,"length_mm":1.8,"top_diameter_mm":{top}}}}}"#));
+        assert!(pear(0.6).contradiction().is_none());
+        assert!(pear(0.9).contradiction().is_some());
+        assert!(end(r#"{"flame":{"diameter_mm":1.2,"length_mm":1.0}}"#).contradiction().is_some());
+        let round = r#"{"cylinder":{"diameter_mm":1.0,"length_mm":0.9,"tip":"round"}}"#;
+        assert!(end(round).contradiction().is_some());
+    }
+}
