@@ -4,9 +4,12 @@ mod phantom;
 
 use phantom::*;
 use typodont::device::Reading;
-use typodont::frame::Vec3;
+use typodont::frame::{Pose, Quat, Vec3};
 use typodont::sim::{Command, Simulation};
-use typodont::touch::{Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Shape, Space, WorkingEnd};
+use typodont::touch::{
+    Body, EDGE, Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Profile, Shank, Shape, Space,
+    WorkingEnd,
+};
 use typodont::volume::Label;
 
 #[test]
@@ -57,5 +60,41 @@ fn a_step_never_allocates() {
     });
     assert!(cut > 500 && touched > 2_000, "the course must do what is measured: {cut} cut, {touched} touched");
     assert!(led > 10_000, "led in {led} ticks");
+    assert_eq!(counted.count_total, 0, "{counted:?}");
+}
+
+#[test]
+fn a_step_with_a_shell_never_allocates() {
+    // Aim: the same for an instrument of any shape: turned in contact, cutting, on its shank, taken and put away.
+    let block = volume([120, 90, 90], 0.1, |p| (p.z, if p.x > 0.0 { SOFT } else { HARD }));
+    let mut setup = setup(block, WorkingEnd::Ball { radius: 0.7 }, true);
+    let bur = |profile: Profile| Instrument::shaped(Body::turned(profile, Some(Shank::friction_grip(1.0, 4.0))), true);
+    setup.instruments.push(bur(Profile::frustum(0.5, 0.5, 4.0, [EDGE; 2])));
+    setup.instruments.push(bur(Profile::flame(0.6, 4.0, 0.1)));
+    let form = Form::RoundBox { half: Vec3::splat(2.0), rounding: 0.5 };
+    setup.matter.around =
+        vec![Shape { label: Label(9), tooth_from_shape: typodont::frame::Pose::at(Vec3::Y * 7.0), form }];
+    setup.device.max_torque = 200.0;
+    let mut sim = Simulation::new(setup);
+    let (mut cut, mut touched, mut turned) = (0, 0, 0);
+    let counted = allocation_counter::measure(|| {
+        for tick in 0..16_000u32 {
+            match tick {
+                1_000 => sim.apply(&Command::Take { instrument: 1 }),
+                9_000 => sim.apply(&Command::Take { instrument: 2 }),
+                13_000 => sim.apply(&Command::Take { instrument: 0 }),
+                _ => {}
+            }
+            let sway = tick as f32 * 0.002;
+            let depth = 3.5 * libm::sinf(tick as f32 * 0.0016);
+            let position = Vec3::new(3.0 * libm::cosf(sway), 3.0 * libm::sinf(sway * 0.7), -depth);
+            let orientation = Quat::from_rotation_x(1.5 * libm::sinf(sway * 0.3));
+            let step = sim.step(&Reading { pose: Pose { position, orientation }, buttons: 0 });
+            cut += u32::from(step.cutting);
+            touched += u32::from(step.touch.is_some());
+            turned += u32::from(step.torque != Vec3::ZERO);
+        }
+    });
+    assert!(cut > 500 && touched > 2_000 && turned > 1_000, "{cut} cut, {touched} touched, {turned} turned");
     assert_eq!(counted.count_total, 0, "{counted:?}");
 }

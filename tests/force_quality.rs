@@ -47,7 +47,7 @@ fn sliding_on_a_ball_feels_like_a_ball() {
     // Method: friction off, 1 N/mm, 1 mm deep, every resolution we ship.
     for end in [WorkingEnd::Point, WorkingEnd::Ball { radius: 0.7 }] {
         for spacing in [0.172, 0.1, 0.05] {
-            let worst = slide_on_ball(end, spacing, 50.0);
+            let worst = slide_on_ball(end.clone(), spacing, 50.0);
             println!("{end:?} {spacing}: {:.4} {:.3}° {:.4} N", worst.magnitude, worst.angle, worst.jump);
             assert!(worst.magnitude < 0.02, "{end:?} {spacing} mm: {} off", worst.magnitude);
             assert!(worst.angle < 2.0, "{end:?} {spacing} mm: {}°", worst.angle);

@@ -49,8 +49,8 @@ fn world() -> Setup {
     let volume = phantom::volume([80, 80, 80], 0.2, |p| (p.y, tissue(p)));
     let bur = WorkingEnd::Ball { radius: 0.7 };
     let explorer = Instrument::new(WorkingEnd::Point, false);
-    let setup = phantom::setup(volume, bur, true);
-    Setup { instruments: vec![Instrument::new(bur, true), explorer], device: Spec::phantom_omni(), ramp: 200, ..setup }
+    let setup = phantom::setup(volume, bur.clone(), true);
+    Setup { instruments: vec![Instrument::new(bur.clone(), true), explorer], device: Spec::phantom_omni(), ramp: 200, ..setup }
 }
 
 /// Turns for a while; `at_ms` moves the hand and gives orders once a millisecond. Returns every tick that was told.

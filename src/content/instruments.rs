@@ -3,7 +3,7 @@
 use super::Library;
 use super::json;
 use crate::diagnostic::Diagnostic;
-use crate::touch::{Instrument, WorkingEnd};
+use crate::touch::{Body, EDGE, Instrument, Profile, Shank, WorkingEnd};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -53,6 +53,16 @@ pub enum EndEntry {
     /// A tip finer than anything felt.
     Point,
     Ball(BallEntry),
+    /// A ball with a cone behind it that narrows toward the neck.
+    Pear(PearEntry),
+    /// A straight fissure bur.
+    Cylinder(CylinderEntry),
+    /// A fissure bur that is more slender at its tip.
+    Tapered(TaperedEntry),
+    /// A cone that is widest at its flat tip.
+    InvertedCone(InvertedConeEntry),
+    /// Slender at tip and neck, widest in the middle.
+    Flame(FlameEntry),
 }
 
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -63,14 +73,144 @@ pub struct BallEntry {
     pub diameter_mm: f32,
 }
 
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PearEntry {
+    /// Diameter of the ball at the tip, mm: 0.3 to 5.
+    #[schemars(range(min = 0.3, max = 5.0))]
+    pub diameter_mm: f32,
+    /// Length of the cutting part, mm: 0.5 to 12, and longer than it is wide.
+    #[schemars(range(min = 0.5, max = 12.0))]
+    pub length_mm: f32,
+    /// Diameter at the top of the cutting part, mm: 0.2 to 5.
+    #[schemars(range(min = 0.2, max = 5.0))]
+    pub top_diameter_mm: f32,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CylinderEntry {
+    /// Diameter, mm: 0.3 to 5.
+    #[schemars(range(min = 0.3, max = 5.0))]
+    pub diameter_mm: f32,
+    /// Length of the cutting part, mm: 0.5 to 12, and longer than it is wide if its tip is round.
+    #[schemars(range(min = 0.5, max = 12.0))]
+    pub length_mm: f32,
+    #[serde(default)]
+    pub tip: TipEntry,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TaperedEntry {
+    /// Greatest diameter, at the top of the cutting part, mm: 0.3 to 5.
+    #[schemars(range(min = 0.3, max = 5.0))]
+    pub diameter_mm: f32,
+    /// Diameter at the tip, mm: 0.2 to 5.
+    #[schemars(range(min = 0.2, max = 5.0))]
+    pub tip_diameter_mm: f32,
+    /// Length of the cutting part, mm: 0.5 to 12, and longer than it is wide if its tip is round.
+    #[schemars(range(min = 0.5, max = 12.0))]
+    pub length_mm: f32,
+    #[serde(default)]
+    pub tip: TipEntry,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InvertedConeEntry {
+    /// Diameter at the flat tip, mm: 0.3 to 5.
+    #[schemars(range(min = 0.3, max = 5.0))]
+    pub diameter_mm: f32,
+    /// Diameter at the top, mm: 0.2 to 5.
+    #[schemars(range(min = 0.2, max = 5.0))]
+    pub top_diameter_mm: f32,
+    /// Length of the cutting part, mm: 0.3 to 12.
+    #[schemars(range(min = 0.3, max = 12.0))]
+    pub length_mm: f32,
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FlameEntry {
+    /// Greatest diameter, mm: 0.5 to 5.
+    #[schemars(range(min = 0.5, max = 5.0))]
+    pub diameter_mm: f32,
+    /// Length of the cutting part, mm: 0.5 to 12, and longer than it is wide.
+    #[schemars(range(min = 0.5, max = 12.0))]
+    pub length_mm: f32,
+}
+
+/// How a fissure bur ends.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq)]
+#[serde(rename_all = "snake_case")]
+pub enum TipEntry {
+    /// With an edge.
+    #[default]
+    Flat,
+    /// With half a ball.
+    Round,
+}
+
+/// Radius of a flame's tip, mm: a needle's would find every pore of a voxel surface.
+const FLAME_TIP: f32 = 0.1;
+
 impl InstrumentEntry {
     /// The instrument as touch knows it.
     pub fn make(&self) -> Instrument {
-        let end = match &self.end {
-            EndEntry::Point => WorkingEnd::Point,
-            EndEntry::Ball(ball) => WorkingEnd::Ball { radius: 0.5 * ball.diameter_mm },
+        let bur = |profile: Profile, top: f32| {
+            let [_, length] = profile.span();
+            Instrument::shaped(Body::turned(profile, Some(Shank::friction_grip(top, length))), self.cuts)
         };
-        Instrument::new(end, self.cuts)
+        match &self.end {
+            EndEntry::Point => Instrument::new(WorkingEnd::Point, self.cuts),
+            EndEntry::Ball(ball) => Instrument::new(WorkingEnd::Ball { radius: 0.5 * ball.diameter_mm }, self.cuts),
+            EndEntry::Pear(e) => {
+                let profile = Profile::round_ended(0.5 * e.diameter_mm, 0.5 * e.top_diameter_mm, e.length_mm);
+                bur(profile, e.top_diameter_mm)
+            }
+            EndEntry::Cylinder(e) => bur(fissure(e.diameter_mm, e.diameter_mm, e.length_mm, e.tip), e.diameter_mm),
+            EndEntry::Tapered(e) => bur(fissure(e.tip_diameter_mm, e.diameter_mm, e.length_mm, e.tip), e.diameter_mm),
+            EndEntry::InvertedCone(e) => {
+                bur(fissure(e.diameter_mm, e.top_diameter_mm, e.length_mm, TipEntry::Flat), e.top_diameter_mm)
+            }
+            EndEntry::Flame(e) => bur(Profile::flame(0.5 * e.diameter_mm, e.length_mm, FLAME_TIP), 2.0 * FLAME_TIP),
+        }
+    }
+}
+
+fn fissure(tip_diameter: f32, top_diameter: f32, length: f32, tip: TipEntry) -> Profile {
+    let (low, high) = (0.5 * tip_diameter, 0.5 * top_diameter);
+    match tip {
+        TipEntry::Flat => Profile::frustum(low, high, length, [EDGE; 2]),
+        TipEntry::Round => Profile::round_ended(low, high, length),
+    }
+}
+
+impl EndEntry {
+    /// What is wrong with a shape whose lengths are each in range.
+    fn contradiction(&self) -> Option<&'static str> {
+        let (is_wrong, what) = match self {
+            EndEntry::Point | EndEntry::Ball(_) => return None,
+            EndEntry::Pear(e) => (
+                e.length_mm <= e.diameter_mm || e.top_diameter_mm >= e.diameter_mm,
+                "a pear is longer than it is wide, and wider at its tip than at its top",
+            ),
+            EndEntry::Cylinder(e) => (
+                e.tip == TipEntry::Round && e.length_mm <= e.diameter_mm,
+                "a round-ended cylinder is longer than it is wide",
+            ),
+            EndEntry::Tapered(e) => {
+                let is_short = e.tip == TipEntry::Round && e.length_mm <= e.diameter_mm;
+                (
+                    is_short || e.tip_diameter_mm >= e.diameter_mm,
+                    "a tapered bur is more slender at its tip, and longer than it is wide if its tip is round",
+                )
+            }
+            EndEntry::InvertedCone(e) => (e.top_diameter_mm >= e.diameter_mm, "an inverted cone is widest at its tip"),
+            EndEntry::Flame(e) => (e.length_mm <= e.diameter_mm, "a flame is longer than it is wide"),
+        };
+        is_wrong.then_some(what)
     }
 }
 
@@ -113,6 +253,13 @@ impl InstrumentTable {
                 found.push(read.places.complain(&format!("/instruments/{index}/cuts"), "cutting-point", message, help));
             }
         }
+        for (index, entry) in entries.iter().enumerate() {
+            if let Some(what) = entry.end.contradiction() {
+                let message = format!("\"{}\" has no such shape", entry.id);
+                let place = format!("/instruments/{index}/end");
+                found.push(read.places.complain(&place, "impossible-shape", message, Some(what.to_string())));
+            }
+        }
         if found.is_empty() { Ok(InstrumentTable { entries }) } else { Err(found) }
     }
 
@@ -122,5 +269,42 @@ impl InstrumentTable {
 
     pub fn by_id(&self, id: &str) -> Option<&InstrumentEntry> {
         self.entries.iter().find(|e| e.id == id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touch::Region;
+
+    fn end(json: &str) -> EndEntry {
+        serde_json::from_str(json).unwrap()
+    }
+
+    #[test]
+    fn every_shipped_instrument_can_be_made() {
+        // Aim: what the table offers has a shape, and burs that are no balls have a shank behind it.
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        let mut bodies = 0;
+        for id in table.ids() {
+            if let WorkingEnd::Shaped(body) = table.by_id(id).unwrap().make().end {
+                let shank = body.shell().iter().filter(|n| n.region == Region::Shank).count();
+                let head = body.shell().len() - shank;
+                assert!((200..1000).contains(&head) && shank > 50, "{id}: {head} and {shank} points");
+                bodies += 1;
+            }
+        }
+        assert!(bodies >= 6);
+    }
+
+    #[test]
+    fn shapes_that_cannot_be_are_seen() {
+        let pear =
+            |top: f32| end(&format!(r#"{{"pear":{{"diameter_mm":0.8,"length_mm":1.8,"top_diameter_mm":{top}}}}}"#));
+        assert!(pear(0.6).contradiction().is_none());
+        assert!(pear(0.9).contradiction().is_some());
+        assert!(end(r#"{"flame":{"diameter_mm":1.2,"length_mm":1.0}}"#).contradiction().is_some());
+        let round = r#"{"cylinder":{"diameter_mm":1.0,"length_mm":0.9,"tip":"round"}}"#;
+        assert!(end(round).contradiction().is_some());
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Takes moves in world space. Gives readings as a hand would, and what was felt when a move ends. Never sees the tooth.
 
-use super::{Device, Gone, Hand, HandModel, Output, Reading, Spec};
-use crate::frame::{Pose, Quat, Vec3};
+use super::{Device, Gone, Hand, HandModel, Output, Reading, Spec, UPRIGHT};
+use crate::frame::{Pose, Vec3};
 use crate::tick::TICK_S;
 use std::collections::VecDeque;
 
@@ -64,7 +64,6 @@ const REACH_PATIENCE: f32 = 10.0;
 pub struct Scripted {
     spec: Spec,
     hand: Hand,
-    orientation: Quat,
     tremor: Tremor,
     /// Where the tip is on the screen.
     seen: Vec3,
@@ -131,7 +130,6 @@ impl Scripted {
         Scripted {
             spec,
             hand: Hand::resting_at(model, start),
-            orientation: Quat::IDENTITY,
             tremor,
             seen: start,
             moves: VecDeque::new(),
@@ -284,6 +282,6 @@ impl Device for Scripted {
         self.hand.goal += self.tremor.next();
         let reading = self.hand.turn(output);
         self.hand.goal = steady;
-        Ok(Reading { pose: Pose { orientation: self.orientation, ..reading.pose }, ..reading })
+        Ok(Reading { pose: Pose { orientation: UPRIGHT, ..reading.pose }, ..reading })
     }
 }

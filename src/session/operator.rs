@@ -10,7 +10,6 @@ use crate::device::{Device, Felt, Gone, HandModel, Move, Output, Reading, Script
 use crate::frame::Vec3;
 use crate::scenario::{Lesion, QuestionKind, Scenario, Stage, Workpiece};
 use crate::sim::Step;
-use crate::touch::WorkingEnd;
 use crate::volume::ISO;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -102,12 +101,9 @@ impl Operator {
         self.workpiece.world_from_tooth * point_in_tooth
     }
 
-    /// Radius of the working end now in the hand, mm.
+    /// How far the working end now in the hand reaches below the device's tip, mm.
     fn radius(&self, instrument: usize) -> f32 {
-        match self.scenario.instruments[instrument].make().end {
-            WorkingEnd::Point => 0.0,
-            WorkingEnd::Ball { radius } => radius,
-        }
+        self.scenario.instruments[instrument].make().radius()
     }
 
     fn begin_stage(&mut self, index: usize) {

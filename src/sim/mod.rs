@@ -18,7 +18,7 @@ use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
     Carver, Carving, Contact, Factors, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials, Matter, Press,
-    Proxy, SpringLimit, Vibration,
+    Proxy, Pull, SpringLimit, Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
 
@@ -167,7 +167,7 @@ impl Simulation {
             guide: Guide::new(guidances, &spring),
             world_from_tooth,
             tooth_from_world,
-            force_limit: ForceLimit { max_force: device.max_force },
+            force_limit: ForceLimit { max_force: device.max_force, max_torque: device.max_torque },
             tick: Tick::ZERO,
             instrument: 0,
             bur_runs: true,
@@ -194,20 +194,23 @@ impl Simulation {
             return self.let_go(tick);
         };
         self.hand = pose;
-        let hand = self.tooth_from_world * pose.position;
+        let held = self.tooth_from_world * pose;
+        let hand = held.position;
         let instrument = &self.instruments[self.instrument];
         if !self.is_out {
-            self.is_out = Proxy::is_free_at(&self.matter, instrument, hand);
+            self.is_out = Proxy::is_free_at(&self.matter, instrument, &held);
             return self.let_go(tick);
         }
         let materials = &self.materials[self.instrument];
-        self.proxy.follow(&self.matter, instrument, materials, hand);
+        self.proxy.follow(&self.matter, instrument, materials, &held);
         let tip = self.proxy.tip();
         let contact = self.proxy.contact().copied();
         let pull = self.law.pull(hand, tip, contact.as_ref());
         let cutting = match contact {
-            Some(_) if instrument.cuts && self.bur_runs => {
-                let press = Press { tip, hand, pull };
+            // A bur that leans on its shank presses the less with what cuts, and without it not at all.
+            Some(Contact { at_head, .. }) if instrument.cuts && self.bur_runs && at_head > 0.0 => {
+                let pull = Pull { spring: pull.spring * at_head, ..pull };
+                let press = Press { tip, hand, orientation: held.orientation, pull };
                 self.carver.cut(&mut self.matter.volume, instrument, materials, &press)
             }
             _ => {
@@ -226,6 +229,9 @@ impl Simulation {
             force += guidance;
         }
         let force = self.gate.emit(force, &self.force_limit);
+        let lever = contact.map_or(Vec3::ZERO, |c| c.lever);
+        let torque = self.world_from_tooth.turn(lever * pull.force.length()) * eased;
+        let torque = self.gate.emit_torque(torque, &self.force_limit);
         let touch = contact.map(|Contact { label, normal, .. }| Touch {
             label,
             spring: pull.spring,
@@ -234,7 +240,7 @@ impl Simulation {
         Step {
             tick,
             force,
-            torque: Vec3::ZERO,
+            torque,
             hand: pose.position,
             tip: self.world_from_tooth * tip,
             touch,

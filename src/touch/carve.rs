@@ -8,11 +8,12 @@
 //! the density itself, so what falls does not depend on the voxels' size. Neither does how much: the advance per tick
 //! is limited in millimetres, never in voxels.
 
+use super::body::Body;
 use super::instrument::Instrument;
 use super::law::Pull;
 use super::material::Materials;
 use super::rate::{Account, Rate};
-use crate::frame::Vec3;
+use crate::frame::{Quat, Vec3};
 use crate::tick::TICK_S;
 use crate::volume::{Density, Edit, Volume, Voxel, ramp};
 
@@ -47,6 +48,10 @@ const RUN_OUT: f32 = 0.01;
 
 /// How far behind its centre a bur still clears its sides, as a share of its radius.
 const BEHIND: f32 = 0.2;
+
+/// A surface cuts that faces the way by more than this (cosine). The sides of a plunging fissure bur do not: what its tip has
+/// opened is wide enough, and cutting there again with every tremble of the hand would ream the hole out.
+const FACING: f32 = 0.02;
 
 /// A bite is carried out over this many ticks, every so many-th row of voxels in each: a bur at full contact changes
 /// thousands of fine voxels, and no single tick should bear them all. Rows interleave, so the surface sinks evenly.
@@ -106,11 +111,14 @@ impl Carver {
         let share = self.threshold_share(press.hand);
         let is_wearing = match self.carving.law {
             CuttingLaw::Threshold => false,
-            CuttingLaw::Rate(rate) => self.account.save(&rate, instrument.radius(), press.pull.spring),
+            CuttingLaw::Rate(rate) => self.account.save(&rate, instrument.head_radius(), press.pull.spring),
         };
         let planned = self.biting.or_else(|| Some((self.plan(volume, instrument, materials, press, share)?, 0)));
         let Some((bite, done)) = planned else { return is_wearing };
-        self.carve(volume, &bite, done);
+        match instrument.body() {
+            None => self.carve(volume, &bite, done),
+            Some(body) => self.carve_body(volume, body, &bite, done),
+        }
         if let CuttingLaw::Rate(_) = self.carving.law {
             self.account.pay(&self.edits, materials, volume.grid().voxel_mm3() as f32);
         }
@@ -127,7 +135,7 @@ impl Carver {
         press: &Press,
         share: f32,
     ) -> Option<Bite> {
-        let Press { tip, hand, pull } = *press;
+        let Press { tip, hand, orientation, pull } = *press;
         let (deepest, run_out) = match self.carving.law {
             CuttingLaw::Threshold => (self.plan_advance(materials, &pull, share), RUN_OUT),
             CuttingLaw::Rate(_) => {
@@ -144,7 +152,7 @@ impl Carver {
         let way = (hand - tip).normalize_or_zero() * deepest + self.arrears(tip, volume.band());
         // The rate law's account already remembers what a bite was too short for.
         self.owed = matches!(self.carving.law, CuttingLaw::Threshold).then_some(tip + way);
-        Some(Bite { tip, way, deepest, radius: instrument.radius() + run_out })
+        Some(Bite { tip, way, deepest, run_out, radius: instrument.radius() + run_out, orientation })
     }
 
     /// What the last bite owes to the tip: the part of its way that was too short to change a stored density.
@@ -223,6 +231,69 @@ impl Carver {
         }
     }
 
+    /// Carries out one share of a bite with a working end of any shape.
+    fn carve_body(&mut self, volume: &mut Volume, body: &Body, bite: &Bite, share: u32) {
+        let (grid, band) = (*volume.grid(), volume.band());
+        let cylinder = Cylinder::of(body, bite, bite.run_out + band);
+        let [low, high] = cylinder.extent();
+        let [xs, ys, zs] = grid.cells_within(low, high);
+        let to_steps = grid.spacing.x.recip();
+        for z in zs {
+            for y in ys.clone().filter(|y| (y + z) % SHARES == share) {
+                let first = grid.centre([xs.start, y, z]);
+                let Some([low, high]) = cylinder.cut(first) else { continue };
+                let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
+                let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
+                self.carve_body_run(volume, body, bite, [xs.start, y, z], steps);
+            }
+        }
+    }
+
+    /// Carves a part of a row, given in steps from one of its cells.
+    fn carve_body_run(
+        &mut self,
+        volume: &mut Volume,
+        body: &Body,
+        bite: &Bite,
+        row: [u32; 3],
+        steps: std::ops::Range<u32>,
+    ) {
+        let start = volume.grid().index(row);
+        let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
+        if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
+            return;
+        }
+        let [x, y, z] = row;
+        let (grid, band) = (*volume.grid(), volume.band());
+        let handle_from_tooth = glam::Mat3::from_quat(bite.orientation.conjugate());
+        let first = handle_from_tooth * (grid.centre(row) - bite.tip - bite.way);
+        let along = handle_from_tooth.x_axis * grid.spacing.x;
+        // Into a harder tissue the bur goes less far: there it is this much farther back for each lost share of its way.
+        let back = handle_from_tooth * bite.way;
+        let far = bite.way.length();
+        for step in steps {
+            if volume.densities()[start + step as usize] == Density::EMPTY {
+                continue;
+            }
+            let before = volume.voxel(start + step as usize);
+            let advance = self.advance[usize::from(before.label.0)];
+            if advance <= 0.0 {
+                continue;
+            }
+            let share = advance / bite.deepest;
+            let here = first + along * step as f32;
+            let distance = body.head_distance(here + back * (1.0 - share));
+            let left = ramp(bite.run_out - distance, band);
+            if left >= before.density || self.edits.len() >= EDITS_MAX {
+                continue;
+            }
+            let gained = body.head_distance(here + back) - distance;
+            if gained > FACING * far * share {
+                self.edits.push(volume.set_cell([x + step, y, z], Voxel { density: left, ..before }));
+            }
+        }
+    }
+
     /// Carves a part of a row, given in steps from the row's first voxel.
     fn carve_run(&mut self, volume: &mut Volume, bite: &Bite, row: &Row, steps: std::ops::Range<u32>) {
         let (spacing, band) = (volume.grid().spacing.x, volume.band());
@@ -271,6 +342,8 @@ pub struct Press {
     pub tip: Vec3,
     /// Where the hand is, inside matter: the bur advances toward it.
     pub hand: Vec3,
+    /// `tooth_from_handle`.
+    pub orientation: Quat,
     pub pull: Pull,
 }
 
@@ -293,6 +366,63 @@ struct Bite {
     way: Vec3,
     /// Length of that way as the law gave it, mm.
     deepest: f32,
-    /// mm
+    /// Of a ball with its run-out, mm.
     radius: f32,
+    /// How much wider than itself the bur cuts, mm.
+    run_out: f32,
+    /// `tooth_from_handle`.
+    orientation: Quat,
+}
+
+/// What a bite can reach with a working end of any shape: a cylinder about its shaft, in tooth space.
+struct Cylinder {
+    middle: Vec3,
+    /// Unit.
+    axis: Vec3,
+    radius: f32,
+    half_length: f32,
+}
+
+impl Cylinder {
+    fn of(body: &Body, bite: &Bite, margin: f32) -> Cylinder {
+        let (radius, [low, high]) = body.head_cylinder();
+        let axis = bite.orientation * Vec3::Z;
+        // A harder tissue sees the end less advanced: half of the way lies on either side of the middle.
+        let middle = bite.tip + bite.way * 0.5 + axis * (0.5 * (low + high));
+        let margin = margin + 0.5 * bite.way.length();
+        Cylinder { middle, axis, radius: radius + margin, half_length: 0.5 * (high - low) + margin }
+    }
+
+    /// Lowest and highest corner of the box around it.
+    fn extent(&self) -> [Vec3; 2] {
+        let aside = |along: f32| self.half_length * along.abs() + self.radius * (1.0 - along * along).max(0.0).sqrt();
+        let half = Vec3::new(aside(self.axis.x), aside(self.axis.y), aside(self.axis.z));
+        [self.middle - half, self.middle + half]
+    }
+
+    /// Where a line along x from a place enters and leaves, as distances from that place.
+    fn cut(&self, from: Vec3) -> Option<[f32; 2]> {
+        let out = from - self.middle;
+        let (along, climb) = (out.dot(self.axis), self.axis.x);
+        let aside = out - self.axis * along;
+        let drift = Vec3::X - self.axis * climb;
+        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+        let (a, b, c) = (drift.length_squared(), drift.dot(aside), aside.length_squared() - self.radius * self.radius);
+        if a > 1e-6 {
+            let inside = b * b - a * c;
+            if inside <= 0.0 {
+                return None;
+            }
+            (low, high) = ((-b - inside.sqrt()) / a, (-b + inside.sqrt()) / a);
+        } else if c > 0.0 {
+            return None;
+        }
+        if climb.abs() > 1e-4 {
+            let (near, far) = ((-self.half_length - along) / climb, (self.half_length - along) / climb);
+            (low, high) = (low.max(near.min(far)), high.min(near.max(far)));
+        } else if along.abs() > self.half_length {
+            return None;
+        }
+        (low < high).then_some([low, high])
+    }
 }

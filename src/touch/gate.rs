@@ -10,6 +10,8 @@ use crate::frame::{Pose, Vec3};
 pub struct ForceLimit {
     /// N
     pub max_force: f32,
+    /// N·mm; 0 where only forces are rendered.
+    pub max_torque: f32,
 }
 
 /// The gates' counters. Faults are never silent: they reach the report.
@@ -19,7 +21,9 @@ pub struct Gate {
     pub refused_readings: u64,
     /// Forces shortened to the device's limit.
     pub clamped_forces: u64,
-    /// Forces that were not finite and became zero.
+    /// Torques shortened to the device's limit.
+    pub clamped_torques: u64,
+    /// Forces and torques that were not finite and became zero.
     pub zeroed_forces: u64,
 }
 
@@ -47,6 +51,23 @@ impl Gate {
         force
     }
 
+    /// A torque that the device can and may render: none at all where it renders only forces.
+    pub fn emit_torque(&mut self, torque: Vec3, limit: &ForceLimit) -> Vec3 {
+        if limit.max_torque <= 0.0 {
+            return Vec3::ZERO;
+        }
+        let length = torque.length();
+        if !length.is_finite() {
+            self.zeroed_forces += 1;
+            return Vec3::ZERO;
+        }
+        if length > limit.max_torque {
+            self.clamped_torques += 1;
+            return torque * (limit.max_torque / length);
+        }
+        torque
+    }
+
     /// Everything the gates had to change so far.
     pub fn faults(&self) -> u64 {
         self.refused_readings + self.zeroed_forces
@@ -60,7 +81,7 @@ mod tests {
     #[test]
     fn nothing_unsafe_passes() {
         let mut gate = Gate::default();
-        let limit = ForceLimit { max_force: 3.3 };
+        let limit = ForceLimit { max_force: 3.3, max_torque: 0.0 };
         assert_eq!(gate.emit(Vec3::new(f32::NAN, 0.0, 0.0), &limit), Vec3::ZERO);
         assert_eq!(gate.emit(Vec3::new(f32::INFINITY, 0.0, 0.0), &limit), Vec3::ZERO);
         assert_eq!(gate.emit(Vec3::splat(f32::MAX), &limit), Vec3::ZERO, "a length that overflows is not a force");
@@ -68,6 +89,18 @@ mod tests {
         assert_eq!(gate.emit(Vec3::X, &limit), Vec3::X);
         assert!(gate.admit(&Pose::at(Vec3::new(0.0, f32::NAN, 0.0))).is_none());
         assert!(gate.admit(&Pose::IDENTITY).is_some());
-        assert_eq!(gate, Gate { refused_readings: 1, clamped_forces: 1, zeroed_forces: 3 });
+        assert_eq!(gate, Gate { refused_readings: 1, clamped_forces: 1, clamped_torques: 0, zeroed_forces: 3 });
+    }
+
+    #[test]
+    fn a_torque_stays_within_what_the_device_renders() {
+        let mut gate = Gate::default();
+        let (none, some) =
+            (ForceLimit { max_force: 3.3, max_torque: 0.0 }, ForceLimit { max_force: 3.3, max_torque: 50.0 });
+        assert_eq!(gate.emit_torque(Vec3::X * 20.0, &none), Vec3::ZERO);
+        assert_eq!(gate.emit_torque(Vec3::X * f32::NAN, &some), Vec3::ZERO);
+        assert_eq!(gate.emit_torque(Vec3::X * 20.0, &some), Vec3::X * 20.0);
+        assert!((gate.emit_torque(Vec3::X * 80.0, &some).x - 50.0).abs() < 1e-4);
+        assert_eq!(gate, Gate { clamped_torques: 1, zeroed_forces: 1, ..Gate::default() });
     }
 }

@@ -1,6 +1,8 @@
 //! What the hand holds.
 
+use super::body::Body;
 use crate::frame::Vec3;
+use std::sync::Arc;
 
 /// An instrument as touch knows it: the shape of its working end, and whether that end cuts.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,12 +15,14 @@ pub struct Instrument {
 }
 
 /// The part that touches.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum WorkingEnd {
     /// The tip of an explorer.
     Point,
     /// A spherical bur; its centre is where the device's tip is. Radius in mm.
     Ball { radius: f32 },
+    /// Any other, with its shank, as the hand turns it. A bur's tip is where the device's tip is.
+    Shaped(Arc<Body>),
 }
 
 /// How far a ball may bulge past the surface between two feelers, mm. Well below what a hand resolves.
@@ -29,15 +33,33 @@ impl Instrument {
         let feelers = match end {
             WorkingEnd::Point => vec![Vec3::ZERO],
             WorkingEnd::Ball { radius } => spread_over_sphere(feelers_for(radius)),
+            WorkingEnd::Shaped(_) => Vec::new(),
         };
         Instrument { end, cuts, feelers }
     }
 
-    /// mm; zero for a point.
+    /// A working end of any shape.
+    pub fn shaped(body: Body, cuts: bool) -> Instrument {
+        Instrument::new(WorkingEnd::Shaped(Arc::new(body)), cuts)
+    }
+
+    /// A ball's radius, mm; zero for what has its surface where the device's tip is.
     pub fn radius(&self) -> f32 {
         match self.end {
-            WorkingEnd::Point => 0.0,
             WorkingEnd::Ball { radius } => radius,
+            WorkingEnd::Point | WorkingEnd::Shaped(_) => 0.0,
+        }
+    }
+
+    /// Greatest radius of what cuts, mm; zero for a point.
+    pub fn head_radius(&self) -> f32 {
+        self.body().map_or(self.radius(), Body::head_radius)
+    }
+
+    pub(super) fn body(&self) -> Option<&Body> {
+        match &self.end {
+            WorkingEnd::Shaped(body) => Some(body),
+            WorkingEnd::Point | WorkingEnd::Ball { .. } => None,
         }
     }
 

@@ -97,7 +97,8 @@ impl Matter {
         self.clear_of_volume(point_in_tooth).min(around).max(0.0)
     }
 
-    fn clear_of_volume(&self, point_in_tooth: Vec3) -> f32 {
+    /// The same for the volume alone.
+    pub(super) fn clear_of_volume(&self, point_in_tooth: Vec3) -> f32 {
         let grid = self.volume.grid();
         let [low, high] = grid.extent();
         let nearest_inside = point_in_tooth.clamp(low, high);

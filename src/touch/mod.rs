@@ -1,14 +1,17 @@
 //! What a hand feels: where an instrument may be, how matter pushes back, what a bur takes away.
 //!
-//! Takes matter, an instrument and where the hand is. Gives where the tip may be, the pull on the hand and the voxels
+//! Takes matter, an instrument and how the hand holds it. Gives where the tip may be, the pull on the hand and the voxels
 //! that fell. Never reads a clock, a file or a device; never allocates once made.
 
 mod matter;
 mod obstacle;
+mod profile;
+mod body;
 mod instrument;
 mod material;
 mod planes;
 mod walls;
+mod shell;
 mod proxy;
 mod law;
 mod rate;
@@ -17,6 +20,7 @@ mod vibration;
 mod guidance;
 mod gate;
 
+pub use body::{Body, Node, Region, Shank};
 pub use carve::{Carver, Carving, CuttingLaw, Press};
 pub use gate::{ForceLimit, Gate};
 pub use guidance::{
@@ -27,6 +31,7 @@ pub use law::{Law, Pull, SpringLimit};
 pub use material::{Factor, Factors, Material, Materials};
 pub use matter::{Form, Matter, Shape};
 pub use obstacle::Obstacle;
+pub use profile::{EDGE, Nearest, Place, Profile};
 pub use proxy::{Contact, Proxy};
 pub use rate::Rate;
 pub use vibration::Vibration;

@@ -3,6 +3,7 @@
 //! A small quadratic programme: minimise |x − goal|² with n·x ≥ d for every wall. Solved by a dual active set of at most
 //! three walls (in three dimensions a fourth adds nothing), after Goldfarb & Idnani (1983).
 
+use super::body::Region;
 use crate::frame::Vec3;
 
 /// A wall that the tip's centre must stay in front of: `normal · x >= offset`.
@@ -14,6 +15,8 @@ pub(super) struct Plane {
     /// Where on the surface the wall was found, tooth space.
     pub at: Vec3,
     pub touched: Touched,
+    /// The part of the instrument that meets it.
+    pub by: Region,
 }
 
 /// What a wall belongs to.
@@ -143,7 +146,7 @@ mod tests {
     use super::*;
 
     fn wall(normal: Vec3, offset: f32) -> Plane {
-        Plane { normal: normal.normalize(), offset, at: Vec3::ZERO, touched: Touched::Volume }
+        Plane { normal: normal.normalize(), offset, at: Vec3::ZERO, touched: Touched::Volume, by: Region::Head }
     }
 
     fn check(planes: &[Plane], goal: Vec3, expected: Vec3) {

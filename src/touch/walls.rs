@@ -2,6 +2,7 @@
 //!
 //! Takes matter, an instrument and its tip. Gives walls for the tip's centre to stay in front of.
 
+use super::body::Region;
 use super::instrument::{FEELER_SAG, Instrument};
 use super::matter::Matter;
 use super::planes::{Plane, Touched};
@@ -65,6 +66,7 @@ pub(super) fn find(planes: &mut Vec<Plane>, matter: &Matter, instrument: &Instru
             offset: seen.normal.dot(tip) - seen.distance - slack,
             at: tip + seen.direction * radius - seen.normal * seen.distance,
             touched: Touched::Volume,
+            by: Region::Head,
         });
     }
     for (index, shape) in matter.around.iter().enumerate() {
@@ -76,6 +78,7 @@ pub(super) fn find(planes: &mut Vec<Plane>, matter: &Matter, instrument: &Instru
                     offset: normal.dot(tip) - clearance,
                     at: tip - normal * distance,
                     touched: Touched::Shape(index),
+                    by: Region::Head,
                 });
             }
         });

@@ -30,7 +30,7 @@ pub fn soak(rig: &mut dyn Rig) {
     let spec = device.spec().clone();
     let volume = phantom::volume([80, 80, 80], 0.2, |p| (p.y, if p.x < 0.0 { HARD } else { SOFT }));
     let bur = WorkingEnd::Ball { radius: 0.7 };
-    let instruments = vec![Instrument::new(bur, true), Instrument::new(WorkingEnd::Point, false)];
+    let instruments = vec![Instrument::new(bur.clone(), true), Instrument::new(WorkingEnd::Point, false)];
     let setup = Setup { instruments, device: spec.clone(), ramp: 200, ..phantom::setup(volume, bur, true) };
     let before = counting::allocations();
     let is_over = Arc::new(AtomicBool::new(false));

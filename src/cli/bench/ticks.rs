@@ -3,14 +3,15 @@
 use super::figures::Figures;
 use super::work::grinding;
 use crate::content::Role;
-use crate::device::{Reading, Spec};
+use crate::device::{Reading, Spec, UPRIGHT};
 use crate::frame::{Pose, Vec3};
 use crate::scenario::Workpiece;
 use crate::session;
 use crate::sim::{Setup, Simulation, Step};
-use crate::touch::{Instrument, WorkingEnd};
+use crate::touch::{Body, EDGE, Instrument, Profile, Shank, WorkingEnd};
 use crate::volume::{Grid, ISO, Label, Volume};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 pub struct Ticks {
@@ -22,6 +23,12 @@ pub struct Ticks {
 
 /// Radius of the round bur, ISO 014.
 const BUR: WorkingEnd = WorkingEnd::Ball { radius: 0.7 };
+
+/// A straight fissure bur, US 57.
+fn fissure() -> WorkingEnd {
+    let profile = Profile::frustum(0.5, 0.5, 4.0, [EDGE; 2]);
+    WorkingEnd::Shaped(Arc::new(Body::turned(profile, Some(Shank::friction_grip(1.0, 4.0)))))
+}
 
 /// Ticks of a course.
 const TICKS: usize = 12_000;
@@ -60,7 +67,9 @@ pub fn on(tooth: Volume) -> Result<Ticks, String> {
 
     let slide = Course { middle, radius: 2.5, speed: 20.0 };
     let grounds: Vec<f32> = (0..TICKS).map(|t| ground(&setup.matter.volume, slide.at(t))).collect();
-    for (name, end, lift) in [("slide", WorkingEnd::Point, -0.3), ("bur_slide", BUR, 0.3)] {
+    for (name, end, lift) in
+        [("slide", WorkingEnd::Point, -0.3), ("bur_slide", BUR, 0.3), ("shell_slide", fissure(), -0.3)]
+    {
         let place = |t: usize| slide.at(t).with_z(grounds[t] + lift);
         us.insert(name, times(&setup, end, false, place, |step| step.touch.is_some()));
     }
@@ -73,7 +82,7 @@ pub fn on(tooth: Volume) -> Result<Ticks, String> {
     // From the mean height of the ground, which all resolutions agree on; the highest voxel they do not.
     let level = (0..TICKS).map(|t| ground(&setup.matter.volume, cut.at(t))).sum::<f32>() / TICKS as f32;
     let place = |t: usize| cut.at(t).with_z(level + 1.5 - t as f32 * (DEPTH / TICKS as f32));
-    for (name, end) in [("cut", WorkingEnd::Point), ("bur_cut", BUR)] {
+    for (name, end) in [("cut", WorkingEnd::Point), ("bur_cut", BUR), ("shell_cut", fissure())] {
         us.insert(name, times(&setup, end, true, place, |step| step.cutting));
     }
     setup.matter.volume = block(*setup.matter.volume.grid(), decay);
@@ -100,7 +109,8 @@ fn begin(setup: &Setup, end: WorkingEnd, cuts: bool, first: Vec3) -> Simulation 
     let mut simulation = Simulation::new(setup);
     for i in 0..300 {
         let above = first + Vec3::Z * (6.0 - 0.02 * i as f32);
-        simulation.step(&Reading::at(world_from_tooth * above));
+        let pose = Pose { position: world_from_tooth * above, orientation: UPRIGHT };
+        simulation.step(&Reading { pose, buttons: 0 });
     }
     simulation
 }
@@ -116,7 +126,8 @@ fn times(
     let mut simulation = begin(setup, end, cuts, place(0));
     let mut times = Vec::with_capacity(TICKS);
     for tick in 0..TICKS {
-        let reading = Reading::at(setup.world_from_tooth * place(tick));
+        let position = setup.world_from_tooth * place(tick);
+        let reading = Reading { pose: Pose { position, orientation: UPRIGHT }, buttons: 0 };
         let start = Instant::now();
         let step = simulation.step(&reading);
         let elapsed = start.elapsed();
