@@ -6,9 +6,7 @@ use phantom::*;
 use typodont::device::Reading;
 use typodont::frame::Vec3;
 use typodont::sim::{Command, Simulation};
-use typodont::touch::{
-    Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Shape, Space, WorkingEnd,
-};
+use typodont::touch::{Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Shape, Space, WorkingEnd};
 use typodont::volume::Label;
 
 #[test]

@@ -376,8 +376,7 @@ fn check_guided(name: &str, table: &str, guidance: Value, expected: &[(&str, usi
     let text = edited("5-grinding.json", "/stages/0/guidance", Some(guidance));
     let mut library = Library::shipped();
     library.hold("table.csv", table.as_bytes().to_vec());
-    let found =
-        scenario::resolve(Source::new("exercise.json", text), &library, Forms::Made).err().unwrap_or_default();
+    let found = scenario::resolve(Source::new("exercise.json", text), &library, Forms::Made).err().unwrap_or_default();
     let line = |d: &Diagnostic| d.line_and_column().map_or(0, |(line, _)| line);
     let in_table = |d: &Diagnostic| if d.source.name == "table.csv" { line(d) } else { 0 };
     let told: Vec<_> = found.iter().map(|d| (d.source.name.as_str(), in_table(d), d.code, d.path.as_str())).collect();

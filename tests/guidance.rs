@@ -140,7 +140,9 @@ fn no_force_jumps() {
         for stiffness in [0.05, 0.2] {
             for (name, points) in [("eight", eight().collect::<Vec<_>>()), ("hairpin", hairpin().collect())] {
                 let wide = Kind::Follow { look_ahead: 20.0, speed: None };
-                for fixture in [tube(points.clone()), follow(points.clone()), Fixture { kind: wide, ..follow(points.clone()) }] {
+                for fixture in
+                    [tube(points.clone()), follow(points.clone()), Fixture { kind: wide, ..follow(points.clone()) }]
+                {
                     let kind = fixture.kind;
                     let fixture = Fixture { stiffness, damping: 0.005 * stiffness, ..fixture };
                     let mut sim = led(Guidance::Path(fixture), Pose::IDENTITY, ideal_device());
@@ -161,7 +163,10 @@ fn no_force_jumps() {
                         assert!(!is_refused || force == Vec3::ZERO);
                         let jump = force.distance(before);
                         if !is_refused {
-                            assert!(jump < 0.05, "{name}, {kind:?}, {stiffness} N/mm, {speed} mm/s, tick {tick}: {jump} N");
+                            assert!(
+                                jump < 0.05,
+                                "{name}, {kind:?}, {stiffness} N/mm, {speed} mm/s, tick {tick}: {jump} N"
+                            );
                             worst = worst.max(jump);
                         }
                         assert!(!was_let_go || force.length() < 0.01, "comes back softly: {force}");
@@ -184,20 +189,18 @@ fn thrown(fixture: Fixture, from: Vec3, velocity: Vec3, encoder_step: f32) -> [f
     let mut sim = led(Guidance::Path(fixture), Pose::IDENTITY, device);
     let mut hand = Hand::resting_at(model, from);
     let (mut told, mut felt) = (Vec3::ZERO, Vec3::ZERO);
-    let (mut given, mut most, mut before) = (0.0f64, 0.0f64, 0.0);
-    for tick in 0..10_000 {
-        if tick == 2 * EASED {
-            // Eased in around a hand at rest on the path; then it is thrown.
-            hand = Hand::resting_at(model, from);
-            hand.set_velocity(velocity);
-            (told, felt, before) = (Vec3::ZERO, Vec3::ZERO, energy(&hand));
-        }
+    // Eased in around a hand that is held still; then it is thrown.
+    for _ in 0..2 * EASED {
+        sim.step(&hand.turn(&Output::NONE));
+    }
+    hand.set_velocity(velocity);
+    let before = energy(&hand);
+    let (mut given, mut most) = (0.0f64, 0.0f64);
+    for _ in 0..9000 {
         let at = hand.position();
         let reading = hand.turn(&Output { force: told, ..Output::NONE });
-        if tick >= 2 * EASED {
-            given += f64::from(felt.dot(hand.position() - at));
-            most = most.max(given);
-        }
+        given += f64::from(felt.dot(hand.position() - at));
+        most = most.max(given);
         felt = told;
         told = sim.step(&reading).force;
     }
@@ -280,7 +283,8 @@ fn exercise(name: &str, guidance: &str) -> PathBuf {
     folder.join("guided.json")
 }
 
-const TUBE: &str = r#"{ "path": { "file": "expert.csv", "kind": "tube", "radius_mm": 0.5, "stiffness_n_per_mm": 0.2 } }"#;
+const TUBE: &str =
+    r#"{ "path": { "file": "expert.csv", "kind": "tube", "radius_mm": 0.5, "stiffness_n_per_mm": 0.2 } }"#;
 const FELT: &str = r#"{ "forces": { "file": "felt.csv", "repeat": true, "scale": 1.0, "space": "tooth" } }"#;
 
 #[test]
@@ -364,5 +368,9 @@ fn a_session_becomes_a_path_for_the_next() {
     }
     let output = typodont(&["path", bundle, "-o", "x.csv", "--stage", "tyr"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(complained(&output).contains("unknown-stage") && complained(&output).contains("try"), "{}", complained(&output));
+    assert!(
+        complained(&output).contains("unknown-stage") && complained(&output).contains("try"),
+        "{}",
+        complained(&output)
+    );
 }

@@ -44,7 +44,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let (table, rows) = if *forces { table_of_forces(&samples) } else { table_of_path(&samples) };
     let most = if *forces { ROWS_MAX } else { POINTS_MAX };
     if rows > most {
-        eprintln!("{}: has {rows} rows, of which an exercise follows at most {most}: take a part of it", output.display());
+        eprintln!(
+            "{}: has {rows} rows, of which an exercise follows at most {most}: take a part of it",
+            output.display()
+        );
     }
     super::write(output, table)?;
     say(format!("{}: {rows} rows", output.display()))

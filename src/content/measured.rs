@@ -190,7 +190,13 @@ fn row(
             Some(number) if (*least..=*most).contains(&number) => numbers.push(number),
             Some(number) => {
                 let message = format!("{name} is {number}: expected {least} to {most}");
-                found.push(complaint(source, place, "out-of-range", message, "units are millimetres, newtons and seconds"));
+                found.push(complaint(
+                    source,
+                    place,
+                    "out-of-range",
+                    message,
+                    "units are millimetres, newtons and seconds",
+                ));
             }
             None => {
                 let message = format!("\"{}\" is not a number", abridged(written));
@@ -221,7 +227,10 @@ mod tests {
     /// Lines, columns and rules of all complaints.
     fn complaints<T>(read: Result<T, Vec<Diagnostic>>) -> Vec<(usize, usize, &'static str)> {
         let found = read.err().unwrap_or_default();
-        found.iter().map(|d| d.line_and_column().map_or((0, 0, d.code), |(line, column)| (line, column, d.code))).collect()
+        found
+            .iter()
+            .map(|d| d.line_and_column().map_or((0, 0, d.code), |(line, column)| (line, column, d.code)))
+            .collect()
     }
 
     fn check_forces(text: &str, expected: &[(usize, usize, &str)]) {
@@ -241,7 +250,10 @@ mod tests {
         assert_eq!(rows, [row(0.5, [1.0, -2.0, 3.0]), row(1.5, [0.0, 0.0, -0.25])]);
         for text in ["x_mm,y_mm,z_mm\n1,2,3\n1,2,4", "time_s,x_mm,y_mm,z_mm\n0,1,2,3\n0.1,1,2,4\n"] {
             let path = path(Source::new("path.csv", text)).unwrap();
-            assert_eq!((path.points(), path.length()), (&[Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.0, 4.0)][..], 1.0));
+            assert_eq!(
+                (path.points(), path.length()),
+                (&[Vec3::new(1.0, 2.0, 3.0), Vec3::new(1.0, 2.0, 4.0)][..], 1.0)
+            );
         }
     }
 
@@ -260,7 +272,10 @@ mod tests {
         check_forces(&format!("{head}0,0,0,0\n-1,0,0,0\n"), &[(3, 1, "out-of-range")]);
         check_forces(&format!("{head}0,0,0,0\n1,0, 5.5,0\n"), &[(3, 6, "out-of-range")]);
         check_forces(&format!("{head}0,0,0,0\n1,4,4,0\n"), &[(3, 1, "out-of-range")]);
-        check_forces(&format!("{head}0,0,0,0\n1,0,0,0\n1,0,0,0\n0.5,0,0,0\n"), &[(4, 1, "wrong-order"), (5, 1, "wrong-order")]);
+        check_forces(
+            &format!("{head}0,0,0,0\n1,0,0,0\n1,0,0,0\n0.5,0,0,0\n"),
+            &[(4, 1, "wrong-order"), (5, 1, "wrong-order")],
+        );
         let many = format!("{head}{}", "a,0,0,0\n".repeat(100));
         assert_eq!(complaints(forces(Source::new("felt.csv", many))).len(), COMPLAINTS_MAX + 1);
         let rows: String = (0..ROWS_MAX + 1).map(|i| format!("{},0,0,0\n", i as f64 * 1e-3)).collect();

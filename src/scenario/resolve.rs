@@ -594,7 +594,12 @@ impl Resolver<'_> {
             [("look_ahead_mm", written.look_ahead_mm.is_some()), ("speed_mm_s", written.speed_mm_s.is_some())];
         for (key, _) in of_follow.iter().filter(|(_, is_written)| *is_written && is_tube) {
             let message = format!("a tube has no {key}");
-            self.complain(&format!("{path}/{key}"), "unused-key", message, "leave it out, or set \"kind\" to \"follow\"");
+            self.complain(
+                &format!("{path}/{key}"),
+                "unused-key",
+                message,
+                "leave it out, or set \"kind\" to \"follow\"",
+            );
         }
         let stiffness = written.stiffness_n_per_mm;
         let damping = written.damping_n_s_per_mm.unwrap_or(USUAL_DAMPING_TIME * stiffness);

@@ -17,8 +17,8 @@ use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
-    Carver, Carving, Contact, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials, Matter, Press, Proxy, SpringLimit,
-    Vibration,
+    Carver, Carving, Contact, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials, Matter, Press, Proxy,
+    SpringLimit, Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
 

@@ -17,7 +17,9 @@ mod gate;
 
 pub use carve::{Carver, Carving, Press};
 pub use gate::{ForceLimit, Gate};
-pub use guidance::{DAMPING_TIME, EASE_S, Fixture, ForceRow, Forces, Guidance, Guide, Kind, POINT_DISTANCE, Path, Space};
+pub use guidance::{
+    DAMPING_TIME, EASE_S, Fixture, ForceRow, Forces, Guidance, Guide, Kind, POINT_DISTANCE, Path, Space,
+};
 pub use instrument::{Instrument, WorkingEnd};
 pub use law::{Law, Pull, SpringLimit};
 pub use material::{Material, Materials};
