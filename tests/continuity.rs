@@ -83,7 +83,7 @@ fn check(name: &str, volume: fn(f32) -> Volume, law: Option<CuttingLaw>) {
         for spacing in [0.2, 0.1] {
             for speed in [10.0, 30.0, 100.0] {
                 for friction in [0.0, 0.4] {
-                    let mut sim = Simulation::new(world(volume(spacing), end, law, friction));
+                    let mut sim = Simulation::new(world(volume(spacing), end.clone(), law, friction));
                     let steps = follow(&mut sim, sweep(radius, 0.6, speed));
                     let jumps = steps[1..].iter().zip(&steps).map(|(a, b)| (a.force - b.force).length());
                     let (at, worst) = jumps.enumerate().fold((0, 0.0), |w, (i, j)| if j > w.1 { (i, j) } else { w });

@@ -189,20 +189,18 @@ fn thrown(fixture: Fixture, from: Vec3, velocity: Vec3, encoder_step: f32) -> [f
     let mut sim = led(Guidance::Path(fixture), Pose::IDENTITY, device);
     let mut hand = Hand::resting_at(model, from);
     let (mut told, mut felt) = (Vec3::ZERO, Vec3::ZERO);
-    let (mut given, mut most, mut before) = (0.0f64, 0.0f64, 0.0);
-    for tick in 0..10_000 {
-        if tick == 2 * EASED {
-            // Eased in around a hand at rest on the path; then it is thrown.
-            hand = Hand::resting_at(model, from);
-            hand.set_velocity(velocity);
-            (told, felt, before) = (Vec3::ZERO, Vec3::ZERO, energy(&hand));
-        }
+    // Eased in around a hand that is held still; then it is thrown.
+    for _ in 0..2 * EASED {
+        sim.step(&hand.turn(&Output::NONE));
+    }
+    hand.set_velocity(velocity);
+    let before = energy(&hand);
+    let (mut given, mut most) = (0.0f64, 0.0f64);
+    for _ in 0..9000 {
         let at = hand.position();
         let reading = hand.turn(&Output { force: told, ..Output::NONE });
-        if tick >= 2 * EASED {
-            given += f64::from(felt.dot(hand.position() - at));
-            most = most.max(given);
-        }
+        given += f64::from(felt.dot(hand.position() - at));
+        most = most.max(given);
         felt = told;
         told = sim.step(&reading).force;
     }

@@ -82,7 +82,7 @@ fn a_mesh_of_a_ball_feels_like_a_ball() {
     // in 80×160 facets, turned and moved, circled over 1 mm deep.
     let place = Pose { position: Vec3::new(2.0, -1.0, 3.0), orientation: Quat::from_xyzw(0.5, 0.5, -0.5, 0.5) };
     for end in [WorkingEnd::Point, WorkingEnd::Ball { radius: 0.7 }] {
-        let mut sim = Simulation::new(around(&ball_obj(5.0, 80, 160), place, end));
+        let mut sim = Simulation::new(around(&ball_obj(5.0, 80, 160), place, end.clone()));
         let reach = 5.0 + if let WorkingEnd::Ball { radius } = end { radius } else { 0.0 };
         let (u, v) = (Vec3::new(0.8, 0.6, 0.0), Vec3::new(-0.36, 0.48, 0.8));
         let down = (0..400).map(|i| u * (reach + 0.5 - 1.5 * i as f32 / 399.0));

@@ -50,7 +50,12 @@ fn world() -> Setup {
     let bur = WorkingEnd::Ball { radius: 0.7 };
     let explorer = Instrument::new(WorkingEnd::Point, false);
     let setup = phantom::setup(volume, bur.clone(), true);
-    Setup { instruments: vec![Instrument::new(bur.clone(), true), explorer], device: Spec::phantom_omni(), ramp: 200, ..setup }
+    Setup {
+        instruments: vec![Instrument::new(bur.clone(), true), explorer],
+        device: Spec::phantom_omni(),
+        ramp: 200,
+        ..setup
+    }
 }
 
 /// Turns for a while; `at_ms` moves the hand and gives orders once a millisecond. Returns every tick that was told.
