@@ -37,12 +37,12 @@ struct Weight {
 }
 
 impl Weight {
-    fn resting(end: WorkingEnd, sticking: f32, sliding: f32) -> Weight {
+    fn resting(end: &WorkingEnd, sticking: f32, sliding: f32) -> Weight {
         let slope = volume([160, 80, 60], 0.1, |p| (p.dot(outward()), HARD));
-        let mut setup = setup(slope, end, false);
+        let mut setup = setup(slope, end.clone(), false);
         let material = Material { static_friction: sticking, dynamic_friction: sliding, ..*setup.materials.get(HARD) };
         setup.materials.set(HARD, material);
-        let radius = if let WorkingEnd::Ball { radius } = end { radius } else { 0.0 };
+        let radius = if let WorkingEnd::Ball { radius } = end { *radius } else { 0.0 };
         let at = outward() * (radius + 0.05) - downhill() * 5.0;
         let mut weight = Weight { sim: Simulation::new(setup), at, velocity: Vec3::ZERO, is_gripped: true };
         for _ in 0..800 {
@@ -86,7 +86,7 @@ fn a_resting_weight_sticks_up_to_the_angle_of_its_coefficient() {
     for end in ENDS {
         for (sticking, sliding) in [(0.2f32, 0.2f32), (0.3, 0.1), (0.5, 0.3), (0.8, 0.2), (0.4, 0.4)] {
             let expected = sticking.atan().to_degrees();
-            let mut weight = Weight::resting(end, sticking, sliding);
+            let mut weight = Weight::resting(&end, sticking, sliding);
             weight.tilt(expected - 3.0);
             let start = weight.way();
             let mut angle = expected - 3.0;
@@ -108,7 +108,7 @@ fn a_sliding_weight_stops_below_the_angle_of_its_coefficient() {
         for (sticking, sliding) in [(0.2f32, 0.2f32), (0.3, 0.15), (0.5, 0.3), (0.4, 0.4)] {
             let critical = sliding.atan().to_degrees();
             let run = |angle: f32| {
-                let mut weight = Weight::resting(end, sticking, sliding);
+                let mut weight = Weight::resting(&end, sticking, sliding);
                 weight.is_gripped = false;
                 for _ in 0..4000 {
                     if weight.speed() > 25.0 {
@@ -138,7 +138,7 @@ fn a_sliding_weight_stops_below_the_angle_of_its_coefficient() {
 fn a_stuck_tip_stays_stuck() {
     // Aim: below the angle of sticking nothing creeps: less than 0.02 mm in two seconds, while the hand trembles.
     for end in ENDS {
-        let mut weight = Weight::resting(end, 0.5, 0.3);
+        let mut weight = Weight::resting(&end, 0.5, 0.3);
         weight.tilt(20.0);
         let start = weight.way();
         for tick in 0..2000 {
