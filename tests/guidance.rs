@@ -325,7 +325,10 @@ fn a_guided_session_is_a_proof() {
         let scored = metric(&session(&bundle), "force_max_n").unwrap();
         println!("{name}: pressed with {pressed} N, told {told} N, scored {scored} N");
         assert!((scored - f64::from(pressed)).abs() < 1e-6);
-        assert!(name == "guided_tube" || (told - pressed).abs() > 0.005, "the tooth is touched while forces are played");
+        assert!(
+            name == "guided_tube" || (told - pressed).abs() > 0.005,
+            "the tooth is touched while forces are played"
+        );
     }
 }
 
