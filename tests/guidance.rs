@@ -272,7 +272,7 @@ fn exercise(name: &str, guidance: &str) -> PathBuf {
   "instruments": ["explorer"],
   "stages": [
     {{ "id": "settle", "title": "Settle", "instruction": "Settle.", "time_limit_s": 1 }},
-    {{ "id": "try", "title": "Trace", "instruction": "Trace.", "time_limit_s": 4, "guidance": {guidance} }},
+    {{ "id": "try", "title": "Trace", "instruction": "Trace.", "time_limit_s": 6, "guidance": {guidance} }},
     {{ "id": "rest", "title": "Rest", "instruction": "Rest.", "time_limit_s": 1 }}
   ]
 }}"#
@@ -311,12 +311,24 @@ fn a_guided_session_is_a_proof() {
         });
         assert_eq!(told.collect::<Vec<_>>(), expected);
         let workpiece = recording.workpiece().unwrap();
-        let mut led = Vec::new();
+        let (mut led, mut pressed, mut told) = (Vec::new(), 0.0f32, 0.0f32);
         typodont::record::replay(&recording, workpiece, typodont::record::Watch::Everything, |_, step, _, _| {
             led.extend((step.guidance != Vec3::ZERO).then_some(step.tick.0));
+            if step.touch.is_some() {
+                pressed = pressed.max(step.force.distance(step.guidance));
+                told = told.max(step.force.length());
+            }
         });
         let (first, last) = (*led.first().unwrap(), *led.last().unwrap());
         assert!(first >= expected[0].0 && last < expected[1].0 + EASED, "led from {first} to {last}, {expected:?}");
+        // How the exercise leads the hand is not how hard the trainee presses.
+        let scored = metric(&session(&bundle), "force_max_n").unwrap();
+        println!("{name}: pressed with {pressed} N, told {told} N, scored {scored} N");
+        assert!((scored - f64::from(pressed)).abs() < 1e-6);
+        assert!(
+            name == "guided_tube" || (told - pressed).abs() > 0.005,
+            "the tooth is touched while forces are played"
+        );
     }
 }
 

@@ -156,8 +156,20 @@ pub const PLAIN: &[About] = &[
         Higher,
         "least distance between R without pulp and pulp; none if either is empty",
     ),
-    about("force_max_n", "Greatest force", "N", Lower, "greatest force on the hand in contact; never in contact: 0"),
-    about("force_mean_n", "Mean force", "N", Lower, "mean force over ticks in contact; never in contact: none"),
+    about(
+        "force_max_n",
+        "Greatest force",
+        "N",
+        Lower,
+        "greatest force on the hand in contact, guidance left out; never in contact: 0",
+    ),
+    about(
+        "force_mean_n",
+        "Mean force",
+        "N",
+        Lower,
+        "mean force over ticks in contact, guidance left out; never in contact: none",
+    ),
     about(
         "speed_max_mm_s",
         "Greatest speed in contact",

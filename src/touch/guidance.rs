@@ -178,7 +178,7 @@ impl Path {
     /// The place nearest to a point between two places of the path; of equals the first.
     fn nearest(&self, point: Vec3, from: f32, to: f32) -> Foot {
         let mut best = Foot { along: from, point: self.at(from) };
-        let mut least = best.point.distance_squared(point);
+        let mut least = best.point.distance(point);
         let first = self.along.partition_point(|&a| a <= from).saturating_sub(1);
         for (ends, along) in self.points.windows(2).zip(self.along.windows(2)).skip(first) {
             let (&[a, b], &[start, end]) = (ends, along) else { break };
@@ -186,10 +186,15 @@ impl Path {
                 break;
             }
             let length = end - start;
+            // Most legs are too far away for any of their points: seen without a division or a root.
+            let farthest = least + length;
+            if a.distance_squared(point) > farthest * farthest {
+                continue;
+            }
             let way = (b - a) / length;
             let on_leg = (point - a).dot(way).max(from - start).max(0.0).min(to - start).min(length);
             let foot = Foot { along: start + on_leg, point: a + way * on_leg };
-            let distance = foot.point.distance_squared(point);
+            let distance = foot.point.distance(point);
             if distance < least {
                 (best, least) = (foot, distance);
             }
