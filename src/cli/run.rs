@@ -97,7 +97,7 @@ pub enum Player {
     /// A script on a simulated device, as fast as the machine can.
     Script(Box<OperatorFile>),
     /// A person with a device, in real time.
-    Person(live::Held),
+    Person(Box<live::Held>),
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
@@ -117,7 +117,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let player = match is_scripted {
         true => Player::Script(Box::new(operator(&arguments.operator, &library)?)),
-        false => Player::Person(held(arguments)?),
+        false => Player::Person(Box::new(held(arguments)?)),
     };
     let run = Run {
         scenario: Arc::new(scenario),
@@ -223,7 +223,7 @@ pub fn perform(run: Run) -> Result<PathBuf, Failure> {
             end
         }
         Player::Person(held) => {
-            live::play(&mut session, simulation, held, &mut recorder).map_err(|broken| match broken {
+            live::play(&mut session, simulation, *held, &mut recorder).map_err(|broken| match broken {
                 Broken::Observer(error) => stopped(&error),
                 Broken::Servo(what) => stopped(&what),
             })?

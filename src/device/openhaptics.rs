@@ -545,7 +545,10 @@ impl Arm {
         self.stage = Stage::Running { schedule };
         let Errors { force, device, refused } = hd.drain();
         match device.max(refused) {
-            SUCCESS => Ok(self.meeting.note(Errors { force, ..Errors::default() })),
+            SUCCESS => {
+                self.meeting.note(Errors { force, ..Errors::default() });
+                Ok(())
+            }
             code => Err(lost("its library does not start the servo; restart the program", code)),
         }
     }

@@ -499,8 +499,8 @@ extern "C" fn feel_hd(hand: *mut c_void, told: *const f64, sample: *mut HdSample
             sample.transform[4 * column + row] = f64::from(along[row]);
         }
     }
-    for row in 0..3 {
-        sample.transform[12 + row] = f64::from(reading.pose.position[row]) + HD_MIDDLE[row];
+    for (row, middle) in HD_MIDDLE.into_iter().enumerate() {
+        sample.transform[12 + row] = f64::from(reading.pose.position[row]) + middle;
     }
     sample.transform[15] = 1.0;
     sample.buttons = reading.buttons;
