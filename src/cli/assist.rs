@@ -4,6 +4,7 @@ use super::{Failure, live};
 use crate::device::Link;
 use crate::sim::Assist;
 use clap::Args;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::TryRecvError;
 use std::time::Duration;
 
@@ -32,7 +33,11 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut assist = Assist::start(held.device, link).map_err(Failure::Wrong)?;
     live::speak("second hand: follows the first one; hold the button to lead it, type end to leave");
     let lines = live::typed_lines();
+    let is_interrupted = live::interruptions();
     while !assist.has_ended() {
+        if is_interrupted.load(Ordering::Relaxed) {
+            return Ok(());
+        }
         while let Some(news) = assist.next_news() {
             live::speak(format!("second hand: {}", live::assist_text(news)));
         }

@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 
 /// The device a person holds, and how to find it again.
 pub struct Held {
+    /// As it was asked for.
+    pub name: String,
     pub device: Box<dyn Device + Send>,
     pub driver: &'static dyn Driver,
     pub argument: Option<String>,
@@ -43,6 +45,11 @@ pub enum From<'a> {
 pub fn join(held: &mut Held, from: &From) -> Result<(), Failure> {
     let max_damping = held.device.spec().max_damping;
     let (link, assist) = match from {
+        From::Device(name) if *name == held.name => {
+            return Err(Failure::misuse(format!(
+                "same-device: {name} is in the first hand; name another one, NAME:WHICH, for the second"
+            )));
+        }
         From::Device(name) => {
             let (ours, theirs) = Link::pair();
             let assist = Assist::start(open(name)?.device, theirs).map_err(Failure::Wrong)?;
@@ -60,10 +67,10 @@ pub fn join(held: &mut Held, from: &From) -> Result<(), Failure> {
 }
 
 /// Opens the device that `--device NAME[:ARGUMENT]` names.
-pub fn open(name: &str) -> Result<Held, Failure> {
-    let (name, argument) = match name.split_once(':') {
+pub fn open(asked: &str) -> Result<Held, Failure> {
+    let (name, argument) = match asked.split_once(':') {
         Some((name, argument)) => (name, Some(argument.to_string())),
-        None => (name, None),
+        None => (asked, None),
     };
     let Some(driver) = crate::device::driver(name) else {
         let known = crate::device::DRIVERS.iter().map(|d| d.name()).collect::<Vec<_>>().join(", ");
@@ -72,7 +79,7 @@ pub fn open(name: &str) -> Result<Held, Failure> {
         )));
     };
     let device = driver.open(argument.as_deref()).map_err(|trouble| no_device(name, &trouble))?;
-    Ok(Held { device, driver, argument, second: None })
+    Ok(Held { name: asked.to_string(), device, driver, argument, second: None })
 }
 
 fn no_device(name: &str, trouble: &Trouble) -> Failure {
@@ -95,7 +102,7 @@ pub fn play(
     held: Held,
     recorder: &mut Recorder,
 ) -> Result<EndFile, Stopped> {
-    let Held { device, driver, argument, second } = held;
+    let Held { device, driver, argument, second, .. } = held;
     let (second, mut assist) = second.map_or((None, None), |s| (Some(s.end), s.assist));
     let lines = typed_lines();
     let is_interrupted = interruptions();
@@ -113,8 +120,10 @@ pub fn play(
         if live.is_waiting() && looked.elapsed() > LOOK_EVERY {
             looked = Instant::now();
             if let Ok(device) = driver.open(argument.as_deref()) {
-                live.go_on::<Recorder>(device)?;
-                speak("the device is back; take the instrument out of the tooth, then go on");
+                speak(match live.go_on::<Recorder>(device)? {
+                    true => "the device is back; take the instrument out of the tooth, then go on",
+                    false => "this is another device than the session began with; plug that one in again",
+                });
             }
         }
         if is_interrupted.swap(false, Ordering::Relaxed) {
@@ -147,18 +156,13 @@ pub fn play(
     Ok(EndFile { reason: reason.into(), servo: ServoFile::of_live(&kept) })
 }
 
-/// Whether somebody asked the program to stop (Ctrl-C): the session is aborted then, its hand let go and its bundle made.
-/// A second time ends the program at once.
-fn interruptions() -> Arc<AtomicBool> {
+/// Whether somebody asked the program to stop (Ctrl-C, or the system's word for it): the session is aborted then, its hand
+/// let go and its bundle made.
+pub fn interruptions() -> Arc<AtomicBool> {
     let is_asked = Arc::new(AtomicBool::new(false));
-    let (asked, was_asked) = (is_asked.clone(), AtomicBool::new(false));
+    let asked = is_asked.clone();
     // Where it cannot be caught, the program ends as it would have; the device lets go when no force comes any more.
-    let _ = ctrlc::set_handler(move || {
-        asked.store(true, Ordering::Relaxed);
-        if was_asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
-        }
-    });
+    let _ = ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed));
     is_asked
 }
 
@@ -189,6 +193,7 @@ fn tell(heard: &[Heard], session: &Session) {
             Heard::Effect(Effect::Refused { why }) => speak(format!("not taken: {why}")),
             Heard::Effect(Effect::Answered { .. }) => speak("noted"),
             Heard::Effect(Effect::Tell(_) | Effect::StepStarted { .. }) => {}
+            Heard::Begun(priority) => speak(format!("the servo turns with {priority}")),
             Heard::Device(state) if state.is_ready() => speak("the device is ready"),
             Heard::Device(state) => speak(format!("time stands still: {state}")),
             Heard::Gone(gone) => speak(format!("time stands still: {gone}; plug it in again and the session goes on")),
@@ -200,7 +205,7 @@ fn tell(heard: &[Heard], session: &Session) {
 pub fn assist_text(news: AssistNews) -> String {
     match news {
         AssistNews::Device(state) => format!("the device is {state}"),
-        AssistNews::Gone(gone) => gone.to_string(),
+        AssistNews::Gone(gone) => format!("{gone}; it stays away until the session is begun anew"),
         AssistNews::First { is_there: true } => "the first hand is there; hold the button to lead it".to_string(),
         AssistNews::First { is_there: false } => "the first hand has fallen silent".to_string(),
         AssistNews::Leading(true) => "leads".to_string(),

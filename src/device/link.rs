@@ -12,6 +12,7 @@ use crate::frame::{Quat, Vec3};
 use crate::mailbox::Newest;
 use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::Arc;
@@ -87,6 +88,9 @@ impl Link {
             theirs: theirs.clone(),
             epoch,
             refused: refused.clone(),
+            // Seeded by the system, for each meeting anew.
+            meeting: RandomState::new().build_hasher().finish() as u32 | 1,
+            their_meeting: 0,
             sequence: 0,
             heard: None,
             one_way: FIRST_DELAY,
@@ -152,6 +156,9 @@ struct Carrying {
     theirs: Arc<Newest<WORDS>>,
     epoch: Instant,
     refused: Arc<AtomicU64>,
+    /// A number of chance that names this meeting: who says it back speaks to us, and now.
+    meeting: u32,
+    their_meeting: u32,
     sequence: u32,
     heard: Option<Heard>,
     /// How long a datagram is under way, s: half of the shortest round trip of late.
@@ -192,7 +199,13 @@ impl Carrying {
     }
 
     fn send(&mut self) {
-        let (Some(peer), Some((_, words))) = (self.peer, self.ours.read()) else { return };
+        if let Some(peer) = self.peer {
+            self.send_to(peer, self.their_meeting);
+        }
+    }
+
+    fn send_to(&mut self, peer: SocketAddr, their_meeting: u32) {
+        let Some((_, words)) = self.ours.read() else { return };
         let (mate, _) = mate_of(words);
         self.sequence = self.sequence.wrapping_add(1);
         let (echo_us, echo_age_us) = match self.heard {
@@ -206,6 +219,8 @@ impl Carrying {
         bytes[12..20].copy_from_slice(&(self.epoch.elapsed().as_micros() as u64).to_le_bytes());
         bytes[20..28].copy_from_slice(&echo_us.to_le_bytes());
         bytes[28..32].copy_from_slice(&echo_age_us.to_le_bytes());
+        bytes[64..68].copy_from_slice(&self.meeting.to_le_bytes());
+        bytes[68..72].copy_from_slice(&their_meeting.to_le_bytes());
         bytes[32..36].copy_from_slice(&mate.buttons.to_le_bytes());
         let numbers = mate.position.to_array().into_iter().chain(mate.orientation.to_array());
         for (to, number) in bytes[36..64].chunks_exact_mut(4).zip(numbers) {
@@ -228,6 +243,12 @@ impl Carrying {
         let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
         let number = |i: usize| f32::from_bits(word(36 + 4 * i));
         let (sequence, now) = (word(8), Instant::now());
+        if word(68) != self.meeting {
+            // Not said to us in this meeting: a peer that does not know it yet, or words of an old meeting played back. Either is
+            // told what to say, and moves nobody.
+            self.send_to(from, word(64));
+            return Some(());
+        }
         if let Some(heard) = self.heard.filter(|heard| heard.at.elapsed() < PEER_AFTER) {
             // One peer at a time, and only what is newer than the newest.
             let is_newer = sequence.wrapping_sub(heard.sequence).cast_signed() > 0;
@@ -235,7 +256,7 @@ impl Carrying {
                 return None;
             }
         }
-        self.peer = Some(from);
+        (self.peer, self.their_meeting) = (Some(from), word(64));
         self.heard = Some(Heard { sequence, sent_us: long(12), at: now });
         self.measure(long(20), word(28));
         let mate = Mate {

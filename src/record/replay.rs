@@ -268,6 +268,8 @@ fn differing_part(recorded: &Haptic, again: &Haptic) -> Option<&'static str> {
     let bits = |v: crate::frame::Vec3| v.to_array().map(f32::to_bits);
     let parts = [
         (bits(recorded.force) != bits(again.force), "force"),
+        (bits(recorded.torque) != bits(again.torque), "torque"),
+        (bits(recorded.lead) != bits(again.lead), "other hand's lead"),
         (bits(recorded.tip) != bits(again.tip), "place of the tip"),
         (recorded.spring.to_bits() != again.spring.to_bits(), "spring's force"),
         (recorded.removed != again.removed, "number of voxels removed"),

@@ -151,8 +151,9 @@ impl Watcher {
         self.now.cutting |= step.cutting;
         self.was_touched |= step.touch.is_some();
         if let Some(touch) = &step.touch {
-            // How the exercise leads the hand is not how hard the trainee presses.
-            let pressed = if step.guidance == Vec3::ZERO { step.force } else { step.force - step.guidance };
+            // How the exercise or an instructor leads the hand is not how hard the trainee presses.
+            let led = step.guidance + step.lead;
+            let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
             let force = f64::from(pressed.length());
             self.seen.contact_ticks += 1;
             self.seen.force.add(force, tick, place);

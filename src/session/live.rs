@@ -5,7 +5,8 @@
 //! than the one for which the session gave it.
 
 use super::{Effect, Event, Input, Observer, Session};
-use crate::device::{Device, Gone, State};
+use crate::device::realtime::Priority;
+use crate::device::{Device, Gone, Spec, State};
 use crate::sim::{BeatSummary, Beats, Command, Ended, Letter, Order, Second, Servo, Simulation, Step, Turn};
 use crate::tick::Tick;
 use crate::touch::Gate;
@@ -18,6 +19,8 @@ pub const COMMAND_LAG_TICKS: u64 = 1 << 14;
 /// Something to show or to say.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Heard {
+    /// The servo has begun to turn, with this priority.
+    Begun(Priority),
     Effect(Effect),
     /// The device is in another state; unless it is ready, time stands still.
     Device(State),
@@ -37,6 +40,10 @@ pub struct Live {
     screen: Option<Step>,
     buttons: u32,
     interruptions: u64,
+    /// What the recording's head says of the device.
+    spec: Spec,
+    is_paused: bool,
+    was_ready: bool,
     /// How the beats went, once nothing turns any more.
     kept_beats: Option<BeatSummary>,
 }
@@ -106,6 +113,9 @@ impl Live {
             screen: None,
             buttons: 0,
             interruptions: 0,
+            spec: device.spec().clone(),
+            is_paused: false,
+            was_ready: false,
             kept_beats: None,
         };
         let mut heard = Vec::new();
@@ -130,6 +140,9 @@ impl Live {
         beats: Beats,
     ) -> Result<(), Broken<E>> {
         let mut servo = Servo::start(simulation, device, second, beats).map_err(Broken::Servo)?;
+        if self.is_paused {
+            servo.order(Order::Pause);
+        }
         for command in &self.given {
             servo.order(Order::Command(*command));
         }
@@ -137,16 +150,20 @@ impl Live {
         Ok(())
     }
 
-    /// Goes on after the device was gone, with the same or another one of its kind.
-    pub fn go_on<O: Observer>(&mut self, device: Box<dyn Device + Send>) -> Result<(), Broken<O::Error>> {
+    /// Goes on after the device was gone. False when this is another device than the session began with: what a spring may be
+    /// and what the recording says of it would not be true any more.
+    pub fn go_on<O: Observer>(&mut self, device: Box<dyn Device + Send>) -> Result<bool, Broken<O::Error>> {
+        if *device.spec() != self.spec {
+            return Ok(false);
+        }
         match std::mem::replace(&mut self.at_work, Work::Over) {
             Work::Waiting(left) => {
                 let Left { simulation, second, beats } = *left;
-                self.start(simulation, device, second, beats)
+                self.start(simulation, device, second, beats).map(|()| true)
             }
             other => {
                 self.at_work = other;
-                Ok(())
+                Ok(true)
             }
         }
     }
@@ -163,13 +180,14 @@ impl Live {
         while !session.are_stages_over() {
             let Some(letter) = self.servo_mut().and_then(Servo::next_letter) else { break };
             match letter {
+                Letter::Begun(priority) => heard.push(Heard::Begun(priority)),
                 Letter::Commanded(_, command) => {
                     self.given.pop_front();
                     observer.command(self.tick, &command)?;
                 }
                 Letter::Turned(turn) => self.turned(&turn, session, observer, &mut heard)?,
                 Letter::Device(state) => {
-                    self.interruptions += u64::from(!state.is_ready() && self.tick > Tick::ZERO);
+                    self.ready(state.is_ready());
                     heard.push(Heard::Device(state));
                 }
             }
@@ -178,11 +196,17 @@ impl Live {
             // Only the questionnaire may be left: the hand is free and time stands still.
             self.rest()?;
         } else if has_ended && let Some(ended) = self.stop()? {
-            self.interruptions += 1;
+            self.ready(false);
             heard.push(Heard::Gone(ended.gone.unwrap_or(Gone::Ended)));
             self.at_work = Work::Waiting(Box::new(Left::from(ended)));
         }
         Ok(heard)
+    }
+
+    /// Being away is one interruption, however many states it goes through.
+    fn ready(&mut self, is_ready: bool) {
+        self.interruptions += u64::from(self.was_ready && !is_ready);
+        self.was_ready = is_ready;
     }
 
     fn turned<O: Observer>(
@@ -251,6 +275,7 @@ impl Live {
 
     /// Lets time stand still and the hand go, or ends that.
     pub fn pause(&mut self, is_paused: bool) {
+        self.is_paused = is_paused;
         if let Some(servo) = self.servo_mut() {
             servo.order(if is_paused { Order::Pause } else { Order::Resume });
         }

@@ -38,6 +38,11 @@ impl Second {
         self.coupling.force(position, self.link.far(|mate| mate.is_leading))
     }
 
+    /// The first hand was let go: the lead comes in softly when it is back.
+    pub(super) fn forget(&mut self) {
+        self.coupling.forget();
+    }
+
     /// Datagrams that were refused on the way.
     pub fn refused(&self) -> u64 {
         self.link.refused()
@@ -133,7 +138,9 @@ fn assist(
                 return;
             }
         };
-        pace.beat(&mut beats);
+        if pace.beat(&mut beats).is_none() {
+            continue;
+        }
         let now = device.state();
         if state != Some(now) {
             state = Some(now);

@@ -208,9 +208,9 @@ impl Simulation {
         let pull = self.law.pull(hand, tip, contact.as_ref());
         let cutting = match contact {
             // A bur that leans on its shank presses the less with what cuts, and without it not at all.
-            Some(Contact { at_head, .. }) if instrument.cuts && self.bur_runs && at_head > 0.0 => {
+            Some(Contact { at_head, label, .. }) if instrument.cuts && self.bur_runs && at_head > 0.0 => {
                 let pull = Pull { spring: pull.spring * at_head, ..pull };
-                let press = Press { tip, hand, orientation: held.orientation, pull };
+                let press = Press { tip, hand, orientation: held.orientation, pull, label };
                 self.carver.cut(&mut self.matter.volume, instrument, materials, &press)
             }
             _ => {
@@ -281,6 +281,11 @@ impl Simulation {
             guidance: Vec3::ZERO,
             instrument: self.instrument,
         }
+    }
+
+    /// True while the hand is free because it was let go, and has not been out of matter since.
+    pub fn has_let_go(&self) -> bool {
+        !self.is_out
     }
 
     /// Another hand leads this one with a force, N, world space, from the next tick on. A force that is not finite is none.

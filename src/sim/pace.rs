@@ -16,9 +16,15 @@ pub(super) struct Pace {
     beat: Beat,
     /// End of a wait that is spun instead of slept.
     spin: Duration,
-    /// When the next beat is due.
+    /// When the next tick is due. Ticks are milliseconds of this clock, whoever keeps the beat.
     due: Instant,
+    /// When the last beat came.
+    last: Instant,
 }
+
+/// A beat of a device that comes earlier than this turns no tick: a device that runs faster than 1 kHz must not make a
+/// session's time run faster.
+const EARLY: Duration = Duration::from_micros(500);
 
 /// With priority the last stretch of a wait is spun: waking takes 30–100 µs and varies. Without it spinning is punished by
 /// the scheduler (measured: p99 of 2.5 ms against 0.1 ms), so nothing is.
@@ -27,7 +33,8 @@ const SPIN: Duration = Duration::from_micros(80);
 impl Pace {
     pub fn new(beat: Beat, priority: Priority) -> Pace {
         let spin = if priority == Priority::Realtime { SPIN } else { Duration::ZERO };
-        Pace { beat, spin, due: Instant::now() + BEAT }
+        let now = Instant::now();
+        Pace { beat, spin, due: now + BEAT, last: now }
     }
 
     /// Waits until the next beat is due, where the device does not do that.
@@ -44,18 +51,25 @@ impl Pace {
         }
     }
 
-    /// A beat has come: counts how late, and says so.
-    pub fn beat(&mut self, beats: &mut Beats) -> Duration {
+    /// A beat has come: counts how late, and says so; `None` for one that comes before its tick is due.
+    ///
+    /// A device's own beat is late by how much longer it took than a millisecond; beats are missed by the clock.
+    pub fn beat(&mut self, beats: &mut Beats) -> Option<Duration> {
         let now = Instant::now();
-        let late = now.saturating_duration_since(self.due);
-        beats.late.add(late);
-        let whole = (late.as_secs_f64() / TICK_S) as u32;
-        beats.missed += u64::from(whole);
-        self.due = match self.beat {
-            // Beats that never came are not made up for: the hand has moved on.
-            Beat::Ours => self.due + BEAT * (whole + 1),
-            Beat::Device => now + BEAT,
+        if now + EARLY < self.due {
+            return None;
+        }
+        let behind = now.saturating_duration_since(self.due);
+        let late = match self.beat {
+            Beat::Ours => behind,
+            Beat::Device => now.saturating_duration_since(self.last + BEAT),
         };
-        late
+        beats.late.add(late);
+        // Beats that never came are not made up for: the hand has moved on.
+        let whole = (behind.as_secs_f64() / TICK_S) as u32;
+        beats.missed += u64::from(whole);
+        self.due += BEAT * (whole + 1);
+        self.last = now;
+        Some(late)
     }
 }

@@ -18,6 +18,7 @@ use crate::tick::Tick;
 use crate::touch::Gate;
 use crate::volume::Edit;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -28,13 +29,13 @@ pub enum Order {
     /// Time stands still and the hand is free.
     Pause,
     Resume,
-    /// The thread ends, and gives back what it was given.
-    Stop,
 }
 
 /// What the servo tells, in the order in which it happened.
 #[derive(Clone, Copy, Debug)]
 pub enum Letter {
+    /// The thread has begun, with this priority.
+    Begun(Priority),
     /// A command was carried out, before this tick.
     Commanded(Tick, Command),
     /// A tick was turned; so many edits lie in the other box.
@@ -59,7 +60,9 @@ pub struct Servo {
     letters: Receiver<Letter>,
     edits: Receiver<Edit>,
     beats: Arc<Newest<9>>,
-    thread: JoinHandle<Ended>,
+    stop: Arc<AtomicBool>,
+    /// `None` once it was waited for.
+    thread: Option<JoinHandle<Ended>>,
 }
 
 /// What a servo leaves when it ends.
@@ -105,10 +108,12 @@ impl Servo {
         let (edit_post, edits) = mailbox::ordered(EDITS_MAX);
         let summary = Arc::new(Newest::new());
         let post = Post { letters: post, edits: edit_post, beats, summary: summary.clone() };
-        let turning = move || turn(simulation, device, second, inbox, post);
+        let stop = Arc::new(AtomicBool::new(false));
+        let is_over = stop.clone();
+        let turning = move || turn(simulation, device, second, inbox, post, &is_over);
         let thread = thread::Builder::new().name("servo".into()).spawn(turning);
         let thread = thread.map_err(|e| format!("the system gives no thread for the servo: {e}"))?;
-        Ok(Servo { orders, letters, edits, beats: summary, thread })
+        Ok(Servo { orders, letters, edits, beats: summary, stop, thread: Some(thread) })
     }
 
     /// Gives an order; false when there is no room or the servo has ended.
@@ -133,15 +138,27 @@ impl Servo {
 
     /// True when the thread has ended by itself: the device is gone.
     pub fn has_ended(&self) -> bool {
-        self.thread.is_finished()
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     /// Stops the servo and waits for it. Letters that were not fetched are lost with it: fetch them first.
     ///
     /// An error when the thread failed; the device was let go then.
     pub fn stop(mut self) -> Result<Ended, String> {
-        self.order(Order::Stop);
-        self.thread.join().map_err(|_| "the servo failed and has let the hand go; please report this".to_string())
+        self.stop.store(true, Ordering::Release);
+        let ended = self.thread.take().and_then(|thread| thread.join().ok());
+        ended.ok_or_else(|| "the servo failed and has let the hand go; please report this".to_string())
+    }
+}
+
+/// Whoever drops a servo, for whatever reason, lets the hand go.
+impl Drop for Servo {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // It looks up every beat; the device is closed with what the thread leaves.
+            let _ = thread.join();
+        }
     }
 }
 
@@ -185,8 +202,10 @@ fn turn(
     mut second: Option<Second>,
     mut orders: Receiver<Order>,
     mut post: Post,
+    is_over: &AtomicBool,
 ) -> Ended {
     let priority = realtime::raise();
+    post.letter(Letter::Begun(priority));
     let mut pace = Pace::new(device.beat(), priority);
     let mut output = Output::NONE;
     let mut state = None;
@@ -198,8 +217,18 @@ fn turn(
             pace.wait();
             device.exchange(&output)
         };
-        let late = pace.beat(&mut post.beats);
-        while let Some(order) = orders.try_recv() {
+        if is_over.load(Ordering::Acquire) {
+            break 'beats None;
+        }
+        let late = match (pace.beat(&mut post.beats), &exchanged) {
+            (Some(late), _) => late,
+            (None, Ok(_)) => continue,
+            (None, Err(_)) => Duration::ZERO,
+        };
+        // A command that was carried out and not told of would spoil the recording: it waits until its letter fits.
+        while post.letters.room() > 1
+            && let Some(order) = orders.try_recv()
+        {
             match order {
                 Order::Command(command) => {
                     simulation.apply(&command);
@@ -207,7 +236,6 @@ fn turn(
                 }
                 Order::Pause => is_paused = true,
                 Order::Resume => is_paused = false,
-                Order::Stop => break 'beats None,
             }
         }
         let now = device.state();
@@ -223,12 +251,18 @@ fn turn(
                     post.turned(Reading::ABSENT, step, &simulation);
                 }
                 (is_held, output) = (false, Output::NONE);
+                if let Some(second) = &mut second {
+                    second.forget();
+                }
                 continue;
             }
             Err(gone) => {
                 if is_held {
                     let step = simulation.step(&Reading::ABSENT);
                     post.turned(Reading::ABSENT, step, &simulation);
+                }
+                if let Some(second) = &mut second {
+                    second.forget();
                 }
                 break 'beats Some(gone);
             }
@@ -244,6 +278,9 @@ fn turn(
         let step = simulation.step(&reading);
         post.beats.work.add(begun.elapsed());
         output = step.output();
+        if let Some(second) = second.as_mut().filter(|_| simulation.has_let_go()) {
+            second.forget();
+        }
         post.turned(reading, step, &simulation);
     };
     if gone.is_none() {

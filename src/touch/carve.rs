@@ -15,7 +15,7 @@ use super::material::Materials;
 use super::rate::{Account, Rate};
 use crate::frame::{Quat, Vec3};
 use crate::tick::TICK_S;
-use crate::volume::{Density, Edit, Volume, Voxel, ramp};
+use crate::volume::{Density, Edit, Label, Volume, Voxel, ramp};
 
 /// The carving law's numbers, from the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,6 +111,11 @@ impl Carver {
         let share = self.threshold_share(press.hand);
         let is_wearing = match self.carving.law {
             CuttingLaw::Threshold => false,
+            // What cannot be cut is not worn either, however hard a bur leans on it.
+            CuttingLaw::Rate(_) if materials.get(press.label).cut_force.is_none() => {
+                self.account.close();
+                return false;
+            }
             CuttingLaw::Rate(rate) => self.account.save(&rate, instrument.head_radius(), press.pull.spring),
         };
         let planned = self.biting.or_else(|| Some((self.plan(volume, instrument, materials, press, share)?, 0)));
@@ -135,7 +140,7 @@ impl Carver {
         press: &Press,
         share: f32,
     ) -> Option<Bite> {
-        let Press { tip, hand, orientation, pull } = *press;
+        let Press { tip, hand, orientation, pull, .. } = *press;
         let (deepest, run_out) = match self.carving.law {
             CuttingLaw::Threshold => (self.plan_advance(materials, &pull, share), RUN_OUT),
             CuttingLaw::Rate(_) => {
@@ -345,6 +350,8 @@ pub struct Press {
     /// `tooth_from_handle`.
     pub orientation: Quat,
     pub pull: Pull,
+    /// Tissue that carries most of it.
+    pub label: Label,
 }
 
 /// A row of voxels along x, seen from the bur's advanced centre.

@@ -122,6 +122,7 @@ impl Rig for Haply {
             force: true,
             torque: false,
             orientation: true,
+            buttons: true,
             resolution: 0.01,
             is_rate: false,
             misbehaviours: &[Unplug, Garbage, Late, OverSpeed],

@@ -60,7 +60,7 @@ fn a_live_session_holds_when_turned_again() {
         }
         if live.is_waiting() {
             rig.recover();
-            live.go_on::<Recorder>(rig.open().unwrap()).unwrap();
+            assert!(live.go_on::<Recorder>(rig.open().unwrap()).unwrap());
             back_at = Some(Instant::now());
         }
         if cut > 400 && gone == 1 && !done {

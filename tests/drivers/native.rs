@@ -356,6 +356,7 @@ const OMNI: Abilities = Abilities {
     force: true,
     torque: false,
     orientation: true,
+    buttons: true,
     resolution: 0.055,
     is_rate: false,
     misbehaviours: &[

@@ -60,6 +60,7 @@ impl Rig for Rigged {
             force: true,
             torque: true,
             orientation: true,
+            buttons: true,
             resolution: 0.02,
             is_rate: false,
             misbehaviours: &[

@@ -151,6 +151,7 @@ impl Rig for HidRig {
             force: true,
             torque: false,
             orientation: true,
+            buttons: true,
             resolution: 0.06,
             is_rate: false,
             misbehaviours: &[Misbehaviour::Unplug, Misbehaviour::Garbage, Misbehaviour::Late],
@@ -336,6 +337,8 @@ impl Rig for SerialRig {
             force: true,
             torque: false,
             orientation: true,
+            // Its only button sits on a stylus with a radio of its own.
+            buttons: false,
             resolution: 0.001,
             is_rate: false,
             misbehaviours: &[Misbehaviour::Unplug, Misbehaviour::Garbage, Misbehaviour::Late],

@@ -34,6 +34,7 @@ pub struct Abilities {
     pub force: bool,
     pub torque: bool,
     pub orientation: bool,
+    pub buttons: bool,
     /// It counts in steps of so much, mm: positions are compared within twice this.
     pub resolution: f32,
     /// It reports rates, not places: the suite asks for directions only.

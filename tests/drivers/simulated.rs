@@ -43,6 +43,7 @@ impl Rig for Simulated {
             force: true,
             torque: true,
             orientation: true,
+            buttons: true,
             resolution: 0.03,
             is_rate: false,
             misbehaviours: &[Misbehaviour::Unplug, Misbehaviour::Late, Misbehaviour::WarmMotors],

@@ -46,6 +46,7 @@ impl Rig for Rigged {
             force: false,
             torque: false,
             orientation: true,
+            buttons: true,
             resolution: 0.1,
             is_rate: true,
             misbehaviours: &[Misbehaviour::Unplug],

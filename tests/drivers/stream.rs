@@ -90,6 +90,7 @@ impl Rig for Stream {
             force: false,
             torque: false,
             orientation: true,
+            buttons: true,
             resolution: 0.01,
             is_rate: false,
             misbehaviours: &[Misbehaviour::Unplug, Misbehaviour::Garbage],

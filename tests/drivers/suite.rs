@@ -62,7 +62,7 @@ fn poses_and_buttons_arrive(rig: &mut dyn Rig) {
             assert!(off < 1.0, "{}: handle {expected}, told {told}: {off}°", rig.name());
         }
     }
-    for buttons in [1, 0] {
+    for buttons in [1, 0].into_iter().filter(|_| abilities.buttons) {
         hand.press_buttons(buttons);
         let start = Instant::now();
         while exchange(&mut device, Output::NONE).buttons & 1 != buttons {
@@ -304,7 +304,7 @@ impl Heard {
                     self.states += 1;
                     self.last = Some(state);
                 }
-                Letter::Commanded(..) => {}
+                Letter::Begun(_) | Letter::Commanded(..) => {}
             }
         }
     }
