@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 use typodont::record::Recording;
 
-static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| std::fs::read("tests/golden/5-grinding.mcap").unwrap());
+static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| std::fs::read("tests/golden/version-2.mcap").unwrap());
 
 fn complaint(bytes: &[u8]) -> Option<String> {
     Recording::parse("x.mcap", bytes).err().map(|e| e.to_string())

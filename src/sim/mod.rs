@@ -201,15 +201,18 @@ impl Simulation {
             self.is_out = Proxy::is_free_at(&self.matter, instrument, &held);
             return self.let_go(tick);
         }
+        let eased = self.ease_in();
+        let instrument = &self.instruments[self.instrument];
         let materials = &self.materials[self.instrument];
         self.proxy.follow(&self.matter, instrument, materials, &held);
         let tip = self.proxy.tip();
         let contact = self.proxy.contact().copied();
         let pull = self.law.pull(hand, tip, contact.as_ref());
         let cutting = match contact {
-            // A bur that leans on its shank presses the less with what cuts, and without it not at all.
+            // A bur that leans on its shank presses the less with what cuts, and without it not at all. And nobody cuts with a
+            // force that is not felt yet.
             Some(Contact { at_head, label, .. }) if instrument.cuts && self.bur_runs && at_head > 0.0 => {
-                let pull = Pull { spring: pull.spring * at_head, ..pull };
+                let pull = Pull { spring: pull.spring * at_head * eased, ..pull };
                 let press = Press { tip, hand, orientation: held.orientation, pull, label };
                 self.carver.cut(&mut self.matter.volume, instrument, materials, &press)
             }
@@ -219,7 +222,6 @@ impl Simulation {
             }
         };
         let tremble = if cutting { self.vibration.force(tick) } else { Vec3::ZERO };
-        let eased = self.ease_in();
         let mut force = (self.world_from_tooth.turn(pull.force) + tremble) * eased;
         if self.lead != Vec3::ZERO {
             force += self.lead;

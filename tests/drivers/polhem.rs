@@ -358,7 +358,7 @@ impl Rig for SerialRig {
 fn speak(mut arm: SerialPort, hand: &SharedHand, faults: &Faults) {
     arm.set_read_timeout(Duration::from_millis(1)).unwrap();
     let (mut heard, mut was_woken) = (Vec::new(), false);
-    let (mut force, mut told_at) = (Vec3::ZERO, Instant::now());
+    let (mut force, mut told_at, mut due) = (Vec3::ZERO, Instant::now(), Instant::now());
     let mut answers: VecDeque<(Instant, Vec<u8>)> = VecDeque::new();
     while !faults.is(Misbehaviour::Unplug) {
         // A pseudo-terminal without a program gives an error or nothing, a quiet one a time-out.
@@ -392,6 +392,9 @@ fn speak(mut arm: SerialPort, hand: &SharedHand, faults: &Faults) {
         if told_at.elapsed() > Duration::from_millis(500) {
             force = Vec3::ZERO;
         }
+        // It works at 1 kHz, however fast it is spoken to.
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        due = (due + Duration::from_millis(1)).max(Instant::now() - Duration::from_millis(5));
         let at = hand.turn(Output { force, ..Output::NONE });
         let delay = if faults.is(Misbehaviour::Late) { Duration::from_millis(50) } else { Duration::ZERO };
         let line = if faults.is(Misbehaviour::Garbage) { vec![b'#'; 64] } else { line(&at) };

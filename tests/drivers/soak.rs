@@ -75,9 +75,9 @@ pub fn soak(rig: &mut dyn Rig) {
     let allocated = counting::allocations() - before;
     let felt = hand.most_felt();
     println!("{}: {elapsed:.0} ms, {turned} ticks, {allocated} allocations, felt {felt} N; {beats:?}", rig.name());
+    assert!(ended.gone.is_none(), "{}: {:?}", rig.name(), ended.gone);
     assert_eq!(allocated, 0, "{}", rig.name());
     assert_eq!(beats.dropped, 0, "{}", rig.name());
-    assert!(ended.gone.is_none(), "{}: {:?}", rig.name(), ended.gone);
     assert!(forces <= spec.max_force * 1.001 && felt <= spec.max_force * 1.01, "{}: {forces} {felt}", rig.name());
     assert!(turned > 0);
 }

@@ -135,6 +135,7 @@ fn contact_is_stable(rig: &mut dyn Rig) {
         rig.name(),
         ended.beats.summary()
     );
+    assert!(ended.gone.is_none(), "{}: {:?} while leaning on a wall", rig.name(), ended.gone);
     // A machine under load may let go and come back, which moves the hand once; a buzz never stops.
     if ended.beats.let_go == 0 && heard.states <= 1 {
         assert!(speed < 5.0, "{}: rms {speed} mm/s against a wall", rig.name());
