@@ -8,7 +8,7 @@ use crate::device::{Device, Driver, Link, Trouble};
 use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
 use crate::scenario::{QuestionKind, Scenario};
 use crate::session::{Answer, Broken, Effect, Heard, Input, Live, Session};
-use crate::sim::{Assist, AssistNews, Second, Simulation};
+use crate::sim::{Assist, AssistNews, Command, Second, Simulation};
 use std::fmt::Write;
 use std::io::BufRead;
 use std::sync::Arc;
@@ -192,6 +192,9 @@ fn tell(heard: &[Heard], session: &Session) {
             Heard::Effect(Effect::StagesOver) => speak(questionnaire_text(session.scenario())),
             Heard::Effect(Effect::Refused { why }) => speak(format!("not taken: {why}")),
             Heard::Effect(Effect::Answered { .. }) => speak("noted"),
+            Heard::Effect(Effect::Tell(Command::Take { instrument })) => {
+                speak(format!("in the hand: {}", session.scenario().instruments[*instrument].title));
+            }
             Heard::Effect(Effect::Tell(_) | Effect::StepStarted { .. }) => {}
             Heard::Begun(priority) => speak(format!("the servo turns with {priority}")),
             Heard::Device(state) if state.is_ready() => speak("the device is ready"),
