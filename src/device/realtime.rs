@@ -75,7 +75,7 @@ fn ask_rtkit() -> bool {
     const PATIENCE: std::time::Duration = std::time::Duration::from_secs(2);
     let before = getrlimit(Resource::Rttime);
     let most = before.maximum.map_or(RTTIME_MAX, |most| most.min(RTTIME_MAX));
-    if setrlimit(Resource::Rttime, Rlimit { current: Some(most), maximum: before.maximum.and(Some(most)) }).is_err() {
+    if setrlimit(Resource::Rttime, Rlimit { current: Some(most), maximum: Some(most) }).is_err() {
         return false;
     }
     let thread = rustix::thread::gettid().as_raw_nonzero().get() as u64;
