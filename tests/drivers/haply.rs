@@ -146,7 +146,7 @@ fn listen(listener: &TcpListener, shared: &Arc<Shared>) {
             Ok(_) if shared.is(Misbehaviour::Unplug) => {}
             Ok((stream, _)) => {
                 let shared = shared.clone();
-                served.push(thread::spawn(move || greet(stream, &shared)));
+                served.push(crate::rig::spawn_device(move || greet(stream, &shared)));
             }
             Err(_) => thread::sleep(Duration::from_millis(2)),
         }

@@ -47,7 +47,7 @@ impl Rig for Rigged {
     fn open(&mut self) -> Result<Box<dyn Device + Send>, String> {
         let (program, device) = cable();
         let (hand, faults) = (self.hand.clone(), self.faults.clone());
-        std::thread::spawn(move || firmware(device, &hand, &faults));
+        crate::rig::spawn_device(move || firmware(device, &hand, &faults));
         Ok(Box::new(Relay::start(OpenHandle::meet(program).map_err(|trouble| trouble.to_string())?)))
     }
 

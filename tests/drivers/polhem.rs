@@ -137,7 +137,7 @@ impl Rig for HidRig {
     fn open(&mut self) -> Result<Box<dyn Device + Send>, String> {
         let (program, device) = cable();
         let (hand, faults) = (self.hand.clone(), self.faults.clone());
-        std::thread::spawn(move || firmware(device, &hand, &faults));
+        crate::rig::spawn_device(move || firmware(device, &hand, &faults));
         let config = CONFIGS.iter().find(|c| c.name == "polhem_v1").unwrap();
         Ok(Box::new(Relay::start(Arm::new(program, config, 65))))
     }
@@ -324,7 +324,7 @@ impl Rig for SerialRig {
     fn open(&mut self) -> Result<Box<dyn Device + Send>, String> {
         let (program, arm) = SerialPort::pair().map_err(|e| e.to_string())?;
         let (hand, faults) = (self.hand.clone(), self.faults.clone());
-        std::thread::spawn(move || speak(arm, &hand, &faults));
+        crate::rig::spawn_device(move || speak(arm, &hand, &faults));
         Ok(Box::new(Relay::start(Records::new(program).map_err(|e| e.to_string())?)))
     }
 

@@ -7,6 +7,15 @@ use std::time::{Duration, Instant};
 use typodont::device::{Device, Hand, HandModel, Output, Reading, UPRIGHT};
 use typodont::frame::{Pose, Quat, Vec3};
 
+/// Starts a fake's thread. A device is no program of this machine: however busy that is, it keeps its own time.
+pub fn spawn_device(work: impl FnOnce() + Send + 'static) -> std::thread::JoinHandle<()> {
+    std::thread::spawn(move || {
+        // Where the system grants nothing, a fake is as late as everyone.
+        let _ = typodont::device::realtime::raise();
+        work();
+    })
+}
+
 /// A fake device of one kind, plugged in.
 pub trait Rig {
     /// What `--device` calls it.

@@ -33,7 +33,7 @@ impl Rig for Rigged {
     fn open(&mut self) -> Result<Box<dyn Device + Send>, String> {
         let (program, device) = cable();
         let (hand, is_plugged, is_wireless) = (self.hand.clone(), self.is_plugged.clone(), self.is_wireless);
-        std::thread::spawn(move || firmware(device, &hand, &is_plugged, is_wireless));
+        crate::rig::spawn_device(move || firmware(device, &hand, &is_plugged, is_wireless));
         Ok(Box::new(Relay::start(SpaceMouse::new(program, 0xc626))))
     }
 

@@ -28,7 +28,7 @@ impl Stream {
         let stop = Arc::new(AtomicBool::new(false));
         let sending = {
             let (hand, misbehaviour, stop) = (hand.clone(), misbehaviour.clone(), stop.clone());
-            thread::spawn(move || send(port, &hand, &misbehaviour, &stop))
+            crate::rig::spawn_device(move || send(port, &hand, &misbehaviour, &stop))
         };
         Stream { port, hand, misbehaviour, stop, sending: Some(sending) }
     }
