@@ -205,6 +205,9 @@ impl Carver {
         let centre = tip + way;
         let reach = Vec3::splat(radius + band);
         let [xs, ys, zs] = grid.cells_within(centre - reach, centre + reach);
+        if xs.is_empty() {
+            return;
+        }
         let to_steps = grid.spacing.x.recip();
         let ahead = way.normalize_or_zero();
         for z in zs {
@@ -242,6 +245,9 @@ impl Carver {
         let cylinder = Cylinder::of(body, bite, bite.run_out + band);
         let [low, high] = cylinder.extent();
         let [xs, ys, zs] = grid.cells_within(low, high);
+        if xs.is_empty() {
+            return;
+        }
         let to_steps = grid.spacing.x.recip();
         for z in zs {
             for y in ys.clone().filter(|y| (y + z) % SHARES == share) {
