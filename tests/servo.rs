@@ -58,13 +58,20 @@ fn world() -> Setup {
     }
 }
 
+/// How long a servo turned, ms: it cannot be asked itself, but it was no less than the one and no more than the other.
+type Turned = std::ops::RangeInclusive<f64>;
+
 /// Turns for a while; `at_ms` moves the hand and gives orders once a millisecond. Returns every tick that was told.
 fn turn_for(
     device: impl Device + Send + 'static,
     duration: Duration,
     mut at_ms: impl FnMut(u64, &mut Servo),
-) -> (Vec<Turn>, Ended, Duration) {
+) -> (Vec<Turn>, Ended, Turned) {
+    let before = Instant::now();
     let mut servo = Servo::start(Simulation::new(world()), Box::new(device), None, Beats::default()).unwrap();
+    while servo.next_letter().is_none() {
+        assert!(before.elapsed() < Duration::from_secs(20), "the servo says nothing");
+    }
     let start = Instant::now();
     let (mut turns, mut edits) = (Vec::new(), Vec::new());
     let mut fetch = |servo: &mut Servo| {
@@ -85,18 +92,21 @@ fn turn_for(
         fetch(&mut servo);
         std::thread::sleep(Duration::from_millis(1));
     }
+    let least = start.elapsed();
     servo.order(Order::Pause);
-    let elapsed = start.elapsed();
     std::thread::sleep(Duration::from_millis(20));
     fetch(&mut servo);
-    (turns, servo.stop().unwrap(), elapsed)
+    let ended = servo.stop().unwrap();
+    (turns, ended, least.as_secs_f64() * 1e3..=before.elapsed().as_secs_f64() * 1e3)
 }
 
-/// Where the hand goes: leans on the left, wanders to the right and back once in four seconds.
+/// Where the hand goes: leans on the left, wanders to the right and back once in four seconds; lifts every two seconds, so
+/// that a hand that was let go in the wall feels it again.
 fn wander(hand: &SharedHand, ms: u64) {
     let phase = (ms % 4000) as f32 / 4000.0;
     let x = 3.0 - 12.0 * (phase - 0.5).abs();
-    hand.reach(Vec3::new(x, -0.9, 0.0));
+    let y = if ms % 2000 < 250 { 3.0 } else { -0.9 };
+    hand.reach(Vec3::new(x, y, 0.0));
 }
 
 #[test]
@@ -108,12 +118,12 @@ fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
     let device = rig.open().unwrap();
     let watch = |beat: u64| match beat {
         300 => counting::watch(true),
-        10_800 => counting::watch(false),
+        10_300 => counting::watch(false),
         _ => {}
     };
     let device = Staged { device, beats: 0, at_beat: watch };
     hand.reach(Vec3::Y * 3.0);
-    let (turns, ended, _) = turn_for(device, Duration::from_secs(14), |ms, servo| {
+    let (turns, ended, _) = turn_for(device, Duration::from_secs(16), |ms, servo| {
         wander(&hand, ms);
         let command = |servo: &mut Servo, command| assert!(servo.order(Order::Command(command)));
         match ms {
@@ -134,8 +144,8 @@ fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
     let cut = turns.iter().filter(|t| t.step.cutting).count();
     let tools: std::collections::BTreeSet<_> = turns.iter().map(|t| t.step.instrument).collect();
     println!("{} ticks, {touched} touching, {cut} cutting, tools {tools:?}: {allocated} allocations", turns.len());
-    assert!(turns.len() > 10_000, "{}", turns.len());
-    assert!(touched > 2000 && cut > 1000 && tools.len() == 2, "{touched} {cut} {tools:?}");
+    assert!(turns.len() > 10_000, "{}: is the machine that busy?", turns.len());
+    assert!(touched > 1000 && cut > 300 && tools.len() == 2, "{touched} {cut} {tools:?}");
     assert_eq!(allocated, 0);
     assert_eq!(ended.beats.dropped, 0);
 }
@@ -160,8 +170,9 @@ fn every_beat_that_is_missed_is_counted() {
     });
     let beats = ended.beats.summary();
     let accounted = (turns.len() as u64 + beats.missed) as f64;
-    println!("{:.1} ms: {} ticks, {beats:?}", elapsed.as_secs_f64() * 1e3, turns.len());
-    assert!((accounted - elapsed.as_secs_f64() * 1e3).abs() < 12.0, "{accounted} of {elapsed:?}");
+    println!("{elapsed:?} ms: {} ticks, {beats:?}", turns.len());
+    // A servo may begin a little after it says so.
+    assert!(elapsed.contains(&(accounted + 12.0)) || elapsed.contains(&accounted), "{accounted} of {elapsed:?}");
     assert!(beats.missed >= 5 + 15 + 40 - 6, "{beats:?}");
     // The two longer stalls let the hand go; each such tick is one that no reading was trusted in.
     let absent = turns.iter().filter(|t| !t.reading.pose.is_sound()).count() as u64;
@@ -194,7 +205,7 @@ fn a_busy_machine_lets_go_rather_than_holds() {
     stop.store(true, Ordering::Relaxed);
     busy.into_iter().for_each(|thread| thread.join().unwrap());
     let beats = ended.beats.summary();
-    println!("{} ticks in {elapsed:?} with {}: {beats:?}", turns.len(), ended.priority);
+    println!("{} ticks in {elapsed:?} ms with {}: {beats:?}", turns.len(), ended.priority);
     assert!(!turns.is_empty());
     assert!(hand.most_felt() <= most * 1.001);
     assert!(turns.iter().all(|t| t.step.force.is_finite() && t.step.force.length() <= most * 1.001));

@@ -38,17 +38,13 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         if is_interrupted.load(Ordering::Relaxed) {
             return Ok(());
         }
-        while let Some(news) = assist.next_news() {
-            live::speak(format!("second hand: {}", live::assist_text(news)));
-        }
+        live::tell_second(&mut assist);
         match lines.try_recv() {
             Ok(line) if line.trim() == "end" => return Ok(()),
             // Without a terminal it stays until the device is gone or the program is stopped.
             Ok(_) | Err(TryRecvError::Disconnected | TryRecvError::Empty) => std::thread::sleep(LISTEN_EVERY),
         }
     }
-    while let Some(news) = assist.next_news() {
-        live::speak(format!("second hand: {}", live::assist_text(news)));
-    }
+    live::tell_second(&mut assist);
     Err(Failure::Told)
 }

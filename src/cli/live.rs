@@ -114,8 +114,8 @@ pub fn play(
         std::thread::sleep(LISTEN_EVERY);
         let heard = live.listen(session, recorder)?;
         tell(&heard, session);
-        while let Some(news) = assist.as_mut().and_then(Assist::next_news) {
-            speak(format!("second hand: {}", assist_text(news)));
+        if let Some(assist) = &mut assist {
+            tell_second(assist);
         }
         if live.is_waiting() && looked.elapsed() > LOOK_EVERY {
             looked = Instant::now();
@@ -204,8 +204,14 @@ fn tell(heard: &[Heard], session: &Session) {
     }
 }
 
-/// What the second hand's servo tells, in words.
-pub fn assist_text(news: AssistNews) -> String {
+/// Says what the second hand's servo told since last asked.
+pub fn tell_second(assist: &mut Assist) {
+    while let Some(news) = assist.next_news() {
+        speak(format!("second hand: {}", assist_text(news)));
+    }
+}
+
+fn assist_text(news: AssistNews) -> String {
     match news {
         AssistNews::Device(state) => format!("the device is {state}"),
         AssistNews::Gone(gone) => format!("{gone}; it stays away until the session is begun anew"),

@@ -10,6 +10,7 @@
 // C is called here: what each block relies on stands beside it.
 #![allow(unsafe_code)]
 
+use super::trust::{self, Nonsense};
 use super::{
     Beat, Device, Driver, Found, Gone, Output, Reading, Relay, Report, Spec, State, Trouble, UPRIGHT, Wire,
     shared_library,
@@ -322,7 +323,7 @@ struct Robot {
     /// When the motors were last switched on, or seen on.
     enabled: Instant,
     /// Reports in a row that made no sense.
-    nonsense: u32,
+    nonsense: Nonsense,
 }
 
 enum Stage {
@@ -359,12 +360,6 @@ const SLOW: Duration = Duration::from_millis(10);
 /// How long forces stay off after the device dropped them: long enough to settle.
 const OFF_LIFE: Duration = Duration::from_millis(500);
 
-/// Reports in a row that make no sense before the device counts as broken: about half a second.
-const NONSENSE_MAX: u32 = 500;
-
-/// So many times its workspace's half are still places a device may say it is.
-const REACH: f32 = 10.0;
-
 impl Robot {
     fn new(sdk: Sdk, id: Id) -> Robot {
         let kind = sdk.system_type.map_or(0, |kind| kind(id));
@@ -384,7 +379,7 @@ impl Robot {
             state: WILL_MOVE,
             turns: STATUS_TURNS,
             enabled: Instant::now(),
-            nonsense: 0,
+            nonsense: Nonsense::default(),
         }
     }
 
@@ -447,14 +442,9 @@ impl Robot {
         }
         self.look_after_force()?;
         let Some(pose) = self.world_pose(place, rows) else {
-            self.nonsense += 1;
-            if self.nonsense > NONSENSE_MAX {
-                return Err(Gone::Lost { why: "its positions make no sense; switch it off and on again", code: 0 });
-            }
-            let state = State::ForceOff { why: "its positions make no sense" };
-            return Ok(Some(Report { reading: Reading::ABSENT, state }));
+            return self.nonsense.refuse().map(Some);
         };
-        self.nonsense = 0;
+        self.nonsense.forgive();
         let is_trusted = !matches!(self.state, State::Calibrate { .. });
         let reading = Reading { pose, buttons: self.buttons() };
         Ok(Some(Report { reading: if is_trusted { reading } else { Reading::ABSENT }, state: self.state }))
@@ -531,7 +521,6 @@ impl Robot {
     /// mm and world axes, from metres and the device's; the handle's shaft, our z, lies along the device's x at rest.
     fn world_pose(&self, [x, y, z]: [f64; 3], rows: [[f64; 3]; 3]) -> Option<Pose> {
         let position = Vec3::new(y as f32, z as f32, x as f32) * 1000.0;
-        let is_reachable = position.is_finite() && (position.abs().cmple(self.spec.workspace_half * REACH)).all();
         let orientation = match self.has_wrist {
             true => {
                 let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = rows.map(|row| row.map(|x| x as f32));
@@ -539,8 +528,7 @@ impl Robot {
             }
             false => UPRIGHT,
         };
-        let pose = Pose { position, orientation };
-        (is_reachable && pose.is_sound()).then_some(pose)
+        trust::sensible(Pose { position, orientation }, &self.spec)
     }
 
     /// A closed gripper is the main button.

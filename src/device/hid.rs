@@ -3,7 +3,7 @@
 //! Takes a vendor, products and a usage page. Gives an open [`Transport`], or a complaint that says what to install.
 //! Never knows what a report means. Whoever reads from it has a thread of their own: reads wait.
 
-use super::{Gone, Trouble};
+use super::{Found, Gone, Trouble};
 use hidapi::{HidApi, HidDevice, HidError};
 use std::ffi::CString;
 use std::time::Duration;
@@ -93,6 +93,19 @@ fn no_list(error: HidError) -> Trouble {
         format!("the system does not list its HID devices: {error}"),
         "unplug the device and plug it in again; on Linux the kernel needs hidraw (CONFIG_HIDRAW)",
     )
+}
+
+/// Devices as `typodont devices` lists them: told apart by their serial numbers.
+pub fn listed(found: Vec<Plugged>) -> Vec<Found> {
+    found.into_iter().map(|p| Found { title: p.title, argument: p.serial }).collect()
+}
+
+/// The device with a serial number, or the first; `title` and `help` are for the complaint that there is none.
+pub fn chosen(found: Vec<Plugged>, serial: Option<&str>, title: &str, help: &str) -> Result<Plugged, Trouble> {
+    found.into_iter().find(|p| serial.is_none_or(|serial| p.serial == serial)).ok_or_else(|| {
+        let which = serial.map_or(String::new(), |serial| format!(" with the serial number {serial}"));
+        Trouble::new(format!("no {title}{which} is plugged in"), help)
+    })
 }
 
 /// Opens a device that [`find`] found.

@@ -21,6 +21,7 @@ mod scripted;
 mod shared_library;
 pub mod spacemouse;
 mod stream;
+mod told;
 mod trust;
 
 pub use coupling::{Coupling, Far, Tie};
@@ -28,8 +29,9 @@ pub use driver::{DRIVERS, Driver, Found, Trouble, driver};
 pub use hand::{Hand, HandModel};
 pub use link::{Link, Mate};
 pub use playback::Playback;
-pub use relay::{FORCE_LIFE, Relay, Report, Wire};
+pub use relay::{Relay, Report, Wire};
 pub use scripted::{Felt, Move, Scripted, Tremor};
+pub use told::FORCE_LIFE;
 
 use crate::frame::{Pose, Quat, Vec3};
 use core::f32::consts::FRAC_1_SQRT_2;

@@ -304,18 +304,12 @@ impl Driver for OpenHandleDriver {
     }
 
     fn find(&self) -> Result<Vec<Found>, Trouble> {
-        Ok(handles()?.into_iter().map(|p| Found { title: p.title, argument: p.serial }).collect())
+        Ok(hid::listed(handles()?))
     }
 
     fn open(&self, argument: Option<&str>) -> Result<Box<dyn Device + Send>, Trouble> {
-        let found = handles()?.into_iter().find(|p| argument.is_none_or(|serial| p.serial == serial));
-        let plugged = found.ok_or_else(|| {
-            let which = argument.map_or(String::new(), |serial| format!(" with the serial number {serial}"));
-            Trouble::new(
-                format!("no open handle{which} is plugged in"),
-                format!("plug it in; its firmware must call itself \"{PRODUCT}\""),
-            )
-        })?;
+        let help = format!("plug it in; its firmware must call itself \"{PRODUCT}\"");
+        let plugged = hid::chosen(handles()?, argument, "open handle", &help)?;
         Ok(Box::new(Relay::start(OpenHandle::meet(hid::open(&plugged)?)?)))
     }
 }

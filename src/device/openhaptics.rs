@@ -10,8 +10,10 @@
 // C is called here: what each block relies on stands beside it.
 #![allow(unsafe_code)]
 
+use super::told::Told;
+use super::trust::{self, Nonsense};
 use super::{
-    Beat, Device, Driver, FORCE_LIFE, Found, Gone, Output, Reading, Relay, Report, Spec, State, Trouble, UPRIGHT, Wire,
+    Beat, Device, Driver, Found, Gone, Output, Reading, Relay, Report, Spec, State, Trouble, UPRIGHT, Wire,
     shared_library,
 };
 use crate::frame::{Pose, Vec3, rotation_near};
@@ -303,8 +305,7 @@ struct Meeting {
     renders_torque: bool,
     /// What to give to `hdUpdateCalibration`; 0 for a device that knows no way.
     style: u32,
-    /// Force and torque, 6 floats; when they were told, µs since `epoch`, low and high word.
-    told: Newest<8>,
+    told: Told,
     report: Newest<REPORT_WORDS>,
     epoch: Instant,
     wire: OnceLock<Thread>,
@@ -413,16 +414,7 @@ impl Meeting {
         if self.stop.load(Ordering::Acquire) {
             return Output::NONE;
         }
-        match self.told.read() {
-            Some((_, words)) => {
-                let told_us = u64::from(words[6]) | u64::from(words[7]) << 32;
-                let is_young = self.now_us().saturating_sub(told_us) < FORCE_LIFE.as_micros() as u64;
-                let [a, b, c, d, e, f, ..] = words.map(f32::from_bits);
-                let told = Output { force: Vec3::new(a, b, c), torque: Vec3::new(d, e, f) };
-                if is_young { told } else { Output::NONE }
-            }
-            None => Output::NONE,
-        }
+        self.told.output()
     }
 
     fn note(&self, errors: Errors) {
@@ -472,7 +464,7 @@ struct Arm {
     /// As last reported.
     state: State,
     /// Reports in a row that made no sense.
-    nonsense: u32,
+    nonsense: Nonsense,
 }
 
 enum Stage {
@@ -488,9 +480,6 @@ enum Stage {
 
 /// How long a turn waits for the next beat: several, so that a late one is not taken for silence.
 const BEAT_WAIT: Duration = Duration::from_millis(5);
-
-/// Reports in a row that make no sense before the device counts as broken: half a second.
-const NONSENSE_MAX: u32 = 500;
 
 /// Frames in a row that the library refuses before it counts as broken.
 const REFUSALS_MAX: u32 = 100;
@@ -512,7 +501,7 @@ impl Arm {
             has_inkwell: styles & STYLE_INKWELL != 0,
             renders_torque: spec.max_torque > 0.0,
             style: style.unwrap_or(0),
-            told: Newest::new(),
+            told: Told::new(),
             report: Newest::new(),
             epoch: Instant::now(),
             wire: OnceLock::new(),
@@ -528,7 +517,16 @@ impl Arm {
             refusal: AtomicU32::new(0),
         }));
         let state = State::Homing { what: "starting its servo" };
-        Arm { spec, meeting, middle, senses_orientation, stage: Stage::Opened, seen: 0, state, nonsense: 0 }
+        Arm {
+            spec,
+            meeting,
+            middle,
+            senses_orientation,
+            stage: Stage::Opened,
+            seen: 0,
+            state,
+            nonsense: Nonsense::default(),
+        }
     }
 
     fn start(&mut self) -> Result<(), Gone> {
@@ -576,10 +574,7 @@ impl Arm {
 
     fn tell(&self, told: &Output) {
         let Output { force, torque } = if self.state.is_ready() { told.within(&self.spec) } else { Output::NONE };
-        let (force, torque) = (force * FORCE_SHARE, torque * FORCE_SHARE);
-        let [a, b, c, d, e, f] = [force.x, force.y, force.z, torque.x, torque.y, torque.z].map(f32::to_bits);
-        let now = self.meeting.now_us();
-        self.meeting.told.write([a, b, c, d, e, f, now as u32, (now >> 32) as u32]);
+        self.meeting.told.tell(&Output { force: force * FORCE_SHARE, torque: torque * FORCE_SHARE });
     }
 
     fn await_report(&mut self) -> Option<[u32; REPORT_WORDS]> {
@@ -618,14 +613,9 @@ impl Arm {
             return Ok(Some(Report { reading: Reading::ABSENT, state: State::Calibrate { how } }));
         }
         let Some(pose) = self.pose(words) else {
-            self.nonsense += 1;
-            if self.nonsense > NONSENSE_MAX {
-                return Err(lost("its positions make no sense; switch it off and on again", 0));
-            }
-            let state = State::ForceOff { why: "its positions make no sense" };
-            return Ok(Some(Report { reading: Reading::ABSENT, state }));
+            return self.nonsense.refuse().map(Some);
         };
-        self.nonsense = 0;
+        self.nonsense.forgive();
         let state = match (cut, docked != 0) {
             (0, false) => State::Ready,
             (0, true) => State::ForceOff { why: "the stylus is in its inkwell; take it out" },
@@ -639,15 +629,10 @@ impl Arm {
         let [x, y, z, origin] =
             std::array::from_fn(|i| Vec3::from_array(std::array::from_fn(|j| f32::from_bits(words[3 * i + j]))));
         let position = origin - self.middle;
-        let is_reachable = position.is_finite() && (position.abs().cmple(self.spec.workspace_half * REACH)).all();
         let orientation = if self.senses_orientation { rotation_near(x, y, z)? } else { UPRIGHT };
-        let pose = Pose { position, orientation };
-        (is_reachable && pose.is_sound()).then_some(pose)
+        trust::sensible(Pose { position, orientation }, &self.spec)
     }
 }
-
-/// The usable workspace is a box within a larger shape; so many times its half are still places an arm may be.
-const REACH: f32 = 10.0;
 
 const HOLD_NEUTRAL: &str =
     "hold the arm in its neutral pose, all joints at right angles, and press the stylus's button";

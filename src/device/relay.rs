@@ -2,8 +2,9 @@
 //!
 //! A [`Wire`] speaks a device's protocol on a thread of its own, where it may block, allocate and call foreign libraries.
 //! The servo meets it at two slots where the newest wins: forces out, reports in. So the servo never waits on anyone, and a
-//! servo that is late is noticed on the other side: a force that is older than [`FORCE_LIFE`] is not sent any more.
+//! servo that is late is noticed on the other side: a force that is older than [`FORCE_LIFE`](super::FORCE_LIFE) is not sent any more.
 
+use super::told::Told;
 use super::{Beat, Device, Gone, Output, Reading, Spec, State, realtime};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::mailbox::{self, Newest, Receiver, Sender};
@@ -12,10 +13,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle, Thread, ThreadId};
 use std::time::{Duration, Instant};
-
-/// How long a force may be sent after the servo gave it: ten beats. Longer, and a stalled program pushes a hand on; much
-/// shorter, and every hiccup of a busy machine is felt.
-pub const FORCE_LIFE: Duration = Duration::from_millis(10);
 
 /// How long the last report stands in for a missing one: USB and radio hiccup for some milliseconds.
 const REPORT_LIFE: Duration = Duration::from_millis(20);
@@ -87,29 +84,16 @@ const CALLERS_MAX: usize = 8;
 
 /// What both threads see.
 struct Shared {
-    /// Force and torque, 6 floats; when they were told, µs since `epoch`, low and high word.
-    told: Newest<8>,
+    told: Told,
     /// Position, orientation, buttons.
     report: Newest<8>,
     stop: AtomicBool,
-    epoch: Instant,
-}
-
-impl Shared {
-    fn now_us(&self) -> u64 {
-        self.epoch.elapsed().as_micros() as u64
-    }
 }
 
 impl Relay {
     /// Starts the thread of a wire.
     pub fn start(wire: impl Wire) -> Relay {
-        let shared = Arc::new(Shared {
-            told: Newest::new(),
-            report: Newest::new(),
-            stop: AtomicBool::new(false),
-            epoch: Instant::now(),
-        });
+        let shared = Arc::new(Shared { told: Told::new(), report: Newest::new(), stop: AtomicBool::new(false) });
         let (spec, beat) = (wire.spec().clone(), wire.beat());
         let there = shared.clone();
         let (post, news) = mailbox::ordered(NEWS_MAX);
@@ -191,7 +175,7 @@ impl Device for Relay {
 
     fn exchange(&mut self, output: &Output) -> Result<Reading, Gone> {
         self.introduce();
-        self.shared.told.write(words_of_output(output, self.shared.now_us()));
+        self.shared.told.tell(output);
         if let Some(thread) = &self.thread {
             thread.thread().unpark();
         }
@@ -246,31 +230,15 @@ impl Drop for Relay {
 const ANSWER_WAIT: Duration = Duration::from_micros(400);
 
 impl Shared {
-    fn told_count(&self) -> u64 {
-        self.told.read().map_or(0, |(count, _)| count)
-    }
-
     /// Waits until the servo has told another force than the one of this count.
     fn await_answer(&self, told: u64) {
         let until = Instant::now() + ANSWER_WAIT;
-        while self.told_count() == told {
+        while self.told.count() == told {
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
                 return;
             }
             thread::park_timeout(left);
-        }
-    }
-
-    /// The newest force, if it is young enough to be sent.
-    fn force(&self) -> Output {
-        match self.told.read() {
-            Some((_, words)) => {
-                let told_us = u64::from(words[6]) | u64::from(words[7]) << 32;
-                let is_young = self.now_us().saturating_sub(told_us) < FORCE_LIFE.as_micros() as u64;
-                if is_young { output_of(words) } else { Output::NONE }
-            }
-            None => Output::NONE,
         }
     }
 }
@@ -291,13 +259,13 @@ fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>, mut callers
     let turning = AssertUnwindSafe(|| {
         let mut state = State::Ready;
         while !shared.stop.load(Ordering::Acquire) {
-            match wire.turn(&shared.force()) {
+            match wire.turn(&shared.told.output()) {
                 Ok(Some(report)) => {
                     // A state that finds no room is told again with the next report.
                     if report.state != state && post.try_send(News::State(report.state)).is_ok() {
                         state = report.state;
                     }
-                    let told = shared.told_count();
+                    let told = shared.told.count();
                     shared.report.write(words_of_reading(&report.reading));
                     if wake() && beat == Beat::Device {
                         shared.await_answer(told);
@@ -317,17 +285,6 @@ fn run(mut wire: impl Wire, shared: &Shared, mut post: Sender<News>, mut callers
         let _ = post.try_send(News::Gone(gone));
         wake();
     }
-}
-
-fn words_of_output(output: &Output, told_us: u64) -> [u32; 8] {
-    let Output { force: f, torque: t } = output;
-    let [a, b, c, d, e, g] = [f.x, f.y, f.z, t.x, t.y, t.z].map(f32::to_bits);
-    [a, b, c, d, e, g, told_us as u32, (told_us >> 32) as u32]
-}
-
-fn output_of(words: [u32; 8]) -> Output {
-    let [a, b, c, d, e, f, ..] = words.map(f32::from_bits);
-    Output { force: Vec3::new(a, b, c), torque: Vec3::new(d, e, f) }
 }
 
 fn words_of_reading(reading: &Reading) -> [u32; 8] {

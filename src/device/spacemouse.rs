@@ -221,19 +221,13 @@ impl Driver for SpaceMouseDriver {
     }
 
     fn find(&self) -> Result<Vec<Found>, Trouble> {
-        let found = hid::find(KINDS)?.into_iter();
-        Ok(found.map(|p| Found { title: p.title, argument: p.serial }).collect())
+        Ok(hid::listed(hid::find(KINDS)?))
     }
 
     fn open(&self, argument: Option<&str>) -> Result<Box<dyn Device + Send>, Trouble> {
-        let found = hid::find(KINDS)?.into_iter().find(|p| argument.is_none_or(|serial| p.serial == serial));
-        let plugged = found.ok_or_else(|| {
-            let which = argument.map_or(String::new(), |serial| format!(" with the serial number {serial}"));
-            Trouble::new(
-                format!("no SpaceMouse{which} is plugged in"),
-                "plug it in, or switch it on and wait until its light is steady; `typodont devices` lists what is there",
-            )
-        })?;
+        let help =
+            "plug it in, or switch it on and wait until its light is steady; `typodont devices` lists what is there";
+        let plugged = hid::chosen(hid::find(KINDS)?, argument, "SpaceMouse", help)?;
         Ok(Box::new(Relay::start(SpaceMouse::new(hid::open(&plugged)?, plugged.product))))
     }
 }

@@ -1,10 +1,10 @@
 //! Whether a device may be given a force: its reports come in time, and say what a hand can do.
 //!
 //! Takes each report's place and when it came. Gives whether it is sound, and why there is no force for now.
-//! Shared by the wires whose firmware judges nothing by itself.
+//! [`Trust`] is shared by the wires whose firmware judges nothing by itself, [`Nonsense`] by those behind a vendor's library.
 
-use super::{Gone, State};
-use crate::frame::Vec3;
+use super::{Gone, Reading, Report, Spec, State};
+use crate::frame::{Pose, Vec3};
 use std::time::{Duration, Instant};
 
 /// Reports further apart than this are late: two frames of full-speed USB's slowest hiccups, and what the relay lets pass.
@@ -95,6 +95,41 @@ impl Trust {
     pub fn is_fresh(&self, now: Instant) -> bool {
         let is_young = self.last.is_some_and(|(at, _)| now.saturating_duration_since(at) <= LATE);
         is_young && self.unsound == 0 && self.state(now).is_ready()
+    }
+}
+
+/// Reports in a row that make no sense before a device counts as broken: about half a second.
+const NONSENSE_MAX: u32 = 500;
+
+/// The usable workspace is a box within a larger shape; so many times its half are still places an arm may be.
+const WORKSPACES: f32 = 10.0;
+
+/// The pose, if a device of this kind can be there.
+pub fn sensible(pose: Pose, spec: &Spec) -> Option<Pose> {
+    let is_reachable = pose.position.abs().cmple(spec.workspace_half * WORKSPACES).all();
+    (is_reachable && pose.is_sound()).then_some(pose)
+}
+
+/// Poses that make no sense, one after the other, from a vendor's library that vouches for all the rest.
+#[derive(Clone, Debug, Default)]
+pub struct Nonsense {
+    in_a_row: u32,
+}
+
+impl Nonsense {
+    /// What to report in place of such a pose, until there were too many.
+    pub fn refuse(&mut self) -> Result<Report, Gone> {
+        self.in_a_row += 1;
+        if self.in_a_row > NONSENSE_MAX {
+            return Err(Gone::Lost { why: "its positions make no sense; switch it off and on again", code: 0 });
+        }
+        let state = State::ForceOff { why: "its positions make no sense" };
+        Ok(Report { reading: Reading::ABSENT, state })
+    }
+
+    /// A pose made sense.
+    pub fn forgive(&mut self) {
+        self.in_a_row = 0;
     }
 }
 

@@ -247,22 +247,14 @@ fn turn(
             Ok(reading) if now.is_ready() && !is_paused => reading,
             Ok(_) => {
                 if is_held {
-                    let step = simulation.step(&Reading::ABSENT);
-                    post.turned(Reading::ABSENT, step, &simulation);
+                    let_go(&mut simulation, second.as_mut(), &mut post);
                 }
                 (is_held, output) = (false, Output::NONE);
-                if let Some(second) = &mut second {
-                    second.forget();
-                }
                 continue;
             }
             Err(gone) => {
                 if is_held {
-                    let step = simulation.step(&Reading::ABSENT);
-                    post.turned(Reading::ABSENT, step, &simulation);
-                }
-                if let Some(second) = &mut second {
-                    second.forget();
+                    let_go(&mut simulation, second.as_mut(), &mut post);
                 }
                 break 'beats Some(gone);
             }
@@ -289,4 +281,13 @@ fn turn(
     }
     post.summary.write(post.beats.summary().words());
     Ended { simulation, device, second, beats: post.beats, priority, gone }
+}
+
+/// The one tick in which a hand that was held is let go; time stands still after it.
+fn let_go(simulation: &mut Simulation, second: Option<&mut Second>, post: &mut Post) {
+    let step = simulation.step(&Reading::ABSENT);
+    post.turned(Reading::ABSENT, step, simulation);
+    if let Some(second) = second {
+        second.forget();
+    }
 }
