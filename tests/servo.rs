@@ -1,6 +1,8 @@
 //! The servo keeps its beat, accounts for every beat it missed, travels light, and lets go when it is late.
 
 mod counting;
+#[path = "drivers/peace.rs"]
+mod peace;
 #[path = "phantom/mod.rs"]
 mod phantom;
 #[path = "drivers/rig.rs"]
@@ -111,106 +113,113 @@ fn wander(hand: &SharedHand, ms: u64) {
 
 #[test]
 fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
-    // Aim: the servo's thread travels light. Method: from its 300th beat on every allocation and release of that thread is
-    // counted, through contact, cutting, a change of tool, of stiffness and of the bur, and a pause.
-    let mut rig = Simulated::new();
-    let hand = rig.hand();
-    let device = rig.open().unwrap();
-    let watch = |beat: u64| match beat {
-        300 => counting::watch(true),
-        10_300 => counting::watch(false),
-        _ => {}
-    };
-    let device = Staged { device, beats: 0, at_beat: watch };
-    hand.reach(Vec3::Y * 3.0);
-    let (turns, ended, _) = turn_for(device, Duration::from_secs(16), |ms, servo| {
-        wander(&hand, ms);
-        let command = |servo: &mut Servo, command| assert!(servo.order(Order::Command(command)));
-        match ms {
-            6000 => command(servo, Command::Take { instrument: 1 }),
-            6200 => hand.reach(Vec3::Y * 4.0),
-            8000 => command(servo, Command::Take { instrument: 0 }),
-            8500 => command(servo, Command::SetStiffness { label: SOFT, stiffness: 0.2 }),
-            9000 => command(servo, Command::RunBur { running: false }),
-            9300 => command(servo, Command::RunBur { running: true }),
+    crate::peace::in_real_time(|| {
+        // Aim: the servo's thread travels light. Method: from its 300th beat on every allocation and release of that thread is
+        // counted, through contact, cutting, a change of tool, of stiffness and of the bur, and a pause.
+        let mut rig = Simulated::new();
+        let hand = rig.hand();
+        let device = rig.open().unwrap();
+        let watch = |beat: u64| match beat {
+            300 => counting::watch(true),
+            10_300 => counting::watch(false),
             _ => {}
-        }
-        if (6000..6300).contains(&ms) || (8000..8300).contains(&ms) {
-            hand.reach(Vec3::Y * 4.0);
-        }
-    });
-    let allocated = counting::allocations();
-    let touched = turns.iter().filter(|t| t.step.touch.is_some()).count();
-    let cut = turns.iter().filter(|t| t.step.cutting).count();
-    let tools: std::collections::BTreeSet<_> = turns.iter().map(|t| t.step.instrument).collect();
-    println!("{} ticks, {touched} touching, {cut} cutting, tools {tools:?}: {allocated} allocations", turns.len());
-    assert!(turns.len() > 10_000, "{}: is the machine that busy?", turns.len());
-    assert!(touched > 1000 && cut > 300 && tools.len() == 2, "{touched} {cut} {tools:?}");
-    assert_eq!(allocated, 0);
-    assert_eq!(ended.beats.dropped, 0);
+        };
+        let device = Staged { device, beats: 0, at_beat: watch };
+        hand.reach(Vec3::Y * 3.0);
+        let before = counting::allocations();
+        let (turns, ended, _) = turn_for(device, Duration::from_secs(16), |ms, servo| {
+            wander(&hand, ms);
+            let command = |servo: &mut Servo, command| assert!(servo.order(Order::Command(command)));
+            match ms {
+                6000 => command(servo, Command::Take { instrument: 1 }),
+                6200 => hand.reach(Vec3::Y * 4.0),
+                8000 => command(servo, Command::Take { instrument: 0 }),
+                8500 => command(servo, Command::SetStiffness { label: SOFT, stiffness: 0.2 }),
+                9000 => command(servo, Command::RunBur { running: false }),
+                9300 => command(servo, Command::RunBur { running: true }),
+                _ => {}
+            }
+            if (6000..6300).contains(&ms) || (8000..8300).contains(&ms) {
+                hand.reach(Vec3::Y * 4.0);
+            }
+        });
+        let allocated = counting::allocations() - before;
+        let touched = turns.iter().filter(|t| t.step.touch.is_some()).count();
+        let cut = turns.iter().filter(|t| t.step.cutting).count();
+        let tools: std::collections::BTreeSet<_> = turns.iter().map(|t| t.step.instrument).collect();
+        println!("{} ticks, {touched} touching, {cut} cutting, tools {tools:?}: {allocated} allocations", turns.len());
+        assert!(turns.len() > 10_000, "{}: is the machine that busy?", turns.len());
+        assert!(touched > 1000 && cut > 300 && tools.len() == 2, "{touched} {cut} {tools:?}");
+        assert_eq!(allocated, 0);
+        assert_eq!(ended.beats.dropped, 0);
+    })
 }
 
 #[test]
 fn every_beat_that_is_missed_is_counted() {
-    // Aim: ticks and missed beats together are the time that passed. Method: three stalls of 5, 15 and 40 ms in contact.
-    let hand = SharedHand::at_rest(0.0);
-    let stall = |beat: u64| {
-        let ms = match beat {
-            1000 => 5,
-            1500 => 15,
-            2000 => 40,
-            _ => 0,
+    crate::peace::in_real_time(|| {
+        // Aim: ticks and missed beats together are the time that passed. Method: three stalls of 5, 15 and 40 ms in contact.
+        let hand = SharedHand::at_rest(0.0);
+        let stall = |beat: u64| {
+            let ms = match beat {
+                1000 => 5,
+                1500 => 15,
+                2000 => 40,
+                _ => 0,
+            };
+            std::thread::sleep(Duration::from_millis(ms));
         };
-        std::thread::sleep(Duration::from_millis(ms));
-    };
-    hand.reach(Vec3::Y * 3.0);
-    let device = Staged { device: InHand::new(&hand), beats: 0, at_beat: stall };
-    let (turns, ended, elapsed) = turn_for(device, Duration::from_secs(3), |ms, _| {
-        hand.reach(Vec3::new(-2.0, if ms < 300 { 3.0 } else { -0.8 }, 0.0));
-    });
-    let beats = ended.beats.summary();
-    let accounted = (turns.len() as u64 + beats.missed) as f64;
-    println!("{elapsed:?} ms: {} ticks, {beats:?}", turns.len());
-    // A servo may begin a little after it says so.
-    assert!(elapsed.contains(&(accounted + 12.0)) || elapsed.contains(&accounted), "{accounted} of {elapsed:?}");
-    assert!(beats.missed >= 5 + 15 + 40 - 6, "{beats:?}");
-    // The two longer stalls let the hand go; each such tick is one that no reading was trusted in.
-    let absent = turns.iter().filter(|t| !t.reading.pose.is_sound()).count() as u64;
-    assert!(beats.let_go >= 2, "{beats:?}");
-    assert!(absent >= beats.let_go, "{absent} {beats:?}");
-    for (place, turn) in turns.iter().enumerate().filter(|(_, t)| !t.reading.pose.is_sound()) {
-        assert_eq!(turn.step.force, Vec3::ZERO);
-        // The hand still stands in the wall: it feels nothing until it has been out.
-        assert!(turns[place..].iter().take(3).all(|t| t.step.force == Vec3::ZERO));
-    }
+        hand.reach(Vec3::Y * 3.0);
+        let device = Staged { device: InHand::new(&hand), beats: 0, at_beat: stall };
+        let (turns, ended, elapsed) = turn_for(device, Duration::from_secs(3), |ms, _| {
+            hand.reach(Vec3::new(-2.0, if ms < 300 { 3.0 } else { -0.8 }, 0.0));
+        });
+        let beats = ended.beats.summary();
+        let accounted = (turns.len() as u64 + beats.missed) as f64;
+        println!("{elapsed:?} ms: {} ticks, {beats:?}", turns.len());
+        // A servo may begin a little after it says so.
+        assert!(elapsed.contains(&(accounted + 12.0)) || elapsed.contains(&accounted), "{accounted} of {elapsed:?}");
+        assert!(beats.missed >= 5 + 15 + 40 - 6, "{beats:?}");
+        // The two longer stalls let the hand go; each such tick is one that no reading was trusted in.
+        let absent = turns.iter().filter(|t| !t.reading.pose.is_sound()).count() as u64;
+        assert!(beats.let_go >= 2, "{beats:?}");
+        assert!(absent >= beats.let_go, "{absent} {beats:?}");
+        for (place, turn) in turns.iter().enumerate().filter(|(_, t)| !t.reading.pose.is_sound()) {
+            assert_eq!(turn.step.force, Vec3::ZERO);
+            // The hand still stands in the wall: it feels nothing until it has been out.
+            assert!(turns[place..].iter().take(3).all(|t| t.step.force == Vec3::ZERO));
+        }
+    })
 }
 
 #[test]
 fn a_busy_machine_lets_go_rather_than_holds() {
-    // Aim: with every core taken the hand is never pushed by a force that is old, and what came late is counted. Method:
-    // four busy threads; the wire's end of the relay says how old the forces were that it passed on.
-    let mut rig = Simulated::new();
-    let hand = rig.hand();
-    let device = rig.open().unwrap();
-    let most = device.spec().max_force;
-    let stop = std::sync::Arc::new(AtomicBool::new(false));
-    let busy: Vec<_> = (0..4)
-        .map(|_| {
-            let stop = stop.clone();
-            std::thread::spawn(move || while !stop.load(Ordering::Relaxed) {})
-        })
-        .collect();
-    hand.reach(Vec3::Y * 3.0);
-    let (turns, ended, elapsed) = turn_for(device, Duration::from_secs(8), |ms, _| wander(&hand, ms));
-    stop.store(true, Ordering::Relaxed);
-    busy.into_iter().for_each(|thread| thread.join().unwrap());
-    let beats = ended.beats.summary();
-    println!("{} ticks in {elapsed:?} ms with {}: {beats:?}", turns.len(), ended.priority);
-    assert!(!turns.is_empty());
-    assert!(hand.most_felt() <= most * 1.001);
-    assert!(turns.iter().all(|t| t.step.force.is_finite() && t.step.force.length() <= most * 1.001));
-    let is_late = beats.late_max > Duration::from_millis(12);
-    let was_let_go = beats.let_go > 0 || turns.iter().any(|t| !t.reading.pose.is_sound());
-    assert!(!is_late || was_let_go, "late by {:?} and never let go", beats.late_max);
-    assert_eq!(beats.dropped, 0);
+    crate::peace::in_real_time(|| {
+        // Aim: with every core taken the hand is never pushed by a force that is old, and what came late is counted. Method:
+        // four busy threads; the wire's end of the relay says how old the forces were that it passed on.
+        let mut rig = Simulated::new();
+        let hand = rig.hand();
+        let device = rig.open().unwrap();
+        let most = device.spec().max_force;
+        let stop = std::sync::Arc::new(AtomicBool::new(false));
+        let busy: Vec<_> = (0..4)
+            .map(|_| {
+                let stop = stop.clone();
+                std::thread::spawn(move || while !stop.load(Ordering::Relaxed) {})
+            })
+            .collect();
+        hand.reach(Vec3::Y * 3.0);
+        let (turns, ended, elapsed) = turn_for(device, Duration::from_secs(8), |ms, _| wander(&hand, ms));
+        stop.store(true, Ordering::Relaxed);
+        busy.into_iter().for_each(|thread| thread.join().unwrap());
+        let beats = ended.beats.summary();
+        println!("{} ticks in {elapsed:?} ms with {}: {beats:?}", turns.len(), ended.priority);
+        assert!(!turns.is_empty());
+        assert!(hand.most_felt() <= most * 1.001);
+        assert!(turns.iter().all(|t| t.step.force.is_finite() && t.step.force.length() <= most * 1.001));
+        let is_late = beats.late_max > Duration::from_millis(12);
+        let was_let_go = beats.let_go > 0 || turns.iter().any(|t| !t.reading.pose.is_sound());
+        assert!(!is_late || was_let_go, "late by {:?} and never let go", beats.late_max);
+        assert_eq!(beats.dropped, 0);
+    })
 }

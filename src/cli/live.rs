@@ -8,7 +8,7 @@ use crate::device::{Device, Driver, Link, Trouble};
 use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
 use crate::scenario::{QuestionKind, Scenario};
 use crate::session::{Answer, Broken, Effect, Heard, Input, Live, Session};
-use crate::sim::{Assist, AssistNews, Command, Second, Simulation};
+use crate::sim::{Assist, AssistNews, Command, Role, Second, Simulation};
 use std::fmt::Write;
 use std::io::BufRead;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub struct Held {
     pub second: Option<SecondHand>,
 }
 
-/// Another hand that follows the first one, and leads it while its button is held.
+/// Another hand that joins the session.
 pub struct SecondHand {
     end: Second,
     /// Its own servo, if its device is plugged in here.
@@ -42,7 +42,7 @@ pub enum From<'a> {
 }
 
 /// Lets a second hand join.
-pub fn join(held: &mut Held, from: &From) -> Result<(), Failure> {
+pub fn join(held: &mut Held, from: &From, role: Role) -> Result<(), Failure> {
     let max_damping = held.device.spec().max_damping;
     let (link, assist) = match from {
         From::Device(name) if *name == held.name => {
@@ -62,7 +62,7 @@ pub fn join(held: &mut Held, from: &From) -> Result<(), Failure> {
             (link, None)
         }
     };
-    held.second = Some(SecondHand { end: Second::new(link, max_damping), assist });
+    held.second = Some(SecondHand { end: Second::new(link, max_damping, role), assist });
     Ok(())
 }
 

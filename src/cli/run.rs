@@ -7,7 +7,7 @@ use crate::record::{EndFile, HeadFile, Recorder, ServoFile};
 use crate::report::bundle;
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece, hex};
 use crate::session::{self, Broken, Operator, OperatorFile, Progress, Session};
-use crate::sim::Simulation;
+use crate::sim::{Role, Simulation};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
@@ -32,7 +32,7 @@ pub struct Arguments {
     /// The device a person holds; see `typodont devices`
     #[arg(long, value_name = "NAME[:WHICH]", default_value = SCRIPTED)]
     device: String,
-    /// A second device here: it follows the first hand, and leads it while its button is held
+    /// A second device here; see --second-role
     #[arg(long, value_name = "NAME[:WHICH]", conflicts_with = "second_at")]
     second: Option<String>,
     /// Lets a second hand join from another machine, at this address of ours
@@ -41,6 +41,9 @@ pub struct Arguments {
     /// What that machine must know: a word of at least 8 letters
     #[arg(long, value_name = "KEY", requires = "second_at", value_parser = key)]
     second_key: Option<String>,
+    /// What a second hand is there for
+    #[arg(long, value_enum, default_value_t)]
+    second_role: SecondRole,
     /// Decides what the exercise leaves to chance; drawn from the clock if left out
     #[arg(long)]
     seed: Option<u64>,
@@ -62,6 +65,25 @@ pub fn spacing(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(mm) if (0.01..=2.0).contains(&mm) => Ok(mm),
         _ => Err("a distance between voxels lies between 0.01 and 2 mm".into()),
+    }
+}
+
+/// As the command line names a [`Role`].
+#[derive(Clone, Copy, Debug, Default, clap::ValueEnum)]
+enum SecondRole {
+    /// Follows the first hand, and leads it while its button is held
+    #[default]
+    Instructor,
+    /// Holds the suction, and feels the tooth with it
+    Suction,
+}
+
+impl From<SecondRole> for Role {
+    fn from(role: SecondRole) -> Role {
+        match role {
+            SecondRole::Instructor => Role::Instructor,
+            SecondRole::Suction => Role::Suction,
+        }
     }
 }
 
@@ -134,10 +156,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn held(arguments: &Arguments) -> Result<live::Held, Failure> {
     let mut held = live::open(&arguments.device)?;
     if let Some(name) = &arguments.second {
-        live::join(&mut held, &live::From::Device(name))?;
+        live::join(&mut held, &live::From::Device(name), arguments.second_role.into())?;
     }
     if let Some((at, key)) = arguments.second_at.as_deref().zip(arguments.second_key.as_deref()) {
-        live::join(&mut held, &live::From::Network { at, key })?;
+        live::join(&mut held, &live::From::Network { at, key }, arguments.second_role.into())?;
     }
     Ok(held)
 }

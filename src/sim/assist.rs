@@ -1,8 +1,11 @@
-//! A second hand: it sees the first one move, feels what that one feels, and leads it while its holder wants that.
+//! A second hand: an instructor's, which follows the first one, feels what that one feels and leads it while its holder wants
+//! that; or an assistant's, which holds the suction.
 //!
 //! [`Second`] is the first hand's end, turned by its servo. [`Assist`] is the second hand's own servo, here or on another
 //! machine: it has no world, only the tie between the two hands.
 
+use super::Simulation;
+use super::attend::Attendant;
 use super::beats::{BeatSummary, Beats};
 use super::pace::Pace;
 use crate::device::{Coupling, Device, Gone, Link, Mate, Output, Reading, State, Tie, realtime};
@@ -15,20 +18,53 @@ use std::thread::{self, JoinHandle};
 /// The button that leads while it is held.
 const LEADS: u32 = 1;
 
+/// What a second hand is there for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Role {
+    /// It follows the first hand, and leads it while button 0 is held.
+    #[default]
+    Instructor,
+    /// It moves freely with a suction tip, and feels the tooth with it.
+    Suction,
+}
+
 /// The first hand's end of the way to a second one.
 pub struct Second {
     link: Link,
     coupling: Coupling,
+    role: Role,
+    /// What it holds in the first hand's world, once it has come into it.
+    attendant: Option<Attendant>,
 }
 
 impl Second {
     /// `max_damping`: what the first hand's device renders, N·s/mm.
-    pub fn new(link: Link, max_damping: f32) -> Second {
-        Second { link, coupling: Coupling::new(Tie::for_damping(max_damping)) }
+    pub fn new(link: Link, max_damping: f32, role: Role) -> Second {
+        Second { link, coupling: Coupling::new(Tie::for_damping(max_damping)), role, attendant: None }
+    }
+
+    /// Comes into a world, before its first tick.
+    pub(super) fn enter(&mut self, world: &Simulation) {
+        self.attendant = (self.role == Role::Suction).then(|| Attendant::new(world.matter()));
+    }
+
+    /// One tick of the second hand, before the first hand's; returns how it leads that one, N.
+    pub(super) fn turn(&mut self, reading: &Reading, world: &Simulation) -> Vec3 {
+        let Some(attendant) = &mut self.attendant else { return self.lead(reading) };
+        match self.link.hear().filter(|(_, delay)| *delay < SILENT_AFTER) {
+            Some((mate, _)) if mate.position.is_finite() => {
+                let tooth_from_world = world.world_from_tooth().inverse();
+                let tip = attendant.follow(world.matter(), world.materials(), &tooth_from_world, mate.position);
+                // The tie that holds an instructor's hand at the trainee's holds an assistant's at its own tip.
+                self.link.tell(&Mate { position: tip, is_leading: false, ..mate });
+            }
+            _ => attendant.forget(),
+        }
+        Vec3::ZERO
     }
 
     /// Shows the first hand to the second; returns how that one leads it, N.
-    pub(super) fn lead(&mut self, reading: &Reading) -> Vec3 {
+    fn lead(&mut self, reading: &Reading) -> Vec3 {
         if !reading.pose.is_sound() {
             self.coupling.forget();
             return Vec3::ZERO;
@@ -41,6 +77,9 @@ impl Second {
     /// The first hand was let go: the lead comes in softly when it is back.
     pub(super) fn forget(&mut self) {
         self.coupling.forget();
+        if let Some(attendant) = &mut self.attendant {
+            attendant.forget();
+        }
     }
 
     /// Datagrams that were refused on the way.

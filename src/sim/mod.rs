@@ -4,12 +4,13 @@
 //! [`Simulation::step`], and [`Servo`] turns it at 1 kHz with a device in somebody's hand. A step never reads a clock, draws
 //! an unseeded number, knows a scenario, or allocates.
 
-mod beats;
 mod assist;
+mod attend;
+mod beats;
 mod pace;
 mod servo;
 
-pub use assist::{Assist, AssistNews, Second};
+pub use assist::{Assist, AssistNews, Role, Second};
 pub use beats::{BeatSummary, Beats, Histogram};
 pub use servo::{Ended, Letter, Order, Servo, Turn};
 

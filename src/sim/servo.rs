@@ -95,14 +95,17 @@ const SUMMARY_TICKS: u64 = 500;
 impl Servo {
     /// Starts turning a simulation with a device.
     ///
-    /// `second` is another hand that sees this one and may lead it. `beats` are those of the same session so far: a session goes on with another servo after its device was plugged in
-    /// again.
+    /// `second` is another hand in this one's world. `beats` are those of the same session so far: a session goes on with
+    /// another servo after its device was plugged in again.
     pub fn start(
         simulation: Simulation,
         device: Box<dyn Device + Send>,
-        second: Option<Second>,
+        mut second: Option<Second>,
         beats: Beats,
     ) -> Result<Servo, String> {
+        if let Some(second) = &mut second {
+            second.enter(&simulation);
+        }
         let (orders, inbox) = mailbox::ordered(ORDERS_MAX);
         let (post, letters) = mailbox::ordered(LETTERS_MAX);
         let (edit_post, edits) = mailbox::ordered(EDITS_MAX);
@@ -264,7 +267,8 @@ fn turn(
         let reading = if is_late { Reading::ABSENT } else { reading };
         is_held = true;
         if let Some(second) = &mut second {
-            simulation.lead(second.lead(&reading));
+            let lead = second.turn(&reading, &simulation);
+            simulation.lead(lead);
         }
         let begun = Instant::now();
         let step = simulation.step(&reading);

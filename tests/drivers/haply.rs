@@ -403,119 +403,133 @@ fn is_near(a: Vec3, b: Vec3, distance: f32) -> bool {
 
 #[test]
 fn both_protocols_pass_the_suite() {
-    for key in ["values", "vector"] {
-        suite::check(&mut Haply::plug_in(key));
-    }
+    crate::peace::in_real_time(|| {
+        for key in ["values", "vector"] {
+            suite::check(&mut Haply::plug_in(key));
+        }
+    })
 }
 
 #[test]
 fn a_force_arrives_whatever_the_service_calls_it() {
-    // Aim: the name of the force that this service understands is found, by version or by trying, before a real force is
-    // sent. Method: both services, each telling its version, none, and a wrong one; a force of three different components
-    // must arrive in world space as it was sent.
-    let force = Vec3::new(0.4, -0.2, 0.3);
-    for (key, version) in [
-        ("values", Some("3.4.1")),
-        ("vector", Some("3.5.0")),
-        ("vector", None),
-        ("values", None),
-        ("values", Some("3.6.0")),
-        ("vector", Some("3.2.0")),
-    ] {
-        let mut rig = Haply::plug_in(key);
-        rig.ways().version = version;
-        let mut device = rig.open().unwrap();
-        let hand = rig.hand();
-        beat_until(&mut device, force, |device, _| device.state().is_ready());
-        beat_until(&mut device, force, |_, _| is_near(hand.felt().force, force, 1e-3));
-        drop(device);
-        assert_eq!(rig.seen().complaints, [""; 0], "{key} {version:?}");
-    }
+    crate::peace::in_real_time(|| {
+        // Aim: the name of the force that this service understands is found, by version or by trying, before a real force is
+        // sent. Method: both services, each telling its version, none, and a wrong one; a force of three different components
+        // must arrive in world space as it was sent.
+        let force = Vec3::new(0.4, -0.2, 0.3);
+        for (key, version) in [
+            ("values", Some("3.4.1")),
+            ("vector", Some("3.5.0")),
+            ("vector", None),
+            ("values", None),
+            ("values", Some("3.6.0")),
+            ("vector", Some("3.2.0")),
+        ] {
+            let mut rig = Haply::plug_in(key);
+            rig.ways().version = version;
+            let mut device = rig.open().unwrap();
+            let hand = rig.hand();
+            beat_until(&mut device, force, |device, _| device.state().is_ready());
+            beat_until(&mut device, force, |_, _| is_near(hand.felt().force, force, 1e-3));
+            drop(device);
+            assert_eq!(rig.seen().complaints, [""; 0], "{key} {version:?}");
+        }
+    })
 }
 
 #[test]
 fn a_service_that_renders_nothing_is_not_trusted() {
-    // Aim: an arm that stays limp under both names says so, and works once it no longer does.
-    let mut rig = Haply::plug_in("vector");
-    rig.misbehave(Misbehaviour::OverSpeed);
-    let mut device = rig.open().unwrap();
-    beat_until(&mut device, Vec3::X, |device, _| matches!(device.state(), State::ForceOff { .. }));
-    assert_eq!(rig.hand().most_felt(), 0.0);
-    rig.recover();
-    beat_until(&mut device, Vec3::X, |device, _| device.state().is_ready());
-    // Cut again, in the middle of a push: the echo tells.
-    let hand = rig.hand();
-    beat_until(&mut device, Vec3::X, |_, _| is_near(hand.felt().force, Vec3::X, 1e-3));
-    rig.misbehave(Misbehaviour::OverSpeed);
-    beat_until(&mut device, Vec3::X, |device, _| matches!(device.state(), State::ForceOff { .. }));
+    crate::peace::in_real_time(|| {
+        // Aim: an arm that stays limp under both names says so, and works once it no longer does.
+        let mut rig = Haply::plug_in("vector");
+        rig.misbehave(Misbehaviour::OverSpeed);
+        let mut device = rig.open().unwrap();
+        beat_until(&mut device, Vec3::X, |device, _| matches!(device.state(), State::ForceOff { .. }));
+        assert_eq!(rig.hand().most_felt(), 0.0);
+        rig.recover();
+        beat_until(&mut device, Vec3::X, |device, _| device.state().is_ready());
+        // Cut again, in the middle of a push: the echo tells.
+        let hand = rig.hand();
+        beat_until(&mut device, Vec3::X, |_, _| is_near(hand.felt().force, Vec3::X, 1e-3));
+        rig.misbehave(Misbehaviour::OverSpeed);
+        beat_until(&mut device, Vec3::X, |device, _| matches!(device.state(), State::ForceOff { .. }));
+    })
 }
 
 #[test]
 fn what_is_missing_from_a_frame_erases_nothing() {
-    // Aim: a grip that comes later is taken, missing lists change nothing, and the service is asked to describe the stranger
-    // once. Method: turn and press before the grip is there; then no reading may fall back to an upright, released handle.
-    let mut rig = Haply::plug_in("vector");
-    let hand = rig.hand();
-    let turned = Quat::from_xyzw(0.5, 0.5, -0.5, 0.5);
-    hand.turn_to(turned);
-    hand.press_buttons(0b101);
-    hand.reach(Vec3::new(10.0, -5.0, 20.0));
-    let mut device = rig.open().unwrap();
-    assert_eq!(device.spec().name, "Haply Inverse3x");
-    beat_until(&mut device, Vec3::ZERO, |_, reading| reading.is_ok_and(|r| r.buttons == 0b101));
-    let from = rig.seen().frames;
-    beat_until(&mut device, Vec3::ZERO, |_, reading| {
-        let reading = reading.unwrap();
-        if reading.pose.is_sound() {
-            assert_eq!(reading.buttons, 0b101);
-            assert!(reading.pose.orientation.angle_between(turned) < 1e-3, "{}", reading.pose.orientation);
-        }
-        rig.seen().frames > from + 100
-    });
-    beat_until(&mut device, Vec3::ZERO, |_, reading| {
-        is_near(reading.unwrap().pose.position, Vec3::new(10.0, -5.0, 20.0), 0.1)
-    });
-    let seen = rig.seen();
-    assert_eq!((seen.full_states_with_grip, seen.configured), (1, 1));
-    assert_eq!(seen.complaints, [""; 0]);
+    crate::peace::in_real_time(|| {
+        // Aim: a grip that comes later is taken, missing lists change nothing, and the service is asked to describe the stranger
+        // once. Method: turn and press before the grip is there; then no reading may fall back to an upright, released handle.
+        let mut rig = Haply::plug_in("vector");
+        let hand = rig.hand();
+        let turned = Quat::from_xyzw(0.5, 0.5, -0.5, 0.5);
+        hand.turn_to(turned);
+        hand.press_buttons(0b101);
+        hand.reach(Vec3::new(10.0, -5.0, 20.0));
+        let mut device = rig.open().unwrap();
+        assert_eq!(device.spec().name, "Haply Inverse3x");
+        beat_until(&mut device, Vec3::ZERO, |_, reading| reading.is_ok_and(|r| r.buttons == 0b101));
+        let from = rig.seen().frames;
+        beat_until(&mut device, Vec3::ZERO, |_, reading| {
+            let reading = reading.unwrap();
+            if reading.pose.is_sound() {
+                assert_eq!(reading.buttons, 0b101);
+                assert!(reading.pose.orientation.angle_between(turned) < 1e-3, "{}", reading.pose.orientation);
+            }
+            rig.seen().frames > from + 100
+        });
+        beat_until(&mut device, Vec3::ZERO, |_, reading| {
+            is_near(reading.unwrap().pose.position, Vec3::new(10.0, -5.0, 20.0), 0.1)
+        });
+        let seen = rig.seen();
+        assert_eq!((seen.full_states_with_grip, seen.configured), (1, 1));
+        assert_eq!(seen.complaints, [""; 0]);
+    })
 }
 
 #[test]
 fn an_arm_that_is_not_in_the_snapshot_is_asked_for() {
-    let mut rig = Haply::plug_in("vector");
-    rig.ways().is_arm_late = true;
-    let mut device = rig.open().unwrap();
-    assert_eq!(device.spec().name, "Haply Inverse3x");
-    until_ready(&mut device);
+    crate::peace::in_real_time(|| {
+        let mut rig = Haply::plug_in("vector");
+        rig.ways().is_arm_late = true;
+        let mut device = rig.open().unwrap();
+        assert_eq!(device.spec().name, "Haply Inverse3x");
+        until_ready(&mut device);
+    })
 }
 
 #[test]
 fn an_arm_waits_for_its_calibration_in_sight_and_without_force() {
-    let mut rig = Haply::plug_in("values");
-    rig.ways().is_calibrated = false;
-    let mut device = rig.open().unwrap();
-    beat_until(&mut device, Vec3::X, |device, _| matches!(device.state(), State::Calibrate { .. }));
-    assert_eq!(rig.hand().most_felt(), 0.0);
-    rig.ways().is_calibrated = true;
-    until_ready(&mut device);
+    crate::peace::in_real_time(|| {
+        let mut rig = Haply::plug_in("values");
+        rig.ways().is_calibrated = false;
+        let mut device = rig.open().unwrap();
+        beat_until(&mut device, Vec3::X, |device, _| matches!(device.state(), State::Calibrate { .. }));
+        assert_eq!(rig.hand().most_felt(), 0.0);
+        rig.ways().is_calibrated = true;
+        until_ready(&mut device);
+    })
 }
 
 #[test]
 fn a_command_lasts_one_tick() {
-    // Aim: when the program ends or only stops to turn the servo, the hand is free. Method: push, then stop exchanging; then
-    // push again, and drop the device.
-    let mut rig = Haply::plug_in("vector");
-    let hand = rig.hand();
-    let mut device = rig.open().unwrap();
-    for is_dropped in [false, true] {
-        beat_until(&mut device, Vec3::Y, |_, _| is_near(hand.felt().force, Vec3::Y, 1e-3));
-        if is_dropped {
-            break;
+    crate::peace::in_real_time(|| {
+        // Aim: when the program ends or only stops to turn the servo, the hand is free. Method: push, then stop exchanging; then
+        // push again, and drop the device.
+        let mut rig = Haply::plug_in("vector");
+        let hand = rig.hand();
+        let mut device = rig.open().unwrap();
+        for is_dropped in [false, true] {
+            beat_until(&mut device, Vec3::Y, |_, _| is_near(hand.felt().force, Vec3::Y, 1e-3));
+            if is_dropped {
+                break;
+            }
+            wait_for(|| hand.felt() == Output::NONE);
         }
+        drop(device);
         wait_for(|| hand.felt() == Output::NONE);
-    }
-    drop(device);
-    wait_for(|| hand.felt() == Output::NONE);
+    })
 }
 
 fn wait_for(holds: impl Fn() -> bool) {
@@ -528,57 +542,63 @@ fn wait_for(holds: impl Fn() -> bool) {
 
 #[test]
 fn late_answers_let_go_and_are_never_overtaken() {
-    // Aim: an answer that comes 50 ms late pushes nobody, and no second frame is sent meanwhile.
-    let mut rig = Haply::plug_in("vector");
-    let hand = rig.hand();
-    let mut device = rig.open().unwrap();
-    until_ready(&mut device);
-    rig.misbehave(Misbehaviour::Late);
-    let since = rig.seen().frames;
-    beat_until(&mut device, Vec3::X, |_, _| rig.seen().frames > since + 6);
-    assert!(matches!(device.state(), State::ForceOff { .. }), "{}", device.state());
-    hand.most_felt();
-    beat_until(&mut device, Vec3::X, |_, _| rig.seen().frames > since + 12);
-    assert_eq!(hand.most_felt(), 0.0);
-    rig.recover();
-    until_ready(&mut device);
-    assert_eq!(rig.seen().complaints, [""; 0]);
+    crate::peace::in_real_time(|| {
+        // Aim: an answer that comes 50 ms late pushes nobody, and no second frame is sent meanwhile.
+        let mut rig = Haply::plug_in("vector");
+        let hand = rig.hand();
+        let mut device = rig.open().unwrap();
+        until_ready(&mut device);
+        rig.misbehave(Misbehaviour::Late);
+        let since = rig.seen().frames;
+        beat_until(&mut device, Vec3::X, |_, _| rig.seen().frames > since + 6);
+        assert!(matches!(device.state(), State::ForceOff { .. }), "{}", device.state());
+        hand.most_felt();
+        beat_until(&mut device, Vec3::X, |_, _| rig.seen().frames > since + 12);
+        assert_eq!(hand.most_felt(), 0.0);
+        rig.recover();
+        until_ready(&mut device);
+        assert_eq!(rig.seen().complaints, [""; 0]);
+    })
 }
 
 #[test]
 fn a_broken_line_or_broken_words_end_with_a_reason() {
-    // Aim: each way of losing the service says what happened, lets go, and a new connection works.
-    type Break = fn(&mut Haply);
-    let break_it: [(&str, Break); 3] = [
-        ("ended the connection", |rig| rig.ways().drops_mid_tick = true),
-        ("the Inverse Service", |rig| rig.misbehave(Misbehaviour::Unplug)),
-        ("cannot be read", |rig| rig.misbehave(Misbehaviour::Garbage)),
-    ];
-    for (reason, break_it) in break_it {
-        let mut rig = Haply::plug_in("vector");
-        let mut device = rig.open().unwrap();
-        until_ready(&mut device);
-        break_it(&mut rig);
-        let gone = until_gone(&mut device);
-        assert!(gone.to_string().contains(reason), "{gone}");
-        drop(device);
-        wait_for(|| rig.hand().felt() == Output::NONE);
-        rig.recover();
-        rig.ways().drops_mid_tick = false;
-        until_ready(&mut rig.open().unwrap());
-    }
+    crate::peace::in_real_time(|| {
+        // Aim: each way of losing the service says what happened, lets go, and a new connection works.
+        type Break = fn(&mut Haply);
+        let break_it: [(&str, Break); 3] = [
+            ("ended the connection", |rig| rig.ways().drops_mid_tick = true),
+            ("the Inverse Service", |rig| rig.misbehave(Misbehaviour::Unplug)),
+            ("cannot be read", |rig| rig.misbehave(Misbehaviour::Garbage)),
+        ];
+        for (reason, break_it) in break_it {
+            let mut rig = Haply::plug_in("vector");
+            let mut device = rig.open().unwrap();
+            until_ready(&mut device);
+            break_it(&mut rig);
+            let gone = until_gone(&mut device);
+            assert!(gone.to_string().contains(reason), "{gone}");
+            drop(device);
+            wait_for(|| rig.hand().felt() == Output::NONE);
+            rig.recover();
+            rig.ways().drops_mid_tick = false;
+            until_ready(&mut rig.open().unwrap());
+        }
+    })
 }
 
 #[test]
 fn what_is_no_service_is_named() {
-    // Aim: everything that may stand at the address in place of the service ends in a complaint that says what to do.
-    let haply = driver("haply").unwrap();
-    let complaint = |argument: &str| haply.open(Some(argument)).err().unwrap().to_string();
-    let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
-    assert!(complaint(&nobody.to_string()).contains("start the Inverse Service"));
-    assert!(complaint("nonsense").contains("is no address"));
-    let rig = Haply::plug_in("vector");
-    assert!(complaint(&format!("127.0.0.1:{}/0000", rig.port)).contains("no device 0000"));
-    rig.ways().version = Some("3.0.8");
-    assert!(complaint(&format!("127.0.0.1:{}", rig.port)).contains("update"));
+    crate::peace::in_real_time(|| {
+        // Aim: everything that may stand at the address in place of the service ends in a complaint that says what to do.
+        let haply = driver("haply").unwrap();
+        let complaint = |argument: &str| haply.open(Some(argument)).err().unwrap().to_string();
+        let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        assert!(complaint(&nobody.to_string()).contains("start the Inverse Service"));
+        assert!(complaint("nonsense").contains("is no address"));
+        let rig = Haply::plug_in("vector");
+        assert!(complaint(&format!("127.0.0.1:{}/0000", rig.port)).contains("no device 0000"));
+        rig.ways().version = Some("3.0.8");
+        assert!(complaint(&format!("127.0.0.1:{}", rig.port)).contains("update"));
+    })
 }

@@ -10,6 +10,7 @@ mod live;
 mod mouse;
 mod native;
 mod open_handle;
+mod peace;
 #[path = "../phantom/mod.rs"]
 mod phantom;
 mod pipe;
@@ -24,23 +25,27 @@ mod suite;
 
 #[test]
 fn a_simulated_device_passes_the_suite() {
-    suite::check(&mut simulated::Simulated::new());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut simulated::Simulated::new());
+    })
 }
 
 #[test]
 fn every_fake_is_soaked() {
-    // One after the other: what a servo's thread allocates is counted for the whole process.
-    let mut fakes: Vec<Box<dyn rig::Rig>> = vec![
-        Box::new(simulated::Simulated::new()),
-        Box::new(native::Native::omni()),
-        Box::new(native::Native::omega()),
-        Box::new(haply::Haply::plug_in("values")),
-        Box::new(haply::Haply::plug_in("vector")),
-        Box::new(polhem::HidRig::new()),
-        Box::new(polhem::SerialRig::new()),
-        Box::new(open_handle::Rigged::new()),
-        Box::new(spacemouse::Rigged::new(false)),
-        Box::new(stream::Stream::plug_in()),
-    ];
-    fakes.iter_mut().for_each(|fake| soak::soak(fake.as_mut()));
+    crate::peace::in_real_time(|| {
+        // One after the other: what a servo's thread allocates is counted for the whole process.
+        let mut fakes: Vec<Box<dyn rig::Rig>> = vec![
+            Box::new(simulated::Simulated::new()),
+            Box::new(native::Native::omni()),
+            Box::new(native::Native::omega()),
+            Box::new(haply::Haply::plug_in("values")),
+            Box::new(haply::Haply::plug_in("vector")),
+            Box::new(polhem::HidRig::new()),
+            Box::new(polhem::SerialRig::new()),
+            Box::new(open_handle::Rigged::new()),
+            Box::new(spacemouse::Rigged::new(false)),
+            Box::new(stream::Stream::plug_in()),
+        ];
+        fakes.iter_mut().for_each(|fake| soak::soak(fake.as_mut()));
+    })
 }

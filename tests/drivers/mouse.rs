@@ -12,22 +12,24 @@ fn settle(device: &mut impl Device) -> Vec3 {
 
 #[test]
 fn the_hand_follows_the_pointer() {
-    // Aim: right is right, down is down, the wheel goes into the screen, in millimetres. Method: each alone.
-    let (mouse, mut device) = Mouse::new();
-    assert_eq!((device.beat(), device.state()), (Beat::Ours, State::Ready));
-    mouse.moved(50.0, 0.0);
-    assert!(settle(&mut device).distance(Vec3::new(5.0, 0.0, 0.0)) < 0.01);
-    mouse.clone().moved(0.0, 30.0);
-    assert!(settle(&mut device).distance(Vec3::new(5.0, -3.0, 0.0)) < 0.01);
-    mouse.wheel(4.0);
-    assert!(settle(&mut device).distance(Vec3::new(5.0, -3.0, -2.0)) < 0.01);
-    mouse.button(0, true);
-    mouse.button(2, true);
-    mouse.button(40, true);
-    assert_eq!(device.exchange(&Output::NONE).unwrap().buttons, 0b101);
-    mouse.button(0, false);
-    let reading = device.exchange(&Output::NONE).unwrap();
-    assert_eq!((reading.buttons, reading.pose.orientation), (0b100, UPRIGHT));
+    crate::peace::in_real_time(|| {
+        // Aim: right is right, down is down, the wheel goes into the screen, in millimetres. Method: each alone.
+        let (mouse, mut device) = Mouse::new();
+        assert_eq!((device.beat(), device.state()), (Beat::Ours, State::Ready));
+        mouse.moved(50.0, 0.0);
+        assert!(settle(&mut device).distance(Vec3::new(5.0, 0.0, 0.0)) < 0.01);
+        mouse.clone().moved(0.0, 30.0);
+        assert!(settle(&mut device).distance(Vec3::new(5.0, -3.0, 0.0)) < 0.01);
+        mouse.wheel(4.0);
+        assert!(settle(&mut device).distance(Vec3::new(5.0, -3.0, -2.0)) < 0.01);
+        mouse.button(0, true);
+        mouse.button(2, true);
+        mouse.button(40, true);
+        assert_eq!(device.exchange(&Output::NONE).unwrap().buttons, 0b101);
+        mouse.button(0, false);
+        let reading = device.exchange(&Output::NONE).unwrap();
+        assert_eq!((reading.buttons, reading.pose.orientation), (0b100, UPRIGHT));
+    })
 }
 
 #[test]
@@ -58,8 +60,10 @@ fn the_spring_is_kept_for_the_window() {
 
 #[test]
 fn a_mouse_is_always_there_but_needs_a_window() {
-    let mouse = driver("mouse").expect("it is a driver");
-    assert_eq!(mouse.find().unwrap().len(), 1);
-    let trouble = mouse.open(None).err().expect("no window here");
-    assert!(trouble.to_string().contains("desktop program"), "{trouble}");
+    crate::peace::in_real_time(|| {
+        let mouse = driver("mouse").expect("it is a driver");
+        assert_eq!(mouse.find().unwrap().len(), 1);
+        let trouble = mouse.open(None).err().expect("no window here");
+        assert!(trouble.to_string().contains("desktop program"), "{trouble}");
+    })
 }

@@ -18,158 +18,180 @@ use typodont::frame::{Quat, Vec3};
 
 #[test]
 fn openhaptics_passes_the_suite() {
-    suite::check(&mut Native::omni());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut Native::omni());
+    })
 }
 
 #[test]
 fn force_dimension_passes_the_suite() {
-    suite::check(&mut Native::omega());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut Native::omega());
+    })
 }
 
 #[test]
 fn a_premium_feels_torque_in_its_own_unit() {
-    // Aim: HDAPI takes mN·m, so N·mm pass unchanged. Method: an arm of six axes is told a torque.
-    let rig = Native::omni();
-    rig.order("stub_six_axes");
-    let mut device = ready(&rig);
-    assert_eq!(device.spec().max_torque, 188.0);
-    let told = Output { torque: Vec3::new(0.0, 90.0, -20.0), ..Output::NONE };
-    wait(&mut device, told, "the torque", |_, _| (rig.hand.felt().torque - told.torque).length() < 0.1);
-    let wild = Output { torque: Vec3::X * 9000.0, ..Output::NONE };
-    wait(&mut device, wild, "a clamped torque", |_, _| (rig.hand.felt().torque.length() - 188.0).abs() < 1.0);
+    crate::peace::in_real_time(|| {
+        // Aim: HDAPI takes mN·m, so N·mm pass unchanged. Method: an arm of six axes is told a torque.
+        let rig = Native::omni();
+        rig.order("stub_six_axes");
+        let mut device = ready(&rig);
+        assert_eq!(device.spec().max_torque, 188.0);
+        let told = Output { torque: Vec3::new(0.0, 90.0, -20.0), ..Output::NONE };
+        wait(&mut device, told, "the torque", |_, _| (rig.hand.felt().torque - told.torque).length() < 0.1);
+        let wild = Output { torque: Vec3::X * 9000.0, ..Output::NONE };
+        wait(&mut device, wild, "a clamped torque", |_, _| (rig.hand.felt().torque.length() - 188.0).abs() < 1.0);
+    })
 }
 
 #[test]
 fn openhaptics_says_what_the_device_is() {
-    // Aim: limits come from the device, and never exceed what its model stands. Method: the stub says 1 N/mm, 3.3 N.
-    let rig = Native::omni();
-    let device = ready(&rig);
-    let spec = device.spec();
-    assert_eq!(spec.name, "PHANTOM Omni");
-    assert_eq!((spec.max_force, spec.continuous_force), (3.3, 0.88));
-    assert_eq!(spec.max_stiffness, 0.7, "an Omni stands 0.7 N/mm, whatever its library says");
-    assert_eq!(spec.workspace_half, Vec3::new(80.0, 60.0, 35.0));
+    crate::peace::in_real_time(|| {
+        // Aim: limits come from the device, and never exceed what its model stands. Method: the stub says 1 N/mm, 3.3 N.
+        let rig = Native::omni();
+        let device = ready(&rig);
+        let spec = device.spec();
+        assert_eq!(spec.name, "PHANTOM Omni");
+        assert_eq!((spec.max_force, spec.continuous_force), (3.3, 0.88));
+        assert_eq!(spec.max_stiffness, 0.7, "an Omni stands 0.7 N/mm, whatever its library says");
+        assert_eq!(spec.workspace_half, Vec3::new(80.0, 60.0, 35.0));
+    })
 }
 
 #[test]
 fn an_omni_that_lost_its_place_asks_for_its_inkwell() {
-    // Aim: calibrating is a visible state, needs the docked stylus, and no force is felt before. Method: an arm with the
-    // inkwell style that lost its place; a person docks it, then takes it out.
-    let rig = Native::omni();
-    rig.calibration(4, true);
-    let mut device = rig.opened().unwrap();
-    let push = Output { force: Vec3::Y, ..Output::NONE };
-    rig.hand.most_felt();
-    wait(
-        &mut device,
-        push,
-        "a call for the inkwell",
-        |state, _| matches!(state, State::Calibrate { how } if how.contains("inkwell")),
-    );
-    assert_eq!(rig.ask::<u32>("stub_updates"), 0, "never without the stylus in");
-    rig.set("stub_dock", true);
-    wait(&mut device, push, "docked, without force", |state, reading| {
-        matches!(state, State::ForceOff { why } if why.contains("inkwell")) && reading.pose.is_sound()
-    });
-    assert_eq!(rig.ask::<u32>("stub_updates"), 1);
-    assert_eq!(rig.hand.most_felt(), 0.0);
-    rig.set("stub_dock", false);
-    wait(&mut device, push, "ready and felt", |state, _| state.is_ready() && rig.hand.felt().force.y > 0.9);
+    crate::peace::in_real_time(|| {
+        // Aim: calibrating is a visible state, needs the docked stylus, and no force is felt before. Method: an arm with the
+        // inkwell style that lost its place; a person docks it, then takes it out.
+        let rig = Native::omni();
+        rig.calibration(4, true);
+        let mut device = rig.opened().unwrap();
+        let push = Output { force: Vec3::Y, ..Output::NONE };
+        rig.hand.most_felt();
+        wait(
+            &mut device,
+            push,
+            "a call for the inkwell",
+            |state, _| matches!(state, State::Calibrate { how } if how.contains("inkwell")),
+        );
+        assert_eq!(rig.ask::<u32>("stub_updates"), 0, "never without the stylus in");
+        rig.set("stub_dock", true);
+        wait(&mut device, push, "docked, without force", |state, reading| {
+            matches!(state, State::ForceOff { why } if why.contains("inkwell")) && reading.pose.is_sound()
+        });
+        assert_eq!(rig.ask::<u32>("stub_updates"), 1);
+        assert_eq!(rig.hand.most_felt(), 0.0);
+        rig.set("stub_dock", false);
+        wait(&mut device, push, "ready and felt", |state, _| state.is_ready() && rig.hand.felt().force.y > 0.9);
+    })
 }
 
 #[test]
 fn an_arm_without_zero_waits_for_a_person() {
-    // Aim: encoders are reset before the servo starts, when a person says that the arm is in place. Method: the stub
-    // refuses a reset while its scheduler runs; the button is held at first, which must not count.
-    let rig = Native::omni();
-    rig.order("stub_six_axes");
-    rig.calibration(1, true);
-    rig.hand.press_buttons(1);
-    let turns = rig.hand.turns();
-    eventually("the button is down", || rig.hand.turns() > turns + 2);
-    let mut device = rig.opened().unwrap();
-    let asks = |state: State| matches!(state, State::Calibrate { how } if how.contains("neutral"));
-    wait(&mut device, Output::NONE, "a call for the neutral pose", |state, _| asks(state));
-    hold(&mut device, Duration::from_millis(200));
-    assert_eq!(rig.ask::<u32>("stub_updates"), 0);
-    rig.hand.press_buttons(0);
-    hold(&mut device, Duration::from_millis(200));
-    assert!(asks(device.state()));
-    rig.hand.press_buttons(1);
-    wait(&mut device, Output::NONE, "ready", |state, reading| state.is_ready() && reading.pose.is_sound());
-    assert_eq!(rig.ask::<u32>("stub_updates"), 1);
+    crate::peace::in_real_time(|| {
+        // Aim: encoders are reset before the servo starts, when a person says that the arm is in place. Method: the stub
+        // refuses a reset while its scheduler runs; the button is held at first, which must not count.
+        let rig = Native::omni();
+        rig.order("stub_six_axes");
+        rig.calibration(1, true);
+        rig.hand.press_buttons(1);
+        let turns = rig.hand.turns();
+        eventually("the button is down", || rig.hand.turns() > turns + 2);
+        let mut device = rig.opened().unwrap();
+        let asks = |state: State| matches!(state, State::Calibrate { how } if how.contains("neutral"));
+        wait(&mut device, Output::NONE, "a call for the neutral pose", |state, _| asks(state));
+        hold(&mut device, Duration::from_millis(200));
+        assert_eq!(rig.ask::<u32>("stub_updates"), 0);
+        rig.hand.press_buttons(0);
+        hold(&mut device, Duration::from_millis(200));
+        assert!(asks(device.state()));
+        rig.hand.press_buttons(1);
+        wait(&mut device, Output::NONE, "ready", |state, reading| state.is_ready() && reading.pose.is_sound());
+        assert_eq!(rig.ask::<u32>("stub_updates"), 1);
+    })
 }
 
 #[test]
 fn warm_motors_are_switched_on_again() {
-    // Aim: the library switches force output off with the error and does not switch it on again. Method: warm, then cool.
-    let rig = Native::omni();
-    let mut device = ready(&rig);
-    let push = Output { force: Vec3::X, ..Output::NONE };
-    wait(&mut device, push, "a push", |_, _| rig.hand.felt().force.x > 0.9);
-    rig.fault(0x0200);
-    // The newest error says only that the force failed; the first says why.
-    wait(&mut device, push, "the reason", |state, _| {
-        matches!(state, State::ForceOff { why } if why.contains("warm")) && rig.hand.felt().force == Vec3::ZERO
-    });
-    assert!(!rig.ask::<bool>("stub_is_force_output_on"));
-    rig.fault(0);
-    wait(&mut device, push, "a push again", |state, _| state.is_ready() && rig.hand.felt().force.x > 0.9);
+    crate::peace::in_real_time(|| {
+        // Aim: the library switches force output off with the error and does not switch it on again. Method: warm, then cool.
+        let rig = Native::omni();
+        let mut device = ready(&rig);
+        let push = Output { force: Vec3::X, ..Output::NONE };
+        wait(&mut device, push, "a push", |_, _| rig.hand.felt().force.x > 0.9);
+        rig.fault(0x0200);
+        // The newest error says only that the force failed; the first says why.
+        wait(&mut device, push, "the reason", |state, _| {
+            matches!(state, State::ForceOff { why } if why.contains("warm")) && rig.hand.felt().force == Vec3::ZERO
+        });
+        assert!(!rig.ask::<bool>("stub_is_force_output_on"));
+        rig.fault(0);
+        wait(&mut device, push, "a push again", |state, _| state.is_ready() && rig.hand.felt().force.x > 0.9);
+    })
 }
 
 #[test]
 fn a_library_that_refuses_every_frame_ends_the_device() {
-    let rig = Native::omni();
-    let mut device = ready(&rig);
-    rig.fault(0x0402);
-    let said = gone(&mut device);
-    assert!(said.contains("refuses") && said.contains(&0x0402.to_string()), "{said}");
+    crate::peace::in_real_time(|| {
+        let rig = Native::omni();
+        let mut device = ready(&rig);
+        rig.fault(0x0402);
+        let said = gone(&mut device);
+        assert!(said.contains("refuses") && said.contains(&0x0402.to_string()), "{said}");
+    })
 }
 
 #[test]
 fn openhaptics_says_why_it_does_not_open() {
-    // Aim: the trap of garbage handles, a device in use, one that is not there. Method: the stub does each.
-    let rig = Native::omni();
-    rig.set("stub_garbage_handle", true);
-    let said = rig.opened().err().unwrap();
-    assert!(said.contains("handle 0x7f3a1c40") && said.contains("help: "), "{said}");
-    rig.set("stub_garbage_handle", false);
-    rig.set("stub_unplug", true);
-    let said = rig.opened().err().unwrap();
-    assert!(said.contains("Communication error (0x0302)") && said.contains("plug"), "{said}");
-    rig.set("stub_unplug", false);
-    let held = rig.opened().unwrap();
-    let said = rig.opened().err().unwrap();
-    assert!(said.contains("open already"), "{said}");
-    drop(held);
-    ready(&rig);
+    crate::peace::in_real_time(|| {
+        // Aim: the trap of garbage handles, a device in use, one that is not there. Method: the stub does each.
+        let rig = Native::omni();
+        rig.set("stub_garbage_handle", true);
+        let said = rig.opened().err().unwrap();
+        assert!(said.contains("handle 0x7f3a1c40") && said.contains("help: "), "{said}");
+        rig.set("stub_garbage_handle", false);
+        rig.set("stub_unplug", true);
+        let said = rig.opened().err().unwrap();
+        assert!(said.contains("Communication error (0x0302)") && said.contains("plug"), "{said}");
+        rig.set("stub_unplug", false);
+        let held = rig.opened().unwrap();
+        let said = rig.opened().err().unwrap();
+        assert!(said.contains("open already"), "{said}");
+        drop(held);
+        ready(&rig);
+    })
 }
 
 #[test]
 fn closing_a_device_lets_go() {
-    for rig in [Native::omni(), Native::omega()] {
-        let mut device = ready(&rig);
-        let push = Output { force: Vec3::Z, ..Output::NONE };
-        wait(&mut device, push, "a push", |_, _| rig.hand.felt().force.z > 0.9);
-        drop(device);
-        let turns = rig.hand.turns();
-        eventually("turns", || rig.hand.turns() > turns + 2);
-        assert_eq!(rig.hand.felt(), Output::NONE, "{}", rig.driver);
-    }
+    crate::peace::in_real_time(|| {
+        for rig in [Native::omni(), Native::omega()] {
+            let mut device = ready(&rig);
+            let push = Output { force: Vec3::Z, ..Output::NONE };
+            wait(&mut device, push, "a push", |_, _| rig.hand.felt().force.z > 0.9);
+            drop(device);
+            let turns = rig.hand.turns();
+            eventually("turns", || rig.hand.turns() > turns + 2);
+            assert_eq!(rig.hand.felt(), Output::NONE, "{}", rig.driver);
+        }
+    })
 }
 
 #[test]
 fn a_missing_library_is_told_in_the_loaders_words() {
-    // Aim: people can act on the complaint. Method: a file that is not there, one that is no library, one of another kind.
-    for name in ["openhaptics", "forcedimension"] {
-        let open = |path: &Path| driver(name).unwrap().open(path.to_str()).err().unwrap();
-        let said = open(Path::new("/nowhere/libX.so"));
-        assert!(said.what.contains("/nowhere/libX.so") && said.help.contains("install"), "{said}");
-        let text = open(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
-        assert!(text.what.len() > "cannot load ".len() + 20, "{text}");
-    }
-    let said = driver("openhaptics").unwrap().open(built("drd", &[]).to_str()).err().unwrap();
-    assert!(said.what.contains("hdInitDevice"), "{said}");
+    crate::peace::in_real_time(|| {
+        // Aim: people can act on the complaint. Method: a file that is not there, one that is no library, one of another kind.
+        for name in ["openhaptics", "forcedimension"] {
+            let open = |path: &Path| driver(name).unwrap().open(path.to_str()).err().unwrap();
+            let said = open(Path::new("/nowhere/libX.so"));
+            assert!(said.what.contains("/nowhere/libX.so") && said.help.contains("install"), "{said}");
+            let text = open(&Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"));
+            assert!(text.what.len() > "cannot load ".len() + 20, "{text}");
+        }
+        let said = driver("openhaptics").unwrap().open(built("drd", &[]).to_str()).err().unwrap();
+        assert!(said.what.contains("hdInitDevice"), "{said}");
+    })
 }
 
 /// Set in the child process in which the loader knows the stubs by the vendors' names.
@@ -215,114 +237,130 @@ fn a_library_that_is_not_installed_is_a_clear_complaint() {
 
 #[test]
 fn homing_is_announced_before_the_device_moves() {
-    // Aim: nobody's hand is there when the device moves by itself, and the wire reports all the while. Method: a device
-    // that needs homing; the stub says when it moves.
-    let rig = Native::omega();
-    rig.order("stub_needs_homing");
-    let mut device = rig.opened().unwrap();
-    let says = |state: State, word: &str| matches!(state, State::Homing { what } if what.contains(word));
-    wait(&mut device, Output::NONE, "the announcement", |state, _| says(state, "will move"));
-    assert_eq!(rig.ask::<u32>("stub_homing"), 0, "it moves before anyone could read that it will");
-    rig.hand.most_felt();
-    let push = Output { force: Vec3::X, ..Output::NONE };
-    wait(&mut device, push, "the homing", |state, _| says(state, "keep the hands off"));
-    eventually("it moves", || rig.ask::<u32>("stub_homing") == 1);
-    assert_eq!(rig.hand.most_felt(), 0.0);
-    wait(&mut device, Output::NONE, "ready", |state, reading| state.is_ready() && reading.pose.is_sound());
-    assert_eq!(rig.ask::<u32>("stub_homing"), 2, "homed once, and still");
+    crate::peace::in_real_time(|| {
+        // Aim: nobody's hand is there when the device moves by itself, and the wire reports all the while. Method: a device
+        // that needs homing; the stub says when it moves.
+        let rig = Native::omega();
+        rig.order("stub_needs_homing");
+        let mut device = rig.opened().unwrap();
+        let says = |state: State, word: &str| matches!(state, State::Homing { what } if what.contains(word));
+        wait(&mut device, Output::NONE, "the announcement", |state, _| says(state, "will move"));
+        assert_eq!(rig.ask::<u32>("stub_homing"), 0, "it moves before anyone could read that it will");
+        rig.hand.most_felt();
+        let push = Output { force: Vec3::X, ..Output::NONE };
+        wait(&mut device, push, "the homing", |state, _| says(state, "keep the hands off"));
+        eventually("it moves", || rig.ask::<u32>("stub_homing") == 1);
+        assert_eq!(rig.hand.most_felt(), 0.0);
+        wait(&mut device, Output::NONE, "ready", |state, reading| state.is_ready() && reading.pose.is_sound());
+        assert_eq!(rig.ask::<u32>("stub_homing"), 2, "homed once, and still");
+    })
 }
 
 #[test]
 fn closing_stops_a_device_that_homes() {
-    let rig = Native::omega();
-    rig.order("stub_needs_homing");
-    let mut device = rig.opened().unwrap();
-    wait(&mut device, Output::NONE, "it moves", |_, _| rig.ask::<u32>("stub_homing") == 1);
-    drop(device);
-    eventually("it stands", || rig.ask::<u32>("stub_homing") == 0);
+    crate::peace::in_real_time(|| {
+        let rig = Native::omega();
+        rig.order("stub_needs_homing");
+        let mut device = rig.opened().unwrap();
+        wait(&mut device, Output::NONE, "it moves", |_, _| rig.ask::<u32>("stub_homing") == 1);
+        drop(device);
+        eventually("it stands", || rig.ask::<u32>("stub_homing") == 0);
+    })
 }
 
 #[test]
 fn a_sigma_feels_torque_and_its_gripper_is_a_button() {
-    // Aim: N·mm become N·m on the right axes; left-handed grippers count negative. Method: one of each hand.
-    for is_left_handed in [false, true] {
-        let rig = Native::omega();
-        rig.set("stub_sigma", is_left_handed);
-        let mut device = ready(&rig);
-        assert_eq!(device.spec().max_torque, 200.0);
-        let told = Output { force: Vec3::X, torque: Vec3::new(10.0, 20.0, -150.0) };
-        wait(&mut device, told, "the torque", |_, _| (rig.hand.felt().torque - told.torque).length() < 0.1);
-        assert!((rig.hand.felt().force - told.force).length() < 1e-3);
-        rig.gripper(0.4);
-        wait(&mut device, Output::NONE, "an open gripper", |_, reading| reading.buttons == 0);
-        rig.gripper(0.02);
-        wait(&mut device, Output::NONE, "a closed gripper", |_, reading| reading.buttons == 1);
-        rig.gripper(0.11);
-        hold(&mut device, Duration::from_millis(100));
-        wait(&mut device, Output::NONE, "some play", |_, reading| reading.buttons == 1);
-        rig.gripper(0.4);
-        wait(&mut device, Output::NONE, "an open gripper again", |_, reading| reading.buttons == 0);
-    }
+    crate::peace::in_real_time(|| {
+        // Aim: N·mm become N·m on the right axes; left-handed grippers count negative. Method: one of each hand.
+        for is_left_handed in [false, true] {
+            let rig = Native::omega();
+            rig.set("stub_sigma", is_left_handed);
+            let mut device = ready(&rig);
+            assert_eq!(device.spec().max_torque, 200.0);
+            let told = Output { force: Vec3::X, torque: Vec3::new(10.0, 20.0, -150.0) };
+            wait(&mut device, told, "the torque", |_, _| (rig.hand.felt().torque - told.torque).length() < 0.1);
+            assert!((rig.hand.felt().force - told.force).length() < 1e-3);
+            rig.gripper(0.4);
+            wait(&mut device, Output::NONE, "an open gripper", |_, reading| reading.buttons == 0);
+            rig.gripper(0.02);
+            wait(&mut device, Output::NONE, "a closed gripper", |_, reading| reading.buttons == 1);
+            rig.gripper(0.11);
+            hold(&mut device, Duration::from_millis(100));
+            wait(&mut device, Output::NONE, "some play", |_, reading| reading.buttons == 1);
+            rig.gripper(0.4);
+            wait(&mut device, Output::NONE, "an open gripper again", |_, reading| reading.buttons == 0);
+        }
+    })
 }
 
 #[test]
 fn saturated_motors_and_guarded_reads_are_successes() {
-    // Aim: 1 and 2 are no errors. Method: a force at which the stub answers 2, reads so fast that it answers 1.
-    let rig = Native::omega();
-    let mut device = ready(&rig);
-    let told = Output { force: Vec3::Y * 11.5, ..Output::NONE };
-    wait(&mut device, told, "11.5 N", |state, _| state.is_ready() && rig.hand.felt().force.y > 11.4);
+    crate::peace::in_real_time(|| {
+        // Aim: 1 and 2 are no errors. Method: a force at which the stub answers 2, reads so fast that it answers 1.
+        let rig = Native::omega();
+        let mut device = ready(&rig);
+        let told = Output { force: Vec3::Y * 11.5, ..Output::NONE };
+        wait(&mut device, told, "11.5 N", |state, _| state.is_ready() && rig.hand.felt().force.y > 11.4);
+    })
 }
 
 #[test]
 fn forces_switched_off_by_hand_stay_off() {
-    // Aim: a person's decision at the device stands until they take it back. Method: the force button, longer than the
-    // driver waits before it switches on by itself.
-    let rig = Native::omega();
-    let mut device = ready(&rig);
-    rig.set("stub_force_button", false);
-    let push = Output { force: Vec3::X, ..Output::NONE };
-    let off = |state: State| matches!(state, State::ForceOff { why } if why.contains("button"));
-    wait(&mut device, push, "the reason", |state, _| off(state));
-    rig.hand.most_felt();
-    hold(&mut device, Duration::from_millis(1200));
-    assert!(off(device.state()), "{}", device.state());
-    assert_eq!(rig.hand.most_felt(), 0.0);
-    rig.set("stub_force_button", true);
-    wait(&mut device, push, "a push", |state, _| state.is_ready() && rig.hand.felt().force.x > 0.9);
+    crate::peace::in_real_time(|| {
+        // Aim: a person's decision at the device stands until they take it back. Method: the force button, longer than the
+        // driver waits before it switches on by itself.
+        let rig = Native::omega();
+        let mut device = ready(&rig);
+        rig.set("stub_force_button", false);
+        let push = Output { force: Vec3::X, ..Output::NONE };
+        let off = |state: State| matches!(state, State::ForceOff { why } if why.contains("button"));
+        wait(&mut device, push, "the reason", |state, _| off(state));
+        rig.hand.most_felt();
+        hold(&mut device, Duration::from_millis(1200));
+        assert!(off(device.state()), "{}", device.state());
+        assert_eq!(rig.hand.most_felt(), 0.0);
+        rig.set("stub_force_button", true);
+        wait(&mut device, push, "a push", |state, _| state.is_ready() && rig.hand.felt().force.x > 0.9);
+    })
 }
 
 #[test]
 fn the_devices_own_watchdog_is_set() {
-    // Aim: a program that dies cannot leave a force on. Method: 160 times 125 µs are 20 ms.
-    let rig = Native::omega();
-    let _device = ready(&rig);
-    assert_eq!(rig.ask::<u8>("stub_watchdog"), 160);
+    crate::peace::in_real_time(|| {
+        // Aim: a program that dies cannot leave a force on. Method: 160 times 125 µs are 20 ms.
+        let rig = Native::omega();
+        let _device = ready(&rig);
+        assert_eq!(rig.ask::<u8>("stub_watchdog"), 160);
+    })
 }
 
 #[test]
 fn a_device_without_wrist_is_held_upright() {
-    let rig = Native::omega();
-    rig.order("stub_no_wrist");
-    rig.hand.turn_to(Quat::from_rotation_x(1.0));
-    let mut device = ready(&rig);
-    wait(&mut device, Output::NONE, "a pose", |_, reading| reading.pose.orientation == UPRIGHT);
-    assert_eq!(device.spec().name, "omega.3");
+    crate::peace::in_real_time(|| {
+        let rig = Native::omega();
+        rig.order("stub_no_wrist");
+        rig.hand.turn_to(Quat::from_rotation_x(1.0));
+        let mut device = ready(&rig);
+        wait(&mut device, Output::NONE, "a pose", |_, reading| reading.pose.orientation == UPRIGHT);
+        assert_eq!(device.spec().name, "omega.3");
+    })
 }
 
 #[test]
 fn an_old_library_without_optional_functions_serves() {
-    // Aim: only what is needed is required. Method: a library of eight functions; place, button and force must do.
-    let rig = Native::new("forcedimension", &built("drd", &["small"]), feel_dhd, OMEGA);
-    let mut device = ready(&rig);
-    rig.hand.reach(Vec3::new(5.0, -3.0, 2.0));
-    let is_there = |reading: Reading| (reading.pose.position - rig.hand.goal()).length() < 0.2;
-    wait(&mut device, Output::NONE, "the place", |_, reading| is_there(reading));
-    rig.hand.press_buttons(0b10);
-    wait(&mut device, Output::NONE, "the second button", |_, reading| reading.buttons == 0b10);
-    let push = Output { force: Vec3::new(0.0, 0.0, -1.0), ..Output::NONE };
-    wait(&mut device, push, "a push", |_, _| rig.hand.felt().force.z < -0.9);
-    assert_eq!(device.spec().max_torque, 0.0);
+    crate::peace::in_real_time(|| {
+        // Aim: only what is needed is required. Method: a library of eight functions; place, button and force must do.
+        let rig = Native::new("forcedimension", &built("drd", &["small"]), feel_dhd, OMEGA);
+        let mut device = ready(&rig);
+        rig.hand.reach(Vec3::new(5.0, -3.0, 2.0));
+        let is_there = |reading: Reading| (reading.pose.position - rig.hand.goal()).length() < 0.2;
+        wait(&mut device, Output::NONE, "the place", |_, reading| is_there(reading));
+        rig.hand.press_buttons(0b10);
+        wait(&mut device, Output::NONE, "the second button", |_, reading| reading.buttons == 0b10);
+        let push = Output { force: Vec3::new(0.0, 0.0, -1.0), ..Output::NONE };
+        wait(&mut device, push, "a push", |_, _| rig.hand.felt().force.z < -0.9);
+        assert_eq!(device.spec().max_torque, 0.0);
+    })
 }
 
 /// A fake device behind a shared library.

@@ -175,31 +175,35 @@ fn firmware(device: DeviceEnd, hand: &SharedHand, faults: &Faults) {
 
 #[test]
 fn an_open_handle_passes_the_suite() {
-    suite::check(&mut Rigged::new());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut Rigged::new());
+    })
 }
 
 #[test]
 fn a_handle_says_what_it_is_and_what_it_waits_for() {
-    // Aim: the description becomes the device's spec, and each state is told as it is. Method: a handle in each state.
-    let mut rig = Rigged::new();
-    for (state, word) in [(0, "starting"), (1, "press its button"), (2, "hands off"), (3, "ready"), (9, "newer")] {
-        rig.faults.state.store(state, Ordering::Release);
-        let mut device = rig.open().unwrap();
-        let spec = device.spec();
-        assert_eq!((spec.name.as_str(), spec.max_force, spec.max_torque), ("School handle", 5.0, 50.0));
-        assert_eq!((spec.max_stiffness, spec.resolution), (1.5, 0.02));
-        assert_eq!((spec.workspace_half, spec.apparent_mass), (Vec3::new(60.0, 45.0, 30.0), 0.06));
-        let (start, push) = (Instant::now(), Output { force: Vec3::X, ..Output::NONE });
-        rig.hand.most_felt();
-        while !device.state().to_string().contains(word) {
-            std::thread::sleep(Duration::from_millis(1));
-            device.exchange(&push).unwrap();
-            assert!(start.elapsed() < PATIENCE, "state {state}: {}", device.state());
+    crate::peace::in_real_time(|| {
+        // Aim: the description becomes the device's spec, and each state is told as it is. Method: a handle in each state.
+        let mut rig = Rigged::new();
+        for (state, word) in [(0, "starting"), (1, "press its button"), (2, "hands off"), (3, "ready"), (9, "newer")] {
+            rig.faults.state.store(state, Ordering::Release);
+            let mut device = rig.open().unwrap();
+            let spec = device.spec();
+            assert_eq!((spec.name.as_str(), spec.max_force, spec.max_torque), ("School handle", 5.0, 50.0));
+            assert_eq!((spec.max_stiffness, spec.resolution), (1.5, 0.02));
+            assert_eq!((spec.workspace_half, spec.apparent_mass), (Vec3::new(60.0, 45.0, 30.0), 0.06));
+            let (start, push) = (Instant::now(), Output { force: Vec3::X, ..Output::NONE });
+            rig.hand.most_felt();
+            while !device.state().to_string().contains(word) {
+                std::thread::sleep(Duration::from_millis(1));
+                device.exchange(&push).unwrap();
+                assert!(start.elapsed() < PATIENCE, "state {state}: {}", device.state());
+            }
+            if state != 3 {
+                assert_eq!(rig.hand.most_felt(), 0.0, "state {state}");
+            }
         }
-        if state != 3 {
-            assert_eq!(rig.hand.most_felt(), 0.0, "state {state}");
-        }
-    }
+    })
 }
 
 #[test]
@@ -219,52 +223,54 @@ fn another_teensy_is_told_from_a_handle() {
 
 #[test]
 fn the_example_in_the_document_is_true() {
-    // Aim: whoever builds a handle can trust the example. Method: the bytes of the document are what a handle at that place
-    // sends, and the driver reads from them what the document says.
-    let document = include_str!("../../content/devices/open-handle.md");
-    let example = |title: &str| -> Vec<u8> {
-        let text = document.split(title).nth(1).and_then(|after| after.split("```").nth(1)).unwrap();
-        let words = text.split_whitespace().filter(|w| w.len() == 2);
-        words.map(|w| u8::from_str_radix(w, 16).unwrap()).collect()
-    };
-    let (state, spec) = (example("### Example: a state"), example("### Example: a description"));
-    assert_eq!(spec, description());
-    for report in [&state, &spec] {
-        assert_eq!((report.len(), &report[60..]), (64, &checksum(&report[..60]).to_le_bytes()[..]));
-    }
-    let (program, device) = cable();
-    let handle = std::thread::spawn(move || {
-        let mut number = 0u16;
-        while let Ok(report) = device.try_receive() {
-            match report {
-                Some(report) if report[4] == 2 => device.send(&spec),
-                _ => {
-                    // The same report with a number of its own each time.
-                    number = number.wrapping_add(1);
-                    let mut next = state.clone();
-                    next[4..6].copy_from_slice(&number.to_le_bytes());
-                    let sum = checksum(&next[..60]);
-                    next[60..].copy_from_slice(&sum.to_le_bytes());
-                    device.send(&next);
+    crate::peace::in_real_time(|| {
+        // Aim: whoever builds a handle can trust the example. Method: the bytes of the document are what a handle at that place
+        // sends, and the driver reads from them what the document says.
+        let document = include_str!("../../content/devices/open-handle.md");
+        let example = |title: &str| -> Vec<u8> {
+            let text = document.split(title).nth(1).and_then(|after| after.split("```").nth(1)).unwrap();
+            let words = text.split_whitespace().filter(|w| w.len() == 2);
+            words.map(|w| u8::from_str_radix(w, 16).unwrap()).collect()
+        };
+        let (state, spec) = (example("### Example: a state"), example("### Example: a description"));
+        assert_eq!(spec, description());
+        for report in [&state, &spec] {
+            assert_eq!((report.len(), &report[60..]), (64, &checksum(&report[..60]).to_le_bytes()[..]));
+        }
+        let (program, device) = cable();
+        let handle = std::thread::spawn(move || {
+            let mut number = 0u16;
+            while let Ok(report) = device.try_receive() {
+                match report {
+                    Some(report) if report[4] == 2 => device.send(&spec),
+                    _ => {
+                        // The same report with a number of its own each time.
+                        number = number.wrapping_add(1);
+                        let mut next = state.clone();
+                        next[4..6].copy_from_slice(&number.to_le_bytes());
+                        let sum = checksum(&next[..60]);
+                        next[60..].copy_from_slice(&sum.to_le_bytes());
+                        device.send(&next);
+                    }
                 }
+                std::thread::sleep(Duration::from_millis(1));
             }
+        });
+        let mut relay = Relay::start(OpenHandle::meet(program).unwrap());
+        let start = Instant::now();
+        let reading = loop {
             std::thread::sleep(Duration::from_millis(1));
-        }
-    });
-    let mut relay = Relay::start(OpenHandle::meet(program).unwrap());
-    let start = Instant::now();
-    let reading = loop {
-        std::thread::sleep(Duration::from_millis(1));
-        let reading = relay.exchange(&Output::NONE).unwrap();
-        if reading.pose.is_sound() {
-            break reading;
-        }
-        assert!(start.elapsed() < PATIENCE);
-    };
-    assert!(reading.pose.position.distance(Vec3::new(12.5, -3.2, 0.75)) < 1e-4, "{reading:?}");
-    assert!(reading.pose.orientation.angle_between(UPRIGHT) < 1e-3);
-    assert!(reading.pose.orientation.angle_between(Quat::IDENTITY) > 1.5);
-    assert_eq!(reading.buttons, 1);
-    drop(relay);
-    handle.join().unwrap();
+            let reading = relay.exchange(&Output::NONE).unwrap();
+            if reading.pose.is_sound() {
+                break reading;
+            }
+            assert!(start.elapsed() < PATIENCE);
+        };
+        assert!(reading.pose.position.distance(Vec3::new(12.5, -3.2, 0.75)) < 1e-4, "{reading:?}");
+        assert!(reading.pose.orientation.angle_between(UPRIGHT) < 1e-3);
+        assert!(reading.pose.orientation.angle_between(Quat::IDENTITY) > 1.5);
+        assert_eq!(reading.buttons, 1);
+        drop(relay);
+        handle.join().unwrap();
+    })
 }

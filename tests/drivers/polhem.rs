@@ -239,7 +239,9 @@ fn firmware(device: DeviceEnd, hand: &SharedHand, faults: &Faults) {
 
 #[test]
 fn an_arm_on_hid_passes_the_suite() {
-    suite::check(&mut HidRig::new());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut HidRig::new());
+    })
 }
 
 fn open(rig: &mut dyn Rig) -> Box<dyn Device + Send> {
@@ -261,48 +263,59 @@ fn until(device: &mut Box<dyn Device + Send>, told: Output, what: &str, holds: i
 
 #[test]
 fn a_silent_arm_is_woken_by_a_report_of_zeros() {
-    // Aim: the arm says nothing before it is spoken to, and the first word to it is no force. Method: the bare cable.
-    let (mut program, device) = cable();
-    let mut report = [0; 65];
-    assert_eq!(program.read(&mut report, Duration::from_millis(20)), Ok(0));
-    let config = CONFIGS.iter().find(|c| c.name == "woodenhaptics_v2015").unwrap();
-    let mut relay = Relay::start(Arm::new(program, config, 65));
-    // The program pushes at once; the arm has not said where it is.
-    let _ = relay.exchange(&Output { force: Vec3::X * 3.0, ..Output::NONE });
-    assert_eq!(device.receive(PATIENCE), Some(vec![0; 65]));
+    crate::peace::in_real_time(|| {
+        // Aim: the arm says nothing before it is spoken to, and the first word to it is no force. Method: the bare cable.
+        let (mut program, device) = cable();
+        let mut report = [0; 65];
+        assert_eq!(program.read(&mut report, Duration::from_millis(20)), Ok(0));
+        let config = CONFIGS.iter().find(|c| c.name == "woodenhaptics_v2015").unwrap();
+        let mut relay = Relay::start(Arm::new(program, config, 65));
+        // The program pushes at once; the arm has not said where it is.
+        let _ = relay.exchange(&Output { force: Vec3::X * 3.0, ..Output::NONE });
+        assert_eq!(device.receive(PATIENCE), Some(vec![0; 65]));
+    })
 }
 
 #[test]
 fn an_arm_that_is_lost_is_calibrated_by_a_person() {
-    // Aim: a visible state, no force while in it, the preset when the button is pressed, and not before.
-    let mut rig = HidRig::new();
-    rig.faults.is_lost.store(true, Ordering::Release);
-    let mut device = open(&mut rig);
-    let push = Output { force: Vec3::Y, ..Output::NONE };
-    until(&mut device, push, "it asks", |_, state| matches!(state, State::Calibrate { how } if how.contains("button")));
-    for _ in 0..50 {
-        std::thread::sleep(Duration::from_millis(1));
-        device.exchange(&push).unwrap();
-    }
-    assert_eq!((rig.faults.preset.load(Ordering::Acquire), rig.hand.most_felt()), (0, 0.0));
-    rig.hand.press_buttons(1);
-    until(&mut device, Output::NONE, "it is told", |_, state| state == State::Ready);
-    assert_eq!(rig.faults.preset.load(Ordering::Acquire), -5000);
+    crate::peace::in_real_time(|| {
+        // Aim: a visible state, no force while in it, the preset when the button is pressed, and not before.
+        let mut rig = HidRig::new();
+        rig.faults.is_lost.store(true, Ordering::Release);
+        let mut device = open(&mut rig);
+        let push = Output { force: Vec3::Y, ..Output::NONE };
+        until(
+            &mut device,
+            push,
+            "it asks",
+            |_, state| matches!(state, State::Calibrate { how } if how.contains("button")),
+        );
+        for _ in 0..50 {
+            std::thread::sleep(Duration::from_millis(1));
+            device.exchange(&push).unwrap();
+        }
+        assert_eq!((rig.faults.preset.load(Ordering::Acquire), rig.hand.most_felt()), (0, 0.0));
+        rig.hand.press_buttons(1);
+        until(&mut device, Output::NONE, "it is told", |_, state| state == State::Ready);
+        assert_eq!(rig.faults.preset.load(Ordering::Acquire), -5000);
+    })
 }
 
 #[test]
 fn the_wrist_is_read_in_its_own_order() {
-    // Aim: rolling the handle about its shaft is a roll, and the button in the same encoder does not turn it. Method: roll
-    // with the button down; the shaft stays where it is.
-    let mut rig = HidRig::new();
-    let mut device = open(&mut rig);
-    let tilted = Quat::from_rotation_x(-0.4);
-    let rolled = tilted * Quat::from_rotation_z(0.8);
-    rig.hand.turn_to(rolled);
-    rig.hand.press_buttons(1);
-    until(&mut device, Output::NONE, "rolled", |reading, _| {
-        reading.buttons == 1 && reading.pose.is_sound() && reading.pose.orientation.angle_between(rolled) < 0.02
-    });
+    crate::peace::in_real_time(|| {
+        // Aim: rolling the handle about its shaft is a roll, and the button in the same encoder does not turn it. Method: roll
+        // with the button down; the shaft stays where it is.
+        let mut rig = HidRig::new();
+        let mut device = open(&mut rig);
+        let tilted = Quat::from_rotation_x(-0.4);
+        let rolled = tilted * Quat::from_rotation_z(0.8);
+        rig.hand.turn_to(rolled);
+        rig.hand.press_buttons(1);
+        until(&mut device, Output::NONE, "rolled", |reading, _| {
+            reading.buttons == 1 && reading.pose.is_sound() && reading.pose.orientation.angle_between(rolled) < 0.02
+        });
+    })
 }
 
 pub struct SerialRig {
@@ -432,24 +445,28 @@ fn line(at: &Reading) -> Vec<u8> {
 
 #[test]
 fn an_arm_on_a_serial_port_passes_the_suite() {
-    suite::check(&mut SerialRig::new());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut SerialRig::new());
+    })
 }
 
 #[test]
 fn a_lost_byte_costs_a_moment_and_not_the_device() {
-    // Aim: after a byte is lost the two find each other again, in step. Method: lose one of the arm's bytes several times;
-    // after each the readings follow the hand again.
-    let mut rig = SerialRig::new();
-    let mut device = open(&mut rig);
-    until(&mut device, Output::NONE, "it speaks", |reading, state| state.is_ready() && reading.pose.is_sound());
-    for round in 1..=5 {
-        rig.faults.drop_byte.store(true, Ordering::Release);
-        let goal = Vec3::X * round as f32;
-        rig.hand.reach(goal);
-        until(&mut device, Output::NONE, "it follows again", |reading, state| {
-            state.is_ready() && reading.pose.position.distance(goal) < 0.2
-        });
-    }
-    let push = Output { force: Vec3::Y * 0.5, ..Output::NONE };
-    until(&mut device, push, "it pushes again", |_, _| rig.hand.felt().force.distance(push.force) < 0.01);
+    crate::peace::in_real_time(|| {
+        // Aim: after a byte is lost the two find each other again, in step. Method: lose one of the arm's bytes several times;
+        // after each the readings follow the hand again.
+        let mut rig = SerialRig::new();
+        let mut device = open(&mut rig);
+        until(&mut device, Output::NONE, "it speaks", |reading, state| state.is_ready() && reading.pose.is_sound());
+        for round in 1..=5 {
+            rig.faults.drop_byte.store(true, Ordering::Release);
+            let goal = Vec3::X * round as f32;
+            rig.hand.reach(goal);
+            until(&mut device, Output::NONE, "it follows again", |reading, state| {
+                state.is_ready() && reading.pose.position.distance(goal) < 0.2
+            });
+        }
+        let push = Output { force: Vec3::Y * 0.5, ..Output::NONE };
+        until(&mut device, push, "it pushes again", |_, _| rig.hand.felt().force.distance(push.force) < 0.01);
+    })
 }

@@ -102,12 +102,16 @@ fn firmware(device: DeviceEnd, hand: &SharedHand, is_plugged: &AtomicBool, is_wi
 
 #[test]
 fn a_cabled_spacemouse_passes_the_suite() {
-    suite::check(&mut Rigged::new(false));
+    crate::peace::in_real_time(|| {
+        suite::check(&mut Rigged::new(false));
+    })
 }
 
 #[test]
 fn a_wireless_spacemouse_passes_the_suite() {
-    suite::check(&mut Rigged::new(true));
+    crate::peace::in_real_time(|| {
+        suite::check(&mut Rigged::new(true));
+    })
 }
 
 fn relay() -> (Relay, DeviceEnd) {
@@ -122,68 +126,74 @@ fn exchange(relay: &mut Relay) -> Reading {
 
 #[test]
 fn a_cap_at_rest_is_silent_and_not_gone() {
-    // Aim: silence means unchanged. Method: a second without any report, far longer than other devices may be silent for;
-    // then a push, silence again: the place moves on, for the cap is still pushed.
-    let (mut relay, device) = relay();
-    let start = Instant::now();
-    while start.elapsed() < Duration::from_secs(1) {
-        exchange(&mut relay);
-    }
-    let rest = exchange(&mut relay);
-    assert_eq!((rest.pose.position, relay.state()), (Vec3::ZERO, State::Ready));
-    assert!(rest.pose.orientation.angle_between(UPRIGHT) < 1e-3);
-    device.send(&[1, 0x5e, 0x01, 0, 0, 0, 0]);
-    let start = Instant::now();
-    while exchange(&mut relay).pose.position.x < 10.0 {
-        assert!(start.elapsed() < Duration::from_secs(20), "a cap that is held still moves the place");
-    }
-    device.send(&[1, 0, 0, 0, 0, 0, 0]);
-    let mut last = exchange(&mut relay).pose.position;
-    let start = Instant::now();
-    let mut still_since = Instant::now();
-    while still_since.elapsed() < Duration::from_millis(100) {
-        let now = exchange(&mut relay).pose.position;
-        if now != last {
-            (last, still_since) = (now, Instant::now());
+    crate::peace::in_real_time(|| {
+        // Aim: silence means unchanged. Method: a second without any report, far longer than other devices may be silent for;
+        // then a push, silence again: the place moves on, for the cap is still pushed.
+        let (mut relay, device) = relay();
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(1) {
+            exchange(&mut relay);
         }
-        assert!(start.elapsed() < Duration::from_secs(20), "a cap that came back stops the place");
-    }
+        let rest = exchange(&mut relay);
+        assert_eq!((rest.pose.position, relay.state()), (Vec3::ZERO, State::Ready));
+        assert!(rest.pose.orientation.angle_between(UPRIGHT) < 1e-3);
+        device.send(&[1, 0x5e, 0x01, 0, 0, 0, 0]);
+        let start = Instant::now();
+        while exchange(&mut relay).pose.position.x < 10.0 {
+            assert!(start.elapsed() < Duration::from_secs(20), "a cap that is held still moves the place");
+        }
+        device.send(&[1, 0, 0, 0, 0, 0, 0]);
+        let mut last = exchange(&mut relay).pose.position;
+        let start = Instant::now();
+        let mut still_since = Instant::now();
+        while still_since.elapsed() < Duration::from_millis(100) {
+            let now = exchange(&mut relay).pose.position;
+            if now != last {
+                (last, still_since) = (now, Instant::now());
+            }
+            assert!(start.elapsed() < Duration::from_secs(20), "a cap that came back stops the place");
+        }
+    })
 }
 
 #[test]
 fn the_cap_turns_the_handle_about_the_axis_it_is_turned_about() {
-    // Aim: device axes are right, toward the user, down. Method: turn the cap about each; watch the handle's tilt.
-    for (bytes, axis) in [
-        ([2, 0x5e, 0x01, 0, 0, 0, 0], Vec3::X),
-        ([2, 0, 0, 0x5e, 0x01, 0, 0], Vec3::Z),
-        ([2, 0, 0, 0, 0, 0x5e, 0x01], -Vec3::Y),
-    ] {
-        let (mut relay, device) = relay();
-        device.send(&bytes);
-        let start = Instant::now();
-        loop {
-            let turned = exchange(&mut relay).pose.orientation * UPRIGHT.conjugate();
-            if turned.is_finite() && turned.to_axis_angle().1 > 0.3 {
-                let (about, _) = turned.to_axis_angle();
-                assert!(about.distance(axis) < 0.01, "{about}, not {axis}");
-                break;
+    crate::peace::in_real_time(|| {
+        // Aim: device axes are right, toward the user, down. Method: turn the cap about each; watch the handle's tilt.
+        for (bytes, axis) in [
+            ([2, 0x5e, 0x01, 0, 0, 0, 0], Vec3::X),
+            ([2, 0, 0, 0x5e, 0x01, 0, 0], Vec3::Z),
+            ([2, 0, 0, 0, 0, 0x5e, 0x01], -Vec3::Y),
+        ] {
+            let (mut relay, device) = relay();
+            device.send(&bytes);
+            let start = Instant::now();
+            loop {
+                let turned = exchange(&mut relay).pose.orientation * UPRIGHT.conjugate();
+                if turned.is_finite() && turned.to_axis_angle().1 > 0.3 {
+                    let (about, _) = turned.to_axis_angle();
+                    assert!(about.distance(axis) < 0.01, "{about}, not {axis}");
+                    break;
+                }
+                assert!(start.elapsed() < Duration::from_secs(20), "about {axis}: nothing turns");
             }
-            assert!(start.elapsed() < Duration::from_secs(20), "about {axis}: nothing turns");
         }
-    }
+    })
 }
 
 #[test]
 fn what_no_spacemouse_sends_ends_in_a_clear_word() {
-    let (mut relay, device) = relay();
-    let start = Instant::now();
-    let gone = loop {
-        device.send(&[1, 2, 3]);
-        std::thread::sleep(Duration::from_millis(1));
-        if let Err(gone) = relay.exchange(&Output::NONE) {
-            break gone;
-        }
-        assert!(start.elapsed() < Duration::from_secs(20));
-    };
-    assert!(gone.to_string().contains("SpaceMouse"), "{gone}");
+    crate::peace::in_real_time(|| {
+        let (mut relay, device) = relay();
+        let start = Instant::now();
+        let gone = loop {
+            device.send(&[1, 2, 3]);
+            std::thread::sleep(Duration::from_millis(1));
+            if let Err(gone) = relay.exchange(&Output::NONE) {
+                break gone;
+            }
+            assert!(start.elapsed() < Duration::from_secs(20));
+        };
+        assert!(gone.to_string().contains("SpaceMouse"), "{gone}");
+    })
 }

@@ -123,106 +123,118 @@ fn beat_until(device: &mut dyn Device, mut holds: impl FnMut(State, Result<Readi
 
 #[test]
 fn a_stream_passes_the_suite() {
-    suite::check(&mut Stream::plug_in());
+    crate::peace::in_real_time(|| {
+        suite::check(&mut Stream::plug_in());
+    })
 }
 
 #[test]
 fn a_pose_sent_is_a_pose_read() {
-    let mut rig = Stream::plug_in();
-    let turned = Quat::from_xyzw(0.5, -0.5, 0.5, 0.5);
-    let goal = Vec3::new(-12.0, 7.0, 3.5);
-    rig.hand().reach(goal);
-    rig.hand().turn_to(turned);
-    rig.hand().press_buttons(2);
-    let mut device = rig.open().unwrap();
-    beat_until(&mut device, |state, reading| {
-        state.is_ready()
-            && reading.is_ok_and(|r| {
-                (r.pose.position - goal).length() < 0.05
-                    && r.pose.orientation.angle_between(turned) < 1e-3
-                    && r.buttons == 2
-            })
-    });
+    crate::peace::in_real_time(|| {
+        let mut rig = Stream::plug_in();
+        let turned = Quat::from_xyzw(0.5, -0.5, 0.5, 0.5);
+        let goal = Vec3::new(-12.0, 7.0, 3.5);
+        rig.hand().reach(goal);
+        rig.hand().turn_to(turned);
+        rig.hand().press_buttons(2);
+        let mut device = rig.open().unwrap();
+        beat_until(&mut device, |state, reading| {
+            state.is_ready()
+                && reading.is_ok_and(|r| {
+                    (r.pose.position - goal).length() < 0.05
+                        && r.pose.orientation.angle_between(turned) < 1e-3
+                        && r.buttons == 2
+                })
+        });
+    })
 }
 
 #[test]
 fn a_stream_waits_for_its_sender_and_says_when_it_stops() {
-    // Aim: before the first pose the stream waits in sight, as long as it takes; a sender that stops or sends something else
-    // ends it with a reason; opened again it works.
-    let mut rig = Stream::plug_in();
-    for (how, reason) in [(Misbehaviour::Unplug, "silent"), (Misbehaviour::Garbage, "stream.md")] {
-        rig.misbehave(Misbehaviour::Unplug);
-        let mut device = rig.open().unwrap();
-        beat_until(&mut device, |state, _| matches!(state, State::Calibrate { .. }));
-        rig.recover();
-        beat_until(&mut device, |state, reading| state.is_ready() && reading.is_ok_and(|r| r.pose.is_sound()));
-        rig.misbehave(how);
-        beat_until(&mut device, |_, reading| reading.is_err_and(|gone| gone.to_string().contains(reason)));
-    }
+    crate::peace::in_real_time(|| {
+        // Aim: before the first pose the stream waits in sight, as long as it takes; a sender that stops or sends something else
+        // ends it with a reason; opened again it works.
+        let mut rig = Stream::plug_in();
+        for (how, reason) in [(Misbehaviour::Unplug, "silent"), (Misbehaviour::Garbage, "stream.md")] {
+            rig.misbehave(Misbehaviour::Unplug);
+            let mut device = rig.open().unwrap();
+            beat_until(&mut device, |state, _| matches!(state, State::Calibrate { .. }));
+            rig.recover();
+            beat_until(&mut device, |state, reading| state.is_ready() && reading.is_ok_and(|r| r.pose.is_sound()));
+            rig.misbehave(how);
+            beat_until(&mut device, |_, reading| reading.is_err_and(|gone| gone.to_string().contains(reason)));
+        }
+    })
 }
 
 #[test]
 fn the_newest_pose_wins_and_older_ones_are_dropped() {
-    // Aim: order is the sender's, not the network's. Method: three datagrams, the last of them the oldest but one; the pose
-    // stays at the newest.
-    let port = free_port();
-    let mut device = driver("stream").unwrap().open(Some(&format!("127.0.0.1:{port}"))).unwrap();
-    let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let poses = [(1.0, 1.0), (1.002, 3.0), (1.001, 2.0)];
-    let send = || {
-        for (t_s, x) in poses {
-            let text = format!(r#"{{"t_s": {t_s}, "position_mm": [{x}, 0, 0]}}"#);
-            sender.send_to(text.as_bytes(), ("127.0.0.1", port)).unwrap();
-        }
-    };
-    send();
-    let mut last = Reading::ABSENT;
-    beat_until(&mut device, |_, reading| {
-        last = reading.unwrap();
-        last.pose.position.x == 3.0
-    });
-    assert_eq!(last.pose.orientation, UPRIGHT);
-    // The same again, all of it old by now: nothing of it is shown before silence lets go.
-    send();
-    beat_until(&mut device, |_, reading| {
-        let shown = reading.unwrap_or(Reading::ABSENT).pose;
-        assert!(!shown.is_sound() || shown.position.x == 3.0, "{shown:?}");
-        !shown.is_sound()
-    });
+    crate::peace::in_real_time(|| {
+        // Aim: order is the sender's, not the network's. Method: three datagrams, the last of them the oldest but one; the pose
+        // stays at the newest.
+        let port = free_port();
+        let mut device = driver("stream").unwrap().open(Some(&format!("127.0.0.1:{port}"))).unwrap();
+        let sender = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let poses = [(1.0, 1.0), (1.002, 3.0), (1.001, 2.0)];
+        let send = || {
+            for (t_s, x) in poses {
+                let text = format!(r#"{{"t_s": {t_s}, "position_mm": [{x}, 0, 0]}}"#);
+                sender.send_to(text.as_bytes(), ("127.0.0.1", port)).unwrap();
+            }
+        };
+        send();
+        let mut last = Reading::ABSENT;
+        beat_until(&mut device, |_, reading| {
+            last = reading.unwrap();
+            last.pose.position.x == 3.0
+        });
+        assert_eq!(last.pose.orientation, UPRIGHT);
+        // The same again, all of it old by now: nothing of it is shown before silence lets go.
+        send();
+        beat_until(&mut device, |_, reading| {
+            let shown = reading.unwrap_or(Reading::ABSENT).pose;
+            assert!(!shown.is_sound() || shown.position.x == 3.0, "{shown:?}");
+            !shown.is_sound()
+        });
+    })
 }
 
 #[test]
 fn the_manuals_sender_is_understood() {
-    // Aim: what `content/devices/stream.md` tells a school's engineer to run works as it stands. Method: run it, with the port
-    // changed only; the tip goes round in its circle.
-    let Some(python) = std::env::var_os("TYPODONT_PYTHON") else {
-        // Straight to the terminal: the test harness would keep what a passing test prints to itself.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: the manual's sender was not run; set TYPODONT_PYTHON");
-        return;
-    };
-    let manual = include_str!("../../content/devices/stream.md");
-    let code = manual.split("```python").nth(1).unwrap().split("```").next().unwrap();
-    let port = free_port();
-    let mut device = driver("stream").unwrap().open(Some(&format!("127.0.0.1:{port}"))).unwrap();
-    let mut sender = Command::new(python).arg("-c").arg(code.replace("7400", &port.to_string())).spawn().unwrap();
-    let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
-    beat_until(&mut device, |_, reading| {
-        let Reading { pose, buttons } = reading.unwrap();
-        if pose.is_sound() {
-            assert!((pose.position.length() - 5.0).abs() < 1e-3 && buttons == 1, "{pose:?}");
-            assert!(pose.orientation.angle_between(UPRIGHT) < 1e-3);
-            (least, most) = (least.min(pose.position.x), most.max(pose.position.x));
-        }
-        most - least > 1.0
-    });
-    sender.kill().unwrap();
-    sender.wait().unwrap();
+    crate::peace::in_real_time(|| {
+        // Aim: what `content/devices/stream.md` tells a school's engineer to run works as it stands. Method: run it, with the port
+        // changed only; the tip goes round in its circle.
+        let Some(python) = std::env::var_os("TYPODONT_PYTHON") else {
+            // Straight to the terminal: the test harness would keep what a passing test prints to itself.
+            let _ = writeln!(std::io::stderr(), "SKIPPED: the manual's sender was not run; set TYPODONT_PYTHON");
+            return;
+        };
+        let manual = include_str!("../../content/devices/stream.md");
+        let code = manual.split("```python").nth(1).unwrap().split("```").next().unwrap();
+        let port = free_port();
+        let mut device = driver("stream").unwrap().open(Some(&format!("127.0.0.1:{port}"))).unwrap();
+        let mut sender = Command::new(python).arg("-c").arg(code.replace("7400", &port.to_string())).spawn().unwrap();
+        let (mut least, mut most) = (f32::INFINITY, f32::NEG_INFINITY);
+        beat_until(&mut device, |_, reading| {
+            let Reading { pose, buttons } = reading.unwrap();
+            if pose.is_sound() {
+                assert!((pose.position.length() - 5.0).abs() < 1e-3 && buttons == 1, "{pose:?}");
+                assert!(pose.orientation.angle_between(UPRIGHT) < 1e-3);
+                (least, most) = (least.min(pose.position.x), most.max(pose.position.x));
+            }
+            most - least > 1.0
+        });
+        sender.kill().unwrap();
+        sender.wait().unwrap();
+    })
 }
 
 #[test]
 fn an_address_that_cannot_be_listened_on_is_a_complaint() {
-    let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
-    let address = taken.local_addr().unwrap().to_string();
-    let trouble = driver("stream").unwrap().open(Some(&address)).err().unwrap();
-    assert!(trouble.what.contains(&address) && trouble.help.contains("free port"), "{trouble}");
+    crate::peace::in_real_time(|| {
+        let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
+        let address = taken.local_addr().unwrap().to_string();
+        let trouble = driver("stream").unwrap().open(Some(&address)).err().unwrap();
+        assert!(trouble.what.contains(&address) && trouble.help.contains("free port"), "{trouble}");
+    })
 }

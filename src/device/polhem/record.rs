@@ -135,16 +135,16 @@ impl Records {
         let mut heard = Vec::new();
         self.look(&mut heard)?;
         if !heard.is_empty() || self.opened.elapsed() > WAKE_AFTER {
+            // What cannot be thrown away is read, and refused as no record.
+            let _ = self.port.discard_input_buffer();
             self.start_again()?;
         }
         Ok(())
     }
 
-    /// Throws away what lies there and speaks without a force.
+    /// Speaks without a force, to be answered with the beginning of a record. What lies there is left: the second half of
+    /// a record may be on its way, and without its first it would be taken for the next one's beginning.
     fn start_again(&mut self) -> Result<(), Gone> {
-        self.heard.clear();
-        // What cannot be thrown away is read, and refused as no record.
-        let _ = self.port.discard_input_buffer();
         // An arm that answered since the last time is not slow: what it did not answer never reached it.
         let still = if self.has_answered { 0 } else { self.unanswered.unwrap_or(0) };
         self.unanswered = Some((still + 1).min(UNANSWERED_MAX));
@@ -157,24 +157,30 @@ impl Records {
         let until = Instant::now() + ANSWER;
         let mut heard = std::mem::take(&mut self.heard);
         let mut looked = Ok(());
-        while heard.len() < RECORD && looked.is_ok() && Instant::now() < until {
+        while !has_line(&heard) && looked.is_ok() && Instant::now() < until {
             looked = self.look(&mut heard);
         }
         self.heard = heard;
         looked?;
         let mut newest = None;
-        while let Some((record, rest)) = self.heard.split_first_chunk::<RECORD>() {
-            if record[RECORD - 1] != END {
-                self.trust.unsound()?;
-                return Ok(None);
+        while has_line(&self.heard) {
+            // Where a line's end is missing all is dropped up to where it should be.
+            let end = self.heard[..RECORD.min(self.heard.len())].iter().position(|b| *b == END);
+            let line: Vec<u8> = self.heard.drain(..end.map_or(RECORD, |at| at + 1)).collect();
+            match (line.try_into(), end) {
+                (Ok(record), Some(_)) => newest = Some(record),
+                _ => self.trust.unsound()?,
             }
-            newest = Some(*record);
-            self.heard = rest.to_vec();
             self.unanswered = self.unanswered.map(|n| n.saturating_sub(1));
             self.has_answered = true;
         }
         Ok(newest)
     }
+}
+
+/// Whether the bytes hold a line, be it too short, or more than one could.
+fn has_line(heard: &[u8]) -> bool {
+    heard.len() >= RECORD || heard.contains(&END)
 }
 
 impl Wire for Records {
