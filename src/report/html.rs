@@ -145,6 +145,10 @@ struct StageLine {
     began: String,
     took: String,
     ended_by: &'static str,
+    /// The exercise led the trainee's hand.
+    guided: bool,
+    /// For how long another person's hand did.
+    led: Option<String>,
     asked: bool,
     answers: Vec<AnswerLine>,
 }
@@ -294,6 +298,8 @@ fn stage_lines(recording: &Recording, session: &SessionFile) -> Vec<StageLine> {
             "cleared" => "the decay being gone",
             _ => "being broken off",
         },
+        guided: result.guided,
+        led: result.led_s.map(words::duration),
         asked: !stage.ask.is_empty(),
         answers: result.answers.iter().map(|a| answer_line(a, result.started_s)).collect(),
     };

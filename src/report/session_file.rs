@@ -5,6 +5,7 @@ use crate::record::{Recording, ServoFile, SpecFile, ended_by_name};
 use crate::scenario::{Limit, QuestionKind, Questionnaire};
 use crate::score::{Grade, SCORER_VERSION, Scored};
 use crate::session::{Answer, Given};
+use crate::tick::Tick;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
@@ -81,6 +82,9 @@ pub struct StageFile {
     /// The exercise led the trainee's hand; left out where it did not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub guided: bool,
+    /// For how long another person's hand led the trainee's, s; left out where none did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub led_s: Option<f64>,
     pub answers: Vec<AnswerFile>,
 }
 
@@ -234,8 +238,8 @@ fn tidy(value: f64) -> f64 {
 }
 
 fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
-    let results = recording.scenario.stages.iter().zip(&scored.replay.outcome.stages);
-    let stage = |(stage, result): (&crate::scenario::Stage, &crate::session::StageResult)| {
+    let results = recording.scenario.stages.iter().zip(&scored.replay.outcome.stages).zip(&scored.led_ticks);
+    let stage = |((stage, result), &led): ((&crate::scenario::Stage, &crate::session::StageResult), &u64)| {
         let answers = stage.ask.iter().zip(&result.answers).filter_map(|(question, given)| {
             let Given { value, at, right, step } = given.as_ref()?;
             Some(AnswerFile {
@@ -255,6 +259,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
             ended_s: result.ended.seconds(),
             ended_by: ended_by_name(result.ended_by).to_string(),
             guided: stage.guidance.is_some(),
+            led_s: (led > 0).then(|| Tick(led).seconds()),
             answers: answers.collect(),
         }
     };

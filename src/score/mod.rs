@@ -37,6 +37,8 @@ pub struct Scored {
     /// Force, speed and the like over time, thinned for drawing.
     pub trace: Trace,
     pub grade: Option<Grade>,
+    /// Ticks in which another person's hand led the trainee's, by stage of the scenario.
+    pub led_ticks: Vec<u64>,
 }
 
 /// A session turned again and watched, before it is judged.
@@ -70,6 +72,6 @@ pub fn judge(recording: &Recording, watched: Watched) -> Scored {
     let measures = measures::all(recording, &replay, &seen, &shape);
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
-    let process::Seen { falls, trace, .. } = seen;
-    Scored { replay, measures, verdicts, falls, trace, grade }
+    let process::Seen { falls, trace, led_ticks, .. } = seen;
+    Scored { replay, measures, verdicts, falls, trace, grade, led_ticks }
 }

@@ -61,6 +61,8 @@ pub struct Seen {
     pub contact_ticks: u64,
     pub soft_ticks: u64,
     pub neighbour_ticks: u64,
+    /// Ticks in which another person's hand led this one, by stage.
+    pub led_ticks: Vec<u64>,
     /// Log dimensionless jerk.
     pub smoothness: Option<f64>,
     pub falls: Falls,
@@ -130,6 +132,7 @@ impl Watcher {
                 contact_ticks: 0,
                 soft_ticks: 0,
                 neighbour_ticks: 0,
+                led_ticks: vec![0; scenario.stages.len()],
                 smoothness: None,
                 falls: Falls::default(),
                 trace: Trace::default(),
@@ -150,6 +153,11 @@ impl Watcher {
         self.seen.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
         self.was_touched |= step.touch.is_some();
+        if step.lead != Vec3::ZERO
+            && let Some((stage, _)) = session.stage()
+        {
+            self.seen.led_ticks[stage] += 1;
+        }
         if let Some(touch) = &step.touch {
             // How the exercise or an instructor leads the hand is not how hard the trainee presses.
             let led = step.guidance + step.lead;

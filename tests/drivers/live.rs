@@ -147,6 +147,8 @@ fn an_instructor_leads_the_trainee_and_feels_them() {
                 assert_eq!(haptic.lead, step.lead);
             });
             assert_eq!(again.difference, None, "{kind}");
+            let scored = typodont::score::score(&recording, Watch::Nothing).unwrap();
+            assert!(scored.led_ticks[0] > 100, "{kind}: led for {:?} ticks", scored.led_ticks);
             println!("{kind}: led with up to {most} N");
             assert!((0.1..=1.5001).contains(&most), "{kind}: led with {most} N");
         }

@@ -1,0 +1,210 @@
+//! The teeth of a scene, their forms and their decay, and what stands around them.
+
+use super::{Forms, Resolver, tooth_path};
+use crate::anatomy;
+use crate::content;
+use crate::frame::{Pose, Quat, Vec3};
+use crate::scenario::file;
+use crate::scenario::workpiece::anatomy_tissues;
+use crate::scenario::{Decay, DecayPlace, Form, Layout, Scene, Tooth};
+use crate::touch::{self, Obstacle, Shape};
+use crate::volume::{Label, Volume};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+impl Resolver<'_> {
+    pub(super) fn scene(&mut self, written: &file::SceneFile) -> Option<Scene> {
+        let (layout, teeth) = match written {
+            file::SceneFile::Tooth(tooth) => (Layout::Single, vec![tooth]),
+            file::SceneFile::Pair(pair) => (Layout::Pair { gap: pair.gap_mm }, vec![&pair.left, &pair.right]),
+            file::SceneFile::Jaw(jaw) => (Layout::Jaw, vec![&jaw.tooth]),
+        };
+        let paths: Vec<String> = (0..teeth.len()).map(|i| tooth_path(written, i)).collect();
+        self.unique(teeth.iter().zip(&paths).map(|(t, p)| (t.id.as_str(), format!("{p}/id"))));
+        let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
+        self.unique(decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id"))));
+        let teeth: Vec<Option<Tooth>> = teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path)).collect();
+        let around = match written {
+            file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+        };
+        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, around })
+    }
+
+    /// What stands around a tooth; an obstacle that cannot be read is complained about and left out.
+    fn obstacles(&mut self, written: &[file::ObstacleFile]) -> Vec<Shape> {
+        let mut shapes = Vec::new();
+        for (index, obstacle) in written.iter().enumerate() {
+            let path = format!("/scene/jaw/around/{index}");
+            let label = self.label(&obstacle.tissue, &format!("{path}/tissue"));
+            let Some(form) = self.mesh(&obstacle.mesh, &format!("{path}/mesh")) else { continue };
+            let position = Vec3::from(obstacle.position_mm.map(|c| c.0));
+            let [x, y, z] = obstacle.orientation_deg.map(|a| a.0.to_radians());
+            let orientation = Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x);
+            shapes.push(Shape { label, tooth_from_shape: Pose { position, orientation }, form });
+        }
+        shapes
+    }
+
+    /// Reads a mesh, and keeps its bytes for the recording.
+    fn mesh(&mut self, name: &str, path: &str) -> Option<touch::Form> {
+        let unclosed = content::obj::Unusable::Open { edges: 0 };
+        let read = self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
+            let mesh = content::obj::parse(&bytes).map_err(told)?;
+            let obstacle = Obstacle::new(&mesh).ok_or_else(|| told(unclosed))?;
+            Ok((bytes, obstacle))
+        });
+        fn told(unusable: content::obj::Unusable) -> (&'static str, String, Option<String>) {
+            (unusable.code(), unusable.to_string(), Some(unusable.help().into()))
+        }
+        match read {
+            Ok((bytes, obstacle)) => {
+                self.files.insert(name.to_string(), bytes);
+                Some(touch::Form::Mesh(Arc::new(obstacle)))
+            }
+            Err((code, message, help)) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
+        }
+    }
+
+    fn tooth(&mut self, written: &file::ToothFile, path: &str) -> Option<Tooth> {
+        let (quadrant, position) = (written.fdi / 10, written.fdi % 10);
+        if !(1..=4).contains(&quadrant) || !(1..=8).contains(&position) {
+            let message = format!("there is no tooth {}", written.fdi);
+            self.complain(
+                &format!("{path}/fdi"),
+                "unknown-tooth",
+                message,
+                "the first digit is 1–4 (quadrant), the second 1–8 (from the midline)",
+            );
+        }
+        let form = self.form(&written.form, written.fdi, path);
+        let decay =
+            written.decay.iter().enumerate().map(|(i, d)| self.decay(d, &format!("{path}/decay/{i}"))).collect();
+        Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay })
+    }
+
+    fn form(&mut self, written: &file::FormFile, fdi: u8, path: &str) -> Option<Form> {
+        match written {
+            _ if self.forms == Forms::Recorded => Some(Form::Recorded),
+            file::FormFile::Procedural(made) => {
+                if fdi != 36 {
+                    let help = "for now the program makes 36; other teeth can be given as ct or labels";
+                    self.complain(
+                        &format!("{path}/fdi"),
+                        "unknown-form",
+                        format!("tooth {fdi} cannot be made procedurally"),
+                        help,
+                    );
+                }
+                Some(Form::Procedural { spacing: made.spacing_mm })
+            }
+            file::FormFile::Ct(scan) => {
+                let path = format!("{path}/form/ct/file");
+                let spacing = scan.spacing_mm.map(|s| s.map(|s| s.0));
+                let volume = self.read_scan(&scan.file, &path, |image, tissues| {
+                    content::scan::segmented(image, spacing, tissues).map_err(|e| e.to_string())
+                })?;
+                Some(Form::Given(Arc::new(volume)))
+            }
+            file::FormFile::Labels(map) => {
+                let numbers = self.numbers(&map.tissues, &format!("{path}/form/labels/tissues"));
+                let path = format!("{path}/form/labels/file");
+                let spacing = map.spacing_mm.map(|s| s.map(|s| s.0));
+                let volume = self.read_scan(&map.file, &path, |image, _| {
+                    content::scan::labelled(image, spacing, &numbers).map_err(|e| e.to_string())
+                })?;
+                Some(Form::Given(Arc::new(volume)))
+            }
+        }
+    }
+
+    fn read_scan(
+        &mut self,
+        name: &str,
+        path: &str,
+        make: impl FnOnce(&content::nrrd::Image, &anatomy::Tissues) -> Result<Volume, String>,
+    ) -> Option<Volume> {
+        let image = self
+            .library
+            .bytes(name)
+            .map_err(|e| (e.code, e.message, e.help))
+            .and_then(|bytes| content::nrrd::parse(&bytes).map_err(|e| ("wrong-volume", e.to_string(), None)));
+        let tissues = anatomy_tissues(&self.tissues);
+        match image.and_then(|image| make(&image, &tissues).map_err(|e| ("wrong-volume", e, None))) {
+            Ok(volume) => Some(volume),
+            Err((code, message, help)) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
+        }
+    }
+
+    /// Numbers of a label map as labels.
+    fn numbers(&mut self, written: &BTreeMap<String, String>, path: &str) -> BTreeMap<u8, Label> {
+        let mut numbers = BTreeMap::new();
+        for (number, tissue) in written {
+            let at = format!("{path}/{}", number.replace('~', "~0").replace('/', "~1"));
+            let label = self.label(tissue, &at);
+            match number.parse::<u8>() {
+                Ok(number) if number > 0 => {
+                    numbers.insert(number, label);
+                }
+                _ => self.complain(
+                    &at,
+                    "wrong-number",
+                    format!("\"{number}\" is not a number of a label map"),
+                    "use \"1\" to \"255\"; 0 is air",
+                ),
+            }
+        }
+        if numbers.is_empty() {
+            self.complain(
+                path,
+                "no-tissues",
+                "no number is given a tissue",
+                "{ \"1\": \"enamel\", \"2\": \"dentine\", \"3\": \"pulp\" }",
+            );
+        }
+        numbers
+    }
+
+    fn decay(&mut self, written: &file::DecayFile, path: &str) -> Decay {
+        let radii = match &written.shape {
+            file::DecayShapeFile::Sphere(sphere) => [sphere.radius_mm; 3],
+            file::DecayShapeFile::Ellipsoid(ellipsoid) => ellipsoid.radii_mm.map(|r| r.0),
+        };
+        let place = match written.at {
+            file::DecayPlaceFile::Centre => DecayPlace::Centre,
+            file::DecayPlaceFile::RandomQuadrant => DecayPlace::RandomQuadrant,
+            file::DecayPlaceFile::Quadrant(quadrant) => DecayPlace::Quadrant(quadrant),
+            file::DecayPlaceFile::OffsetMm(offset) => DecayPlace::Offset(offset.map(|o| o.0)),
+        };
+        let by_quadrant = matches!(place, DecayPlace::RandomQuadrant | DecayPlace::Quadrant(_));
+        if by_quadrant && written.surface != file::SurfaceFile::O {
+            let message = "quadrants are counted on the occlusal surface only";
+            self.complain(
+                &format!("{path}/at"),
+                "wrong-place",
+                message,
+                "set surface to \"O\", or place it with offset_mm",
+            );
+        }
+        let label = self.label(&written.tissue, &format!("{path}/tissue"));
+        if self.tissues.role(label).is_some_and(|role| role != content::Role::Decay) {
+            let decay: Vec<&str> = self
+                .tissues
+                .entries()
+                .iter()
+                .filter(|e| e.role == content::Role::Decay)
+                .map(|e| e.name.as_str())
+                .collect();
+            let help = format!("tissues with the role \"decay\": {}", decay.join(", "));
+            let message = format!("\"{}\" is not a kind of decay", written.tissue);
+            self.complain(&format!("{path}/tissue"), "wrong-tissue", message, help);
+        }
+        Decay { id: written.id.clone(), label, radii, surface: written.surface, place, depth: written.depth_mm }
+    }
+}

@@ -1,0 +1,75 @@
+//! One trial of the workpiece: what only shows in the matter itself is told to the author too.
+
+use super::tooth_path;
+use crate::content::json::Places;
+use crate::diagnostic::Diagnostic;
+use crate::frame::Vec3;
+use crate::scenario::file::ScenarioFile;
+use crate::scenario::workpiece::Unmakeable;
+use crate::scenario::{Scenario, Workpiece};
+use crate::touch::Guidance;
+
+/// A path further from the teeth than this leads nowhere, mm.
+const PATH_AWAY: f32 = 10.0;
+
+/// Makes the workpiece once: what only shows in the matter itself (a decay outside its tooth) is told to the author too.
+pub(super) fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, found: &mut Vec<Diagnostic>) {
+    let problem = match Workpiece::make(scenario, 0) {
+        Ok(workpiece) => {
+            find_paths_away(scenario, &workpiece, places, found);
+            return find_zones_outside(scenario, &workpiece, places, found);
+        }
+        Err(problem) => problem,
+    };
+    let (path, help) = match &problem {
+        Unmakeable::DecayOutside { tooth, decay } => (
+            format!("{}/decay/{decay}", tooth_path(&written.scene, *tooth)),
+            "make it larger, move it toward the surface's middle, or change depth_mm",
+        ),
+        Unmakeable::NoEnamel { tooth } => {
+            (format!("{}/form", tooth_path(&written.scene, *tooth)), "check which number or grey value is enamel")
+        }
+        Unmakeable::ZoneSize { zone, .. } => {
+            (format!("/zones/{zone}/region/labels/file"), "draw the map on the very volume that the tooth is made from")
+        }
+        Unmakeable::UnequalSpacing => ("/scene".to_string(), "give both teeth the same spacing_mm"),
+        Unmakeable::TooLarge { .. } | Unmakeable::OnlyRecorded => ("/scene".to_string(), "choose a larger spacing_mm"),
+    };
+    found.push(places.complain(&path, "impossible-scene", problem.to_string(), Some(help.into())));
+}
+
+/// A zone that no tooth reaches would never matter, and its author would never know.
+fn find_zones_outside(scenario: &Scenario, workpiece: &Workpiece, places: &Places, found: &mut Vec<Diagnostic>) {
+    let [low, high] = corners(workpiece);
+    for (index, zone) in scenario.zones.iter().enumerate() {
+        let is_outside = |[from, to]: [Vec3; 2]| from.cmpgt(high).any() || to.cmplt(low).any();
+        if zone.region.extent().is_some_and(is_outside) {
+            let message = format!("the zone \"{}\" lies outside the tooth", zone.id);
+            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm: buccal, distal, occlusal");
+            found.push(places.complain(&format!("/zones/{index}/region"), "empty-region", message, Some(help)));
+        }
+    }
+}
+
+/// A path far from every tooth is one in another space or another unit.
+fn find_paths_away(scenario: &Scenario, workpiece: &Workpiece, places: &Places, found: &mut Vec<Diagnostic>) {
+    let [low, high] = corners(workpiece);
+    let is_near = |p: &Vec3| p.distance(p.clamp(low, high)) <= PATH_AWAY;
+    for (index, stage) in scenario.stages.iter().enumerate() {
+        if let Some(Guidance::Path(fixture)) = stage.guidance.and_then(|g| scenario.guidances.get(g))
+            && !fixture.path.points().iter().any(is_near)
+        {
+            let message = format!("the path stays more than {PATH_AWAY} mm away from the tooth");
+            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm: buccal, distal, occlusal");
+            let path = format!("/stages/{index}/guidance/path/file");
+            found.push(places.complain(&path, "wrong-place", message, Some(help)));
+        }
+    }
+}
+
+/// Corners of the box around all teeth, tooth space, mm.
+fn corners(workpiece: &Workpiece) -> [Vec3; 2] {
+    let low = workpiece.teeth.iter().map(|t| t.low).reduce(Vec3::min).unwrap_or_default();
+    let high = workpiece.teeth.iter().map(|t| t.high).reduce(Vec3::max).unwrap_or_default();
+    [low, high]
+}

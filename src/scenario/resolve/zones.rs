@@ -1,0 +1,72 @@
+//! What is to be removed and what is to be spared.
+
+use super::Resolver;
+use crate::content;
+use crate::scenario::file;
+use crate::scenario::{Mask, Region, Zone};
+use std::sync::Arc;
+
+impl Resolver<'_> {
+    pub(super) fn zones(&mut self, written: &[file::ZoneFile]) -> Vec<Zone> {
+        self.unique(written.iter().enumerate().map(|(i, z)| (z.id.as_str(), format!("/zones/{i}/id"))));
+        let zone = |(i, z): (usize, &file::ZoneFile)| {
+            let region = self.region(&z.region, &format!("/zones/{i}/region"))?;
+            Some(Zone { id: z.id.clone(), title: z.title.clone(), role: z.role, region })
+        };
+        written.iter().enumerate().filter_map(zone).collect()
+    }
+
+    fn region(&mut self, written: &file::RegionFile, path: &str) -> Option<Region> {
+        let point = |p: [file::CoordinateFile; 3]| p.map(|c| c.0);
+        Some(match written {
+            file::RegionFile::Tissue(name) => Region::Tissue(self.label(name, &format!("{path}/tissue"))),
+            file::RegionFile::Around(around) => Region::Around {
+                label: self.label(&around.tissue, &format!("{path}/around/tissue")),
+                within: around.within_mm,
+            },
+            file::RegionFile::Sphere(sphere) => {
+                Region::Sphere { centre: point(sphere.centre_mm), radius: sphere.radius_mm }
+            }
+            file::RegionFile::Box(corners) => {
+                let (min, max) = (point(corners.min_mm), point(corners.max_mm));
+                if (0..3).any(|a| min[a] >= max[a]) {
+                    self.complain(
+                        &format!("{path}/box"),
+                        "empty-region",
+                        "the box is empty",
+                        "each of min_mm must be less than its max_mm",
+                    );
+                }
+                Region::Box { min, max }
+            }
+            file::RegionFile::Cylinder(c) => {
+                if point(c.from_mm) == point(c.to_mm) {
+                    self.complain(
+                        &format!("{path}/cylinder"),
+                        "empty-region",
+                        "the cylinder has no length",
+                        "from_mm and to_mm must differ",
+                    );
+                }
+                Region::Cylinder { from: point(c.from_mm), to: point(c.to_mm), radius: c.radius_mm }
+            }
+            file::RegionFile::Labels(labels) => {
+                let path = format!("{path}/labels/file");
+                let mask = self.library.bytes(&labels.file).map_err(|e| (e.code, e.message)).and_then(|bytes| {
+                    self.files.insert(labels.file.clone(), bytes.clone());
+                    let image = content::nrrd::parse(&bytes).map_err(|e| ("wrong-volume", e.to_string()))?;
+                    let mask =
+                        content::scan::mask(&image, labels.value).map_err(|e| ("wrong-volume", e.to_string()))?;
+                    Ok(Mask { dims: image.geometry.dims, is_inside: mask })
+                });
+                match mask {
+                    Ok(mask) => Region::Mask(Arc::new(mask)),
+                    Err((code, message)) => {
+                        self.complain(&path, code, format!("\"{}\": {message}", labels.file), "");
+                        return None;
+                    }
+                }
+            }
+        })
+    }
+}
