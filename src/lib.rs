@@ -19,6 +19,7 @@ pub mod volume;
 pub mod anatomy;
 pub mod touch;
 pub mod device;
+pub mod audio;
 pub mod content;
 pub mod sim;
 pub mod scenario;

@@ -1,0 +1,129 @@
+//! What the drill does, as far as it can be heard.
+
+/// What is in the hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Tool {
+    /// A handpiece driven by air: very fast, and slower under every load.
+    #[default]
+    AirTurbine,
+    /// A speed-increasing contra-angle (1:5) on an electric motor, which keeps its speed.
+    Electric,
+    /// A contra-angle (1:1) for round burs in dentine.
+    LowSpeed,
+    /// A probe, an excavator: nothing turns.
+    Hand,
+}
+
+/// The moment's load on the working end. The newest one counts.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct DrillLoad {
+    pub tool: Tool,
+    pub is_running: bool,
+    /// Speed of the bur when nothing holds it, rpm, 0 to 500 000. What the load leaves of it is worked out here.
+    pub speed: f32,
+    pub is_touching: bool,
+    /// True while matter is taken away; a bur that only rubs is quieter.
+    pub is_cutting: bool,
+    /// Force on the working end, N, 0 to 20.
+    pub force: f32,
+    /// Speed of the working end's surface against the tissue, mm/s, 0 to 60 000: at a bur's circumference when nothing holds
+    /// it, at a hand instrument's tip along the surface.
+    pub surface_speed: f32,
+    /// Vickers hardness of what is touched, HV, 0 to 1000: enamel about 300, dentine 60, decay 15; 0 for soft tissue.
+    pub hardness: f32,
+    pub is_suction_on: bool,
+    /// Water spray, which only a running handpiece gives.
+    pub is_spray_on: bool,
+}
+
+/// How many words a load fills in a mailbox.
+pub(super) const WORDS: usize = 5;
+
+/// Where each answer stands in the first word; the tool is in its lowest two bits.
+const IS_RUNNING: u32 = 1 << 2;
+const IS_TOUCHING: u32 = 1 << 3;
+const IS_CUTTING: u32 = 1 << 4;
+const IS_SUCTION_ON: u32 = 1 << 5;
+const IS_SPRAY_ON: u32 = 1 << 6;
+
+impl DrillLoad {
+    pub const SPEED_MAX: f32 = 500_000.0;
+    pub const FORCE_MAX: f32 = 20.0;
+    pub const SURFACE_SPEED_MAX: f32 = 60_000.0;
+    pub const HARDNESS_MAX: f32 = 1000.0;
+
+    /// The load with every number within its range; what is no number counts as zero. A sound is no place for a fault.
+    pub(super) fn within_ranges(self) -> DrillLoad {
+        let within = |value: f32, most: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, most) };
+        DrillLoad {
+            speed: within(self.speed, Self::SPEED_MAX),
+            force: within(self.force, Self::FORCE_MAX),
+            surface_speed: within(self.surface_speed, Self::SURFACE_SPEED_MAX),
+            hardness: within(self.hardness, Self::HARDNESS_MAX),
+            ..self
+        }
+    }
+
+    pub(super) fn to_words(self) -> [u32; WORDS] {
+        let flags = [
+            (self.is_running, IS_RUNNING),
+            (self.is_touching, IS_TOUCHING),
+            (self.is_cutting, IS_CUTTING),
+            (self.is_suction_on, IS_SUCTION_ON),
+            (self.is_spray_on, IS_SPRAY_ON),
+        ];
+        let first = flags.iter().filter(|(is_set, _)| *is_set).fold(self.tool as u32, |word, (_, flag)| word | flag);
+        let numbers = [self.speed, self.force, self.surface_speed, self.hardness].map(f32::to_bits);
+        [first, numbers[0], numbers[1], numbers[2], numbers[3]]
+    }
+
+    pub(super) fn from_words(words: [u32; WORDS]) -> DrillLoad {
+        let [first, numbers @ ..] = words;
+        let [speed, force, surface_speed, hardness] = numbers.map(f32::from_bits);
+        let tool = [Tool::AirTurbine, Tool::Electric, Tool::LowSpeed, Tool::Hand][(first & 0b11) as usize];
+        DrillLoad {
+            tool,
+            is_running: first & IS_RUNNING != 0,
+            speed,
+            is_touching: first & IS_TOUCHING != 0,
+            is_cutting: first & IS_CUTTING != 0,
+            force,
+            surface_speed,
+            hardness,
+            is_suction_on: first & IS_SUCTION_ON != 0,
+            is_spray_on: first & IS_SPRAY_ON != 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_load_arrives_as_it_was_posted() {
+        // Aim: no field is lost or swapped on the way. Method: every tool, every flag alone, and numbers all different.
+        let numbers = DrillLoad { speed: 1.0, force: 2.0, surface_speed: 3.0, hardness: 4.0, ..DrillLoad::default() };
+        for tool in [Tool::AirTurbine, Tool::Electric, Tool::LowSpeed, Tool::Hand] {
+            for flag in 0..5 {
+                let load = DrillLoad {
+                    tool,
+                    is_running: flag == 0,
+                    is_touching: flag == 1,
+                    is_cutting: flag == 2,
+                    is_suction_on: flag == 3,
+                    is_spray_on: flag == 4,
+                    ..numbers
+                };
+                assert_eq!(DrillLoad::from_words(load.to_words()), load);
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_is_silent() {
+        let wild = DrillLoad { speed: f32::NAN, force: f32::INFINITY, surface_speed: -1.0, ..DrillLoad::default() };
+        let tame = wild.within_ranges();
+        assert_eq!((tame.speed, tame.force, tame.surface_speed), (0.0, DrillLoad::FORCE_MAX, 0.0));
+    }
+}
