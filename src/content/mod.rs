@@ -12,6 +12,7 @@ mod tissues;
 mod instruments;
 mod feel;
 pub mod measured;
+pub mod sounds;
 
 pub use feel::{AgeBand, FeelTable};
 pub use instruments::{InstrumentEntry, InstrumentTable, ToolKind};
