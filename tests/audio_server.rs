@@ -1,0 +1,283 @@
+//! The player against a real sound server's null sink, against none, and against a broken one.
+#![cfg(all(unix, not(target_os = "macos")))]
+
+mod hearing;
+
+use hearing::*;
+use std::fs::{self, File};
+use std::io::{Read, Write};
+use std::os::unix::net::UnixListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use typodont::audio::{DrillLoad, News, Output, Player, RETRY, Silence, Sounds, Tool, sounds};
+
+/// Far longer than anything here takes: whoever waits as long waits in vain.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A program that ends with the test.
+struct Running(Child);
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A folder of this test's own. Sockets have short paths, so it is not below the target folder.
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("typodont-{name}-{}", std::process::id()));
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    let begun = Instant::now();
+    loop {
+        if let Some(found) = look() {
+            return found;
+        }
+        assert!(begun.elapsed() < PATIENCE, "{what} did not come");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A private PulseAudio with a null sink; `None`, said loudly, where it is not installed.
+fn server(folder: &Path) -> Option<Running> {
+    let socket = folder.join("socket");
+    let protocol = format!("module-native-protocol-unix socket={} auth-anonymous=1", socket.display());
+    let sink = "module-null-sink sink_name=ear format=float32le rate=48000 channels=1";
+    let mut pulseaudio = Command::new("pulseaudio");
+    pulseaudio.args(["-n", "--daemonize=no", "--use-pid-file=no", "--exit-idle-time=-1", "--disable-shm=yes"]);
+    pulseaudio.args(["--high-priority=no", "-L", &protocol, "-L", sink]);
+    pulseaudio.env("HOME", folder).env("XDG_RUNTIME_DIR", folder).stdout(Stdio::null()).stderr(Stdio::null());
+    let has_recorder = Command::new("parec").arg("--version").stdout(Stdio::null()).status().is_ok();
+    let Some(child) = pulseaudio.spawn().ok().filter(|_| has_recorder) else {
+        eprintln!("SKIPPED: no pulseaudio with parec here: no sound was played to a real server");
+        return None;
+    };
+    let running = Running(child);
+    wait_for("the server's socket", || socket.exists().then_some(()));
+    Some(running)
+}
+
+/// What comes out of the null sink.
+struct Recorder {
+    file: File,
+    _parec: Running,
+}
+
+impl Recorder {
+    fn start(folder: &Path) -> Recorder {
+        let path = folder.join("heard.raw");
+        let mut parec = Command::new("parec");
+        parec.args(["-d", "ear.monitor", "--raw", "--format=float32le", "--rate=48000", "--channels=1"]);
+        parec.arg("--latency-msec=10").stdout(File::create(&path).unwrap()).stderr(Stdio::null());
+        parec.env("HOME", folder).env("PULSE_SERVER", format!("unix:{}", folder.join("socket").display()));
+        let parec = Running(parec.spawn().unwrap());
+        Recorder { file: File::open(path).unwrap(), _parec: parec }
+    }
+
+    /// The next seconds of the recording, as far as it has come.
+    fn take(&mut self, seconds: f32) -> Vec<f32> {
+        let mut bytes = vec![0; (seconds * RATE as f32) as usize * 4];
+        let mut read = 0;
+        wait_for("the recording", || {
+            read += self.file.read(&mut bytes[read..]).unwrap();
+            (read == bytes.len()).then_some(())
+        });
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+    }
+
+    /// Goes on to what is recorded from now on.
+    fn catch_up(&mut self) {
+        let mut rest = Vec::new();
+        self.file.read_to_end(&mut rest).unwrap();
+        // Half a sample may be there already; its other half follows.
+        let half = rest.len() % 4;
+        if half > 0 {
+            let mut bytes = vec![0; 4 - half];
+            wait_for("a sample", || self.file.read_exact(&mut bytes).ok());
+        }
+    }
+
+    /// Half a second of what a load sounds like, after it has settled.
+    fn settled(&mut self, sounds: &mut Sounds, load: &DrillLoad) -> Vec<f32> {
+        sounds.load(load);
+        self.catch_up();
+        self.take(1.5);
+        self.take(0.5)
+    }
+}
+
+fn playing(player: &mut Player) -> (String, Duration) {
+    match wait_for("news", || player.news()) {
+        News::Playing { place, latency } => (place, latency.unwrap()),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn silent(player: &mut Player) -> Silence {
+    match wait_for("news", || player.news()) {
+        News::Silent(silence) => silence,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_server_lets_idle_light_and_heavy_grinding_be_heard() {
+    // Aim: what the synthesiser makes reaches an ear. Method: the null sink's monitor, recorded; spectra as middle values, so
+    // that a gap on a busy machine decides nothing.
+    let folder = folder("spectra");
+    let Some(_server) = server(&folder) else { return };
+    let (mut sounds, heard) = sounds();
+    let server = Some(folder.join("socket"));
+    let mut player = Player::start(heard, Output { server, ..Output::default() });
+    let (_, latency) = playing(&mut player);
+    // What the server grants, not what a clock saw.
+    assert!(latency <= Duration::from_millis(40), "{latency:?}");
+    let mut recorder = Recorder::start(&folder);
+
+    let silence = recorder.settled(&mut sounds, &DrillLoad::default());
+    assert_eq!(level(&silence), 0.0);
+    let [idle, light, heavy, dentine] =
+        [idle(), grinding(0.3), grinding(2.0), DrillLoad { hardness: 60.0, ..grinding(2.0) }]
+            .map(|load| Spectrum::of(&recorder.settled(&mut sounds, &load)));
+    // The rotor: 5000 Hz free, a tenth less at 0.3 N, a third of it at 2 N.
+    let pitch = idle.peak(3000.0, 5500.0);
+    assert!((pitch / 5000.0 - 1.0).abs() < 0.02, "{pitch}");
+    let pitch = light.peak(3000.0, 5500.0);
+    assert!((pitch / 4500.0 - 1.0).abs() < 0.02, "{pitch}");
+    assert!(heavy.power(4400.0, 5100.0) < 0.5 * idle.power(4900.0, 5100.0));
+    // The grinding: where a free handpiece is quiet.
+    let grind = |spectrum: &Spectrum| spectrum.power(200.0, 900.0);
+    assert!(grind(&light) > 3.0 * grind(&idle), "{} {}", grind(&light), grind(&idle));
+    assert!(grind(&heavy) > 1.5 * grind(&light), "{} {}", grind(&heavy), grind(&light));
+    assert!(heavy.brightness() > 1.2 * dentine.brightness(), "{} {}", heavy.brightness(), dentine.brightness());
+
+    let silence = recorder.settled(&mut sounds, &DrillLoad::default());
+    assert_eq!(level(&silence), 0.0);
+    println!("latency {latency:?}, {} gaps", player.gaps());
+    let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn contact_starts_and_stops_within_20_ms_at_the_ear() {
+    // Aim: touch and release arrive as sharp as they were sent. Method: a probe on enamel, out of silence; in the recorded stream,
+    // how long it takes from the first sound to the usual level, and from the last of the usual level to silence. The best of
+    // several touches: a gap of a busy server may tear one.
+    let folder = folder("contact");
+    let Some(_server) = server(&folder) else { return };
+    let (mut sounds, heard) = sounds();
+    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+    playing(&mut player);
+    let mut recorder = Recorder::start(&folder);
+    let rest = DrillLoad { tool: Tool::Hand, ..DrillLoad::default() };
+    recorder.settled(&mut sounds, &rest);
+    // Steady enough to have a usual level within 5 ms: drawn so fast that its ridges blur.
+    let touching = DrillLoad { surface_speed: 60.0, ..scratching() };
+
+    let (mut starts, mut stops) = (Vec::new(), Vec::new());
+    for _ in 0..5 {
+        recorder.catch_up();
+        sounds.load(&touching);
+        let on = recorder.take(0.6);
+        let usual = level(&on[on.len() - 9600..]);
+        assert!(usual > 0.005, "{usual}");
+        sounds.load(&rest);
+        let off = recorder.take(0.6);
+        let begun = on.iter().position(|s| *s != 0.0).unwrap_or(0);
+        starts.push(on[begun..].chunks(240).position(|part| level(part) > 0.6 * usual).unwrap_or(999) * 5 + 5);
+        let parts: Vec<f32> = off.chunks(240).map(level).collect();
+        let last = parts.iter().rposition(|part| *part > 0.6 * usual).unwrap_or(0);
+        let end = parts.iter().rposition(|part| *part > 0.0).unwrap_or(0);
+        assert_eq!(parts.last(), Some(&0.0), "it ends in silence");
+        stops.push((end - last) * 5);
+    }
+    println!("from first sound to the usual level {starts:?} ms, from there to silence {stops:?} ms");
+    assert!(starts.iter().any(|ms| *ms <= 20), "{starts:?}");
+    assert!(stops.iter().any(|ms| *ms <= 20), "{stops:?}");
+    let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn a_cry_reaches_the_ear_and_ends() {
+    let folder = folder("cry");
+    let Some(_server) = server(&folder) else { return };
+    let (mut sounds, heard) = sounds();
+    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+    playing(&mut player);
+    let mut recorder = Recorder::start(&folder);
+    assert_eq!(level(&recorder.take(0.3)), 0.0);
+    assert!(sounds.cry(1.0));
+    let said = recorder.take(2.0);
+    assert!(level(&said) > 0.01, "{}", level(&said));
+    assert_eq!(level(&recorder.take(0.3)), 0.0);
+    let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn a_server_that_dies_is_named_once_and_found_again() {
+    // Aim: a dying server costs one sentence, and a new one is heard. Method: kill it while it plays, start another one.
+    let folder = folder("death");
+    let Some(first) = server(&folder) else { return };
+    let (mut sounds, heard) = sounds();
+    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+    sounds.load(&idle());
+    playing(&mut player);
+    drop(first);
+    let silence = silent(&mut player);
+    assert!(matches!(silence, Silence::Lost { .. }), "{silence:?}");
+    std::thread::sleep(RETRY + RETRY / 2);
+    assert_eq!(player.news(), None, "said once");
+    let _ = fs::remove_file(folder.join("socket"));
+    let _second = server(&folder);
+    playing(&mut player);
+    let mut recorder = Recorder::start(&folder);
+    recorder.take(0.5);
+    assert!(level(&recorder.take(0.5)) > 0.01);
+    let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn without_a_server_it_says_so_once_and_goes_on() {
+    let folder = folder("none");
+    let (mut sounds, heard) = sounds();
+    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+    let silence = silent(&mut player);
+    let said = silence.to_string();
+    assert!(matches!(silence, Silence::None { .. }), "{silence:?}");
+    assert!(said.contains("socket") && said.contains("start PipeWire or PulseAudio"), "{said}");
+    // Loads are taken all the same; of cries only as many as may wait.
+    let taken = (0..100).filter(|_| sounds.cry(1.0)).count();
+    assert!((1..100).contains(&taken), "{taken}");
+    sounds.load(&idle());
+    std::thread::sleep(RETRY + RETRY / 2);
+    assert_eq!(player.news(), None, "said once");
+    let _ = fs::remove_dir_all(folder);
+}
+
+#[test]
+fn a_server_that_talks_nonsense_is_refused_and_does_no_harm() {
+    // Aim: whatever answers at the socket, the player names it and goes on. Method: nonsense, a message beyond all measure, and
+    // one that hangs up.
+    for (what, answer) in [("nonsense", vec![7u8; 400]), ("hangs up", vec![]), ("zeros", vec![0u8; 400])] {
+        let folder = folder(&format!("nonsense-{}", what.replace(' ', "-")));
+        let listener = UnixListener::bind(folder.join("socket")).unwrap();
+        let answering = std::thread::spawn(move || {
+            let (mut socket, _) = listener.accept().unwrap();
+            let mut asked = [0; 20];
+            let _ = socket.read(&mut asked);
+            let _ = socket.write_all(&answer);
+        });
+        let (_sounds, heard) = sounds();
+        let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+        let silence = silent(&mut player);
+        assert!(matches!(silence, Silence::Refused { .. }), "{what}: {silence:?}");
+        drop(player);
+        answering.join().unwrap();
+        let _ = fs::remove_dir_all(folder);
+    }
+}
