@@ -32,10 +32,10 @@ const fn tone(order: f32, level: f32) -> Tone {
 /// 0.4 of the rotor), the motor of a 1:5 contra-angle (0.2) and the meshing of its gears. How loud each is was chosen by ear and
 /// by its spectrum; half or twice as loud is still that handpiece.
 ///
-/// Under load an air turbine falls about linearly with torque until it stalls (J. Dyson, B. Darvell, *Torque, power and efficiency
-/// characterization of dental air turbine handpieces*, J. Dent. 27, 1999); an electric motor is governed. The forces at which
-/// they would stand still stand for burs of about 1 mm, chosen so that a usual 1 N takes a third of a turbine's speed: 2 to 5 N
-/// works for turbines.
+/// Under load an air turbine's speed falls linearly with torque until it stalls (J. Dyson, B. Darvell, *Torque, power and
+/// efficiency characterization of dental air turbine handpieces*, J. Dent. 27, 1999); an electric motor is governed. The force
+/// that stalls it: 3 N on a bur of 1 mm are 1.5 N·mm, where up to 2.3 N·mm were measured (P. Brockhurst, R. Shams, Aust. Dent. J.
+/// 39, 1994). 2 to 5 N works for turbines; those of motors are so high that speed barely falls.
 const AIR_TURBINE: Character = Character {
     tones: &[tone(1.0, 1.0), tone(2.0, 0.3), tone(3.0, 0.12), tone(0.4, 0.14), tone(0.8, 0.1)],
     rush: 0.9,
