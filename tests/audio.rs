@@ -23,6 +23,13 @@ fn settled(load: &DrillLoad) -> Vec<f32> {
     hear(&mut synth, load, 1.0)
 }
 
+/// What contact adds to a settled load, sample by sample: the same held handpiece, with a surface that does not move, is silent
+/// on the tooth.
+fn contact_alone(load: &DrillLoad) -> Vec<f32> {
+    let held = settled(&DrillLoad { surface_speed: 0.0, ..*load });
+    settled(load).iter().zip(&held).map(|(both, handpiece)| both - handpiece).collect()
+}
+
 #[test]
 fn a_free_handpiece_sings_at_its_speed() {
     // Aim: the pitch is the rotor's. Method: the strongest line of a turbine at three speeds.
@@ -50,13 +57,9 @@ fn a_turbine_gives_way_under_the_hand_and_a_motor_does_not() {
 #[test]
 fn grinding_is_louder_the_harder_it_is_pressed() {
     for tool in [Tool::AirTurbine, Tool::Electric, Tool::LowSpeed] {
-        let loud = |force: f32| {
-            let free = Spectrum::of(&settled(&DrillLoad { tool, ..idle() }));
-            let pressed = Spectrum::of(&settled(&DrillLoad { tool, ..grinding(force) }));
-            pressed.beyond(&free).power(100.0, 20_000.0)
-        };
+        let loud = |force: f32| level(&contact_alone(&DrillLoad { tool, ..grinding(force) }));
         let [light, usual, heavy] = [0.25, 1.0, 2.0].map(loud);
-        assert!(light > 0.0 && usual > 1.5 * light && heavy > 1.1 * usual, "{tool:?}: {light} {usual} {heavy}");
+        assert!(light > 0.0 && usual > 1.3 * light && heavy > 1.05 * usual, "{tool:?}: {light} {usual} {heavy}");
     }
 }
 
@@ -69,16 +72,12 @@ fn what_rubs_is_quieter_than_what_cuts() {
 
 #[test]
 fn the_harder_the_tissue_the_brighter_the_sound() {
-    // Aim: enamel, dentine, decay and gum are told apart by ear. Method: mean frequency of what contact adds, for a drill that
-    // keeps its speed and for a probe.
+    // Aim: enamel, dentine, decay and gum are told apart by ear. Method: mean frequency of what contact adds, for a drill and for
+    // a probe.
     let tissues = [("enamel", 300.0), ("dentine", 60.0), ("decay", 15.0), ("gum", 0.0)];
-    let drill = DrillLoad { tool: Tool::Electric, ..grinding(1.0) };
-    let background = Spectrum::of(&settled(&DrillLoad { is_touching: false, ..drill }));
-    for load in [drill, scratching()] {
-        let bright = tissues.map(|(_, hardness)| {
-            let sound = Spectrum::of(&settled(&DrillLoad { hardness, ..load }));
-            if load.tool == Tool::Hand { sound.brightness() } else { sound.beyond(&background).brightness() }
-        });
+    for load in [grinding(1.0), DrillLoad { tool: Tool::Electric, ..grinding(1.0) }, scratching()] {
+        let bright =
+            tissues.map(|(_, hardness)| Spectrum::of(&contact_alone(&DrillLoad { hardness, ..load })).brightness());
         let is_falling = bright.windows(2).all(|pair| pair[0] > 1.15 * pair[1]);
         assert!(is_falling, "{:?}: {tissues:?} sound at {bright:?} Hz", load.tool);
     }
@@ -156,6 +155,25 @@ fn nothing_clicks_as_it_comes_and_goes() {
             assert!(largest_step(&change) < 1.1 * usual, "{name}, seed {seed}: {} of {usual}", largest_step(&change));
         }
     }
+}
+
+#[test]
+fn contact_fades_and_is_not_cut() {
+    // Aim: noise hides a cut from a look at steps, not from the ear. Method: the level of the first millisecond of touch and of
+    // release, over many seeds, beside the usual level: touch begins faint, release begins nearly as loud as before.
+    let rest = DrillLoad { tool: Tool::Hand, ..DrillLoad::default() };
+    let touching = DrillLoad { surface_speed: 60.0, ..scratching() };
+    let (mut first, mut last, mut usual) = (Vec::new(), Vec::new(), Vec::new());
+    for seed in 0..32 {
+        let mut synth = Synth::new(&Options { seed, ..Options::default() });
+        hear(&mut synth, &rest, 0.1);
+        let touch = hear(&mut synth, &touching, 0.3);
+        first.extend(&touch[..48]);
+        usual.extend(&touch[4800..]);
+        last.extend(&hear(&mut synth, &rest, 0.1)[..48]);
+    }
+    let (first, last, usual) = (level(&first), level(&last), level(&usual));
+    assert!(first < 0.3 * usual && last > 0.6 * usual, "{first} {last} of {usual}");
 }
 
 #[test]
