@@ -13,10 +13,14 @@ const FOLLOW: f32 = 0.012;
 
 /// Of full scale, at a firm 3 N at full speed on enamel: 0.2 to 0.5 works.
 const GRIND_LEVEL: f32 = 0.42;
-const SCRATCH_LEVEL: f32 = 0.25;
+const SCRATCH_LEVEL: f32 = 0.12;
 
-/// The force, N, at which grinding is half as loud as it can become. Usual forces on a bur are 0.5 to 2 N.
-const HALF_FORCE: f32 = 1.0;
+/// The force, N, at which grinding has its full loudness, and half of what it could ever have. Usual forces on a bur are 0.5 to
+/// 2 N. Below 2.5 a turbine would grow quieter under a heavy hand, since its speed falls faster than force makes it loud.
+const FULL_FORCE: f32 = 3.0;
+
+/// The same for a tip: a probe is led with some tenths of a newton.
+const FULL_TIP_FORCE: f32 = 0.5;
 
 /// The speed of a bur's surface, mm/s, at which grinding has its full loudness: 1 mm at 200 000 rpm.
 const FULL_SURFACE_SPEED: f32 = 10_000.0;
@@ -175,7 +179,7 @@ fn heard(load: &DrillLoad, rotor: &Rotor) -> Option<Character> {
 /// Louder with force and speed (both level off), brighter the harder the tissue; a bur that is held back is duller.
 fn grind(load: &DrillLoad, share: f32) -> Character {
     let hardness = (load.hardness / ENAMEL).min(2.0).sqrt();
-    let force = load.force / (load.force + HALF_FORCE) / 0.75;
+    let force = 2.0 * load.force / (load.force + FULL_FORCE);
     let speed = (load.surface_speed * share / FULL_SURFACE_SPEED).min(1.5).sqrt();
     let work = if load.is_cutting { 1.0 } else { RUB };
     Character {
@@ -192,7 +196,7 @@ fn grind(load: &DrillLoad, share: f32) -> Character {
 /// The same for a tip that is drawn along: its pitch is the tissue's, its rhythm the hand's.
 fn scratch(load: &DrillLoad) -> Character {
     let hardness = (load.hardness / ENAMEL).min(2.0).sqrt();
-    let force = load.force / (load.force + 0.5 * HALF_FORCE);
+    let force = 2.0 * load.force / (load.force + FULL_TIP_FORCE);
     let speed = (load.surface_speed / FULL_TIP_SPEED).min(1.5).sqrt();
     Character {
         level: SCRATCH_LEVEL * force * speed * (0.15 + 0.85 * hardness.min(1.0)),
