@@ -54,7 +54,7 @@ fn server(folder: &Path) -> Option<Running> {
     pulseaudio.args(["--high-priority=no", "-L", &protocol, "-L", sink]);
     pulseaudio.env("HOME", folder).env("XDG_RUNTIME_DIR", folder).stdout(Stdio::null()).stderr(Stdio::null());
     let has_recorder = Command::new("parec").arg("--version").stdout(Stdio::null()).status().is_ok();
-    let Some(child) = pulseaudio.spawn().ok().filter(|_| has_recorder) else {
+    let Some(child) = has_recorder.then(|| pulseaudio.spawn().ok()).flatten() else {
         eprintln!("SKIPPED: no pulseaudio with parec here: no sound was played to a real server");
         return None;
     };
@@ -82,13 +82,17 @@ impl Recorder {
 
     /// The next seconds of the recording, as far as it has come.
     fn take(&mut self, seconds: f32) -> Vec<f32> {
-        let mut bytes = vec![0; (seconds * RATE as f32) as usize * 4];
-        let mut read = 0;
+        let bytes = self.bytes((seconds * RATE as f32) as usize * 4);
+        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+    }
+
+    fn bytes(&mut self, count: usize) -> Vec<u8> {
+        let (mut bytes, mut read) = (vec![0; count], 0);
         wait_for("the recording", || {
             read += self.file.read(&mut bytes[read..]).unwrap();
-            (read == bytes.len()).then_some(())
+            (read == count).then_some(())
         });
-        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+        bytes
     }
 
     /// Goes on to what is recorded from now on.
@@ -96,11 +100,7 @@ impl Recorder {
         let mut rest = Vec::new();
         self.file.read_to_end(&mut rest).unwrap();
         // Half a sample may be there already; its other half follows.
-        let half = rest.len() % 4;
-        if half > 0 {
-            let mut bytes = vec![0; 4 - half];
-            wait_for("a sample", || self.file.read_exact(&mut bytes).ok());
-        }
+        self.bytes(rest.len().wrapping_neg() % 4);
     }
 
     /// Half a second of what a load sounds like, after it has settled.
