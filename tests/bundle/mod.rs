@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The program, started in the repository's root. Whole sessions are played by the release program where there is one, named
-/// by `TYPODONT_RELEASE`: it says the same, sooner.
+/// by `TYPODONT_OPTIMISED`: it says the same, sooner.
 pub fn typodont(arguments: &[&str]) -> Output {
-    let program = std::env::var("TYPODONT_RELEASE").unwrap_or_else(|_| env!("CARGO_BIN_EXE_typodont").to_string());
+    let program = std::env::var("TYPODONT_OPTIMISED").unwrap_or_else(|_| env!("CARGO_BIN_EXE_typodont").to_string());
     Command::new(program).args(arguments).current_dir(env!("CARGO_MANIFEST_DIR")).output().unwrap()
 }
 
