@@ -13,6 +13,9 @@ pub struct Matter {
     pub around: Vec<Shape>,
 }
 
+/// More than a distance of some metres loses by rounding, mm: what is farther than a reach by this is surely out of it.
+const ROUNDING: f32 = 1e-2;
+
 /// A solid described by a formula, or by its surface.
 #[derive(Clone, Debug)]
 pub struct Shape {
@@ -72,11 +75,15 @@ impl Shape {
         (self.distance(point_in_tooth), slope.try_normalize().unwrap_or(Vec3::Z))
     }
 
-    /// Signed distance and outward normal of every place where a ball about a point may meet the shape: one for a convex
-    /// form, for a mesh all up to a distance.
+    /// Signed distance and outward normal of every place where a ball about a point may meet the shape: at most one for a
+    /// convex form, for a mesh all up to a distance. What is farther than `within` may be left out.
     pub(super) fn meet(&self, point_in_tooth: Vec3, within: f32, mut each: impl FnMut(f32, Vec3)) {
         match &self.form {
+            // Its normal costs six distances more: only what is within reach is asked for it.
             Form::Ball { .. } | Form::RoundBox { .. } | Form::Capsule { .. } => {
+                if self.distance(point_in_tooth) > within + ROUNDING {
+                    return;
+                }
                 let (distance, normal) = self.distance_and_normal(point_in_tooth);
                 each(distance, normal);
             }
