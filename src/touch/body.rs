@@ -219,8 +219,8 @@ fn turn(profile: &Profile, region: Region, apart: f32, shell: &mut Vec<Node>) {
 #[derive(Clone, Debug, PartialEq)]
 struct Table {
     low_z: f32,
-    count_r: usize,
-    count_z: usize,
+    count_r: u32,
+    count_z: u32,
     distances: Vec<f32>,
 }
 
@@ -234,9 +234,9 @@ impl Table {
     fn of(profile: &Profile) -> Table {
         let [low, high] = profile.span();
         let low_z = low - MARGIN;
-        let count_r = ((profile.radius() + MARGIN) / STEP).ceil() as usize + 2;
-        let count_z = ((high - low + 2.0 * MARGIN) / STEP).ceil() as usize + 2;
-        let place = |i: usize, j: usize| Place { r: i as f32 * STEP, z: low_z + j as f32 * STEP };
+        let count_r = ((profile.radius() + MARGIN) / STEP).ceil() as u32 + 2;
+        let count_z = ((high - low + 2.0 * MARGIN) / STEP).ceil() as u32 + 2;
+        let place = |i: u32, j: u32| Place { r: i as f32 * STEP, z: low_z + j as f32 * STEP };
         let distances = (0..count_z).flat_map(|j| (0..count_r).map(move |i| profile.distance(place(i, j)))).collect();
         Table { low_z, count_r, count_z, distances }
     }
@@ -248,11 +248,13 @@ impl Table {
         if !(z >= 0.0 && z < (self.count_z - 1) as f32 && r < (self.count_r - 1) as f32) {
             return None;
         }
-        let (i, j) = (r as usize, z as usize);
+        // By way of `i32`: one instruction there and one back.
+        let (i, j) = (r as i32, z as i32);
         let (fr, fz) = (r - i as f32, z - j as f32);
-        let corner = j * self.count_r + i;
+        let row = self.count_r as usize;
+        let corner = j as usize * row + i as usize;
         let low = self.distances.get(corner..corner + 2)?;
-        let high = self.distances.get(corner + self.count_r..corner + self.count_r + 2)?;
+        let high = self.distances.get(corner + row..corner + row + 2)?;
         let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
         Some(mix(mix(low[0], low[1], fr), mix(high[0], high[1], fr), fz))
     }

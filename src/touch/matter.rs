@@ -109,10 +109,10 @@ impl Matter {
         let grid = self.volume.grid();
         let [low, high] = grid.extent();
         let nearest_inside = point_in_tooth.clamp(low, high);
-        let outside = nearest_inside.distance(point_in_tooth);
-        if outside > 0.0 {
+        let outside_squared = nearest_inside.distance_squared(point_in_tooth);
+        if outside_squared > 0.0 {
             // Interpolation reaches one voxel beyond the last centre.
-            return (outside - grid.spacing.max_element()).max(0.0);
+            return (outside_squared.sqrt() - grid.spacing.max_element()).max(0.0);
         }
         match grid.nearest(point_in_tooth) {
             Some(cell) => {

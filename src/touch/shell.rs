@@ -27,11 +27,16 @@ const LOOKS: usize = 3;
 /// the first.
 const TURNS: usize = 2;
 
+/// Points that follow each other in a shell lie near each other: while all of so many rest, one question passes them.
+const COMPANY: usize = 16;
+
 /// Which points need no look yet: matter is too far from them for what the instrument has moved since.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watch {
     /// Of each point, the way at which it may meet matter again, mm.
     wake: Vec<f64>,
+    /// Of each [`COMPANY`] of points, the least of their ways.
+    wake_first: Vec<f64>,
     /// Farthest that any point can have moved since the watch began, mm.
     way: f64,
     seen_from: Option<Vec3>,
@@ -39,7 +44,12 @@ pub(super) struct Watch {
 
 impl Watch {
     pub fn with_capacity(points: usize) -> Watch {
-        Watch { wake: Vec::with_capacity(points), way: 0.0, seen_from: None }
+        Watch {
+            wake: Vec::with_capacity(points),
+            wake_first: Vec::with_capacity(points.div_ceil(COMPANY)),
+            way: 0.0,
+            seen_from: None,
+        }
     }
 
     /// True while it is a shell that is followed.
@@ -63,6 +73,8 @@ impl Watch {
             None => {
                 self.wake.clear();
                 self.wake.resize(points, 0.0);
+                self.wake_first.clear();
+                self.wake_first.resize(points.div_ceil(COMPANY), 0.0);
                 self.way = 0.0;
             }
         }
@@ -110,18 +122,25 @@ pub(super) fn find(planes: &mut Vec<Plane>, watch: &mut Watch, matter: &Matter, 
     watch.arrive(held.body.shell().len(), tip);
     let grid = volume.grid();
     let (tip_in_grid, to_grid) = (grid.from_tooth(tip), glam::Mat3::from_diagonal(grid.spacing.recip()) * turn);
-    for (node, wake) in held.body.shell().iter().zip(&mut watch.wake) {
-        if *wake > watch.way {
+    let companies = held.body.shell().chunks(COMPANY).zip(watch.wake.chunks_mut(COMPANY));
+    for ((nodes, wakes), first) in companies.zip(&mut watch.wake_first) {
+        if *first > watch.way {
             continue;
         }
-        let density = volume.density_in_grid(tip_in_grid + to_grid * node.at);
-        if density > 0.0 {
-            wall(node, density);
-            continue;
+        for (node, wake) in nodes.iter().zip(wakes.iter_mut()) {
+            if *wake > watch.way {
+                continue;
+            }
+            let density = volume.density_in_grid(tip_in_grid + to_grid * node.at);
+            if density > 0.0 {
+                wall(node, density);
+                continue;
+            }
+            // What is cut away only makes room: this stays true.
+            let clear = matter.clear_of_volume(tip + turn * node.at).max(band);
+            *wake = watch.way + f64::from(clear - reach);
         }
-        // What is cut away only makes room: this stays true.
-        let clear = matter.clear_of_volume(tip + turn * node.at).max(band);
-        *wake = watch.way + f64::from(clear - reach);
+        *first = wakes.iter().copied().fold(f64::INFINITY, f64::min);
     }
     find_shapes(planes, matter, held, look);
 }

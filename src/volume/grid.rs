@@ -70,7 +70,8 @@ impl Grid {
 
     /// The voxel whose centre is nearest to a point of tooth space; `None` outside the grid.
     pub fn nearest(&self, point_in_tooth: Vec3) -> Option<[u32; 3]> {
-        let at = (self.from_tooth(point_in_tooth) + 0.5).floor();
+        // Counted down to whole steps at the end: what is not negative needs no call for it.
+        let at = self.from_tooth(point_in_tooth) + 0.5;
         let inside = |v: f32, n: u32| v >= 0.0 && v < n as f32;
         (inside(at.x, self.dims[0]) && inside(at.y, self.dims[1]) && inside(at.z, self.dims[2])).then_some([
             at.x as u32,
