@@ -147,6 +147,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_within_reach_is_met_and_what_is_far_is_not_asked() {
+        let shape = Shape { label: Label(1), tooth_from_shape: Pose::IDENTITY, form: Form::Ball { radius: 2.0 } };
+        for (height, is_met) in [(1.9, true), (2.05, true), (2.099, true), (2.2, false)] {
+            let place = Vec3::Z * height;
+            let mut met = None;
+            shape.meet(place, 0.1, |distance, normal| met = Some((distance, normal)));
+            assert_eq!(met, is_met.then(|| shape.distance_and_normal(place)), "{height}");
+        }
+    }
+
+    #[test]
     fn a_clear_radius_holds_no_matter() {
         let volume = phantom::ball([120, 120, 120], Vec3::splat(0.1), 2.0);
         let matter = Matter { volume, around: Vec::new() };

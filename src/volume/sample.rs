@@ -178,6 +178,38 @@ mod tests {
     }
 
     #[test]
+    fn a_sample_has_the_very_bits_of_the_formula() {
+        // Aim: recordings replay bit for bit, however a look is made cheap. Method: noise with much empty space, and the
+        // formula written out, corner by corner, in and around the grid.
+        let grid = super::super::Grid::centred([9, 12, 10], Vec3::new(0.1, 0.2, 0.3));
+        let mut volume = phantom::ball(grid.dims, grid.spacing, 0.1);
+        let mut state = 7u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        for index in 0..grid.len() {
+            let density = if random() > 0.8 { Density::from_unit(random()) } else { Density::EMPTY };
+            volume.set(index, super::super::Voxel { density, label: super::super::Label(1) });
+        }
+        let (mut empty, mut filled) = (0, 0);
+        for _ in 0..20_000 {
+            let at = Vec3::new(random() * 12.0 - 2.0, random() * 15.0 - 2.0, random() * 13.0 - 2.0);
+            let is_inside = at.cmpge(Vec3::ZERO).all() && at.cmplt(Vec3::new(8.0, 11.0, 9.0)).all();
+            let (base, unit) = (at.floor(), if is_inside { 1.0 } else { 1.0 / 255.0 });
+            let f = at - base;
+            let corner = |x, y, z| f32::from(volume.density_of(base + Vec3::new(x, y, z)).bits()) * unit;
+            let along_x = |y, z| mix(corner(0.0, y, z), corner(1.0, y, z), f.x);
+            let along_y = |z| mix(along_x(0.0, z), along_x(1.0, z), f.y);
+            let whole = mix(along_y(0.0), along_y(1.0), f.z);
+            let expected: f32 = if is_inside { whole * (1.0 / 255.0) } else { whole };
+            assert_eq!(volume.density_in_grid(at).to_bits(), expected.to_bits(), "{at}");
+            *(if expected > 0.0 { &mut filled } else { &mut empty }) += 1;
+        }
+        assert!(empty > 1000 && filled > 1000, "{empty} empty, {filled} filled");
+    }
+
+    #[test]
     fn both_ways_of_sampling_agree() {
         let volume = phantom::ball([30, 30, 30], Vec3::splat(0.2), 2.0);
         for i in 0..2000 {
