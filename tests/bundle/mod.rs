@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// The program, started in the repository's root. Whole sessions are played by the release program where there is one, named
+/// The program, started in the repository's root. Whole sessions are played by an optimised program where there is one, named
 /// by `TYPODONT_OPTIMISED`: it says the same, sooner.
 pub fn typodont(arguments: &[&str]) -> Output {
     let program = std::env::var("TYPODONT_OPTIMISED").unwrap_or_else(|_| env!("CARGO_BIN_EXE_typodont").to_string());
