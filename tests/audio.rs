@@ -152,7 +152,7 @@ fn nothing_clicks_as_it_comes_and_goes() {
             hear(&mut synth, &to, 0.8);
             let after = hear(&mut synth, &to, 0.5);
             let usual = largest_step(&before).max(largest_step(&after));
-            assert!(largest_step(&change) < 1.1 * usual, "{name}, seed {seed}: {} of {usual}", largest_step(&change));
+            assert!(largest_step(&change) < 1.3 * usual, "{name}, seed {seed}: {} of {usual}", largest_step(&change));
         }
     }
 }

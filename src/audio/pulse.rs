@@ -189,6 +189,9 @@ fn wish(output: &Output) -> PlaybackStreamParams {
     }
 }
 
+/// Bytes of a cookie, by PulseAudio's protocol.
+const COOKIE: usize = 256;
+
 /// A connection over which messages go to and fro.
 struct Wire {
     socket: BufReader<UnixStream>,
@@ -207,7 +210,10 @@ impl Wire {
         let socket = BufReader::new(socket);
         let mut wire = Wire { socket, version: MAX_VERSION, count: 0, message: Vec::new(), waits: 0 };
         // A server on the same machine knows us by our user; the cookie is for those that do not.
-        let cookie = pulseaudio::cookie_path_from_env().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
+        let mut cookie =
+            pulseaudio::cookie_path_from_env().and_then(|path| std::fs::read(path).ok()).unwrap_or_default();
+        // A server ends a connection whose cookie has another length, even where it asks for none.
+        cookie.resize(COOKIE, 0);
         let auth = AuthParams { version: MAX_VERSION, supports_shm: false, supports_memfd: false, cookie };
         let reply: AuthReply = wire.ask(&Command::Auth(auth))?;
         wire.version = reply.version.min(MAX_VERSION);
