@@ -140,6 +140,9 @@ impl Results {
     /// The same for people, one line per figure.
     fn table(&self) -> String {
         let mut lines = vec![format!("typodont {} on {}, {} threads", self.version, self.cpu, self.threads)];
+        if let Some(frames) = self.frame_ms.values().next() {
+            lines.push(format!("pictures: {}", frames.adapter));
+        }
         lines.push(format!("{:<34}{:>10}{:>10}{:>10}{:>9}", "", "p50", "p99", "max", "n"));
         let mut line = |name: String, f: &Figures| {
             lines.push(format!("{name:<34}{:>10.2}{:>10.2}{:>10.2}{:>9}", f.p50, f.p99, f.max, f.n));
@@ -148,7 +151,9 @@ impl Results {
             cases.iter().for_each(|(case, f)| line(format!("tick_us.{dims}.{case}"), f));
         }
         for (dims, cases) in &self.frame_ms {
-            line(format!("frame_ms.{dims}.iso ({})", cases.adapter), &cases.iso);
+            line(format!("frame_ms.{dims}.surface"), &cases.surface);
+            line(format!("frame_ms.{dims}.iso"), &cases.iso);
+            line(format!("frame_ms.{dims}.volume"), &cases.volume);
         }
         let tables = [
             ("mesh_ms", &self.mesh_ms),

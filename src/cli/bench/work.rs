@@ -5,9 +5,9 @@ use crate::anatomy::Tissues;
 use crate::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
 use crate::content::{Library, TissueTable};
 use crate::diagnostic::{Source, headlines};
-use crate::frame::Vec3;
+use crate::frame::{Pose, Quat, Vec3};
+use crate::render::{Changes, Orbit, Painter, Palette, Scene, Shown, Tooth, TransferFunction};
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece};
-use crate::volume::march::{self, Camera, Shot, Side};
 use crate::volume::{Label, Volume, Voxel, distance, surface};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -56,13 +56,14 @@ pub struct Work {
     pub frames: Frames,
 }
 
-/// One picture of 780×690 pixels.
+/// One picture of 780×690 pixels, in each way to see a tooth.
 #[derive(Serialize)]
 pub struct Frames {
-    /// What draws it.
-    pub adapter: &'static str,
-    /// The surface met by a ray through each pixel.
+    /// What draws it: an adapter's name, or `cpu`.
+    pub adapter: String,
+    pub surface: Figures,
     pub iso: Figures,
+    pub volume: Figures,
 }
 
 pub fn on(tooth: &Volume) -> Result<Work, String> {
@@ -73,7 +74,7 @@ pub fn on(tooth: &Volume) -> Result<Work, String> {
         std::hint::black_box(surface::extract(tooth));
     });
     let load_ms = load_ms(tooth)?;
-    Ok(Work { edt_ms, load_ms, mesh_ms, remesh_ms: remesh_ms(tooth), frames: frames(tooth) })
+    Ok(Work { edt_ms, load_ms, mesh_ms, remesh_ms: remesh_ms(tooth), frames: frames(tooth)? })
 }
 
 /// The surface around a bite of a bur of 0.7 mm radius, taken from the highest cusp.
@@ -101,15 +102,41 @@ fn remesh_ms(tooth: &Volume) -> Figures {
     })
 }
 
-fn frames(tooth: &Volume) -> Frames {
-    let [width, height] = [780, 690];
-    let camera = Camera::framing(Side::Occlusal, tooth, width as f32 / height as f32);
-    let shot = Shot { camera, width, height };
-    let iso = repeated(1e3, || {
-        std::hint::black_box(march::iso(tooth, &shot, |_, _| [0.9, 0.85, 0.8]));
-    });
-    Frames { adapter: "cpu", iso }
+fn frames(tooth: &Volume) -> Result<Frames, String> {
+    let (mut painter, _) = Painter::best();
+    let table = TissueTable::read(&Library::shipped()).map_err(|found| headlines(&found))?;
+    let palette = Palette::of(|label| table.by_label(label).map_or([0.5; 3], |tissue| tissue.rgb()), 0.2);
+    let function = Arc::new(TransferFunction::tissue(&palette));
+    let grid = tooth.grid();
+    let [low, high] = tooth.tight_box().unwrap_or_default().map(|cell| grid.centre(cell));
+    let upright = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
+    let orbit = Orbit::around(upright * (0.5 * (low + high)), 0.5 * (high - low).length());
+    let mut failed = None;
+    let mut times = |shown: Shown| {
+        let mut view = orbit;
+        // Shaders are translated with the first picture; the next are what a trainee waits for.
+        let mut changes = Changes::Anew;
+        let mut picture = || {
+            let seen =
+                Tooth { volume: tooth, changes, world_from_tooth: upright, palette: &palette, shown: shown.clone() };
+            let scene = Scene { tooth: Some(seen), ..Scene::empty() };
+            let drawn = painter.draw_only(&scene, &view.viewpoint(), None, [780, 690]);
+            failed = drawn.err().or(failed.take());
+            changes = Changes::Bricks(&[]);
+            view = view.turned(STEP_AROUND, 0.0);
+        };
+        picture();
+        repeated(1e3, picture)
+    };
+    let [surface, iso, volume] = [Shown::Surface, Shown::Iso, Shown::Volume(function)].map(&mut times);
+    match failed {
+        Some(error) => Err(error.to_string()),
+        None => Ok(Frames { adapter: painter.adapter().to_string(), surface, iso, volume }),
+    }
 }
+
+/// 40°: nine pictures go once round the tooth.
+const STEP_AROUND: f32 = 0.698;
 
 /// Reading the tooth from a compressed NRRD.
 fn load_ms(tooth: &Volume) -> Result<Figures, String> {

@@ -7,7 +7,7 @@ mod camera;
 mod light;
 mod picture;
 mod ray;
-mod rows;
+pub mod rows;
 mod slice;
 
 pub use camera::{Camera, Shot, Side};

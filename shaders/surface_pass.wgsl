@@ -1,0 +1,63 @@
+// Triangles with light per pixel: solids, and the carved tooth as marching cubes give it. After view.wgsl and tooth.wgsl.
+// Its twin is src/render/twin/surface_pass.rs.
+
+struct Solid {
+    world_from_solid: mat4x4f,
+    // Colour and gloss, multiplied with those of the vertices.
+    finish: vec4f,
+}
+
+@group(2) @binding(0) var<uniform> solid: Solid;
+
+struct Corner {
+    @location(0) position: vec3f,
+    // w: gloss.
+    @location(1) normal: vec4f,
+    @location(2) colour: vec4f,
+}
+
+struct Varying {
+    @builtin(position) place: vec4f,
+    @location(0) point: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) finish: vec4f,
+}
+
+fn placed(corner: Corner, world_from_own: mat4x4f) -> Varying {
+    let point = world_from_own * vec4f(corner.position, 1.0);
+    let normal = (world_from_own * vec4f(corner.normal.xyz, 0.0)).xyz;
+    return Varying(view.clip_from_world * point, point.xyz, normal, vec4f(corner.colour.rgb, corner.normal.w));
+}
+
+@vertex
+fn solid_vertex(corner: Corner) -> Varying {
+    return placed(corner, solid.world_from_solid);
+}
+
+@fragment
+fn solid_fragment(in: Varying) -> @location(0) vec4f {
+    return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normalize(in.normal))), 1.0);
+}
+
+@vertex
+fn tooth_vertex(corner: Corner) -> Varying {
+    return placed(corner, tooth.world_from_tooth);
+}
+
+@fragment
+fn tooth_fragment(in: Varying) -> @location(0) vec4f {
+    let normal = normalize(in.normal);
+    let at = (tooth.voxel_from_world * vec4f(in.point, 1.0)).xyz;
+    return vec4f(screen(lit(in.finish, openness(at, normal), in.point, normal)), 1.0);
+}
+
+// Behind everything: a triangle that covers the picture.
+@vertex
+fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 1.0, 1.0);
+}
+
+@fragment
+fn background_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+    return vec4f(screen(mix(view.background_top.rgb, view.background_bottom.rgb, pixel.y / view.size.y)), 1.0);
+}

@@ -1,0 +1,129 @@
+// The carved tooth as a volume, for the passes that look into it. After view.wgsl. Its twin is src/render/twin/matter.rs.
+// `at` is a place in voxel steps from the first voxel's middle.
+
+struct Tooth {
+    world_from_voxel: mat4x4f,
+    voxel_from_world: mat4x4f,
+    world_from_tooth: mat4x4f,
+    // Voxels; w: voxels along the edge of a cube of `hollow`.
+    dims: vec4f,
+    // The box that holds all matter; w: length of a step of blending, mm.
+    low: vec4f,
+    // w: share of the colour that lamps shade in blending.
+    high: vec4f,
+    // Between voxels, mm.
+    spacing: vec4f,
+    // Colour and gloss by label.
+    palette: array<vec4f, 256>,
+}
+
+@group(1) @binding(0) var<uniform> tooth: Tooth;
+// Density and label (of 255).
+@group(1) @binding(1) var voxels: texture_3d<f32>;
+@group(1) @binding(2) var between: sampler;
+// Bricks to the nearest that may show something.
+@group(1) @binding(3) var empty: texture_3d<u32>;
+// Mean density of cubes.
+@group(1) @binding(4) var hollow: texture_3d<f32>;
+// Colour and opacity after one step, by density and label.
+@group(1) @binding(5) var transfer: texture_2d<f32>;
+
+const BRICK: f32 = 8.0;
+// Share of a voxel that surely leads across a border between bricks, however numbers are rounded.
+const NUDGE: f32 = 0.004;
+// Way outward to the place whose surroundings shade a surface, mm, and the share of light that it can cost.
+const REACH: f32 = 0.7;
+const DARKEST: f32 = 0.62;
+
+// Trilinear; empty beyond the grid.
+fn density(at: vec3f) -> f32 {
+    let inside = clamp(min(at + 1.0, tooth.dims.xyz - at), vec3f(0.0), vec3f(1.0));
+    let value = textureSampleLevel(voxels, between, (at + 0.5) / tooth.dims.xyz, 0.0).r;
+    return value * inside.x * inside.y * inside.z;
+}
+
+// Where the ray is within the box of matter, as depths. Empty when x > y.
+fn span(start: vec3f, along: vec3f) -> vec2f {
+    let safe = select(along, vec3f(1e-9), abs(along) < vec3f(1e-9));
+    let a = (tooth.low.xyz - start) / safe;
+    let b = (tooth.high.xyz - start) / safe;
+    let first = min(a, b);
+    let last = max(a, b);
+    return vec2f(max(max(first.x, first.y), first.z), min(min(last.x, last.y), last.z));
+}
+
+// How far on the ray leaves the cube of bricks around this one; 0 or less never comes out.
+fn way_out(at: vec3f, along: vec3f, brick: vec3f, steps: f32) -> f32 {
+    let reach = max(steps, 1.0);
+    // The first brick goes on where the grid has ended.
+    let first = brick + 1.0 - reach;
+    let low = select(first, vec3f(-1.0), first <= vec3f(0.0)) * BRICK;
+    let high = (brick + reach) * BRICK;
+    let room = select(at - low, high - at, along > vec3f(0.0));
+    let ways = (max(room, vec3f(0.0)) + NUDGE) / max(abs(along), vec3f(1e-9));
+    return min(min(ways.x, ways.y), ways.z);
+}
+
+// The brick that a place is in.
+fn brick_of(at: vec3f) -> vec3f {
+    return clamp(floor(at / BRICK), vec3f(0.0), ceil(tooth.dims.xyz / BRICK) - 1.0);
+}
+
+// How density rises, per mm in world space: over a cube two voxels wide, so that stairs that carving along voxels leaves
+// do not catch the light.
+fn slope(at: vec3f) -> vec3f {
+    let a = density(at + vec3f(-1.0, -1.0, -1.0));
+    let b = density(at + vec3f(1.0, -1.0, -1.0));
+    let c = density(at + vec3f(-1.0, 1.0, -1.0));
+    let d = density(at + vec3f(1.0, 1.0, -1.0));
+    let e = density(at + vec3f(-1.0, -1.0, 1.0));
+    let f = density(at + vec3f(1.0, -1.0, 1.0));
+    let g = density(at + vec3f(-1.0, 1.0, 1.0));
+    let h = density(at + vec3f(1.0, 1.0, 1.0));
+    let rise = vec3f(b + d + f + h - a - c - e - g, c + d + g + h - a - b - e - f, e + f + g + h - a - b - c - d);
+    let per_mm = rise * 0.125 / (tooth.spacing.xyz * tooth.spacing.xyz);
+    return (tooth.world_from_voxel * vec4f(per_mm, 0.0)).xyz;
+}
+
+// Share of light that reaches a surface with this normal.
+fn openness(at: vec3f, normal: vec3f) -> f32 {
+    let outside = at + (tooth.voxel_from_world * vec4f(normal * REACH, 0.0)).xyz;
+    let cubes = vec3f(textureDimensions(hollow));
+    return 1.0 - DARKEST * textureSampleLevel(hollow, between, (outside + 0.5) / (tooth.dims.w * cubes), 0.0).r;
+}
+
+// Colour and gloss of the matter around a place, by how much there is of each.
+fn finish(at: vec3f) -> vec4f {
+    let base = floor(at);
+    let part = at - base;
+    let last = vec3i(tooth.dims.xyz) - 1;
+    var sum = vec4f(0.0);
+    var total = 0.0;
+    for (var i = 0; i < 8; i++) {
+        let corner = vec3i(i & 1, (i >> 1u) & 1, i >> 2u);
+        let voxel = textureLoad(voxels, clamp(vec3i(base) + corner, vec3i(0), last), 0).rg;
+        let near = mix(vec3f(1.0) - part, part, vec3f(corner));
+        let weight = near.x * near.y * near.z * voxel.r;
+        sum += tooth.palette[u32(voxel.g * 255.0 + 0.5)] * weight;
+        total += weight;
+    }
+    return sum / max(total, 1e-6);
+}
+
+fn box_corner(index: u32) -> vec3f {
+    // Two triangles for each of six sides, counter-clockwise from outside.
+    var corners = array<u32, 36>(
+        0u, 2u, 1u, 1u, 2u, 3u, 4u, 5u, 6u, 5u, 7u, 6u,
+        0u, 1u, 4u, 1u, 5u, 4u, 2u, 6u, 3u, 3u, 6u, 7u,
+        0u, 4u, 2u, 2u, 4u, 6u, 1u, 3u, 5u, 3u, 7u, 5u,
+    );
+    let corner = corners[index];
+    let share = vec3f(f32(corner & 1u), f32((corner >> 1u) & 1u), f32(corner >> 2u));
+    return mix(tooth.low.xyz, tooth.high.xyz, share);
+}
+
+// The far sides of the box of matter, so that each pixel is asked once and the eye may be inside.
+@vertex
+fn box_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+    return view.clip_from_world * (tooth.world_from_voxel * vec4f(box_corner(index), 1.0));
+}

@@ -1,0 +1,78 @@
+// Colours and opacities by density, blended along each ray. After view.wgsl and tooth.wgsl.
+// Its twin is src/render/twin/volume_pass.rs.
+
+// Depths of what is already drawn.
+@group(2) @binding(0) var scene_depth: texture_depth_2d;
+
+// Opacity at which nothing behind is seen any more.
+const OPAQUE: f32 = 0.99;
+// Gloss of what is lit.
+const GLOSS: f32 = 0.12;
+
+struct Blended {
+    // Multiplied by opacity.
+    colour: vec4f,
+    // Depth of the first sample that shows anything.
+    first: f32,
+}
+
+// What the table of the nearest voxel's label says for the density at a place.
+fn entry(at: vec3f) -> vec4f {
+    let last = vec3i(tooth.dims.xyz) - 1;
+    let nearest = clamp(vec3i(floor(at + 0.5)), vec3i(0), last);
+    let label = i32(textureLoad(voxels, nearest, 0).g * 255.0 + 0.5);
+    return textureLoad(transfer, vec2i(i32(density(at) * 255.0 + 0.5), label), 0);
+}
+
+// From front to back until nothing shines through or the scene ends the ray.
+fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
+    let ends = span(start, along);
+    let end = min(ends.y, behind);
+    // Samples lie at whole steps from the eye, so that leaping over nothing changes nothing.
+    var number = ceil(max(ends.x, view.position.w) / pace);
+    var z = number * pace;
+    var blended = Blended(vec4f(0.0), -1.0);
+    while z < end {
+        let at = start + along * z;
+        let brick = brick_of(at);
+        let steps = f32(textureLoad(empty, vec3i(brick), 0).r);
+        let out = z + way_out(at, along, brick, steps);
+        if steps > 0.0 {
+            number = max(ceil(out / pace), number + 1.0);
+            z = number * pace;
+            continue;
+        }
+        while z < min(out, end) {
+            let found = entry(start + along * z);
+            if found.a > 0.0 {
+                blended.colour += vec4f(found.rgb, 1.0) * (found.a * (1.0 - blended.colour.a));
+                blended.first = select(blended.first, z, blended.first < 0.0);
+                if blended.colour.a > OPAQUE {
+                    return blended;
+                }
+            }
+            number += 1.0;
+            z = number * pace;
+        }
+    }
+    return blended;
+}
+
+@fragment
+fn volume_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
+    let way = ray(pixel.xy);
+    let start = (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
+    let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
+    let behind = depth_of(textureLoad(scene_depth, vec2i(pixel.xy), 0));
+    let blended = blend(start, along, tooth.low.w / length(way), behind);
+    if blended.first < 0.0 {
+        discard;
+    }
+    let plain = blended.colour.rgb / blended.colour.a;
+    let downhill = -slope(start + along * blended.first);
+    let long = length(downhill);
+    let normal = select(-normalize(way), downhill / max(long, 1e-9), long > 1e-6);
+    let lamps = lit(vec4f(plain, GLOSS), 1.0, view.position.xyz + way * blended.first, normal);
+    let colour = screen(mix(plain, lamps, tooth.high.w));
+    return vec4f(colour * blended.colour.a, blended.colour.a);
+}

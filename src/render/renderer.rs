@@ -1,0 +1,286 @@
+//! Draws scenes on a device into whatever target it is given.
+
+use super::brick_surfaces::BrickSurfaces;
+use super::camera::Viewpoint;
+use super::coarse::Coarse;
+use super::eye::Eye;
+use super::gpu::Error;
+use super::passes::DEPTH;
+use super::scene::{Background, Changes, Scene, Shown, Tooth};
+use super::stereo::Stereo;
+use super::stereo_pass::StereoPass;
+use super::surface_pass::SurfacePass;
+use super::tooth::{ToothTextures, Uploads};
+use super::view;
+use super::volume_pass::VolumePass;
+use super::{iso_pass, resources, sound};
+
+/// All pipelines, and what it keeps on the device between pictures.
+pub struct Renderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    format: wgpu::TextureFormat,
+    tooth_layout: wgpu::BindGroupLayout,
+    surface_pass: SurfacePass,
+    iso_pass: wgpu::RenderPipeline,
+    volume_pass: VolumePass,
+    stereo_pass: StereoPass,
+    views: [ViewGroup; 2],
+    tooth: Option<ToothTextures>,
+    /// In place of a volume that is larger than this adapter's textures.
+    coarse: Option<Coarse>,
+    surfaces: Option<BrickSurfaces>,
+    canvases: [Option<Canvas>; 2],
+}
+
+/// Where a picture goes.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// Of the renderer's format, usable as a render attachment.
+    pub view: &'a wgpu::TextureView,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+}
+
+struct ViewGroup {
+    uniform: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+/// One eye's colours and depths.
+struct Canvas {
+    size: [u32; 2],
+    colour: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    depth_group: wgpu::BindGroup,
+}
+
+impl Renderer {
+    /// Makes the pipelines for targets of a format: 8 bits per channel, sRGB or plain, as windows have them.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, format: wgpu::TextureFormat) -> Renderer {
+        let view_layout = resources::layout(device, "view", &[resources::uniform()]);
+        let tooth_layout = ToothTextures::layout(device);
+        let views = [0, 1].map(|_| {
+            let uniform = resources::uniform_buffer(device, "view", size_of::<view::gpu::View>());
+            let group = resources::group(device, &view_layout, [uniform.as_entire_binding()]);
+            ViewGroup { uniform, group }
+        });
+        Renderer {
+            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout),
+            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout),
+            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout),
+            stereo_pass: StereoPass::new(device, format),
+            device: device.clone(),
+            queue: queue.clone(),
+            format,
+            tooth_layout,
+            views,
+            tooth: None,
+            coarse: None,
+            surfaces: None,
+            canvases: [None, None],
+        }
+    }
+
+    /// Draws a scene over the whole target, as one eye sees it or as two do, and submits the work.
+    ///
+    /// Says what it had to bring to the device: after a cut, only the bricks that changed.
+    pub fn draw(
+        &mut self,
+        scene: &Scene,
+        viewpoint: &Viewpoint,
+        stereo: Option<Stereo>,
+        target: Target,
+    ) -> Result<Uploads, Error> {
+        let limit = self.device.limits().max_texture_dimension_2d;
+        sound(scene, viewpoint, stereo, target.size, limit)?;
+        let uploads = self.prepare(scene);
+        let [width, height] = target.size;
+        let ratio = width as f32 / height as f32;
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        match stereo {
+            None => {
+                self.fit_canvas(0, target.size);
+                self.draw_eye(&mut encoder, scene, &viewpoint.eye(ratio), 0, Some(target.view));
+            }
+            Some(stereo) => {
+                let size = stereo.layout.eye_size(target.size);
+                for (side, eye) in stereo.eyes(viewpoint, ratio).iter().enumerate() {
+                    self.fit_canvas(side, size);
+                    if stereo.layout.needs()[side] {
+                        self.draw_eye(&mut encoder, scene, eye, side, None);
+                    }
+                }
+                self.join(&mut encoder, stereo, size, target.view);
+            }
+        }
+        self.queue.submit([encoder.finish()]);
+        Ok(uploads)
+    }
+
+    /// Brings to the device what the scene has new.
+    fn prepare(&mut self, scene: &Scene) -> Uploads {
+        self.surface_pass.prepare(&self.device, &self.queue, &scene.solids);
+        let Some(tooth) = &scene.tooth else { return Uploads::default() };
+        let limit = self.device.limits().max_texture_dimension_3d;
+        let joined = Coarse::needed(tooth.volume.grid().dims, limit);
+        let mut uploads = match joined {
+            1 => self.prepare_textures(tooth),
+            _ => self.prepare_coarse(tooth, joined),
+        };
+        uploads.joined = joined;
+        if uploads.whole {
+            self.surfaces = None;
+        }
+        uploads.surfaces = self.prepare_surfaces(tooth);
+        uploads
+    }
+
+    fn prepare_coarse(&mut self, tooth: &Tooth, joined: u32) -> Uploads {
+        // Out of its place while the textures follow it.
+        let known = self.coarse.take().filter(|coarse| coarse.is_of(tooth.volume, joined));
+        let (coarse, changed) = match (known, tooth.changes) {
+            (Some(mut coarse), Changes::Bricks(bricks)) => {
+                let changed = coarse.update(tooth.volume, bricks);
+                (coarse, Some(changed))
+            }
+            _ => (Coarse::of(tooth.volume, joined), None),
+        };
+        let changes = changed.as_deref().map_or(Changes::Anew, Changes::Bricks);
+        let uploads = self.prepare_textures(&Tooth { volume: &coarse.volume, changes, ..tooth.clone() });
+        self.coarse = Some(coarse);
+        uploads
+    }
+
+    fn prepare_textures(&mut self, tooth: &Tooth) -> Uploads {
+        let mut uploads = Uploads::default();
+        match &mut self.tooth {
+            Some(known) if known.fits(tooth) => {
+                uploads.bricks = known.follow(&self.queue, tooth);
+                known.pose(&self.queue, tooth);
+            }
+            known => {
+                let made = known.insert(ToothTextures::new(&self.device, &self.queue, &self.tooth_layout, tooth));
+                made.pose(&self.queue, tooth);
+                uploads.whole = true;
+            }
+        }
+        uploads
+    }
+
+    /// Follows with triangles only while they are shown: they are made anew when next wanted.
+    fn prepare_surfaces(&mut self, tooth: &Tooth) -> usize {
+        let Tooth { volume, palette, .. } = *tooth;
+        if tooth.shown != Shown::Surface {
+            if tooth.changes != Changes::Bricks(&[]) {
+                self.surfaces = None;
+            }
+            return 0;
+        }
+        match (&mut self.surfaces, tooth.changes) {
+            (Some(known), Changes::Bricks(changed)) if known.has(palette) => {
+                known.update(&self.device, &self.queue, volume, changed)
+            }
+            _ => {
+                self.surfaces = Some(BrickSurfaces::new(&self.device, &self.queue, volume, palette));
+                0
+            }
+        }
+    }
+
+    fn fit_canvas(&mut self, side: usize, size: [u32; 2]) {
+        if self.canvases[side].as_ref().is_some_and(|canvas| canvas.size == size) {
+            return;
+        }
+        let plane = |label, format| {
+            let texture = resources::target_texture(&self.device, label, size, format);
+            texture.create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        let depth = plane("depth", DEPTH);
+        let depth_group = self.volume_pass.group(&self.device, &depth);
+        self.canvases[side] = Some(Canvas { size, colour: plane("eye", self.format), depth, depth_group });
+    }
+
+    /// One eye's picture, into `target` or into its own canvas.
+    fn draw_eye(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene,
+        eye: &Eye,
+        side: usize,
+        target: Option<&wgpu::TextureView>,
+    ) {
+        let Some(canvas) = &self.canvases[side] else { return };
+        let ViewGroup { uniform, group } = &self.views[side];
+        let view = view::view(scene, eye, canvas.size, self.format.is_srgb());
+        self.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&view));
+        let colour = target.unwrap_or(&canvas.colour);
+        let Background { top, bottom } = scene.background;
+        let [r, g, b] = top.map(f64::from);
+        let clear = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
+        let mut pass = begin(encoder, colour, clear, Some(&canvas.depth));
+        pass.set_bind_group(0, group, &[]);
+        // One colour needs no pass; a target that takes linear light would get another.
+        if top != bottom || self.format.is_srgb() {
+            pass.set_pipeline(&self.surface_pass.background);
+            pass.draw(0..3, 0..1);
+        }
+        self.surface_pass.draw_solids(&mut pass);
+        let (Some(tooth), Some(textures)) = (&scene.tooth, &self.tooth) else { return };
+        pass.set_bind_group(1, &textures.group, &[]);
+        match (&tooth.shown, &self.surfaces) {
+            (Shown::Surface, Some(surfaces)) => {
+                pass.set_pipeline(&self.surface_pass.tooth);
+                surfaces.draw(&mut pass);
+            }
+            (Shown::Surface, None) => {}
+            (Shown::Iso, _) => {
+                pass.set_pipeline(&self.iso_pass);
+                pass.draw(iso_pass::BOX, 0..1);
+            }
+            (Shown::Volume(_), _) => {
+                drop(pass);
+                let mut pass = begin(encoder, colour, wgpu::LoadOp::Load, None);
+                pass.set_bind_group(0, group, &[]);
+                pass.set_bind_group(1, &textures.group, &[]);
+                pass.set_bind_group(2, &canvas.depth_group, &[]);
+                pass.set_pipeline(&self.volume_pass.pipeline);
+                pass.draw(iso_pass::BOX, 0..1);
+            }
+        }
+    }
+
+    fn join(&self, encoder: &mut wgpu::CommandEncoder, stereo: Stereo, size: [u32; 2], target: &wgpu::TextureView) {
+        let [Some(left), Some(right)] = &self.canvases else { return };
+        let eyes = [&left.colour, &right.colour];
+        let group = self.stereo_pass.group(&self.device, &self.queue, eyes, stereo.layout, size);
+        let mut pass = begin(encoder, target, wgpu::LoadOp::Clear(wgpu::Color::BLACK), None);
+        pass.set_pipeline(&self.stereo_pass.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+fn begin<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    colour: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+    depth: Option<&wgpu::TextureView>,
+) -> wgpu::RenderPass<'a> {
+    let depth = depth.map(|view| wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: wgpu::StoreOp::Store }),
+        stencil_ops: None,
+    });
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: None,
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: colour,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+        })],
+        depth_stencil_attachment: depth,
+        ..Default::default()
+    })
+}

@@ -1,0 +1,53 @@
+//! One corner of a triangle as it lies in memory, for the shader and for its twin.
+
+use super::scene::{Finish, Rgb};
+use crate::frame::Vec3;
+use bytemuck::{Pod, Zeroable};
+
+/// In step with `surface_pass.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Vertex {
+    /// mm, in the solid's own space.
+    position: [f32; 3],
+    /// Unit normal and gloss, each of 32767.
+    normal: [i16; 4],
+    /// Colour of 255; the fourth is unused.
+    colour: [u8; 4],
+}
+
+const _: () = assert!(size_of::<Vertex>() == 24);
+
+impl Vertex {
+    /// What fills a buffer's gaps; no triangle has it for a corner.
+    pub const NOWHERE: Vertex = Vertex { position: [0.0; 3], normal: [0; 4], colour: [0; 4] };
+
+    pub fn new(position: Vec3, normal: Vec3, finish: Finish) -> Vertex {
+        let short = |v: f32| (v.clamp(-1.0, 1.0) * 32767.0).round() as i16;
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        let [r, g, b] = finish.colour.map(byte);
+        Vertex {
+            position: position.to_array(),
+            normal: [short(normal.x), short(normal.y), short(normal.z), short(finish.gloss)],
+            colour: [r, g, b, u8::MAX],
+        }
+    }
+
+    pub fn position(&self) -> Vec3 {
+        Vec3::from(self.position)
+    }
+
+    pub fn normal(&self) -> Vec3 {
+        let [x, y, z, _] = self.normal.map(|v| f32::from(v) / 32767.0);
+        Vec3::new(x, y, z)
+    }
+
+    pub fn gloss(&self) -> f32 {
+        f32::from(self.normal[3]) / 32767.0
+    }
+
+    pub fn colour(&self) -> Rgb {
+        let [r, g, b, _] = self.colour.map(|v| f32::from(v) / 255.0);
+        [r, g, b]
+    }
+}

@@ -1,0 +1,42 @@
+//! Colours and opacities by density, blended along each ray in front of what is already drawn.
+
+use super::passes::{self, Depth, Faces, Pass};
+use super::resources;
+
+pub const SOURCE: &str = include_str!("../../shaders/volume_pass.wgsl");
+
+pub struct VolumePass {
+    pub pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+impl VolumePass {
+    pub fn new(
+        device: &wgpu::Device,
+        format: wgpu::TextureFormat,
+        view: &wgpu::BindGroupLayout,
+        tooth: &wgpu::BindGroupLayout,
+    ) -> VolumePass {
+        let module = passes::module(device, "volume_pass", &passes::source(SOURCE));
+        let depth = resources::texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
+        let layout = resources::layout(device, "scene depth", &[depth]);
+        let pass = Pass {
+            label: "volume_pass",
+            module: &module,
+            vertex: "box_vertex",
+            fragment: "volume_fragment",
+            groups: &[Some(view), Some(tooth), Some(&layout)],
+            corners: &[],
+            faces: Faces::Far,
+            depth: Depth::None,
+            format,
+            blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+        };
+        VolumePass { pipeline: pass.pipeline(device), layout }
+    }
+
+    /// The depths that end the rays.
+    pub fn group(&self, device: &wgpu::Device, depth: &wgpu::TextureView) -> wgpu::BindGroup {
+        resources::group(device, &self.layout, [wgpu::BindingResource::TextureView(depth)])
+    }
+}

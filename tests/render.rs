@@ -1,0 +1,316 @@
+//! The picture: what adapters draw and what the processor draws is one picture, and it shows what is there.
+//!
+//! Needs an adapter, if only one in software (`scripts/test` installs it). Where there is none, these tests say SKIPPED.
+//! The pictures lie in `target/tmp/render/` to be looked at.
+
+#[path = "render/scenes.rs"]
+mod scenes;
+
+use scenes::*;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use typodont::frame::{Pose, Vec3};
+use typodont::render::*;
+use typodont::volume::{BRICK, Grid, Label, Volume, surface};
+
+/// One test draws at a time: an adapter in software takes all processors anyway.
+fn adapter() -> Option<(Painter, MutexGuard<'static, ()>)> {
+    static TURN: Mutex<()> = Mutex::new(());
+    let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+    match Painter::gpu() {
+        Ok(painter) => Some((painter, turn)),
+        Err(error @ (Error::NoAdapter { .. } | Error::NoDevice { .. })) => {
+            eprintln!("SKIPPED: {error}");
+            None
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn keep(name: &str, image: &Image) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("render");
+    std::fs::create_dir_all(&folder).unwrap();
+    let Image { width, height, rgba } = image;
+    let path = folder.join(format!("{name}.png"));
+    image::save_buffer(path, rgba, *width, *height, image::ColorType::Rgba8).unwrap();
+}
+
+/// Mean difference of a channel, and the share of pixels that differ by 8 or more in any.
+fn differences(a: &Image, b: &Image) -> (f64, f64) {
+    assert_eq!((a.width, a.height), (b.width, b.height));
+    let sum: u64 = a.rgba.iter().zip(&b.rgba).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    let pixels = a.rgba.chunks(4).zip(b.rgba.chunks(4));
+    let far = pixels.filter(|(a, b)| a.iter().zip(*b).any(|(a, b)| a.abs_diff(*b) >= 8)).count();
+    (sum as f64 / (a.rgba.len() / 4 * 3) as f64, far as f64 / (a.rgba.len() / 4) as f64)
+}
+
+fn is_close(a: &Image, b: &Image) -> bool {
+    let (mean, far) = differences(a, b);
+    mean < 1.0 && far < 0.001
+}
+
+#[test]
+fn adapter_and_processor_draw_the_same_picture() {
+    // Aim: every pass agrees with its twin: mean difference under 1 of 255, 99.9 % of pixels under 8.
+    let Some((mut gpu, _turn)) = adapter() else { return };
+    let (volume, palette) = (molar([128, 128, 80]), palette());
+    let mut wrong = Vec::new();
+    for Story { name, scene, viewpoint, stereo, size } in stories(&volume, &palette) {
+        let drawn = gpu.draw(&scene, &viewpoint, stereo, size).unwrap();
+        let twin = Painter::cpu().draw(&scene, &viewpoint, stereo, size).unwrap();
+        keep(&format!("{name}-gpu"), &drawn);
+        keep(&format!("{name}-cpu"), &twin);
+        let (mean, far) = differences(&drawn, &twin);
+        println!("{name}: mean {mean:.3}, {:.3} % by 8 or more", 100.0 * far);
+        if !is_close(&drawn, &twin) {
+            wrong.push(format!("{name}: mean {mean:.3} of 255, {:.3} % of pixels differ by 8 or more", 100.0 * far));
+        }
+        let background = drawn.pixel(0, 0);
+        let seen = drawn.rgba.chunks(4).filter(|p| p[0].abs_diff(background[0]) > 40).count();
+        assert!(seen > 5000, "{name}: {seen} pixels show anything");
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn shaders_are_valid_and_share_their_structs_with_the_program() {
+    // Aim: a struct that is changed on one side only is found without an adapter. Method: naga, which is what wgpu reads
+    // shaders with, lays each struct out; sizes must be those of the program's own.
+    for shader in shaders() {
+        let module = naga::front::wgsl::parse_str(&shader.source)
+            .unwrap_or_else(|e| panic!("{}: {}", shader.name, e.emit_to_string(&shader.source)));
+        let mut validator =
+            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::default());
+        validator.validate(&module).unwrap_or_else(|e| panic!("{}: {e:?}", shader.name));
+        let mut layouter = naga::proc::Layouter::default();
+        layouter.update(module.to_ctx()).unwrap();
+        assert!(!shader.structs.is_empty());
+        for (name, size) in &shader.structs {
+            let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+            let (handle, _) = found.unwrap_or_else(|| panic!("{} has no struct {name}", shader.name));
+            assert_eq!(layouter[handle].size as usize, *size, "{}: {name}", shader.name);
+        }
+    }
+}
+
+#[test]
+fn a_point_on_the_focus_plane_has_no_parallax_in_the_picture() {
+    // Aim: the analytic amount and sign. Method: small balls before, on and behind the focus plane, found again in both
+    // eyes' pictures as the middle of their pixels. For eyes e apart, focus at f, a point at z: e (z - f) / z on the plane.
+    let (focus, apart) = (100.0f32, 6.0f32);
+    let viewpoint = Viewpoint::looking(Vec3::new(0.0, 0.0, focus), Vec3::ZERO, Vec3::Y);
+    let size = [600, 400];
+    let per_mm = size[1] as f32 / (2.0 * focus * (0.5 * viewpoint.field_of_view).tan());
+    let (gpu, _turn) = adapter().unzip();
+    let painters = [Some(Painter::cpu()), gpu];
+    for mut painter in painters.into_iter().flatten() {
+        for z in [70.0f32, 100.0, 150.0] {
+            let white = Finish { colour: [1.0; 3], gloss: 0.0 };
+            let place = Pose::at(Vec3::new(2.0, 1.0, focus - z));
+            let scene = Scene {
+                solids: vec![Solid::plain(ball(1.5), place, white)],
+                lights: Lights { ambient: 1.0, chair: Lamp::OFF, head: Lamp::OFF },
+                background: Background::plain([0.0; 3]),
+                ..Scene::empty()
+            };
+            let mut middle = |layout| {
+                let stereo = Some(Stereo { layout, eye_distance: apart });
+                let image = painter.draw(&scene, &viewpoint, stereo, size).unwrap();
+                let lit = (0..size[0] * size[1]).map(|i| (i % size[0], i / size[0]));
+                let lit: Vec<(u32, u32)> = lit.filter(|&(x, y)| image.pixel(x, y)[0] > 60).collect();
+                assert!(lit.len() > 100);
+                lit.iter().map(|p| p.0 as f32 + 0.5).sum::<f32>() / lit.len() as f32
+            };
+            let parallax = middle(Layout::Right) - middle(Layout::Left);
+            let expected = apart * (z - focus) / z * per_mm;
+            let adapter = painter.adapter();
+            assert!((parallax - expected).abs() < 0.35, "{adapter}, {z} mm: {parallax} pixels, not {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_solid_half_in_front_hides_exactly_what_it_should() {
+    // Aim: one depth for triangles and rays. Method: a block whose right half is before the tooth and whose left half is
+    // behind. Where the tooth alone is seen, the picture is that without the block; where the block must hide the tooth, it
+    // is that without the tooth.
+    let (volume, palette) = (molar([128, 128, 80]), palette());
+    let viewpoint = Viewpoint::looking(Vec3::new(0.0, -2.0, 60.0), Vec3::new(0.0, -2.0, 0.0), Vec3::Y);
+    let size = [300, 300];
+    let block = |x: f32, z: f32| {
+        let finish = Finish { colour: [0.1, 0.3, 0.9], gloss: 0.0 };
+        Solid::plain(block(Vec3::new(6.0, 2.0, 1.0)), Pose::at(Vec3::new(x, -2.0, z)), finish)
+    };
+    let (gpu, _turn) = adapter().unzip();
+    for mut painter in [Some(Painter::cpu()), gpu].into_iter().flatten() {
+        for shown in [Shown::Surface, Shown::Iso, tissue(&palette)] {
+            let mut draw = |tooth: Option<Tooth>, solids: Vec<Solid>| {
+                let background = Background::plain([0.0; 3]);
+                let scene = Scene { tooth, solids, background, ..Scene::empty() };
+                painter.draw(&scene, &viewpoint, None, size).unwrap()
+            };
+            let tooth = || Some(tooth(&volume, &palette, shown.clone()));
+            let (before, behind) = (block(6.0, 14.0), block(-6.0, -14.0));
+            let both = draw(tooth(), vec![before.clone(), behind.clone()]);
+            let alone = draw(tooth(), vec![]);
+            let front_alone = draw(None, vec![before]);
+            let behind_alone = draw(None, vec![behind]);
+            let (mut hidden, mut hiding) = (0, 0);
+            let is_black = |p: [u8; 4]| p[..3] == [0; 3];
+            let is_opaque = !matches!(shown, Shown::Volume(_));
+            for (x, y) in (0..size[0] * size[1]).map(|i| (i % size[0], i / size[0])) {
+                let seen = both.pixel(x, y);
+                if !is_black(front_alone.pixel(x, y)) {
+                    assert_eq!(seen, front_alone.pixel(x, y), "{shown:?} {x} {y}: the block is before the tooth");
+                    hidden += u32::from(!is_black(alone.pixel(x, y)));
+                } else if is_black(behind_alone.pixel(x, y)) || is_opaque && !is_black(alone.pixel(x, y)) {
+                    assert_eq!(seen, alone.pixel(x, y), "{shown:?} {x} {y}: the tooth is before the block");
+                    hiding += u32::from(!is_black(behind_alone.pixel(x, y)));
+                }
+            }
+            assert!(hidden > 300 && (hiding > 300 || !is_opaque), "{hidden} {hiding}");
+        }
+    }
+}
+
+#[test]
+fn after_a_cut_only_its_bricks_travel_and_the_picture_is_as_made_anew() {
+    // Aim: the cost of a cut is that of its bricks, in every way of seeing. Method: count what is brought over, and compare
+    // with a painter that has never seen the tooth before.
+    let Some((mut gpu, _turn)) = adapter() else { return };
+    let palette = palette();
+    let orbit = Orbit { middle: Vec3::new(0.0, 1.0, 0.0), turn: 0.5, tilt: 0.9, distance: 40.0 };
+    for shown in [Shown::Surface, Shown::Iso, tissue(&palette)] {
+        let mut volume = molar([128, 128, 80]);
+        let whole = Scene { tooth: Some(tooth(&volume, &palette, shown.clone())), ..Scene::empty() };
+        let before = gpu.draw(&whole, &orbit.viewpoint(), None, [300, 300]).unwrap();
+        let middle = surface::extract(&volume).positions.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+        for step in 0..6 {
+            carve(&mut volume, middle + Vec3::new(-0.2, 0.1, -0.5) * step as f32, 1.0);
+            let changed = volume.take_dirty();
+            let cut = Tooth { changes: Changes::Bricks(&changed), ..tooth(&volume, &palette, shown.clone()) };
+            let Painter::Gpu(painter) = &mut gpu else { unreachable!() };
+            let scene = Scene { tooth: Some(cut), ..Scene::empty() };
+            let uploads = painter.paint(&scene, &orbit.viewpoint(), None, [300, 300]).unwrap();
+            assert!(!uploads.whole && uploads.bricks == changed.len() && !changed.is_empty(), "{uploads:?}");
+            let around = surface::affected(&volume, &changed).len();
+            assert_eq!(uploads.surfaces, if shown == Shown::Surface { around } else { 0 });
+            assert!(changed.len() < volume.bricks().len() / 20, "{} bricks of {BRICK}³", changed.len());
+        }
+        let cut = Tooth { changes: Changes::Bricks(&[]), ..tooth(&volume, &palette, shown.clone()) };
+        let after =
+            gpu.draw(&Scene { tooth: Some(cut), ..Scene::empty() }, &orbit.viewpoint(), None, [300, 300]).unwrap();
+        let anew = Scene { tooth: Some(tooth(&volume, &palette, shown.clone())), ..Scene::empty() };
+        let anew = Painter::gpu().unwrap().draw(&anew, &orbit.viewpoint(), None, [300, 300]).unwrap();
+        let (mean, far) = differences(&after, &anew);
+        assert!(mean < 0.02 && far < 0.0005, "{shown:?}: mean {mean}, {far} far");
+        let (_, changed) = differences(&before, &after);
+        assert!(changed > 0.01, "the cut is seen: {changed}");
+    }
+}
+
+#[test]
+fn matter_at_the_grids_end_is_drawn_closed() {
+    // Aim: rays come out of the grid wherever matter touches its end. Method: a grid all full, seen from eight corners; a
+    // ray once went back and forth in the first brick for ever.
+    let grid = Grid::centred([21, 16, 13], Vec3::splat(0.5));
+    let volume = Volume::from_distance(grid, 0.75, |_| (-9.0, Label(1)));
+    let palette = palette();
+    let (mut gpu, _turn) = adapter().unzip();
+    for n in 0..8u32 {
+        let side = |bit: u32| if n >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        let from = Vec3::new(20.0 * side(0), 14.0 * side(1), 17.0 * side(2));
+        let viewpoint = Viewpoint::looking(from, Vec3::ZERO, Vec3::Y);
+        let draw = |painter: &mut Painter, shown| {
+            let background = Background::plain([0.0; 3]);
+            let scene = Scene { tooth: Some(tooth(&volume, &palette, shown)), background, ..Scene::empty() };
+            painter.draw(&scene, &viewpoint, None, [160, 120]).unwrap()
+        };
+        let surface = draw(&mut Painter::cpu(), Shown::Surface);
+        let iso = draw(&mut Painter::cpu(), Shown::Iso);
+        let covered = |image: &Image| image.rgba.chunks(4).filter(|p| p[0] > 20).count() as f64;
+        assert!(covered(&surface) > 2000.0);
+        // Triangles cut the block's edges off straight where rays see them round.
+        assert!((covered(&iso) / covered(&surface) - 1.0).abs() < 0.05, "{} {}", covered(&iso), covered(&surface));
+        if let Some(gpu) = &mut gpu {
+            for shown in [Shown::Iso, tissue(&palette)] {
+                assert!(is_close(&draw(gpu, shown.clone()), &draw(&mut Painter::cpu(), shown)), "corner {n}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_adapter_with_small_textures_shows_a_coarser_tooth_and_says_so() {
+    // Aim: a picture and a notice instead of a crash. Method: a device that is held to textures of 64 voxels.
+    let Some((mut gpu, _turn)) = adapter() else { return };
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let found = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).unwrap();
+    let required_limits = wgpu::Limits { max_texture_dimension_3d: 64, ..found.limits() };
+    let asked = wgpu::DeviceDescriptor { required_limits, ..Default::default() };
+    let (device, queue) = pollster::block_on(found.request_device(&asked)).unwrap();
+    let mut small = Painter::on(Gpu { watch: Watch::over(&device), device, queue, name: "small".into() }).unwrap();
+    let (volume, palette) = (molar([128, 128, 80]), palette());
+    let orbit = Orbit { middle: Vec3::new(0.0, 1.0, 0.0), turn: 0.5, tilt: 0.75, distance: 42.0 };
+    let scene = Scene { tooth: Some(tooth(&volume, &palette, Shown::Iso)), ..Scene::empty() };
+    let Painter::Gpu(painter) = &mut small else { unreachable!() };
+    let uploads = painter.paint(&scene, &orbit.viewpoint(), None, [200, 180]).unwrap();
+    assert_eq!((uploads.whole, uploads.joined), (true, 2));
+    let coarse = small.draw(&scene, &orbit.viewpoint(), None, [200, 180]).unwrap();
+    let fine = gpu.draw(&scene, &orbit.viewpoint(), None, [200, 180]).unwrap();
+    keep("coarse", &coarse);
+    let (mean, _) = differences(&coarse, &fine);
+    assert!(mean > 0.05 && mean < 6.0, "the same tooth, coarser: {mean}");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_in_words() {
+    let viewpoint = Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
+    let (gpu, _turn) = adapter().unzip();
+    for mut painter in [Some(Painter::cpu()), gpu].into_iter().flatten() {
+        let mut refused = |scene: &Scene, viewpoint: Viewpoint, size| {
+            let told = painter.draw(scene, &viewpoint, None, size).unwrap_err().to_string();
+            assert!(told.starts_with("impossible-picture: "), "{told}");
+            told
+        };
+        let scene = Scene::empty();
+        assert!(refused(&scene, viewpoint, [0, 20]).contains("0x20"));
+        assert!(refused(&scene, viewpoint, [20, 70_000]).contains("20x70000"));
+        refused(&scene, Viewpoint { near: f32::NAN, ..viewpoint }, [20, 20]);
+        refused(&scene, Viewpoint { position: viewpoint.focus, ..viewpoint }, [20, 20]);
+        let grey = Finish { colour: [0.5; 3], gloss: 0.0 };
+        let nowhere = Solid::plain(ball(1.0), Pose::at(Vec3::splat(f32::INFINITY)), grey);
+        let scene = Scene { solids: vec![nowhere], ..Scene::empty() };
+        assert!(refused(&scene, viewpoint, [20, 20]).contains("solid 0"));
+    }
+}
+
+#[test]
+fn a_lost_device_is_told_and_another_goes_on() {
+    // Aim: no crash, an error that says what to do. Method: destroy the device under a painter.
+    let Some((_, _turn)) = adapter() else { return };
+    let gpu = Gpu::open().unwrap();
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, wgpu::TextureFormat::Rgba8Unorm);
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d { width: 64, height: 64, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: wgpu::TextureFormat::Rgba8Unorm,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
+        view_formats: &[],
+    });
+    let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+    let viewpoint = Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
+    let target = Target { view: &view, size: [64, 64] };
+    renderer.draw(&Scene::empty(), &viewpoint, None, target).unwrap();
+    assert_eq!(gpu.watch.check(), Ok(()));
+    gpu.device.destroy();
+    let _ = renderer.draw(&Scene::empty(), &viewpoint, None, target);
+    let _ = gpu.device.poll(wgpu::PollType::Wait { submission_index: None, timeout: None });
+    let told = gpu.watch.check().unwrap_err();
+    assert!(matches!(told, Error::Lost { .. }), "{told}");
+    assert!(gpu.watch.check().is_err(), "it stays lost");
+    assert!(Painter::gpu().unwrap().draw(&Scene::empty(), &viewpoint, None, [32, 32]).is_ok());
+}
