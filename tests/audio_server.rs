@@ -3,6 +3,9 @@
 
 mod hearing;
 
+#[path = "drivers/peace.rs"]
+mod peace;
+
 use hearing::*;
 use std::fs::{self, File};
 use std::io::{Read, Write};
@@ -128,156 +131,168 @@ fn silent(player: &mut Player) -> Silence {
 
 #[test]
 fn a_server_lets_idle_light_and_heavy_grinding_be_heard() {
-    // Aim: what the synthesiser makes reaches an ear. Method: the null sink's monitor, recorded; spectra as middle values, so
-    // that a gap on a busy machine decides nothing.
-    let folder = folder("spectra");
-    let Some(_server) = server(&folder) else { return };
-    let (mut sounds, heard) = sounds();
-    let server = Some(folder.join("socket"));
-    let mut player = Player::start(heard, Output { server, ..Output::default() });
-    let (_, latency) = playing(&mut player);
-    // What the server grants, not what a clock saw.
-    assert!(latency <= Duration::from_millis(40), "{latency:?}");
-    let mut recorder = Recorder::start(&folder);
+    peace::in_real_time(|| {
+        // Aim: what the synthesiser makes reaches an ear. Method: the null sink's monitor, recorded; spectra as middle values, so
+        // that a gap on a busy machine decides nothing.
+        let folder = folder("spectra");
+        let Some(_server) = server(&folder) else { return };
+        let (mut sounds, heard) = sounds();
+        let server = Some(folder.join("socket"));
+        let mut player = Player::start(heard, Output { server, ..Output::default() });
+        let (_, latency) = playing(&mut player);
+        // What the server grants, not what a clock saw.
+        assert!(latency <= Duration::from_millis(40), "{latency:?}");
+        let mut recorder = Recorder::start(&folder);
 
-    let silence = recorder.settled(&mut sounds, &DrillLoad::default());
-    assert_eq!(level(&silence), 0.0);
-    let [idle, light, heavy, dentine] =
-        [idle(), grinding(0.3), grinding(2.0), DrillLoad { hardness: 60.0, ..grinding(2.0) }]
-            .map(|load| Spectrum::of(&recorder.settled(&mut sounds, &load)));
-    // The rotor: 5000 Hz free, a tenth less at 0.3 N, a third of it at 2 N.
-    let pitch = idle.peak(3000.0, 5500.0);
-    assert!((pitch / 5000.0 - 1.0).abs() < 0.02, "{pitch}");
-    let pitch = light.peak(3000.0, 5500.0);
-    assert!((pitch / 4500.0 - 1.0).abs() < 0.02, "{pitch}");
-    assert!(heavy.power(4400.0, 5100.0) < 0.5 * idle.power(4900.0, 5100.0));
-    // The grinding: where a free handpiece is quiet.
-    let grind = |spectrum: &Spectrum| spectrum.power(200.0, 900.0);
-    assert!(grind(&light) > 3.0 * grind(&idle), "{} {}", grind(&light), grind(&idle));
-    assert!(grind(&heavy) > 1.5 * grind(&light), "{} {}", grind(&heavy), grind(&light));
-    assert!(heavy.brightness() > 1.2 * dentine.brightness(), "{} {}", heavy.brightness(), dentine.brightness());
+        let silence = recorder.settled(&mut sounds, &DrillLoad::default());
+        assert_eq!(level(&silence), 0.0);
+        let [idle, light, heavy, dentine] =
+            [idle(), grinding(0.3), grinding(2.0), DrillLoad { hardness: 60.0, ..grinding(2.0) }]
+                .map(|load| Spectrum::of(&recorder.settled(&mut sounds, &load)));
+        // The rotor: 5000 Hz free, a tenth less at 0.3 N, a third of it at 2 N.
+        let pitch = idle.peak(3000.0, 5500.0);
+        assert!((pitch / 5000.0 - 1.0).abs() < 0.02, "{pitch}");
+        let pitch = light.peak(3000.0, 5500.0);
+        assert!((pitch / 4500.0 - 1.0).abs() < 0.02, "{pitch}");
+        assert!(heavy.power(4400.0, 5100.0) < 0.5 * idle.power(4900.0, 5100.0));
+        // The grinding: where a free handpiece is quiet.
+        let grind = |spectrum: &Spectrum| spectrum.power(200.0, 900.0);
+        assert!(grind(&light) > 3.0 * grind(&idle), "{} {}", grind(&light), grind(&idle));
+        assert!(grind(&heavy) > 1.5 * grind(&light), "{} {}", grind(&heavy), grind(&light));
+        assert!(heavy.brightness() > 1.2 * dentine.brightness(), "{} {}", heavy.brightness(), dentine.brightness());
 
-    let silence = recorder.settled(&mut sounds, &DrillLoad::default());
-    assert_eq!(level(&silence), 0.0);
-    println!("latency {latency:?}, {} gaps", player.gaps());
-    let _ = fs::remove_dir_all(folder);
+        let silence = recorder.settled(&mut sounds, &DrillLoad::default());
+        assert_eq!(level(&silence), 0.0);
+        println!("latency {latency:?}, {} gaps", player.gaps());
+        let _ = fs::remove_dir_all(folder);
+    })
 }
 
 #[test]
 fn contact_starts_and_stops_within_20_ms_at_the_ear() {
-    // Aim: touch and release arrive as sharp as they were sent. Method: a probe on enamel, out of silence; in the recorded stream,
-    // how long it takes from the first sound to the usual level, and from the last of the usual level to silence. The best of
-    // several touches: a gap of a busy server may tear one.
-    let folder = folder("contact");
-    let Some(_server) = server(&folder) else { return };
-    let (mut sounds, heard) = sounds();
-    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
-    playing(&mut player);
-    let mut recorder = Recorder::start(&folder);
-    let rest = DrillLoad { tool: Tool::Hand, ..DrillLoad::default() };
-    recorder.settled(&mut sounds, &rest);
-    // Steady enough to have a usual level within 5 ms: drawn so fast that its ridges blur.
-    let touching = DrillLoad { surface_speed: 60.0, ..scratching() };
+    peace::in_real_time(|| {
+        // Aim: touch and release arrive as sharp as they were sent. Method: a probe on enamel, out of silence; in the recorded stream,
+        // how long it takes from the first sound to the usual level, and from the last of the usual level to silence. The best of
+        // several touches: a gap of a busy server may tear one.
+        let folder = folder("contact");
+        let Some(_server) = server(&folder) else { return };
+        let (mut sounds, heard) = sounds();
+        let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+        playing(&mut player);
+        let mut recorder = Recorder::start(&folder);
+        let rest = DrillLoad { tool: Tool::Hand, ..DrillLoad::default() };
+        recorder.settled(&mut sounds, &rest);
+        // Steady enough to have a usual level within 5 ms: drawn so fast that its ridges blur.
+        let touching = DrillLoad { surface_speed: 60.0, ..scratching() };
 
-    let (mut starts, mut stops) = (Vec::new(), Vec::new());
-    for _ in 0..5 {
-        recorder.catch_up();
-        sounds.load(&touching);
-        let on = recorder.take(0.6);
-        let usual = level(&on[on.len() - 9600..]);
-        assert!(usual > 0.005, "{usual}");
-        sounds.load(&rest);
-        let off = recorder.take(0.6);
-        let begun = on.iter().position(|s| *s != 0.0).unwrap_or(0);
-        starts.push(on[begun..].chunks(240).position(|part| level(part) > 0.6 * usual).unwrap_or(999) * 5 + 5);
-        let parts: Vec<f32> = off.chunks(240).map(level).collect();
-        let last = parts.iter().rposition(|part| *part > 0.6 * usual).unwrap_or(0);
-        let end = parts.iter().rposition(|part| *part > 0.0).unwrap_or(0);
-        assert_eq!(parts.last(), Some(&0.0), "it ends in silence");
-        stops.push((end - last) * 5);
-    }
-    println!("from first sound to the usual level {starts:?} ms, from there to silence {stops:?} ms");
-    assert!(starts.iter().any(|ms| *ms <= 20), "{starts:?}");
-    assert!(stops.iter().any(|ms| *ms <= 20), "{stops:?}");
-    let _ = fs::remove_dir_all(folder);
+        let (mut starts, mut stops) = (Vec::new(), Vec::new());
+        for _ in 0..5 {
+            recorder.catch_up();
+            sounds.load(&touching);
+            let on = recorder.take(0.6);
+            let usual = level(&on[on.len() - 9600..]);
+            assert!(usual > 0.005, "{usual}");
+            sounds.load(&rest);
+            let off = recorder.take(0.6);
+            let begun = on.iter().position(|s| *s != 0.0).unwrap_or(0);
+            starts.push(on[begun..].chunks(240).position(|part| level(part) > 0.6 * usual).unwrap_or(999) * 5 + 5);
+            let parts: Vec<f32> = off.chunks(240).map(level).collect();
+            let last = parts.iter().rposition(|part| *part > 0.6 * usual).unwrap_or(0);
+            let end = parts.iter().rposition(|part| *part > 0.0).unwrap_or(0);
+            assert_eq!(parts.last(), Some(&0.0), "it ends in silence");
+            stops.push((end - last) * 5);
+        }
+        println!("from first sound to the usual level {starts:?} ms, from there to silence {stops:?} ms");
+        assert!(starts.iter().any(|ms| *ms <= 20), "{starts:?}");
+        assert!(stops.iter().any(|ms| *ms <= 20), "{stops:?}");
+        let _ = fs::remove_dir_all(folder);
+    })
 }
 
 #[test]
 fn a_cry_reaches_the_ear_and_ends() {
-    let folder = folder("cry");
-    let Some(_server) = server(&folder) else { return };
-    let (mut sounds, heard) = sounds();
-    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
-    playing(&mut player);
-    let mut recorder = Recorder::start(&folder);
-    assert_eq!(level(&recorder.take(0.3)), 0.0);
-    assert!(sounds.cry(1.0));
-    let said = recorder.take(2.0);
-    assert!(level(&said) > 0.01, "{}", level(&said));
-    assert_eq!(level(&recorder.take(0.3)), 0.0);
-    let _ = fs::remove_dir_all(folder);
+    peace::in_real_time(|| {
+        let folder = folder("cry");
+        let Some(_server) = server(&folder) else { return };
+        let (mut sounds, heard) = sounds();
+        let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+        playing(&mut player);
+        let mut recorder = Recorder::start(&folder);
+        assert_eq!(level(&recorder.take(0.3)), 0.0);
+        assert!(sounds.cry(1.0));
+        let said = recorder.take(2.0);
+        assert!(level(&said) > 0.01, "{}", level(&said));
+        assert_eq!(level(&recorder.take(0.3)), 0.0);
+        let _ = fs::remove_dir_all(folder);
+    })
 }
 
 #[test]
 fn a_server_that_dies_is_named_once_and_found_again() {
-    // Aim: a dying server costs one sentence, and a new one is heard. Method: kill it while it plays, start another one.
-    let folder = folder("death");
-    let Some(first) = server(&folder) else { return };
-    let (mut sounds, heard) = sounds();
-    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
-    sounds.load(&idle());
-    playing(&mut player);
-    drop(first);
-    let silence = silent(&mut player);
-    assert!(matches!(silence, Silence::Lost { .. }), "{silence:?}");
-    std::thread::sleep(RETRY + RETRY / 2);
-    assert_eq!(player.news(), None, "said once");
-    let _ = fs::remove_file(folder.join("socket"));
-    let _second = server(&folder);
-    playing(&mut player);
-    let mut recorder = Recorder::start(&folder);
-    recorder.take(0.5);
-    assert!(level(&recorder.take(0.5)) > 0.01);
-    let _ = fs::remove_dir_all(folder);
+    peace::in_real_time(|| {
+        // Aim: a dying server costs one sentence, and a new one is heard. Method: kill it while it plays, start another one.
+        let folder = folder("death");
+        let Some(first) = server(&folder) else { return };
+        let (mut sounds, heard) = sounds();
+        let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+        sounds.load(&idle());
+        playing(&mut player);
+        drop(first);
+        let silence = silent(&mut player);
+        assert!(matches!(silence, Silence::Lost { .. }), "{silence:?}");
+        std::thread::sleep(RETRY + RETRY / 2);
+        assert_eq!(player.news(), None, "said once");
+        let _ = fs::remove_file(folder.join("socket"));
+        let _second = server(&folder);
+        playing(&mut player);
+        let mut recorder = Recorder::start(&folder);
+        recorder.take(0.5);
+        assert!(level(&recorder.take(0.5)) > 0.01);
+        let _ = fs::remove_dir_all(folder);
+    })
 }
 
 #[test]
 fn without_a_server_it_says_so_once_and_goes_on() {
-    let folder = folder("none");
-    let (mut sounds, heard) = sounds();
-    let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
-    let silence = silent(&mut player);
-    let said = silence.to_string();
-    assert!(matches!(silence, Silence::None { .. }), "{silence:?}");
-    assert!(said.contains("socket") && said.contains("start PipeWire or PulseAudio"), "{said}");
-    // Loads are taken all the same; of cries only as many as may wait.
-    let taken = (0..100).filter(|_| sounds.cry(1.0)).count();
-    assert!((1..100).contains(&taken), "{taken}");
-    sounds.load(&idle());
-    std::thread::sleep(RETRY + RETRY / 2);
-    assert_eq!(player.news(), None, "said once");
-    let _ = fs::remove_dir_all(folder);
+    peace::in_real_time(|| {
+        let folder = folder("none");
+        let (mut sounds, heard) = sounds();
+        let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+        let silence = silent(&mut player);
+        let said = silence.to_string();
+        assert!(matches!(silence, Silence::None { .. }), "{silence:?}");
+        assert!(said.contains("socket") && said.contains("start PipeWire or PulseAudio"), "{said}");
+        // Loads are taken all the same; of cries only as many as may wait.
+        let taken = (0..100).filter(|_| sounds.cry(1.0)).count();
+        assert!((1..100).contains(&taken), "{taken}");
+        sounds.load(&idle());
+        std::thread::sleep(RETRY + RETRY / 2);
+        assert_eq!(player.news(), None, "said once");
+        let _ = fs::remove_dir_all(folder);
+    })
 }
 
 #[test]
 fn a_server_that_talks_nonsense_is_refused_and_does_no_harm() {
-    // Aim: whatever answers at the socket, the player names it and goes on. Method: nonsense, a message beyond all measure, and
-    // one that hangs up.
-    for (what, answer) in [("nonsense", vec![7u8; 400]), ("hangs up", vec![]), ("zeros", vec![0u8; 400])] {
-        let folder = folder(&format!("nonsense-{}", what.replace(' ', "-")));
-        let listener = UnixListener::bind(folder.join("socket")).unwrap();
-        let answering = std::thread::spawn(move || {
-            let (mut socket, _) = listener.accept().unwrap();
-            let mut asked = [0; 20];
-            let _ = socket.read(&mut asked);
-            let _ = socket.write_all(&answer);
-        });
-        let (_sounds, heard) = sounds();
-        let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
-        let silence = silent(&mut player);
-        assert!(matches!(silence, Silence::Refused { .. }), "{what}: {silence:?}");
-        drop(player);
-        answering.join().unwrap();
-        let _ = fs::remove_dir_all(folder);
-    }
+    peace::in_real_time(|| {
+        // Aim: whatever answers at the socket, the player names it and goes on. Method: nonsense, a message beyond all measure, and
+        // one that hangs up.
+        for (what, answer) in [("nonsense", vec![7u8; 400]), ("hangs up", vec![]), ("zeros", vec![0u8; 400])] {
+            let folder = folder(&format!("nonsense-{}", what.replace(' ', "-")));
+            let listener = UnixListener::bind(folder.join("socket")).unwrap();
+            let answering = std::thread::spawn(move || {
+                let (mut socket, _) = listener.accept().unwrap();
+                let mut asked = [0; 20];
+                let _ = socket.read(&mut asked);
+                let _ = socket.write_all(&answer);
+            });
+            let (_sounds, heard) = sounds();
+            let mut player = Player::start(heard, Output { server: Some(folder.join("socket")), ..Output::default() });
+            let silence = silent(&mut player);
+            assert!(matches!(silence, Silence::Refused { .. }), "{what}: {silence:?}");
+            drop(player);
+            answering.join().unwrap();
+            let _ = fs::remove_dir_all(folder);
+        }
+    })
 }
