@@ -2,19 +2,13 @@
 //!
 //! Takes the default output. Gives a stream that the system calls for samples. Needs no library beyond the system's own.
 
-use super::player::{Heard, Output, Shared, Silence};
+use super::player::{BLOCK, Heard, LISTEN_FOR, Output, Shared, Silence};
 use super::synth::Synth;
 use cpal::traits::{DeviceTrait, HostTrait, StreamTrait};
 use cpal::{BufferSize, Device, ErrorKind, StreamConfig, SupportedBufferSize};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, mpsc};
 use std::time::Duration;
-
-/// How long one wait for the end lasts.
-const LISTEN_FOR: Duration = Duration::from_millis(50);
-
-/// Samples at most between two looks at the load: 2.7 ms at 48 kHz. Whole looks of the synthesiser.
-const BLOCK: usize = 128;
 
 /// The system's default output.
 pub struct Stream {

@@ -127,6 +127,12 @@ impl std::error::Error for Silence {}
 /// How often a missing server is looked for. Below 1 s a refusing one would be pestered.
 pub const RETRY: Duration = Duration::from_secs(2);
 
+/// Samples at most between two looks at the load: 2.7 ms at 48 kHz. Whole looks of the synthesiser.
+pub(super) const BLOCK: usize = 128;
+
+/// How long one wait for a server's wishes, or for the end, lasts.
+pub(super) const LISTEN_FOR: Duration = Duration::from_millis(50);
+
 /// News that may wait to be read.
 const NEWS_WAITING: usize = 16;
 

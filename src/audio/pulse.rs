@@ -3,7 +3,7 @@
 //! Takes a socket. Gives a stream that fills whatever the server asks for. Needs no library of the system; waits only on its
 //! own thread, and nowhere for long.
 
-use super::player::{Heard, Output, Shared, Silence};
+use super::player::{BLOCK, Heard, LISTEN_FOR, Output, Shared, Silence};
 use super::synth::Synth;
 use pulseaudio::protocol::{
     self, AuthParams, AuthReply, ChannelMap, ChannelVolume, Command, CommandReply, CreatePlaybackStreamReply,
@@ -23,12 +23,8 @@ const RATE: u32 = 48_000;
 /// Bytes of a sample: 32-bit floats.
 const SAMPLE: usize = 4;
 
-/// Samples at most between two looks at the load: 2.7 ms. Whole looks of the synthesiser.
-const BLOCK: usize = 128;
-
-/// How long a server may take to answer, and how long one wait for its wishes lasts.
+/// How long a server may take to answer.
 const ANSWERS_WITHIN: Duration = Duration::from_secs(1);
-const LISTEN_FOR: Duration = Duration::from_millis(50);
 
 /// A server that wants nothing for so many waits, 3 s, has stopped working.
 const WAITS_MAX: u32 = 60;

@@ -6,6 +6,7 @@
 use super::scene::Palette;
 use super::surface_mesh;
 use super::vertex::Vertex;
+use crate::volume::march::rows::each;
 use crate::volume::{Volume, surface};
 use std::ops::Range;
 
@@ -60,7 +61,7 @@ impl Part {
 impl BrickSurfaces {
     /// Every brick of a volume.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, palette: &Palette) -> BrickSurfaces {
-        let parts = all_parts(volume, palette);
+        let parts = each(volume.bricks().len(), |brick| Part::of(volume, palette, brick));
         let mut slots = Vec::with_capacity(parts.len());
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
         for part in &parts {
@@ -137,19 +138,6 @@ fn slot_after(vertices: usize, triangles: usize, part: &Part) -> Slot {
         vertices: vertices..vertices + roomy(part.vertices.len()),
         triangles: triangles..triangles + roomy(part.triangles.len()),
     }
-}
-
-/// The surfaces of all bricks; two threads share the work.
-fn all_parts(volume: &Volume, palette: &Palette) -> Vec<Part> {
-    let count = volume.bricks().len();
-    let some = |range: Range<usize>| range.map(|b| Part::of(volume, palette, b)).collect::<Vec<_>>();
-    std::thread::scope(|scope| {
-        let upper = scope.spawn(|| some(count / 2..count));
-        let mut all = some(0..count / 2);
-        // A panic there is one here.
-        all.extend(upper.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        all
-    })
 }
 
 /// A buffer that doubles when it is full. Lengths are in items.

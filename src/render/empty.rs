@@ -2,6 +2,7 @@
 
 use super::scene::Shown;
 use super::transfer::TransferFunction;
+use crate::volume::march::rows::each;
 use crate::volume::{BRICK, ISO, Label, Volume};
 
 /// What rays through a brick can meet. A brick's cells mix its voxels with the next bricks' first.
@@ -30,7 +31,7 @@ const FAR: u8 = 15;
 
 impl Empty {
     pub fn of(volume: &Volume, shown: &Shown) -> Empty {
-        let content: Vec<Content> = contents(volume);
+        let content: Vec<Content> = each(volume.bricks().len(), |brick| content(volume, brick));
         let mut empty = Empty { dims: volume.bricks().dims(), content, steps: Vec::new(), shown: shown.clone() };
         empty.measure();
         empty
@@ -156,19 +157,6 @@ fn with_sharing(volume: &Volume, changed: &[usize]) -> Vec<usize> {
     all.sort_unstable();
     all.dedup();
     all
-}
-
-/// What all bricks hold. The work is shared by two threads: a large volume is read whole here.
-fn contents(volume: &Volume) -> Vec<Content> {
-    let count = volume.bricks().len();
-    let some = |range: std::ops::Range<usize>| range.map(|b| content(volume, b)).collect::<Vec<_>>();
-    std::thread::scope(|scope| {
-        let upper = scope.spawn(|| some(count / 2..count));
-        let mut all = some(0..count / 2);
-        // A panic there is one here.
-        all.extend(upper.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        all
-    })
 }
 
 fn content(volume: &Volume, brick: usize) -> Content {

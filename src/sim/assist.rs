@@ -53,8 +53,8 @@ impl Second {
         let Some(attendant) = &mut self.attendant else { return self.lead(reading) };
         match self.link.hear().filter(|(_, delay)| *delay < SILENT_AFTER) {
             Some((mate, _)) if mate.position.is_finite() => {
-                let tooth_from_world = world.world_from_tooth().inverse();
-                let tip = attendant.follow(world.matter(), world.materials(), &tooth_from_world, mate.position);
+                let (matter, materials) = (world.matter(), world.materials());
+                let tip = attendant.follow(matter, materials, world.world_from_tooth(), mate.position);
                 // The tie that holds an instructor's hand at the trainee's holds an assistant's at its own tip.
                 self.link.tell(&Mate { position: tip, is_leading: false, ..mate });
             }

@@ -29,15 +29,15 @@ impl Attendant {
     /// Where the tip is while the hand is at a place; both in world space, mm.
     ///
     /// A hand that comes in inside matter is reached exactly, and so not pushed, until it has been out.
-    pub fn follow(&mut self, matter: &Matter, materials: &Materials, tooth_from_world: &Pose, hand: Vec3) -> Vec3 {
-        let held = *tooth_from_world * Pose { position: hand, ..Pose::IDENTITY };
+    pub fn follow(&mut self, matter: &Matter, materials: &Materials, world_from_tooth: &Pose, hand: Vec3) -> Vec3 {
+        let held = world_from_tooth.inverse() * Pose { position: hand, ..Pose::IDENTITY };
         if !self.is_out {
             self.is_out = Proxy::is_free_at(matter, &self.instrument, &held);
             self.proxy.let_go(held.position);
             return hand;
         }
         self.proxy.follow(matter, &self.instrument, materials, &held);
-        tooth_from_world.inverse() * self.proxy.tip()
+        *world_from_tooth * self.proxy.tip()
     }
 
     /// The hand was let go.

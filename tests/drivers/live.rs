@@ -2,10 +2,11 @@
 
 use crate::rig::{Misbehaviour, Rig, SharedHand};
 use crate::simulated::Simulated;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use typodont::content::Library;
-use typodont::device::Link;
+use typodont::device::{Link, Spec};
 use typodont::diagnostic::Source;
 use typodont::frame::Vec3;
 use typodont::record::{EndFile, HeadFile, Recorder, Recording, ServoFile, Watch, replay};
@@ -19,22 +20,35 @@ fn grinding() -> Arc<Scenario> {
     Arc::new(scenario::resolve(source, &Library::shipped(), Forms::Made).unwrap())
 }
 
+/// The grinding exercise, about to be recorded live under a name.
+struct Begun {
+    workpiece: Workpiece,
+    file: PathBuf,
+    recorder: Recorder,
+    session: Session,
+    simulation: Simulation,
+}
+
+fn begun(name: &str, spec: &Spec) -> Begun {
+    let scenario = grinding();
+    let workpiece = Workpiece::make(&scenario, 4).unwrap();
+    let head = HeadFile { live: true, ..HeadFile::of(&scenario, spec, 4) };
+    let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.mcap"));
+    let recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
+    let simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
+    Begun { file, recorder, session: Session::new(scenario, &workpiece), simulation, workpiece }
+}
+
 #[test]
 fn a_live_session_holds_when_turned_again() {
     crate::peace::in_real_time(|| {
         // Aim: a recording of a person's session is a proof like a script's. Method: the grinding exercise on a simulated wire,
         // an instrument taken, the cable pulled while cutting, plugged in again, said to be done; then verified.
-        let scenario = grinding();
-        let workpiece = Workpiece::make(&scenario, 4).unwrap();
         let mut rig = Simulated::new();
         let hand = rig.hand();
         hand.reach(Vec3::Y * 8.0);
         let device = rig.open().unwrap();
-        let head = HeadFile { live: true, ..HeadFile::of(&scenario, device.spec(), 4) };
-        let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("live.mcap");
-        let mut recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
-        let mut session = Session::new(scenario.clone(), &workpiece);
-        let simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
+        let Begun { workpiece, file, mut recorder, mut session, simulation } = begun("live", device.spec());
         let (mut live, _) = Live::begin(&mut session, simulation, device, None, &mut recorder).unwrap();
         // Above the decay, then onto it.
         let decay = workpiece.world_from_tooth * workpiece.lesions[0].centre;
@@ -102,13 +116,7 @@ fn an_instructor_leads_the_trainee_and_feels_them() {
             trainee.reach(Vec3::Y * 8.0);
             instructor.let_loose();
             let device = first.open().unwrap();
-            let scenario = grinding();
-            let workpiece = Workpiece::make(&scenario, 4).unwrap();
-            let head = HeadFile { live: true, ..HeadFile::of(&scenario, device.spec(), 4) };
-            let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("led.mcap");
-            let mut recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
-            let mut session = Session::new(scenario.clone(), &workpiece);
-            let simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
+            let Begun { file, mut recorder, mut session, simulation, .. } = begun("led", device.spec());
             let end = Second::new(here, device.spec().max_damping, Role::Instructor);
             let (mut live, _) = Live::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();
             let assist = Assist::start(second.open().unwrap(), there).unwrap();
@@ -165,13 +173,7 @@ fn an_assistants_suction_rests_on_the_tooth_and_leaves_the_trainee_alone() {
         trainee.reach(Vec3::Y * 12.0);
         assistant.reach(Vec3::new(9.0, 12.0, 0.0));
         let device = first.open().unwrap();
-        let scenario = grinding();
-        let workpiece = Workpiece::make(&scenario, 4).unwrap();
-        let head = HeadFile { live: true, ..HeadFile::of(&scenario, device.spec(), 4) };
-        let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("assisted.mcap");
-        let mut recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
-        let mut session = Session::new(scenario.clone(), &workpiece);
-        let simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
+        let Begun { workpiece, file, mut recorder, mut session, simulation } = begun("assisted", device.spec());
         let (here, there) = Link::pair();
         let end = Second::new(here, device.spec().max_damping, Role::Suction);
         let (mut live, _) = Live::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();

@@ -2,7 +2,7 @@
 //! belongs to the triangle that its middle lies in, on an edge to the one below or to the right.
 
 use super::{Canvas, Pixel};
-use crate::volume::march::rows::processors;
+use crate::volume::march::rows::{in_rows, processors};
 
 /// What varies over a triangle: see `surface_pass`.
 pub const VARYING: usize = 10;
@@ -26,16 +26,10 @@ pub fn draw(
     let (width, height) = (canvas.width, canvas.height);
     let bands = processors();
     let rows = height.div_ceil(bands as u32).max(1);
-    let shade = &shade;
-    std::thread::scope(|scope| {
-        for (band, pixels) in canvas.pixels.chunks_mut((rows * width) as usize).enumerate() {
-            let first = band as u32 * rows;
-            let mut strip = Strip { pixels, width, height, first };
-            scope.spawn(move || {
-                for triangle in triangles {
-                    strip.clipped(triangle.map(|i| corners[i as usize]), shade);
-                }
-            });
+    in_rows(&mut canvas.pixels, rows * width, bands, |band, pixels| {
+        let mut strip = Strip { pixels, width, height, first: band * rows };
+        for triangle in triangles {
+            strip.clipped(triangle.map(|i| corners[i as usize]), &shade);
         }
     });
 }

@@ -14,6 +14,7 @@ use crate::frame::Vec3;
 use crate::record::Recording;
 use crate::scenario::ToothPlace;
 use crate::score::{Scored, Verdict};
+use crate::volume::march::rows::each;
 use crate::volume::march::{self, Camera, Picture as Pixels, Shot, Side};
 use crate::volume::{Volume, surface};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -192,13 +193,9 @@ pub fn parts(scored: &Scored) -> Vec<Part> {
 
 /// Every picture as a file's bytes; each processor takes its share.
 fn encoded(drawn: Vec<Drawn>) -> Vec<Picture> {
-    let share = drawn.len().div_ceil(std::thread::available_parallelism().map_or(1, usize::from));
-    let encode =
-        |d: &Drawn| Picture { name: d.name.clone(), title: d.title.clone(), shows: d.shows, png: png(&d.pixels) };
-    std::thread::scope(|scope| {
-        let hands: Vec<_> =
-            drawn.chunks(share).map(|some| scope.spawn(move || some.iter().map(encode).collect::<Vec<_>>())).collect();
-        hands.into_iter().flat_map(|hand| hand.join().expect("encoding does not panic")).collect()
+    each(drawn.len(), |number| {
+        let Drawn { name, title, shows, pixels } = &drawn[number];
+        Picture { name: name.clone(), title: title.clone(), shows: *shows, png: png(pixels) }
     })
 }
 
