@@ -2,7 +2,7 @@
 //!
 //! What the author **wrote** is in [`scenario`]; what the hand **felt** is in [`touch`] and [`sim`]; what
 //! **happened** is in [`session`] and [`record`]; what it **means** is in [`score`]; how it **looks** is in
-//! [`report`] and [`render`]. Millimetres, newtons and seconds everywhere.
+//! [`report`], [`scene`] and [`render`]. Millimetres, newtons and seconds everywhere.
 //!
 //! The modules stand in reading order, lowest first: each may use only those above it
 //! (`ARCHITECTURE.md` has the table, `tests/architecture.rs` holds it).
@@ -26,6 +26,7 @@ pub mod scenario;
 pub mod session;
 pub mod record;
 pub mod score;
-pub mod report;
 pub mod render;
+pub mod scene;
+pub mod report;
 pub mod cli;

@@ -1,0 +1,99 @@
+//! What the hand holds, drawn.
+
+use crate::content::{EndEntry, InstrumentEntry};
+use crate::frame::{Pose, Vec3};
+use crate::mesh::Mesh;
+use crate::render::{Finish, Solid};
+use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
+
+const STEEL: Finish = Finish { colour: [0.72, 0.74, 0.77], gloss: 0.6 };
+
+/// An instrument about its own tip, +z along the shaft toward the hand.
+pub fn instrument(entry: &InstrumentEntry) -> Solid {
+    Solid::plain(Arc::new(turned(&outline(&entry.end))), Pose::IDENTITY, STEEL)
+}
+
+/// Radius and height above the device's tip, mm, from the tip upward. A drawing: what touches is the instrument's own shape.
+fn outline(end: &EndEntry) -> Vec<[f32; 2]> {
+    let tip = match end {
+        EndEntry::Point => {
+            return vec![[0.0, 0.0], [0.12, 0.6], [0.5, 8.0], [1.0, 14.0], [2.6, 20.0], [2.6, 90.0], [0.0, 90.0]];
+        }
+        EndEntry::Ball(e) => arc(0.5 * e.diameter_mm, -1.0, 0.8),
+        EndEntry::Pear(e) => {
+            let radius = 0.5 * e.diameter_mm;
+            [lifted(arc(radius, -1.0, 0.2), radius), vec![[0.5 * e.top_diameter_mm, e.length_mm]]].concat()
+        }
+        EndEntry::Cylinder(e) => straight(e.diameter_mm, e.diameter_mm, e.length_mm),
+        EndEntry::Tapered(e) => straight(e.tip_diameter_mm, e.diameter_mm, e.length_mm),
+        EndEntry::InvertedCone(e) => straight(e.diameter_mm, e.top_diameter_mm, e.length_mm),
+        EndEntry::Flame(e) => {
+            let at = |share: f32| [0.5 * e.diameter_mm * libm::sinf(PI * share), e.length_mm * share];
+            (0..10).map(|i| at(i as f32 / 10.0)).collect()
+        }
+    };
+    let [radius, top] = tip.last().copied().unwrap_or_default();
+    // Neck, friction grip shank (ISO 1797: 1.6 mm) and the handpiece's head.
+    let behind = [[0.8 * radius, top + 0.2], [0.8, top + 3.0], [0.8, top + 9.5], [4.5, top + 9.5], [5.2, top + 12.0]];
+    let head = [[5.2, top + 22.0], [0.0, top + 22.0]];
+    tip.into_iter().chain(behind).chain(head).collect()
+}
+
+/// Part of a circle about the origin, from one share of its radius in height to another.
+fn arc(radius: f32, from: f32, to: f32) -> Vec<[f32; 2]> {
+    let at = |i: usize| {
+        let (low, high) = (libm::asinf(from), libm::asinf(to));
+        let angle = low + (high - low) * i as f32 / 12.0;
+        [radius * libm::cosf(angle), radius * libm::sinf(angle)]
+    };
+    (0..=12).map(at).collect()
+}
+
+fn lifted(outline: Vec<[f32; 2]>, by: f32) -> Vec<[f32; 2]> {
+    outline.into_iter().map(|[radius, height]| [radius, height + by]).collect()
+}
+
+fn straight(low: f32, high: f32, length: f32) -> Vec<[f32; 2]> {
+    vec![[0.0, 0.0], [0.5 * low, 0.0], [0.5 * high, length]]
+}
+
+/// An outline turned about z; each stretch has its own normals, so that edges stay edges.
+fn turned(outline: &[[f32; 2]]) -> Mesh {
+    const SIDES: usize = 32;
+    let mut mesh = Mesh::default();
+    for pair in outline.windows(2) {
+        let [[r0, z0], [r1, z1]] = [pair[0], pair[1]];
+        let out = Vec3::new(z1 - z0, 0.0, r0 - r1).normalize_or(Vec3::Z);
+        let first = mesh.positions.len() as u32;
+        for i in 0..=SIDES {
+            let angle = TAU * i as f32 / SIDES as f32;
+            let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
+            mesh.positions.extend([Vec3::new(r0 * cos, r0 * sin, z0), Vec3::new(r1 * cos, r1 * sin, z1)]);
+            mesh.normals.extend([Vec3::new(out.x * cos, out.x * sin, out.z); 2]);
+        }
+        for i in 0..SIDES as u32 {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|n| first + 2 * i + n);
+            mesh.triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_instruments_surface_faces_outward() {
+        // Aim: lamps light the instrument, not its inside. Method: a closed surface that faces outward encloses a positive
+        // volume; a straight one encloses that of a cylinder.
+        let mesh = turned(&[[0.0, 0.0], [1.0, 0.0], [1.0, 5.0], [0.0, 5.0]]);
+        let expected = f64::from(PI) * 5.0;
+        assert!((mesh.volume_mm3() / expected - 1.0).abs() < 0.01, "{}", mesh.volume_mm3());
+        for (triangle, normal) in mesh.triangles.iter().map(|t| (t, mesh.normals[t[0] as usize])) {
+            let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
+            assert!((b - a).cross(c - a).dot(normal) >= 0.0);
+        }
+    }
+}
