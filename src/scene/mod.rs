@@ -5,8 +5,12 @@
 
 mod around;
 mod instrument;
+mod jaw;
 mod palette;
+mod views;
 
 pub use around::around;
 pub use instrument::instrument;
+pub use jaw::{Mouth, OPEN};
 pub use palette::palette;
+pub use views::{ToothSide, tooth_view};

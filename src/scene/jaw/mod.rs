@@ -1,0 +1,335 @@
+//! The mouth around the carved tooth: both jaws with their teeth and gum.
+//!
+//! The carved tooth is left out, and the arch is laid so that its own crown fits the gap. Where gum and neighbours are
+//! touched, the jaw gives way to them: what is drawn near the tooth is what is felt there.
+
+mod arch;
+mod crown;
+mod gum;
+mod teeth;
+
+use self::arch::{Half, Seat};
+use self::crown::Coloured;
+use self::gum::{Jaw, Side};
+use self::teeth::Model;
+use super::around;
+use crate::content::{Role, TissueTable};
+use crate::frame::{Pose, Quat, Vec3};
+use crate::mesh::Mesh;
+use crate::render::{Finish, Quadrant, Rgb, Solid};
+use crate::scenario::{ToothPlace, Workpiece};
+use crate::touch::{Form, Shape};
+use crate::volume::Label;
+use std::sync::Arc;
+
+/// How far the mouth is open at work, degrees: some 40 mm between the incisors.
+pub const OPEN: f32 = 26.0;
+
+/// Where the condyles' axis lies seen from the lower incisors' edges, back and up, mm: the height of Bonwill's triangle of
+/// four inches, raised by Balkwill's angle of 26° over the occlusal plane.
+const CONDYLES: [f32; 2] = [79.0, 38.5];
+
+/// How far upper edges and cusps reach below the lower ones when the jaws are closed, mm.
+const OVERBITE: f32 = 2.0;
+
+/// How far behind the lower first molar's middle the upper one's lies, so that its mesiobuccal cusp meets the lower one's
+/// buccal groove (Angle's class I), mm.
+const MOLAR_RELATION: f32 = 0.9;
+
+/// Wet gum and enamel.
+const GUM_GLOSS: f32 = 0.28;
+const TOOTH_GLOSS: f32 = 0.22;
+
+/// Around the carved tooth's box the gum is drawn as it is felt up to the first distance, as the jaw has it from the second
+/// on, mm.
+const AS_FELT: [f32; 2] = [6.0, 13.0];
+
+/// Touched shapes nearer than this to the middle of a crown take its place, mm.
+const TAKEN: f32 = 1.0;
+
+/// Both jaws about one carved tooth. Made once for a workpiece; its solids share their meshes.
+#[derive(Clone, Debug)]
+pub struct Mouth {
+    /// The jaw with the carved tooth, the opposite one.
+    near: JawMeshes,
+    opposite: JawMeshes,
+    jaw: Jaw,
+    world_from_near: Pose,
+    near_from_opposite: Pose,
+    /// What is touched beside the tooth and not part of the near jaw's gum.
+    touched: Vec<Solid>,
+    /// True for a tooth of the patient's right side.
+    is_right: bool,
+}
+
+#[derive(Clone, Debug)]
+struct JawMeshes {
+    teeth: Drawn,
+    gum: Drawn,
+}
+
+/// A mesh with tints, and the finish they are multiplied with.
+#[derive(Clone, Debug)]
+struct Drawn {
+    mesh: Arc<Mesh>,
+    tints: Arc<Vec<Rgb>>,
+    finish: Finish,
+}
+
+impl Drawn {
+    fn of(made: Coloured, colour: Rgb, gloss: f32) -> Drawn {
+        Drawn { mesh: Arc::new(made.mesh), tints: Arc::new(made.tints), finish: Finish { colour, gloss } }
+    }
+
+    fn at(&self, world_from_solid: Pose) -> Solid {
+        Solid { mesh: self.mesh.clone(), tints: self.tints.clone(), world_from_solid, finish: self.finish }
+    }
+}
+
+impl Mouth {
+    /// The jaws for a workpiece with one tooth of FDI 11–48; `None` for two teeth side by side, which stand in no jaw.
+    ///
+    /// Tooth space knows no left and right (x is buccal on both sides), and so the jaw of a tooth on the right is drawn as that
+    /// of its twin on the left.
+    pub fn around(workpiece: &Workpiece, tissues: &TissueTable) -> Option<Mouth> {
+        let [tooth] = &workpiece.teeth[..] else { return None };
+        let (quadrant, number) = (tooth.fdi / 10, usize::from(tooth.fdi % 10));
+        if !(1..=4).contains(&quadrant) || !(1..=8).contains(&number) {
+            return None;
+        }
+        let jaw = if quadrant <= 2 { Jaw::Upper } else { Jaw::Lower };
+        let near = Arch::with(jaw, Some((tooth, number)));
+        let other = Arch::with(jaw.other(), None);
+        let seat = near.carved.half.seats[number - 1];
+        let top = 0.5 * (tooth.crown_low + tooth.crown_high);
+        let anchor = Vec3::new(top.x, top.y, tooth.crown_low.z);
+        let near_from_tooth = seat.arch_from_tooth() * Pose::at(-anchor);
+        let gums = tissues.by_name("gingiva").map(|e| e.label());
+        let felt = Felt { tooth, shapes: &workpiece.around, gums, near_from_tooth };
+        let colour = |name: &str, otherwise: Rgb| tissues.by_name(name).map_or(otherwise, |e| e.rgb());
+        let (enamel, pink) = (colour("neighbour", [0.93, 0.91, 0.86]), colour("gingiva", [0.85, 0.53, 0.50]));
+        let drawn =
+            |arch: &Arch, is_taken: &dyn Fn(bool, usize, &Seat) -> bool, fit: &dyn Fn(Vec3) -> Vec3| JawMeshes {
+                teeth: Drawn::of(arch.teeth(is_taken), enamel, TOOTH_GLOSS),
+                gum: Drawn::of(arch.gum(fit), pink, GUM_GLOSS),
+            };
+        let is_taken = |is_carved_side: bool, index: usize, seat: &Seat| {
+            is_carved_side && (index + 1 == number || felt.takes(seat))
+        };
+        let is_soft =
+            |shape: &Shape| tissues.role(shape.label) == Some(Role::Soft) && !matches!(shape.form, Form::Mesh(_));
+        let touched = workpiece.around.iter().filter(|shape| !is_soft(shape));
+        Some(Mouth {
+            near: drawn(&near, &is_taken, &|p| felt.fitted(p)),
+            opposite: drawn(&other, &|_, _, _| false, &|p| p),
+            jaw,
+            world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
+            near_from_opposite: closed(jaw, &near, &other),
+            touched: touched.map(|shape| around::solid(shape, workpiece, tissues)).collect(),
+            is_right: quadrant == 1 || quadrant == 4,
+        })
+    }
+
+    /// Everything but the carved tooth, world space: the mouth open by an angle about the condyles' axis, degrees, 0 to 35;
+    /// the jaw with the carved tooth stays where it is.
+    pub fn solids(&self, open: f32) -> Vec<Solid> {
+        let both = [(&self.near, self.world_from_near), (&self.opposite, self.world_from_opposite(open))];
+        let jaws = both.iter().flat_map(|(jaw, pose)| [jaw.gum.at(*pose), jaw.teeth.at(*pose)]);
+        jaws.chain(self.touched.iter().cloned()).collect()
+    }
+
+    /// The same without the opposite jaw: as a model jaw lies on the bench.
+    pub fn one_jaw(&self) -> Vec<Solid> {
+        let Mouth { near, world_from_near: pose, .. } = self;
+        [near.gum.at(*pose), near.teeth.at(*pose)].into_iter().chain(self.touched.iter().cloned()).collect()
+    }
+
+    /// The arch space of the jaw with the carved tooth, in world space: x to the carved tooth's side, y back from the
+    /// incisors' edges, z occlusal.
+    pub fn world_from_arch(&self) -> Pose {
+        self.world_from_near
+    }
+
+    /// The arch space of a quadrant's jaw in world space, and on which side of it the quadrant lies: 1 or −1 along x.
+    pub(super) fn arch_of(&self, quadrant: Quadrant, open: f32) -> (Pose, f32) {
+        let (jaw, is_right) = match quadrant {
+            Quadrant::UpperRight => (Jaw::Upper, true),
+            Quadrant::UpperLeft => (Jaw::Upper, false),
+            Quadrant::LowerLeft => (Jaw::Lower, false),
+            Quadrant::LowerRight => (Jaw::Lower, true),
+        };
+        let side = if is_right == self.is_right { 1.0 } else { -1.0 };
+        // The opposite jaw faces its own x the other way.
+        if jaw == self.jaw { (self.world_from_near, side) } else { (self.world_from_opposite(open), -side) }
+    }
+
+    fn world_from_opposite(&self, open: f32) -> Pose {
+        self.world_from_near * self.opened(open.clamp(0.0, 35.0)) * self.near_from_opposite
+    }
+
+    /// The turn of the opposite jaw about the condyles' axis, in the near jaw's arch space.
+    fn opened(&self, degrees: f32) -> Pose {
+        let [back, up] = CONDYLES;
+        let axis = match self.jaw {
+            Jaw::Lower => Vec3::new(0.0, back, up),
+            Jaw::Upper => self.near_from_opposite * Vec3::new(0.0, back, up),
+        };
+        // About x, which points to the carved tooth's side: the other jaw's front, at −y from the axis, goes to +z.
+        let orientation = Quat::from_rotation_x(-degrees.to_radians());
+        Pose { position: axis - orientation * axis, orientation }
+    }
+}
+
+impl Jaw {
+    fn other(self) -> Jaw {
+        match self {
+            Jaw::Upper => Jaw::Lower,
+            Jaw::Lower => Jaw::Upper,
+        }
+    }
+
+    fn models(self) -> [Model; 8] {
+        match self {
+            Jaw::Upper => teeth::UPPER,
+            Jaw::Lower => teeth::LOWER,
+        }
+    }
+
+    fn form(self) -> arch::Form {
+        match self {
+            Jaw::Upper => arch::UPPER,
+            Jaw::Lower => arch::LOWER,
+        }
+    }
+}
+
+/// One jaw before it is drawn.
+struct Arch {
+    jaw: Jaw,
+    /// The side with the carved tooth, x > 0, and the other, which is mirrored.
+    carved: Row,
+    plain: Row,
+}
+
+/// Half a jaw's teeth.
+struct Row {
+    half: Half,
+    models: Vec<Model>,
+}
+
+impl Arch {
+    /// A jaw of 28 teeth, with room for a carved tooth of its own size; with the third molars where that is one.
+    fn with(jaw: Jaw, carved: Option<(&ToothPlace, usize)>) -> Arch {
+        let count = if carved.is_some_and(|(_, number)| number == 8) { 8 } else { 7 };
+        let plain = jaw.models()[..count].to_vec();
+        let mut models = plain.clone();
+        if let Some((tooth, number)) = carved {
+            models[number - 1] = fitting(&models[number - 1], tooth);
+        }
+        let row = |models: Vec<Model>| {
+            let teeth: Vec<(Model, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
+            Row { half: Half::of(jaw.form(), &teeth), models }
+        };
+        Arch { jaw, carved: row(models), plain: row(plain) }
+    }
+
+    /// All crowns but those that are taken: on the carved tooth's side or the other, by their place from the midline.
+    fn teeth(&self, is_taken: &dyn Fn(bool, usize, &Seat) -> bool) -> Coloured {
+        let mut all = Coloured::default();
+        for index in 0..self.plain.models.len() {
+            let crown = crown::crown(&self.plain.models[index]);
+            for (row, is_carved_side) in [(&self.carved, true), (&self.plain, false)] {
+                let seat = &row.half.seats[index];
+                if is_taken(is_carved_side, index, seat) {
+                    continue;
+                }
+                let pose = seat.arch_from_tooth();
+                let sided = |v: Vec3| if is_carved_side { v } else { v * Vec3::new(-1.0, 1.0, 1.0) };
+                all.add(&crown, |p| sided(pose * p), |n| sided(pose.turn(n)), !is_carved_side);
+            }
+        }
+        all
+    }
+
+    fn gum(&self, fit: &dyn Fn(Vec3) -> Vec3) -> Coloured {
+        let sides = [(&self.plain, -1.0), (&self.carved, 1.0)];
+        gum::gum(self.jaw, sides.map(|(row, sign)| Side { half: &row.half, models: &row.models, sign }), fit)
+    }
+}
+
+/// A table's tooth with the carved one's own crown, upright as its space is.
+fn fitting(model: &Model, tooth: &ToothPlace) -> Model {
+    /// Room between the carved crown and its neighbours on each side, mm.
+    const CONTACT: f32 = 0.05;
+    let size = tooth.crown_high - tooth.crown_low;
+    let share = |of: [f32; 2], now: f32| [now, now * of[1] / of[0]];
+    let sizes = crate::anatomy::form::Sizes {
+        crown: size.z,
+        mesiodistal: share(model.sizes.mesiodistal, size.y + 2.0 * CONTACT),
+        buccolingual: share(model.sizes.buccolingual, size.x),
+        ..model.sizes
+    };
+    Model { sizes, lean: 0.0, ..*model }
+}
+
+/// The opposite jaw's arch space in the near one's when the jaws are closed.
+fn closed(near: Jaw, own: &Arch, other: &Arch) -> Pose {
+    let (upper, lower) = if near == Jaw::Upper { (own, other) } else { (other, own) };
+    let first_molar = |arch: &Arch| arch.plain.half.seats[5].top.y;
+    let forward = first_molar(lower) + MOLAR_RELATION - first_molar(upper);
+    // Turned about y by half a turn: left becomes right and up becomes down.
+    let orientation = Quat::from_rotation_y(std::f32::consts::PI);
+    let lower_from_upper = Pose { position: Vec3::new(0.0, forward, -OVERBITE), orientation };
+    if near == Jaw::Upper { lower_from_upper.inverse() } else { lower_from_upper }
+}
+
+/// What is touched around the carved tooth, for the drawn jaw to follow.
+struct Felt<'a> {
+    tooth: &'a ToothPlace,
+    shapes: &'a [Shape],
+    gums: Option<Label>,
+    near_from_tooth: Pose,
+}
+
+impl Felt<'_> {
+    /// True when a touched shape other than gum stands where a crown would.
+    fn takes(&self, seat: &Seat) -> bool {
+        let middle_in_arch = seat.top - Vec3::Z * (0.5 * seat.crown);
+        let middle = self.near_from_tooth.inverse() * middle_in_arch;
+        self.shapes.iter().any(|shape| Some(shape.label) != self.gums && shape.distance(middle) < TAKEN)
+    }
+
+    /// A place of the gum, arch space: near the tooth laid onto the gum that is felt, or just under it where that is a mesh
+    /// drawn for itself.
+    fn fitted(&self, point_in_arch: Vec3) -> Vec3 {
+        /// Gum that lies so much deeper or farther off than what is felt is not meant by it, mm.
+        const FAR: [f32; 2] = [3.5, 6.0];
+        /// Nor below the first distance under the neck, fully so from the second on, mm.
+        const DEEP: [f32; 2] = [6.0, 10.0];
+        /// How far under a drawn mesh, mm.
+        const UNDER: f32 = 0.4;
+        let Some(gum) = self.shapes.iter().find(|shape| Some(shape.label) == self.gums) else { return point_in_arch };
+        let ToothPlace { crown_low, crown_high, .. } = *self.tooth;
+        let mut point = self.near_from_tooth.inverse() * point_in_arch;
+        let aside = (point - point.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
+        let (away, off) = (aside.length(), gum.distance(point).abs());
+        let deep = crown_low.z - point.z;
+        let share = (1.0 - between(away, AS_FELT)) * (1.0 - between(off, FAR)) * (1.0 - between(deep, DEEP));
+        if share <= 0.0 {
+            return point_in_arch;
+        }
+        let wanted = if matches!(gum.form, Form::Mesh(_)) { -UNDER } else { 0.0 };
+        let start = point;
+        for _ in 0..3 {
+            let (distance, out) = gum.distance_and_normal(point);
+            point -= out * (distance - wanted);
+        }
+        self.near_from_tooth * start.lerp(point, share)
+    }
+}
+
+/// 0 up to the first bound, 1 from the second on.
+fn between(value: f32, [low, high]: [f32; 2]) -> f32 {
+    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}

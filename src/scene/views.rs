@@ -1,0 +1,89 @@
+//! Places to look from: at each side of the tooth, at each quadrant, at the whole mouth.
+
+use super::jaw::Mouth;
+use crate::frame::Vec3;
+use crate::render::{Orbit, Quadrant};
+use crate::scenario::Workpiece;
+
+/// A side of the tooth, looked at squarely.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ToothSide {
+    Occlusal,
+    Buccal,
+    Lingual,
+    Mesial,
+    Distal,
+}
+
+impl ToothSide {
+    pub const ALL: [ToothSide; 5] =
+        [ToothSide::Occlusal, ToothSide::Buccal, ToothSide::Lingual, ToothSide::Mesial, ToothSide::Distal];
+
+    /// From the tooth toward the eye, tooth space.
+    fn toward_eye(self) -> Vec3 {
+        match self {
+            ToothSide::Occlusal => Vec3::Z,
+            ToothSide::Buccal => Vec3::X,
+            ToothSide::Lingual => Vec3::NEG_X,
+            ToothSide::Mesial => Vec3::NEG_Y,
+            ToothSide::Distal => Vec3::Y,
+        }
+    }
+}
+
+/// What is seen of a crown's surroundings: the picture is so many times as large as the crown.
+const CROWN_ROOM: f32 = 1.25;
+
+/// Half of what a quadrant, and a mouth, fills of a picture, mm.
+const QUADRANT_REACH: f32 = 26.0;
+const MOUTH_REACH: f32 = 40.0;
+
+/// From the middle of an arch to the middle of its second premolars, arch space: aside and back, mm.
+const QUADRANT_MIDDLE: [f32; 2] = [18.0, 20.0];
+
+/// The crowns of the teeth worked on, from one side.
+///
+/// From above, the user's side of the tooth is at the picture's lower edge.
+pub fn tooth_view(workpiece: &Workpiece, side: ToothSide) -> Orbit {
+    let low = workpiece.teeth.iter().map(|t| t.crown_low).fold(Vec3::INFINITY, Vec3::min);
+    let high = workpiece.teeth.iter().map(|t| t.crown_high).fold(Vec3::NEG_INFINITY, Vec3::max);
+    let middle = workpiece.world_from_tooth * (0.5 * (low + high));
+    let radius = 0.5 * CROWN_ROOM * (high - low).max_element();
+    toward(middle, radius, workpiece.world_from_tooth.turn(side.toward_eye()))
+}
+
+impl Mouth {
+    /// A quadrant from in front and from the other side of the mouth, between the open jaws. `open` as for
+    /// [`Mouth::solids`].
+    pub fn quadrant_view(&self, quadrant: Quadrant, open: f32) -> Orbit {
+        let (world_from_arch, side) = self.arch_of(quadrant, open);
+        let [aside, back] = QUADRANT_MIDDLE;
+        let middle = world_from_arch * Vec3::new(side * aside, back, -3.0);
+        toward(middle, QUADRANT_REACH, world_from_arch.turn(Vec3::new(-0.50 * side, -0.75, 0.55)))
+    }
+
+    /// Both jaws from in front.
+    pub fn front_view(&self, open: f32) -> Orbit {
+        let near = self.world_from_arch();
+        let height = 0.5 * open.clamp(0.0, 35.0);
+        toward(near * Vec3::new(0.0, 12.0, height), MOUTH_REACH, near.turn(Vec3::new(0.0, -1.0, 0.12)))
+    }
+
+    /// The jaw with the carved tooth from straight over its chewing surfaces.
+    pub fn arch_view(&self) -> Orbit {
+        let near = self.world_from_arch();
+        let front = near.turn(Vec3::NEG_Y);
+        // Straight down the picture's up is the way that `turn` looks: the incisors are at its lower edge.
+        let orbit = toward(near * Vec3::new(0.0, 25.0, -4.0), MOUTH_REACH, near.turn(Vec3::Z));
+        Orbit { turn: libm::atan2f(front.x, front.z), ..orbit }
+    }
+}
+
+/// Looks at a ball whole from a direction in world space, which need not be a unit.
+fn toward(middle: Vec3, radius: f32, to_eye: Vec3) -> Orbit {
+    let to_eye = to_eye.normalize_or(Vec3::Z);
+    let level = libm::hypotf(to_eye.x, to_eye.z);
+    let turn = if level < 1e-3 { 0.0 } else { libm::atan2f(to_eye.x, to_eye.z) };
+    let start = Orbit { turn, tilt: 0.0, ..Orbit::around(middle, radius) };
+    start.turned(0.0, libm::atan2f(to_eye.y, level))
+}

@@ -1,0 +1,162 @@
+//! What stands before the trainee: the mouth around the tooth, and the places to look from.
+//!
+//! The pictures lie in `target/tmp/scene/` to be looked at.
+
+use std::path::Path;
+use typodont::content::{self, Library};
+use typodont::frame::Vec3;
+use typodont::render::*;
+use typodont::scenario::{self, Forms, Scenario, ToothPlace, Workpiece};
+use typodont::scene::*;
+
+fn exercise(name: &str) -> (Scenario, Workpiece) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name);
+    let library = Library::shipped().with_folder(path.parent().unwrap());
+    let source = content::read_text(&path).unwrap();
+    let scenario = scenario::resolve(source, &library, Forms::Made).unwrap();
+    let workpiece = Workpiece::make(&scenario, 0).unwrap();
+    (scenario, workpiece)
+}
+
+fn keep(name: &str, image: &Image) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("scene");
+    std::fs::create_dir_all(&folder).unwrap();
+    let Image { width, height, rgba } = image;
+    image::save_buffer(folder.join(format!("{name}.png")), rgba, *width, *height, image::ColorType::Rgba8).unwrap();
+}
+
+fn tooth<'a>(workpiece: &'a Workpiece, palette: &'a Palette) -> Tooth<'a> {
+    Tooth {
+        volume: &workpiece.volume,
+        changes: Changes::Anew,
+        world_from_tooth: workpiece.world_from_tooth,
+        palette,
+        shown: Shown::Iso,
+    }
+}
+
+#[test]
+fn the_mouth_is_seen_from_everywhere() {
+    // Aim: every place to look from shows the mouth, not its inside, its back or nothing. Method: draw it; teeth are bright
+    // and gum is red, and each view has its share of both.
+    let (scenario, workpiece) = exercise("5-grinding.json");
+    let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+    let palette = palette(&scenario.tissues, true);
+    let quadrant = |quadrant| mouth.quadrant_view(quadrant, OPEN);
+    let views = [
+        ("front", mouth.front_view(OPEN), mouth.solids(OPEN)),
+        ("arch", mouth.arch_view(), mouth.one_jaw()),
+        ("upper-right", quadrant(Quadrant::UpperRight), mouth.solids(OPEN)),
+        ("upper-left", quadrant(Quadrant::UpperLeft), mouth.solids(OPEN)),
+        ("lower-left", quadrant(Quadrant::LowerLeft), mouth.solids(OPEN)),
+        ("lower-right", quadrant(Quadrant::LowerRight), mouth.solids(OPEN)),
+        (
+            "at-work",
+            Orbit { distance: 60.0, ..tooth_view(&workpiece, ToothSide::Lingual).turned(0.4, 0.6) },
+            mouth.one_jaw(),
+        ),
+    ];
+    let mut painter = Painter::cpu();
+    for (name, orbit, solids) in views {
+        let viewpoint = orbit.viewpoint();
+        let lights = Lights { head: Lamp::head(viewpoint.position), ..Lights::default() };
+        let scene = Scene { tooth: Some(tooth(&workpiece, &palette)), solids, lights, ..Scene::empty() };
+        let image = painter.draw(&scene, &viewpoint, None, [780, 690]).unwrap();
+        keep(name, &image);
+        let share = |is: &dyn Fn([u8; 4]) -> bool| {
+            let count = image.rgba.chunks(4).filter(|p| is([p[0], p[1], p[2], p[3]])).count();
+            count as f64 / f64::from(image.width * image.height)
+        };
+        let gum = share(&|[r, g, _, _]| r > g.saturating_add(35));
+        let teeth = share(&|[r, g, b, _]| r > 110 && r >= b && r.abs_diff(g) < 30);
+        assert!(gum > 0.10 && teeth > 0.03, "{name}: {gum} gum, {teeth} teeth");
+    }
+}
+
+#[test]
+fn each_side_of_the_tooth_is_looked_at_squarely() {
+    // Aim: a button that says "mesial" shows the mesial side, filling the picture.
+    let (_, workpiece) = exercise("5-grinding.json");
+    let place = &workpiece.teeth[0];
+    let middle = 0.5 * (place.crown_low + place.crown_high);
+    for side in ToothSide::ALL {
+        let viewpoint = tooth_view(&workpiece, side).viewpoint();
+        let eye_in_tooth = workpiece.world_from_tooth.inverse() * viewpoint.position;
+        let way = (eye_in_tooth - middle).normalize();
+        let expected = match side {
+            ToothSide::Occlusal => Vec3::Z,
+            ToothSide::Buccal => Vec3::X,
+            ToothSide::Lingual => Vec3::NEG_X,
+            ToothSide::Mesial => Vec3::NEG_Y,
+            ToothSide::Distal => Vec3::Y,
+        };
+        assert!(way.dot(expected) > 0.999, "{side:?}: {way}");
+        let eye = viewpoint.eye(1.0);
+        for corner in 0..8u32 {
+            let share = Vec3::from([0, 1, 2].map(|a| (corner >> a & 1) as f32));
+            let point = workpiece.world_from_tooth * (place.crown_low + (place.crown_high - place.crown_low) * share);
+            let ([x, y], _) = eye.place(point);
+            assert!((-0.1..1.1).contains(&x) && (-0.1..1.1).contains(&y), "{side:?}: {x} {y}");
+        }
+    }
+}
+
+#[test]
+fn the_gap_fits_the_carved_tooth() {
+    // Aim: the carved tooth stands in its jaw as if it had grown there. Method: a molar in the places of molars and
+    // premolars: beside its crown there is a neighbour within half a millimetre, and none inside the box around it by more
+    // than that box has rounded corners.
+    let (scenario, mut workpiece) = exercise("5-grinding.json");
+    workpiece.around.clear();
+    for fdi in [15, 25, 34, 36, 37, 46, 48] {
+        workpiece.teeth[0].fdi = fdi;
+        let ToothPlace { crown_low, crown_high, .. } = workpiece.teeth[0];
+        let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+        let [_, teeth] = &mouth.one_jaw()[..] else { panic!("gum and teeth") };
+        let tooth_from_jaw = workpiece.world_from_tooth.inverse() * teeth.world_from_solid;
+        let inside = |point: Vec3| (point - crown_low).min(crown_high - point).min_element();
+        let corners: Vec<Vec3> = teeth.mesh.positions.iter().map(|p| tooth_from_jaw * *p).collect();
+        let deepest = corners.iter().map(|p| inside(*p)).fold(f32::NEG_INFINITY, f32::max);
+        assert!((-0.6..1.0).contains(&deepest), "{fdi}: a neighbour {deepest} mm inside");
+    }
+}
+
+#[test]
+fn gum_is_drawn_where_it_is_felt() {
+    // Aim: the explorer stops at the gum that is seen. Method: near the tooth every place of the drawn gum that the
+    // handpiece reaches lies on the surface that is touched.
+    let (scenario, workpiece) = exercise("5-grinding.json");
+    let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+    let gum_label = scenario.tissues.by_name("gingiva").unwrap().label();
+    let felt = workpiece.around.iter().find(|shape| shape.label == gum_label).unwrap();
+    let ToothPlace { crown_low, crown_high, .. } = workpiece.teeth[0];
+    let solids = mouth.one_jaw();
+    let tooth_from_gum = workpiece.world_from_tooth.inverse() * solids[0].world_from_solid;
+    let near = solids[0].mesh.positions.iter().map(|p| tooth_from_gum * *p).filter(|p| {
+        let aside = (*p - p.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
+        aside.length() < 5.0 && p.z > crown_low.z - 5.0
+    });
+    let off: Vec<f32> = near.map(|p| felt.distance(p).abs()).collect();
+    assert!(off.len() > 200, "{} places", off.len());
+    assert!(off.iter().all(|d| *d < 0.05), "{:?}", off.iter().copied().fold(0.0, f32::max));
+    assert_eq!(solids.len(), 2 + 2, "gum, teeth, and two neighbours as they are felt");
+}
+
+#[test]
+fn the_mouth_opens_about_the_condyles() {
+    // Aim: the jaws part in front and stay together behind. Method: the way of the opposite jaw's front and back corners.
+    let (scenario, workpiece) = exercise("5-grinding.json");
+    let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+    let arch_from_world = mouth.world_from_arch().inverse();
+    let gap = |open: f32| {
+        let teeth = &mouth.solids(open)[3];
+        let places = teeth.mesh.positions.iter().map(|p| arch_from_world * (teeth.world_from_solid * *p));
+        let lowest =
+            |is: &dyn Fn(&Vec3) -> bool| places.clone().filter(|p| is(p)).map(|p| p.z).fold(f32::INFINITY, f32::min);
+        [lowest(&|p| p.x.abs() < 4.0), lowest(&|p| p.x.abs() > 20.0)]
+    };
+    let ([closed, _], [open, behind]) = (gap(0.0), gap(OPEN));
+    assert!((-4.0..0.0).contains(&closed), "overbite of {closed} mm");
+    assert!((28.0..45.0).contains(&open), "{open} mm between the incisors");
+    assert!(behind < 0.75 * open, "{behind} mm between the molars");
+}
