@@ -34,6 +34,11 @@ pub struct InstrumentEntry {
     /// US number of the same bur.
     #[serde(default)]
     pub us_number: Option<String>,
+    /// How it looks: an .obj, .glb or .gltf file in millimetres, the working end's tip at the origin, +z along the shaft toward
+    /// the hand. Only a picture: what touches is `end`. Without it, or where it cannot be read, the end's outline is drawn.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 200))]
+    pub mesh: Option<String>,
 }
 
 /// Kinds of tool that feel and cut differently.

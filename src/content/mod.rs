@@ -6,6 +6,7 @@ pub mod json;
 mod syntax;
 pub mod nrrd;
 pub mod obj;
+pub mod picture_mesh;
 pub mod scan;
 mod library;
 mod tissues;

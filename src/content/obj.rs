@@ -1,7 +1,7 @@
-//! Wavefront OBJ files of closed surfaces.
+//! Wavefront OBJ files.
 //!
-//! Takes a file's bytes. Gives one closed mesh in millimetres, facing outward, or the first thing that is wrong with it.
-//! Corners at the very same place are one; what a file says of materials and colours is not read.
+//! Takes a file's bytes. Gives one closed mesh in millimetres, facing outward, or the first thing that is wrong with it; or
+//! just the triangles, for what is only looked at. What a file says of materials and colours is not read.
 
 use crate::frame::Vec3;
 use crate::mesh::Mesh;
@@ -94,12 +94,10 @@ impl fmt::Display for Unusable {
 }
 
 /// Reads a closed mesh; all objects of the file together.
+///
+/// Corners at the very same place are one.
 pub fn parse(bytes: &[u8]) -> Result<Mesh, Unusable> {
-    let options =
-        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-    let materials = |_: &std::path::Path| Err(tobj::LoadError::GenericFailure);
-    let (models, _) = tobj::load_obj_buf(&mut &bytes[..], &options, materials)
-        .map_err(|e| Unusable::Syntax { what: e.to_string() })?;
+    let models = models(bytes, false)?;
     let triangles = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
     if triangles > TRIANGLES_MAX {
         return Err(Unusable::TooLarge { triangles });
@@ -124,6 +122,31 @@ pub fn parse(bytes: &[u8]) -> Result<Mesh, Unusable> {
     Ok(mesh)
 }
 
+/// All triangles of a file as they are, closed or not, with its own normals or those of its faces.
+pub(super) fn triangles(bytes: &[u8]) -> Result<Mesh, Unusable> {
+    let mut all = Mesh::default();
+    for tobj::Mesh { positions, normals, indices, .. } in models(bytes, true)?.into_iter().map(|m| m.mesh) {
+        let vectors = |numbers: &[f32]| numbers.chunks_exact(3).map(Vec3::from_slice).collect::<Vec<_>>();
+        let places = vectors(&positions);
+        let corners: Vec<[u32; 3]> = indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+        let given = vectors(&normals);
+        let first = all.positions.len() as u32;
+        all.normals.extend(if given.len() == places.len() { given } else { normals_of(&places, &corners) });
+        all.positions.extend(places);
+        all.triangles.extend(corners.iter().map(|t| t.map(|i| first + i)));
+    }
+    Ok(all)
+}
+
+/// The objects of a file; `is_single`: each corner has one index for its place and its normal.
+fn models(bytes: &[u8], is_single: bool) -> Result<Vec<tobj::Model>, Unusable> {
+    let options =
+        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: is_single };
+    let materials = |_: &std::path::Path| Err(tobj::LoadError::GenericFailure);
+    let read = tobj::load_obj_buf(&mut &bytes[..], &options, materials);
+    read.map(|(models, _)| models).map_err(|e| Unusable::Syntax { what: e.to_string() })
+}
+
 /// One mesh in which every place is one corner; triangles that have lost a side by that are left out.
 fn welded(models: &[tobj::Model]) -> Mesh {
     let mut corners = BTreeMap::new();
@@ -142,15 +165,15 @@ fn welded(models: &[tobj::Model]) -> Mesh {
         let whole = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect::<Vec<_>>();
         mesh.triangles.extend(whole);
     }
-    mesh.normals = normals(&mesh);
+    mesh.normals = normals_of(&mesh.positions, &mesh.triangles);
     mesh
 }
 
 /// Outward normals of the corners, weighted by the area of their faces.
-fn normals(mesh: &Mesh) -> Vec<Vec3> {
-    let mut normals = vec![Vec3::ZERO; mesh.positions.len()];
-    for &triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
+pub(super) fn normals_of(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Vec3> {
+    let mut normals = vec![Vec3::ZERO; positions.len()];
+    for &triangle in triangles {
+        let [a, b, c] = triangle.map(|i| positions[i as usize]);
         triangle.iter().for_each(|&i| normals[i as usize] += (b - a).cross(c - a));
     }
     normals.iter().map(|n| n.normalize_or_zero()).collect()

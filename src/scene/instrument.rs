@@ -1,6 +1,7 @@
 //! What the hand holds, drawn.
 
-use crate::content::{EndEntry, InstrumentEntry};
+use crate::content::{EndEntry, InstrumentEntry, Library, picture_mesh};
+use crate::diagnostic::Diagnostic;
 use crate::frame::{Pose, Vec3};
 use crate::mesh::Mesh;
 use crate::render::{Finish, Solid};
@@ -9,8 +10,19 @@ use std::sync::Arc;
 
 const STEEL: Finish = Finish { colour: [0.72, 0.74, 0.77], gloss: 0.6 };
 
-/// An instrument about its own tip, +z along the shaft toward the hand.
-pub fn instrument(entry: &InstrumentEntry) -> Solid {
+/// An instrument about its own tip, +z along the shaft toward the hand: the mesh that its entry names, or else its outline.
+///
+/// A mesh that cannot be used is complained about, and the outline is drawn.
+pub fn instrument(entry: &InstrumentEntry, library: &Library) -> (Solid, Option<Diagnostic>) {
+    match entry.mesh.as_ref().map(|name| picture_mesh::read(library, name)) {
+        Some(Ok(mesh)) => (Solid::plain(Arc::new(mesh), Pose::IDENTITY, STEEL), None),
+        Some(Err(complaint)) => (outlined(entry), Some(complaint)),
+        None => (outlined(entry), None),
+    }
+}
+
+/// An instrument by the outline of its end, about its own tip, +z along the shaft toward the hand.
+pub fn outlined(entry: &InstrumentEntry) -> Solid {
     Solid::plain(Arc::new(turned(&outline(&entry.end))), Pose::IDENTITY, STEEL)
 }
 
@@ -83,6 +95,26 @@ fn turned(outline: &[[f32; 2]]) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::content::InstrumentTable;
+
+    #[test]
+    fn an_instrument_is_drawn_from_its_mesh_or_else_by_its_outline() {
+        // Aim: a broken file costs the picture, not the lesson, and is named.
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        let mut entry = table.by_id("round_bur_018").unwrap().clone();
+        let plain = outlined(&entry);
+        entry.mesh = Some("bur.obj".into());
+        let mut library = Library::empty();
+        let (missing, complaint) = instrument(&entry, &library);
+        assert_eq!((missing.mesh, complaint.unwrap().code), (plain.mesh.clone(), "missing-file"));
+        library.hold("bur.obj", b"v 0 0 0\nv 1 0 9\nv 0 1 9\nf 1 2 3\n".as_slice());
+        let (drawn, complaint) = instrument(&entry, &library);
+        assert!(complaint.is_none() && drawn.mesh.triangles.len() == 1);
+        library.hold("bur.obj", b"v 0 0".as_slice());
+        let (broken, complaint) = instrument(&entry, &library);
+        assert_eq!(broken.mesh, plain.mesh);
+        assert!(complaint.unwrap().headline().contains("bur.obj"));
+    }
 
     #[test]
     fn an_instruments_surface_faces_outward() {
