@@ -264,6 +264,37 @@ fn an_adapter_with_small_textures_shows_a_coarser_tooth_and_says_so() {
 }
 
 #[test]
+fn a_mirror_shows_what_is_before_it_and_nothing_behind() {
+    // Aim: the picture in the mirror is where geometry says, and what stands behind the mirror is not in it. Method: a mirror
+    // at 45° shows a red ball beside the way of sight in its middle; a blue one behind the mirror is hidden by it.
+    let matt = |colour| Finish { colour, gloss: 0.0 };
+    let orientation = typodont::frame::Quat::from_rotation_y(std::f32::consts::FRAC_PI_4);
+    let mirror = Mirror { world_from_mirror: Pose { position: Vec3::ZERO, orientation }, radius: 8.0, shine: 1.0 };
+    let scene = Scene {
+        solids: vec![
+            Solid::plain(ball(3.0), Pose::at(Vec3::new(40.0, 0.0, 0.0)), matt([1.0, 0.1, 0.1])),
+            Solid::plain(ball(3.0), Pose::at(Vec3::new(0.0, 0.0, -14.0)), matt([0.1, 0.1, 1.0])),
+        ],
+        mirror: Some(mirror),
+        lights: Lights { ambient: 1.0, chair: Lamp::OFF, head: Lamp::OFF },
+        background: Background::plain([0.5; 3]),
+        ..Scene::empty()
+    };
+    let viewpoint = Viewpoint::looking(Vec3::new(0.0, 0.0, 60.0), Vec3::ZERO, Vec3::Y);
+    let (gpu, _turn) = adapter().unzip();
+    for mut painter in [Some(Painter::cpu()), gpu].into_iter().flatten() {
+        let image = painter.draw(&scene, &viewpoint, None, [300, 300]).unwrap();
+        let red = (0..300 * 300u32).map(|i| (i % 300, i / 300));
+        let red: Vec<(u32, u32)> =
+            red.filter(|&(x, y)| image.pixel(x, y)[0] > 150 && image.pixel(x, y)[1] < 100).collect();
+        let middle = red.iter().map(|p| p.0 as f32 + 0.5).sum::<f32>() / red.len() as f32;
+        assert!(red.len() > 200 && (middle - 150.0).abs() < 1.5, "{}: {} at {middle}", painter.adapter(), red.len());
+        let blue = image.rgba.chunks(4).filter(|p| p[2] > 150 && p[0] < 100).count();
+        assert_eq!(blue, 0, "{}", painter.adapter());
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_in_words() {
     let viewpoint = Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
     let (gpu, _turn) = adapter().unzip();
@@ -278,6 +309,8 @@ fn what_cannot_be_drawn_is_refused_in_words() {
         assert!(refused(&scene, viewpoint, [20, 70_000]).contains("20x70000"));
         refused(&scene, Viewpoint { near: f32::NAN, ..viewpoint }, [20, 20]);
         refused(&scene, Viewpoint { position: viewpoint.focus, ..viewpoint }, [20, 20]);
+        let flat = Mirror { world_from_mirror: Pose::IDENTITY, radius: 0.0, shine: 1.0 };
+        assert!(refused(&Scene { mirror: Some(flat), ..Scene::empty() }, viewpoint, [20, 20]).contains("mirror"));
         let grey = Finish { colour: [0.5; 3], gloss: 0.0 };
         let nowhere = Solid::plain(ball(1.0), Pose::at(Vec3::splat(f32::INFINITY)), grey);
         let scene = Scene { solids: vec![nowhere], ..Scene::empty() };

@@ -37,6 +37,8 @@ mod eye;
 mod gpu;
 mod hollow;
 mod iso_pass;
+mod mirror;
+mod mirror_pass;
 mod painter;
 mod passes;
 mod picture;
@@ -57,6 +59,7 @@ pub mod twin;
 pub use camera::{Orbit, Quadrant, Viewpoint};
 pub use eye::{Eye, Window};
 pub use gpu::{Error, Gpu, Watch};
+pub use mirror::Mirror;
 pub use painter::{GpuPainter, Painter};
 pub use picture::Image;
 pub use renderer::{Renderer, Target};
@@ -91,6 +94,7 @@ pub fn shaders() -> Vec<Shader> {
         shader("surface_pass", surface_pass::SOURCE, &[("Solid", size_of::<surface_pass::gpu::Solid>())]),
         shader("iso_pass", iso_pass::SOURCE, &[]),
         shader("volume_pass", volume_pass::SOURCE, &[]),
+        shader("mirror_pass", mirror_pass::SOURCE, &[("Mirror", size_of::<mirror_pass::gpu::Mirror>())]),
         Shader {
             name: "stereo_pass",
             source: stereo_pass::SOURCE.to_string(),
@@ -135,6 +139,9 @@ fn sound(
     }
     if scene.tooth.as_ref().is_some_and(|tooth| !tooth.world_from_tooth.is_sound()) {
         return impossible("the tooth's pose has numbers that are none".into());
+    }
+    if scene.mirror.is_some_and(|mirror| !mirror.is_sound()) {
+        return impossible(format!("the mirror has numbers that make no picture: {:?}", scene.mirror));
     }
     match scene.solids.iter().position(|solid| !solid.world_from_solid.is_sound()) {
         Some(place) => impossible(format!("the pose of solid {place} has numbers that are none")),

@@ -5,6 +5,8 @@ use super::camera::Viewpoint;
 use super::coarse::Coarse;
 use super::eye::Eye;
 use super::gpu::Error;
+use super::mirror;
+use super::mirror_pass::MirrorPass;
 use super::passes::DEPTH;
 use super::scene::{Background, Changes, Scene, Shown, Tooth};
 use super::stereo::Stereo;
@@ -25,7 +27,11 @@ pub struct Renderer {
     iso_pass: wgpu::RenderPipeline,
     volume_pass: VolumePass,
     stereo_pass: StereoPass,
+    mirror_pass: MirrorPass,
     views: [ViewGroup; 2],
+    /// What the mirror shows to each eye.
+    mirrors: [Option<Reflected>; 2],
+    view_layout: wgpu::BindGroupLayout,
     tooth: Option<ToothTextures>,
     /// In place of a volume that is larger than this adapter's textures.
     coarse: Option<Coarse>,
@@ -47,6 +53,13 @@ struct ViewGroup {
     group: wgpu::BindGroup,
 }
 
+/// A mirror's picture, drawn before the eye's own.
+struct Reflected {
+    view: ViewGroup,
+    canvas: Canvas,
+    group: wgpu::BindGroup,
+}
+
 /// One eye's colours and depths.
 struct Canvas {
     size: [u32; 2],
@@ -60,21 +73,20 @@ impl Renderer {
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, format: wgpu::TextureFormat) -> Renderer {
         let view_layout = resources::layout(device, "view", &[resources::uniform()]);
         let tooth_layout = ToothTextures::layout(device);
-        let views = [0, 1].map(|_| {
-            let uniform = resources::uniform_buffer(device, "view", size_of::<view::gpu::View>());
-            let group = resources::group(device, &view_layout, [uniform.as_entire_binding()]);
-            ViewGroup { uniform, group }
-        });
+        let views = [0, 1].map(|_| ViewGroup::new(device, &view_layout));
         Renderer {
             surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout),
             iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout),
             volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout),
             stereo_pass: StereoPass::new(device, format),
+            mirror_pass: MirrorPass::new(device, format, &view_layout),
+            mirrors: [None, None],
             device: device.clone(),
             queue: queue.clone(),
             format,
             tooth_layout,
             views,
+            view_layout,
             tooth: None,
             coarse: None,
             surfaces: None,
@@ -101,12 +113,14 @@ impl Renderer {
         match stereo {
             None => {
                 self.fit_canvas(0, target.size);
+                self.fit_mirror(0, scene);
                 self.draw_eye(&mut encoder, scene, &viewpoint.eye(ratio), 0, Some(target.view));
             }
             Some(stereo) => {
                 let size = stereo.layout.eye_size(target.size);
                 for (side, eye) in stereo.eyes(viewpoint, ratio).iter().enumerate() {
                     self.fit_canvas(side, size);
+                    self.fit_mirror(side, scene);
                     if stereo.layout.needs()[side] {
                         self.draw_eye(&mut encoder, scene, eye, side, None);
                     }
@@ -189,16 +203,31 @@ impl Renderer {
     }
 
     fn fit_canvas(&mut self, side: usize, size: [u32; 2]) {
-        if self.canvases[side].as_ref().is_some_and(|canvas| canvas.size == size) {
-            return;
+        if self.canvases[side].as_ref().is_none_or(|canvas| canvas.size != size) {
+            self.canvases[side] = Some(self.canvas(size));
         }
+    }
+
+    fn canvas(&self, size: [u32; 2]) -> Canvas {
         let plane = |label, format| {
             let texture = resources::target_texture(&self.device, label, size, format);
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         let depth = plane("depth", DEPTH);
         let depth_group = self.volume_pass.group(&self.device, &depth);
-        self.canvases[side] = Some(Canvas { size, colour: plane("eye", self.format), depth, depth_group });
+        Canvas { size, colour: plane("eye", self.format), depth, depth_group }
+    }
+
+    /// Makes room for what the mirror shows, if the scene has one.
+    fn fit_mirror(&mut self, side: usize, scene: &Scene) {
+        let Some(mirror) = &scene.mirror else { return };
+        self.mirror_pass.pose(&self.queue, mirror);
+        if self.mirrors[side].is_none() {
+            let canvas = self.canvas([mirror::PIXELS; 2]);
+            let group = self.mirror_pass.group(&self.device, &canvas.colour);
+            let view = ViewGroup::new(&self.device, &self.view_layout);
+            self.mirrors[side] = Some(Reflected { view, canvas, group });
+        }
     }
 
     /// One eye's picture, into `target` or into its own canvas.
@@ -211,10 +240,29 @@ impl Renderer {
         target: Option<&wgpu::TextureView>,
     ) {
         let Some(canvas) = &self.canvases[side] else { return };
-        let ViewGroup { uniform, group } = &self.views[side];
+        let mut reflected = None;
+        if let (Some(mirror), Some(Reflected { view, canvas, group })) = (&scene.mirror, &self.mirrors[side])
+            && let Some(image) = mirror.image_of(eye)
+        {
+            self.draw_world(encoder, &mirror.lit(scene), (&image, view), canvas, &canvas.colour, None);
+            reflected = Some(group);
+        }
+        let colour = target.unwrap_or(&canvas.colour);
+        self.draw_world(encoder, scene, (eye, &self.views[side]), canvas, colour, reflected);
+    }
+
+    /// Everything through one eye; the mirror with what it shows.
+    fn draw_world(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene,
+        (eye, ViewGroup { uniform, group }): (&Eye, &ViewGroup),
+        canvas: &Canvas,
+        colour: &wgpu::TextureView,
+        reflected: Option<&wgpu::BindGroup>,
+    ) {
         let view = view::view(scene, eye, canvas.size, self.format.is_srgb());
         self.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&view));
-        let colour = target.unwrap_or(&canvas.colour);
         let Background { top, bottom } = scene.background;
         let [r, g, b] = top.map(f64::from);
         let clear = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
@@ -226,6 +274,11 @@ impl Renderer {
             pass.draw(0..3, 0..1);
         }
         self.surface_pass.draw_solids(&mut pass);
+        if let Some(reflected) = reflected {
+            pass.set_pipeline(&self.mirror_pass.pipeline);
+            pass.set_bind_group(2, reflected, &[]);
+            pass.draw(0..3, 0..1);
+        }
         let (Some(tooth), Some(textures)) = (&scene.tooth, &self.tooth) else { return };
         pass.set_bind_group(1, &textures.group, &[]);
         match (&tooth.shown, &self.surfaces) {
@@ -258,6 +311,14 @@ impl Renderer {
         pass.set_pipeline(&self.stereo_pass.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..3, 0..1);
+    }
+}
+
+impl ViewGroup {
+    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> ViewGroup {
+        let uniform = resources::uniform_buffer(device, "view", size_of::<view::gpu::View>());
+        let group = resources::group(device, layout, [uniform.as_entire_binding()]);
+        ViewGroup { uniform, group }
     }
 }
 

@@ -1,5 +1,6 @@
 //! What is to be seen, as plain data: the carved tooth, solids, lamps and a background.
 
+use super::mirror::Mirror;
 use super::transfer::TransferFunction;
 use crate::frame::{Pose, Vec3};
 use crate::mesh::Mesh;
@@ -14,6 +15,8 @@ pub type Rgb = [f32; 3];
 pub struct Scene<'a> {
     pub tooth: Option<Tooth<'a>>,
     pub solids: Vec<Solid>,
+    /// Shows all of this but itself.
+    pub mirror: Option<Mirror>,
     pub lights: Lights,
     pub background: Background,
 }
@@ -24,6 +27,7 @@ impl Scene<'_> {
         Scene {
             tooth: None,
             solids: Vec::new(),
+            mirror: None,
             lights: Lights::default(),
             background: Background { top: [0.80, 0.85, 0.88], bottom: [0.60, 0.66, 0.70] },
         }

@@ -1,4 +1,4 @@
-//! Ten scenes to be drawn twice.
+//! Scenes to be drawn twice.
 
 use std::sync::Arc;
 use typodont::anatomy::{self, Tissues};
@@ -103,7 +103,7 @@ pub fn tissue(palette: &Palette) -> Shown {
     Shown::Volume(Arc::new(TransferFunction::tissue(palette)))
 }
 
-/// The ten.
+/// One of each kind, and some together.
 pub fn stories<'a>(volume: &'a Volume, palette: &'a Palette) -> Vec<Story<'a>> {
     let near = Orbit { middle: Vec3::new(0.0, 1.0, 0.0), turn: 0.5, tilt: 0.75, distance: 42.0 };
     let whole = Orbit { middle: Vec3::new(0.0, -4.0, 0.0), turn: -0.6, tilt: 0.2, distance: 62.0 };
@@ -130,7 +130,19 @@ pub fn stories<'a>(volume: &'a Volume, palette: &'a Palette) -> Vec<Story<'a>> {
         story.scene.lights.head = Lamp::head(story.viewpoint.position);
         story
     };
+    // Beside the tooth, turned so that its far side is seen.
+    let mirrored = |mut story: Story<'a>| {
+        let to_eye = (story.viewpoint.position - Vec3::new(-13.0, 2.0, -6.0)).normalize();
+        let to_tooth = (Vec3::new(-1.0, 2.0, -4.0) - Vec3::new(-13.0, 2.0, -6.0)).normalize();
+        let orientation = Quat::from_rotation_arc(Vec3::Z, (to_eye + to_tooth).normalize());
+        let world_from_mirror = Pose { position: Vec3::new(-13.0, 2.0, -6.0), orientation };
+        story.scene.mirror = Some(Mirror { world_from_mirror, radius: 9.0, shine: 0.8 });
+        story
+    };
     vec![
+        mirrored(story("mirror-iso", Shown::Iso, &solids, whole)),
+        mirrored(with_stereo(Layout::Anaglyph, story("mirror-surface-anaglyph", Shown::Surface, &solids, whole))),
+        head_lit(mirrored(story("mirror-volume", tissue(palette), &solids, near))),
         story("surface", Shown::Surface, &[], near),
         story("surface-in-scene", Shown::Surface, &solids, whole),
         story("iso", Shown::Iso, &[], near),

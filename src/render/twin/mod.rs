@@ -6,6 +6,7 @@
 mod iso_pass;
 mod light;
 mod matter;
+mod mirror_pass;
 mod raster;
 mod stereo_pass;
 mod surface_pass;
@@ -15,6 +16,7 @@ pub use matter::finish;
 pub use stereo_pass::stereo_pass;
 
 use super::eye::Eye;
+use super::mirror::{self, Mirror};
 use super::picture::Image;
 use super::scene::{Background, Changes, Lights, Rgb, Scene, Shown, Tooth};
 use super::{empty::Empty, hollow::Hollow};
@@ -53,10 +55,21 @@ impl Twin {
 
     /// The scene through one eye.
     pub fn draw(&self, scene: &Scene, eye: &Eye, [width, height]: [u32; 2]) -> Image {
+        let seen = scene.mirror.as_ref().and_then(|mirror| Some((mirror, mirror.image_of(eye)?)));
+        let reflected =
+            seen.map(|(mirror, image)| (mirror, self.world(&mirror.lit(scene), None, &image, [mirror::PIXELS; 2])));
+        self.world(scene, reflected.as_ref().map(|(mirror, picture)| (*mirror, picture)), eye, [width, height])
+    }
+
+    /// Everything through one eye; the mirror with what it shows.
+    fn world(&self, scene: &Scene, mirror: Option<(&Mirror, &Image)>, eye: &Eye, [width, height]: [u32; 2]) -> Image {
         let sight = Sight { eye: *eye, lights: scene.lights, width, height };
         let mut canvas = Canvas::behind(&scene.background, width, height);
         for solid in &scene.solids {
             surface_pass::solid(solid, &sight, &mut canvas);
+        }
+        if let Some((mirror, reflected)) = mirror {
+            mirror_pass::mirror_pass(mirror, reflected, &sight, &mut canvas);
         }
         if let (Some(tooth), Some(known)) = (&scene.tooth, &self.known) {
             let matter = Matter::new(tooth, &known.empty, &known.hollow);
