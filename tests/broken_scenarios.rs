@@ -497,7 +497,7 @@ fn a_complaint_reads_like_this() {
             "exercise.json:{line}:19: unknown-instrument: /instruments/0: no instrument is named \"round_bur_14\"\n   |\n\
              {line} |   \"instruments\": [\"round_bur_14\", \"round_bur_010\", \"explorer\"],\n   |                   ^^^^^^^^^^^^^^\n  \
              = help: did you mean \"round_bur_014\"? known: explorer, round_bur_006, round_bur_010, round_bur_014, \
-             round_bur_018, round_bur_023, explorer_steel, steel_round_014, carbide_round_010, carbide_round_014, \
+             round_bur_018, round_bur_023, explorer_steel, mirror_4, mirror_5, steel_round_014, carbide_round_010, carbide_round_014, \
              diamond_round_010, diamond_round_014, diamond_round_014_fine, diamond_round_014_coarse, pear_bur_330, pear_bur_245, \
              fissure_bur_57, tapered_bur_169, inverted_cone_bur_34, flame_012\n"
         )

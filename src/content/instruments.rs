@@ -3,9 +3,12 @@
 use super::Library;
 use super::json;
 use crate::diagnostic::Diagnostic;
+use crate::frame::{Pose, Quat, Vec3};
 use crate::touch::{Body, EDGE, Instrument, Profile, Shank, WorkingEnd};
+use crate::volume::{Grid, Label, Volume};
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::f32::consts::FRAC_PI_4;
 
 /// One line of `content/instruments.json`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -68,6 +71,53 @@ pub enum EndEntry {
     InvertedCone(InvertedConeEntry),
     /// Slender at tip and neck, widest in the middle.
     Flame(FlameEntry),
+    /// A mouth mirror; the middle of its face is where the hand's tip is.
+    Mirror(MirrorEntry),
+}
+
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorEntry {
+    /// Diameter of the face, mm: 14 to 30. No. 4 has 22, no. 5 has 24.
+    #[schemars(range(min = 14.0, max = 30.0))]
+    pub diameter_mm: f32,
+}
+
+impl MirrorEntry {
+    /// Behind its face a mirror is so thick, mm.
+    pub const THICKNESS: f32 = 1.6;
+
+    /// The middle of the face and how it is turned in handle space: it reflects toward its own +z, which leans by 45° from the
+    /// shaft's way to the hand.
+    pub fn handle_from_face(&self) -> Pose {
+        Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_y(FRAC_PI_4) }
+    }
+
+    /// Where the shaft joins the rim, handle space, mm.
+    pub fn foot(&self) -> Vec3 {
+        self.handle_from_face() * Vec3::new(-0.5 * self.diameter_mm, 0.0, -0.5 * Self::THICKNESS)
+    }
+
+    /// What touches: the head, and the shaft as far as it reaches into a mouth.
+    fn body(&self) -> Body {
+        /// Length and radius of the shaft, rounding of the rim, and voxels, mm.
+        const SHAFT: f32 = 25.0;
+        const SLENDER: f32 = 1.1;
+        const ROUNDING: f32 = 0.4;
+        const SPACING: f32 = 0.4;
+        let (radius, half) = (0.5 * self.diameter_mm, 0.5 * Self::THICKNESS);
+        let (face_from_handle, foot) = (self.handle_from_face().inverse(), self.foot());
+        let distance = |p: Vec3| {
+            let at = face_from_handle * p;
+            let beyond = Vec3::new(at.truncate().length() - radius, (at.z + half).abs() - half, 0.0) + ROUNDING;
+            let outside = beyond.max(Vec3::ZERO).truncate().length() + beyond.truncate().max_element().min(0.0);
+            let shaft = p - foot - Vec3::Z * (p.z - foot.z).clamp(0.0, SHAFT);
+            (outside - ROUNDING).min(shaft.length() - SLENDER)
+        };
+        let reach = Vec3::splat(radius + 2.0);
+        let grid = Grid::covering(-reach, reach.max(foot + Vec3::Z * (SHAFT + 2.0)), Vec3::splat(SPACING), 3);
+        Body::of_volume(&Volume::from_distance(grid, 1.5 * SPACING, |p| (distance(p), Label(1))))
+    }
 }
 
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -179,6 +229,7 @@ impl InstrumentEntry {
             EndEntry::InvertedCone(e) => {
                 bur(fissure(e.diameter_mm, e.top_diameter_mm, e.length_mm, TipEntry::Flat), e.top_diameter_mm)
             }
+            EndEntry::Mirror(mirror) => Instrument::shaped(mirror.body(), self.cuts),
             EndEntry::Flame(e) => bur(Profile::flame(0.5 * e.diameter_mm, e.length_mm, FLAME_TIP), 2.0 * FLAME_TIP),
         }
     }
@@ -196,7 +247,7 @@ impl EndEntry {
     /// What is wrong with a shape whose lengths are each in range.
     fn contradiction(&self) -> Option<&'static str> {
         let (is_wrong, what) = match self {
-            EndEntry::Point | EndEntry::Ball(_) => return None,
+            EndEntry::Point | EndEntry::Ball(_) | EndEntry::Mirror(_) => return None,
             EndEntry::Pear(e) => (
                 e.length_mm <= e.diameter_mm || e.top_diameter_mm >= e.diameter_mm,
                 "a pear is longer than it is wide, and wider at its tip than at its top",
@@ -252,8 +303,8 @@ impl InstrumentTable {
                 let help = Some("an explorer never cuts, a bur always does".to_string());
                 found.push(read.places.complain(&format!("/instruments/{index}/kind"), "wrong-kind", message, help));
             }
-            if matches!(entry.end, EndEntry::Point) && entry.cuts {
-                let message = format!("\"{}\" cuts with a point", entry.id);
+            if matches!(entry.end, EndEntry::Point | EndEntry::Mirror(_)) && entry.cuts {
+                let message = format!("\"{}\" cuts with a point or a mirror", entry.id);
                 let help = Some("a bur has a width: give its end as { \"ball\": { \"diameter_mm\": … } }".to_string());
                 found.push(read.places.complain(&format!("/instruments/{index}/cuts"), "cutting-point", message, help));
             }
@@ -292,10 +343,12 @@ mod tests {
         let table = InstrumentTable::read(&Library::shipped()).unwrap();
         let mut bodies = 0;
         for id in table.ids() {
-            if let WorkingEnd::Shaped(body) = table.by_id(id).unwrap().make().end {
+            let entry = table.by_id(id).unwrap();
+            if let WorkingEnd::Shaped(body) = entry.make().end {
                 let shank = body.shell().iter().filter(|n| n.region == Region::Shank).count();
                 let head = body.shell().len() - shank;
-                assert!((200..1000).contains(&head) && shank > 50, "{id}: {head} and {shank} points");
+                let has_shank = shank > 50 || matches!(entry.end, EndEntry::Mirror(_));
+                assert!((200..1000).contains(&head) && has_shank, "{id}: {head} and {shank} points");
                 bodies += 1;
             }
         }

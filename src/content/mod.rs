@@ -16,6 +16,6 @@ pub mod measured;
 pub mod sounds;
 
 pub use feel::{AgeBand, FeelTable};
-pub use instruments::{EndEntry, InstrumentEntry, InstrumentTable, ToolKind};
+pub use instruments::{EndEntry, InstrumentEntry, InstrumentTable, MirrorEntry, ToolKind};
 pub use library::{Library, read_file, read_text};
 pub use tissues::{Role, TissueEntry, TissueTable, parse_color};

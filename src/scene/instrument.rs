@@ -1,10 +1,10 @@
 //! What the hand holds, drawn.
 
-use crate::content::{EndEntry, InstrumentEntry, Library, picture_mesh};
+use crate::content::{EndEntry, InstrumentEntry, Library, MirrorEntry, picture_mesh};
 use crate::diagnostic::Diagnostic;
 use crate::frame::{Pose, Vec3};
 use crate::mesh::Mesh;
-use crate::render::{Finish, Solid};
+use crate::render::{Finish, Mirror, Solid};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -23,15 +23,51 @@ pub fn instrument(entry: &InstrumentEntry, library: &Library) -> (Solid, Option<
 
 /// An instrument by the outline of its end, about its own tip, +z along the shaft toward the hand.
 pub fn outlined(entry: &InstrumentEntry) -> Solid {
-    Solid::plain(Arc::new(turned(&outline(&entry.end))), Pose::IDENTITY, STEEL)
+    Solid::plain(Arc::new(drawing(&entry.end)), Pose::IDENTITY, STEEL)
 }
 
-/// Radius and height above the device's tip, mm, from the tip upward. A drawing: what touches is the instrument's own shape.
-fn outline(end: &EndEntry) -> Vec<[f32; 2]> {
+/// The reflecting face of a mouth mirror held in a place; `None` for every other instrument.
+pub fn mirror(entry: &InstrumentEntry, world_from_tip: Pose) -> Option<Mirror> {
+    /// A little within the rim, mm; rhodium on the front of the glass.
+    const RIM: f32 = 0.4;
+    const SHINE: f32 = 0.8;
+    let EndEntry::Mirror(mirror) = &entry.end else { return None };
+    let radius = 0.5 * mirror.diameter_mm - RIM;
+    Some(Mirror { world_from_mirror: world_from_tip * mirror.handle_from_face(), radius, shine: SHINE })
+}
+
+/// A mouth mirror's head, shaft and handle, without its face.
+fn mirror_body(mirror: &MirrorEntry) -> Mesh {
+    let (radius, back) = (0.5 * mirror.diameter_mm, -MirrorEntry::THICKNESS);
+    // The face lies a twentieth of a millimetre over the glass, within the rim.
+    let head = [[0.0, back], [radius - 0.8, back], [radius, back + 0.5], [radius, 0.0], [radius - 0.4, 0.0]];
+    let glass = [[radius - 0.4, -0.05], [0.0, -0.05]];
+    let shaft =
+        [[0.0, -0.6], [1.0, -0.4], [1.1, 12.0], [1.1, 32.0], [2.8, 38.0], [2.8, 115.0], [2.0, 117.0], [0.0, 117.0]];
+    let mut mesh = placed(turned(&[&head[..], &glass].concat()), mirror.handle_from_face());
+    let shaft = placed(turned(&shaft), Pose::at(mirror.foot()));
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(shaft.positions);
+    mesh.normals.extend(shaft.normals);
+    mesh.triangles.extend(shaft.triangles.iter().map(|t| t.map(|i| first + i)));
+    mesh
+}
+
+fn placed(mut mesh: Mesh, pose: Pose) -> Mesh {
+    mesh.positions.iter_mut().for_each(|p| *p = pose * *p);
+    mesh.normals.iter_mut().for_each(|n| *n = pose.turn(*n));
+    mesh
+}
+
+/// An end with what is behind it, about the device's tip, mm. A drawing: what touches is the instrument's own shape.
+fn drawing(end: &EndEntry) -> Mesh {
+    // Radius and height, from the tip upward.
     let tip = match end {
         EndEntry::Point => {
-            return vec![[0.0, 0.0], [0.12, 0.6], [0.5, 8.0], [1.0, 14.0], [2.6, 20.0], [2.6, 90.0], [0.0, 90.0]];
+            let needle = [[0.0, 0.0], [0.12, 0.6], [0.5, 8.0], [1.0, 14.0]];
+            return turned(&[&needle[..], &[[2.6, 20.0], [2.6, 90.0], [0.0, 90.0]]].concat());
         }
+        EndEntry::Mirror(mirror) => return mirror_body(mirror),
         EndEntry::Ball(e) => arc(0.5 * e.diameter_mm, -1.0, 0.8),
         EndEntry::Pear(e) => {
             let radius = 0.5 * e.diameter_mm;
@@ -49,7 +85,7 @@ fn outline(end: &EndEntry) -> Vec<[f32; 2]> {
     // Neck, friction grip shank (ISO 1797: 1.6 mm) and the handpiece's head.
     let behind = [[0.8 * radius, top + 0.2], [0.8, top + 3.0], [0.8, top + 9.5], [4.5, top + 9.5], [5.2, top + 12.0]];
     let head = [[5.2, top + 22.0], [0.0, top + 22.0]];
-    tip.into_iter().chain(behind).chain(head).collect()
+    turned(&[&tip[..], &behind, &head].concat())
 }
 
 /// Part of a circle about the origin, from one share of its radius in height to another.

@@ -10,7 +10,7 @@ mod palette;
 mod views;
 
 pub use around::around;
-pub use instrument::{instrument, outlined};
+pub use instrument::{instrument, mirror, outlined};
 pub use jaw::{Mouth, OPEN};
 pub use palette::palette;
 pub use views::{ToothSide, tooth_view};
