@@ -3,8 +3,8 @@
 //! The pictures lie in `target/tmp/scene/` to be looked at.
 
 use std::path::Path;
-use typodont::content::{self, Library};
-use typodont::frame::Vec3;
+use typodont::content::{self, InstrumentTable, Library};
+use typodont::frame::{Pose, Quat, Vec3};
 use typodont::render::*;
 use typodont::scenario::{self, Forms, Scenario, ToothPlace, Workpiece};
 use typodont::scene::*;
@@ -71,6 +71,71 @@ fn the_mouth_is_seen_from_everywhere() {
         let teeth = share(&|[r, g, b, _]| r > 110 && r >= b && r.abs_diff(g) < 30);
         assert!(gum > 0.10 && teeth > 0.03, "{name}: {gum} gum, {teeth} teeth");
     }
+}
+
+#[test]
+fn a_preview_shows_the_mouth_where_the_exercise_has_one() {
+    // Aim: `typodont preview` draws what the trainee sees, then decay from two sides and cut. Method: with and without jaw the
+    // first picture differs and the rest does not; a pair of teeth has no jaw to show.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("scene");
+    std::fs::create_dir_all(&folder).unwrap();
+    let preview = |exercise: &str, more: &[&str], name: &str| {
+        let path = folder.join(name);
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_typodont"));
+        command.current_dir(env!("CARGO_MANIFEST_DIR"));
+        let output = command.args(["preview", exercise, "-o"]).arg(&path).args(more).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let picture = image::open(&path).unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), (720 + 3 * 480, 480));
+        picture
+    };
+    let half = |picture: &image::RgbImage, left: u32, width: u32| {
+        (0..480 * width).map(|i| picture.get_pixel(left + i % width, i / width).0).collect::<Vec<_>>()
+    };
+    let with = preview("scenarios/5-grinding.json", &[], "preview.png");
+    let without = preview("scenarios/5-grinding.json", &["--no-jaw"], "preview-no-jaw.png");
+    assert!(half(&with, 0, 720) != half(&without, 0, 720));
+    assert!(half(&with, 720, 1440) == half(&without, 720, 1440));
+    let pair = preview("scenarios/2-decay.json", &["--jaw"], "preview-pair.png");
+    assert!(half(&pair, 0, 720) != half(&without, 0, 720));
+}
+
+#[test]
+fn a_mouth_mirror_shows_the_far_side_of_the_tooth() {
+    // Aim: an instrument of the table reflects in the scene. Method: held behind the tooth, its face toward the way between
+    // the tooth and the eye, it shows enamel where otherwise there is none; turned round, its steel back.
+    let (scenario, workpiece) = exercise("5-grinding.json");
+    let entry = InstrumentTable::read(&Library::shipped()).unwrap().by_id("mirror_5").unwrap().clone();
+    let palette = palette(&scenario.tissues, true);
+    let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+    let viewpoint = Orbit { turn: 0.1, tilt: 0.5, distance: 95.0, ..work_view(&workpiece) }.viewpoint();
+    let tooth_middle =
+        workpiece.world_from_tooth * (0.5 * (workpiece.teeth[0].crown_low + workpiece.teeth[0].crown_high));
+    let place = tooth_middle + Vec3::new(0.0, 11.0, -17.0);
+    let halfway = (tooth_middle - place).normalize() + (viewpoint.position - place).normalize();
+    let draw = |face: Vec3, name: &str| {
+        // The face leans by 45° in the handle's own space; from there it is turned to where it is wanted.
+        let own = mirror(&entry, Pose::IDENTITY).unwrap().world_from_mirror;
+        let orientation = Quat::from_rotation_arc(own.turn(Vec3::Z), face.normalize());
+        let world_from_tip = Pose { position: place, orientation };
+        let (held, complaint) = instrument(&entry, &Library::shipped());
+        assert!(complaint.is_none());
+        let mut solids = mouth.one_jaw();
+        solids.push(Solid { world_from_solid: world_from_tip, ..held });
+        let lights = Lights { head: Lamp::head(viewpoint.position), ..Lights::default() };
+        let mirror = mirror(&entry, world_from_tip);
+        let scene = Scene { tooth: Some(tooth(&workpiece, &palette)), solids, mirror, lights, ..Scene::empty() };
+        let image = Painter::cpu().draw(&scene, &viewpoint, None, [780, 690]).unwrap();
+        keep(name, &image);
+        let ([x, y], _) = viewpoint.eye(780.0 / 690.0).place(place);
+        let around = (0..1600u32)
+            .map(|i| (i % 40, i / 40))
+            .map(|(dx, dy)| image.pixel((x * 780.0) as u32 + dx - 20, (y * 690.0) as u32 + dy - 20));
+        // Enamel and decay are warm, steel and sky are not.
+        around.filter(|p| p[0] > p[2].saturating_add(4)).count()
+    };
+    let (shown, back) = (draw(halfway, "mirror"), draw(-halfway, "mirror-back"));
+    assert!(shown > 800 && back < 100, "{shown} and {back} of 1600 pixels in its middle show the tooth");
 }
 
 #[test]

@@ -14,7 +14,7 @@ mod words;
 
 pub use html::Templates;
 pub use labelmap::tissues as tissue_map;
-pub use pictures::preview_png;
+pub use pictures::{SEEN, preview_png};
 pub use session_file::{
     AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
     StageFile,

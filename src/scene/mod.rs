@@ -13,4 +13,4 @@ pub use around::around;
 pub use instrument::{instrument, mirror, outlined};
 pub use jaw::{Mouth, OPEN};
 pub use palette::palette;
-pub use views::{ToothSide, tooth_view};
+pub use views::{ToothSide, tooth_view, work_view};

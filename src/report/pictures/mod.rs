@@ -7,7 +7,7 @@ mod marks;
 mod preview;
 mod tint;
 
-pub use preview::preview_png;
+pub use preview::{SEEN, preview_png};
 
 use super::glb::Part;
 use crate::frame::Vec3;

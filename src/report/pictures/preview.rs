@@ -4,6 +4,7 @@ use super::tint::Palette;
 use super::{LINE, LINE_WIDTH, SIZE, crown_shot, marks, png, tooth_at};
 use crate::content::Role;
 use crate::frame::Vec3;
+use crate::render::Image;
 use crate::scenario::{Scenario, Workpiece};
 use crate::volume::march::{self, Camera, Picture, Shot, Side};
 use crate::volume::{Label, Volume, surface};
@@ -12,13 +13,20 @@ use crate::volume::{Label, Volume, surface};
 const MARK: [f32; 3] = [0.83, 0.18, 0.10];
 const MARK_SHARE: f32 = 0.30;
 
-/// From above, from the side nearest to the first decay, and cut through that decay, side by side.
-pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece) -> Vec<u8> {
+/// Width and height of the first picture of a preview, pixels.
+pub const SEEN: [u32; 2] = [SIZE * 3 / 2, SIZE];
+
+/// What the trainee sees, a picture of the size [`SEEN`]; then from above, from the side nearest to the first decay, and cut
+/// through that decay, side by side.
+pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, seen: &Image) -> Vec<u8> {
+    let share = |v: u8| f32::from(v) / 255.0;
+    let pixels = seen.rgba.chunks(4).map(|p| [share(p[0]), share(p[1]), share(p[2]), 1.0]).collect();
+    let first = Picture { width: seen.width, height: seen.height, pixels };
     let palette = Palette::of(&scenario.tissues);
     let decay = decay_alone(scenario, &workpiece.volume);
     let tooth = &workpiece.teeth[0];
     let middle = workpiece.lesions.first().map_or(0.5 * (tooth.crown_low + tooth.crown_high), |l| l.centre);
-    let seen = |side: Side| {
+    let from = |side: Side| {
         let shot = Shot { camera: Camera::framing(side, &workpiece.volume, 1.0), width: SIZE, height: SIZE };
         let mut picture = march::iso(&workpiece.volume, &shot, |label, _| palette.tissue(label));
         if let Some(decay) = &decay {
@@ -32,8 +40,8 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece) -> Vec<u8> {
         cut.lay_over(&march::outline(decay, &shot, middle, MARK, LINE_WIDTH));
     }
     cut.lay_over(&march::outline(&workpiece.volume, &shot, middle, LINE, LINE_WIDTH));
-    let sides = seen(Side::Occlusal).beside(&seen(nearest_side(workpiece, middle)));
-    png(&sides.beside(&marks::on_paper(&cut, &shot)))
+    let sides = from(Side::Occlusal).beside(&from(nearest_side(workpiece, middle)));
+    png(&first.beside(&sides).beside(&marks::on_paper(&cut, &shot)))
 }
 
 /// The decay without the tooth.
