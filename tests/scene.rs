@@ -3,11 +3,14 @@
 //! The pictures lie in `target/tmp/scene/` to be looked at.
 
 use std::path::Path;
+use std::sync::Arc;
 use typodont::content::{self, InstrumentTable, Library};
 use typodont::frame::{Pose, Quat, Vec3};
 use typodont::render::*;
 use typodont::scenario::{self, Forms, Scenario, ToothPlace, Workpiece};
 use typodont::scene::*;
+use typodont::touch::{Form, Obstacle, Shape};
+use typodont::volume::{Grid, Volume, surface};
 
 fn exercise(name: &str) -> (Scenario, Workpiece) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios").join(name);
@@ -205,6 +208,29 @@ fn gum_is_drawn_where_it_is_felt() {
     assert!(off.len() > 200, "{} places", off.len());
     assert!(off.iter().all(|d| *d < 0.05), "{:?}", off.iter().copied().fold(0.0, f32::max));
     assert_eq!(solids.len(), 2 + 2, "gum, teeth, and two neighbours as they are felt");
+}
+
+#[test]
+fn under_gum_that_is_a_mesh_the_drawn_gum_does_not_show() {
+    // Aim: a school's own gum is what is seen near the tooth. Method: the usual gum as a mesh; the jaw's own lies under it.
+    let (scenario, mut workpiece) = exercise("5-grinding.json");
+    let gum_label = scenario.tissues.by_name("gingiva").unwrap().label();
+    let usual = workpiece.around.iter().find(|shape| shape.label == gum_label).unwrap().clone();
+    let middle = usual.tooth_from_shape.position;
+    let grid = Grid::covering(middle - 24.0, middle + 24.0, Vec3::splat(0.8), 3);
+    let mesh = surface::extract(&Volume::from_distance(grid, 1.2, |p| (usual.distance(p), gum_label)));
+    let form = Form::Mesh(Arc::new(Obstacle::new(&mesh).unwrap()));
+    workpiece.around = vec![Shape { label: gum_label, tooth_from_shape: Pose::IDENTITY, form }];
+    let ToothPlace { crown_low, crown_high, .. } = workpiece.teeth[0];
+    let solids = Mouth::around(&workpiece, &scenario.tissues).unwrap().one_jaw();
+    assert_eq!(solids.len(), 2 + 1, "gum, teeth, and the mesh itself");
+    let tooth_from_gum = workpiece.world_from_tooth.inverse() * solids[0].world_from_solid;
+    let near = solids[0].mesh.positions.iter().map(|p| tooth_from_gum * *p).filter(|p| {
+        let aside = (*p - p.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
+        aside.length() < 5.0 && p.z > crown_low.z - 5.0
+    });
+    let highest = near.map(|p| workpiece.around[0].distance(p)).fold(f32::NEG_INFINITY, f32::max);
+    assert!((-0.6..-0.2).contains(&highest), "{highest} mm");
 }
 
 #[test]

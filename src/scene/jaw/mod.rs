@@ -312,9 +312,10 @@ impl Felt<'_> {
         let ToothPlace { crown_low, crown_high, .. } = *self.tooth;
         let mut point = self.near_from_tooth.inverse() * point_in_arch;
         let aside = (point - point.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
-        let (away, off) = (aside.length(), gum.distance(point).abs());
         let deep = crown_low.z - point.z;
-        let share = (1.0 - between(away, AS_FELT)) * (1.0 - between(off, FAR)) * (1.0 - between(deep, DEEP));
+        let near = (1.0 - between(aside.length(), AS_FELT)) * (1.0 - between(deep, DEEP));
+        // A mesh is slow to ask.
+        let share = if near > 0.0 { near * (1.0 - between(gum.distance(point).abs(), FAR)) } else { 0.0 };
         if share <= 0.0 {
             return point_in_arch;
         }
