@@ -37,8 +37,9 @@ pub struct InstrumentEntry {
     /// US number of the same bur.
     #[serde(default)]
     pub us_number: Option<String>,
-    /// How it looks: an .obj, .glb or .gltf file in millimetres, the working end's tip at the origin, +z along the shaft toward
-    /// the hand. Only a picture: what touches is `end`. Without it, or where it cannot be read, the end's outline is drawn.
+    /// How it looks: an .obj, .glb or .gltf file in millimetres, the working end's tip at the origin, +z along the shaft
+    /// toward the hand. Only a picture: what touches is `end`. Without it, or where it cannot be read, the end's outline is
+    /// drawn.
     #[serde(default)]
     #[schemars(length(min = 1, max = 200))]
     pub mesh: Option<String>,
@@ -87,8 +88,8 @@ impl MirrorEntry {
     /// Behind its face a mirror is so thick, mm.
     pub const THICKNESS: f32 = 1.6;
 
-    /// The middle of the face and how it is turned in handle space: it reflects toward its own +z, which leans by 45° from the
-    /// shaft's way to the hand.
+    /// The middle of the face and how it is turned in handle space: it reflects toward its own +z, which leans by 45° from
+    /// the shaft's way to the hand.
     pub fn handle_from_face(&self) -> Pose {
         Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_y(FRAC_PI_4) }
     }

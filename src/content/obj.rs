@@ -1,7 +1,7 @@
 //! Wavefront OBJ files.
 //!
-//! Takes a file's bytes. Gives one closed mesh in millimetres, facing outward, or the first thing that is wrong with it; or
-//! just the triangles, for what is only looked at. What a file says of materials and colours is not read.
+//! Takes a file's bytes. Gives one closed mesh in millimetres, facing outward, or the first thing that is wrong with it;
+//! or just the triangles, for what is only looked at. What a file says of materials and colours is not read.
 
 use crate::frame::Vec3;
 use crate::mesh::Mesh;

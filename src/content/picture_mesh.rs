@@ -1,7 +1,7 @@
 //! Meshes that are only looked at: an instrument from a Wavefront OBJ or a glTF 2.0 file.
 //!
-//! Takes a file's bytes, in millimetres. Gives one mesh with normals, or the first thing that is wrong with it. It need not be
-//! closed. Materials, textures and animations are not read.
+//! Takes a file's bytes, in millimetres. Gives one mesh with normals, or the first thing that is wrong with it. It need not
+//! be closed. Materials, textures and animations are not read.
 
 use super::Library;
 use super::obj;

@@ -36,8 +36,8 @@ impl Mirror {
         self.world_from_mirror.turn(Vec3::Z)
     }
 
-    /// The eye's image behind the mirror, which looks out through the face as through a window. What stands behind the
-    /// face is nearer than `near`. `None` when the eye is behind the face.
+    /// The eye's image behind the mirror, which looks out through the face as through a window. What stands behind the face
+    /// is nearer than `near`. `None` when the eye is behind the face.
     ///
     /// A ray that comes to the eye from a place of the face would have gone on to the image in a straight line, so nothing
     /// in the scene need be turned round.
@@ -84,8 +84,8 @@ mod tests {
 
     #[test]
     fn what_is_seen_in_the_mirror_obeys_the_law_of_reflection() {
-        // Aim: the place of the mirror's picture that shows a point is where light from that point leaves the face toward the
-        // eye. Method: reflect the way from the eye to that place about the normal; it must lead to the point.
+        // Aim: the place of the mirror's picture that shows a point is where light from that point leaves the face toward
+        // the eye. Method: reflect the way from the eye to that place about the normal; it must lead to the point.
         let orientation = Quat::from_rotation_y(0.7) * Quat::from_rotation_x(-0.4);
         let mirror = Mirror {
             world_from_mirror: Pose { position: Vec3::new(4.0, -3.0, 2.0), orientation },

@@ -27,8 +27,6 @@ pub struct Half {
     pub seats: Vec<Seat>,
     /// Points of the line through the middles of all crowns, by way along it.
     line: Vec<[f32; 3]>,
-    /// Straight on behind the last.
-    end: [f32; 2],
 }
 
 /// Where one tooth stands.
@@ -80,13 +78,12 @@ impl Half {
             if length(&curve(form.width, depth)) < wanted { low = depth } else { high = depth }
         }
         let line = measured(&curve(form.width, 0.5 * (low + high)));
-        let [.., y, _] = line.last().copied().unwrap_or_default();
-        let mut half = Half { seats: Vec::new(), line, end: [0.5 * form.width, y] };
+        let mut half = Half { seats: Vec::new(), line };
         let mut from = 0.0;
         for (model, width) in teeth {
             let to = from + width;
             // From contact to contact, so that neighbours meet however the line bends.
-            let [mesial, behind] = [from, to].map(|way| half.at(way).0);
+            let [mesial, behind] = [from, to].map(|way| half.place(way));
             let (place, distal) = (0.5 * (mesial + behind), (behind - mesial).normalize_or(Vec3::Y));
             let z = -model.short - spee(form, &half, 0.5 * (from + to));
             let top = Vec3::new(place.x, place.y, z);
@@ -100,17 +97,24 @@ impl Half {
 
     /// The line's point and its way back, level, so far along it.
     pub fn at(&self, way: f32) -> (Vec3, Vec3) {
-        let Some(after) = self.line.iter().position(|p| p[2] > way).filter(|&i| i > 0) else {
-            let [x, y] = self.end;
-            let beyond = way - self.line.last().map_or(0.0, |p| p[2]);
-            return if way > 0.0 { (Vec3::new(x, y + beyond, 0.0), Vec3::Y) } else { (Vec3::ZERO, Vec3::X) };
+        /// The way is taken over a tooth's width or so: the beta function bends sharply where it ends, gum does not. mm
+        const BEND: f32 = 3.0;
+        (self.place(way), (self.place(way + BEND) - self.place(way - BEND)).normalize_or(Vec3::Y))
+    }
+
+    /// A point of the line; straight on behind its end, and on the other side before its beginning.
+    fn place(&self, way: f32) -> Vec3 {
+        if way < 0.0 {
+            return self.place(-way) * Vec3::new(-1.0, 1.0, 1.0);
+        }
+        let after = self.line.partition_point(|p| p[2] <= way).max(1);
+        let Some(&[bx, by, b]) = self.line.get(after) else {
+            let [x, y, end] = self.line[self.line.len() - 1];
+            return Vec3::new(x, y + way - end, 0.0);
         };
-        let spread = 6.min(after).min(self.line.len() - 1 - after).max(1);
-        let ([ax, ay, a], [bx, by, b]) = (self.line[after - 1], self.line[after]);
+        let [ax, ay, a] = self.line[after - 1];
         let part = (way - a) / (b - a).max(1e-6);
-        let place = Vec3::new(ax + (bx - ax) * part, ay + (by - ay) * part, 0.0);
-        let [before, behind] = [self.line[after - spread], self.line[(after + spread - 1).min(self.line.len() - 1)]];
-        (place, Vec3::new(behind[0] - before[0], behind[1] - before[1], 0.0).normalize_or(Vec3::Y))
+        Vec3::new(ax + (bx - ax) * part, ay + (by - ay) * part, 0.0)
     }
 
     /// Way along the line to the last tooth's end.

@@ -46,8 +46,10 @@ pub struct Side<'a> {
 /// The gum over both halves, arch space. `fit` may move each of its places.
 pub fn gum(jaw: Jaw, sides: [Side; 2], fit: impl Fn(Vec3) -> Vec3) -> Coloured {
     let mut columns: Vec<Vec<(Vec3, Rgb)>> = Vec::new();
+    // Both sides end equally far back, also where one tooth is larger than its twin.
+    let ends = sides.each_ref().map(|side| side.half.at(side.half.length() + PAD).0.y);
     for (number, side) in sides.iter().enumerate() {
-        let end = side.half.length() + PAD;
+        let end = side.half.length() + PAD + ends[0].max(ends[1]) - ends[number];
         let count = (end / COLUMN).ceil() as usize;
         let column = |i: usize| side.column(jaw, end * i as f32 / count as f32);
         match number {
