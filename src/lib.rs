@@ -29,4 +29,6 @@ pub mod score;
 pub mod render;
 pub mod scene;
 pub mod report;
+pub mod lesson;
+pub mod app;
 pub mod cli;

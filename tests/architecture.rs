@@ -113,7 +113,7 @@ fn the_lower_rooms_keep_their_promises() {
         // The player waits for a server; what it plays follows from loads and a seed alone.
         (&["device", "sim", "audio"], &["SystemTime", "println!", "eprintln!", "HashMap"]),
         (
-            &["scenario", "session", "record", "report", "content"],
+            &["scenario", "session", "record", "report", "content", "lesson"],
             &["std::time", "SystemTime", "Instant", "println!", "HashMap"],
         ),
         (

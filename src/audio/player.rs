@@ -7,12 +7,13 @@ use super::pulse::Stream;
 
 use super::clip::Replacements;
 use super::load::{DrillLoad, WORDS};
+use super::signal::Ramp;
 use super::synth::{Options, Synth};
 use crate::mailbox::{self, Newest, Receiver, Sender};
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -27,7 +28,21 @@ pub struct Heard {
     load: Arc<Newest<WORDS>>,
     last: DrillLoad,
     cries: Receiver<f32>,
+    volume: Arc<Volume>,
+    ramp: Ramp,
 }
+
+/// A share of full scale, 0 to 1, as the bits of an `f32`.
+struct Volume(AtomicU32);
+
+impl Volume {
+    fn share(&self) -> f32 {
+        f32::from_bits(self.0.load(Ordering::Relaxed))
+    }
+}
+
+/// Samples in which a new volume is reached, so that it does not click: 10 ms at 48 kHz.
+const VOLUME_STEPS: u32 = 480;
 
 /// Cries that may wait. The patient has one mouth, so more than a few are never said.
 const CRIES_WAITING: usize = 8;
@@ -36,7 +51,12 @@ const CRIES_WAITING: usize = 8;
 pub fn sounds() -> (Sounds, Heard) {
     let load = Arc::new(Newest::new());
     let (sender, receiver) = mailbox::ordered(CRIES_WAITING);
-    (Sounds { load: load.clone(), cries: sender }, Heard { load, last: DrillLoad::default(), cries: receiver })
+    let volume = Arc::new(Volume(AtomicU32::new(1.0f32.to_bits())));
+    let ramp = Ramp::at(1.0);
+    (
+        Sounds { load: load.clone(), cries: sender },
+        Heard { load, last: DrillLoad::default(), cries: receiver, volume, ramp },
+    )
 }
 
 impl Sounds {
@@ -63,6 +83,13 @@ impl Heard {
             self.last = DrillLoad::from_words(words);
         }
         synth.fill(&self.last, block);
+        let volume = self.volume.share();
+        if self.ramp.goal != volume {
+            self.ramp.aim(volume, VOLUME_STEPS);
+        }
+        for sample in block {
+            *sample *= self.ramp.next();
+        }
     }
 
     /// Cries from while nobody could hear them are not made up for.
@@ -139,6 +166,7 @@ const NEWS_WAITING: usize = 16;
 /// Plays what [`Sounds`] says until it is dropped.
 pub struct Player {
     news: Receiver<News>,
+    volume: Arc<Volume>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
 }
@@ -156,15 +184,21 @@ impl Player {
     pub fn start(heard: Heard, output: Output) -> Player {
         let (mut sender, news) = mailbox::ordered(NEWS_WAITING);
         let shared = Arc::new(Shared::default());
-        let seen = shared.clone();
+        let (seen, volume) = (shared.clone(), heard.volume.clone());
         let name = thread::Builder::new().name("sound".into());
         let thread = name.spawn(move || play(heard, &output, &mut sender, &seen)).ok();
-        Player { news, shared, thread }
+        Player { news, volume, shared, thread }
     }
 
     /// The next news, if there is any.
     pub fn news(&mut self) -> Option<News> {
         self.news.try_recv()
+    }
+
+    /// How loud everything is from now on: a share of full scale, 0 to 1.
+    pub fn volume(&self, share: f32) {
+        let share = if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) };
+        self.volume.0.store(share.to_bits(), Ordering::Relaxed);
     }
 
     /// How often the server ran out of samples so far, because this machine was too busy; each was heard as a gap.

@@ -39,6 +39,11 @@ pub struct Ramp {
 }
 
 impl Ramp {
+    /// Stands at a value.
+    pub fn at(value: f32) -> Ramp {
+        Ramp { value, goal: value, ..Ramp::default() }
+    }
+
     /// Sets out for a goal, to be reached after so many samples.
     pub fn aim(&mut self, goal: f32, samples: u32) {
         self.goal = goal;

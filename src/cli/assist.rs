@@ -2,6 +2,7 @@
 
 use super::{Failure, live};
 use crate::device::Link;
+use crate::lesson;
 use crate::sim::Assist;
 use clap::Args;
 use std::sync::atomic::Ordering;
@@ -26,7 +27,7 @@ const LISTEN_EVERY: Duration = Duration::from_millis(10);
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { device, to, key } = arguments;
-    let held = live::open(device)?;
+    let held = lesson::open(device)?;
     let link = Link::connect(to, key).map_err(|e| {
         Failure::Wrong(format!("{to}: no-trainee: {e}; give the address that the trainee's program prints"))
     })?;

@@ -1,9 +1,9 @@
 //! `typodont check`: every complaint about every file.
 
 use super::{Failure, say};
-use crate::content::{self, Library};
 use crate::diagnostic::Diagnostic;
-use crate::scenario::{self, Forms};
+use crate::lesson::{self, scenario_files};
+use crate::scenario::Forms;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -56,36 +56,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// All complaints about one scenario.
 fn check(path: &Path) -> Vec<Diagnostic> {
-    let source = match content::read_text(path) {
-        Ok(source) => source,
-        Err(diagnostic) => return vec![diagnostic],
-    };
-    scenario::resolve(source, &library_for(path), Forms::Made).err().unwrap_or_default()
-}
-
-/// The tables that ship with the program, and the files beside a scenario.
-pub fn library_for(scenario: &Path) -> Library {
-    let folder = scenario.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    Library::shipped().with_folder(folder)
-}
-
-/// A file itself; of a folder all scenarios in it, by name.
-fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, Failure> {
-    if !path.is_dir() {
-        return Ok(vec![path.to_path_buf()]);
-    }
-    let unreadable = |e| Failure::wrong(format!("{}: unreadable-folder: {e}", path.display()));
-    let entries = std::fs::read_dir(path).map_err(unreadable)?;
-    let is_scenario = |p: &PathBuf| {
-        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-        name.ends_with(".json") && !name.ends_with(".schema.json")
-    };
-    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(is_scenario).collect();
-    files.sort();
-    match files.is_empty() {
-        true => Err(Failure::wrong(format!("{}: no-scenarios: the folder holds no scenario (*.json)", path.display()))),
-        false => Ok(files),
-    }
+    lesson::read(path, Forms::Made).err().unwrap_or_default()
 }
 
 fn as_json(found: &[Diagnostic]) -> String {

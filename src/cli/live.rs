@@ -4,11 +4,11 @@
 //! in pictures.
 
 use super::{Failure, say};
-use crate::device::{Device, Driver, Link, Trouble};
-use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
+use crate::device::Link;
+use crate::lesson::{self, Failed, Held, Lesson, Prepared, Recorded};
 use crate::scenario::{QuestionKind, Scenario};
-use crate::session::{Answer, Broken, Effect, Heard, Input, Live, Session};
-use crate::sim::{Assist, AssistNews, Command, Role, Second, Simulation};
+use crate::session::{Answer, Effect, Heard, Input, Live, Session};
+use crate::sim::{Assist, AssistNews, Command, Role, Second};
 use std::fmt::Write;
 use std::io::BufRead;
 use std::sync::Arc;
@@ -16,13 +16,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
-/// The device a person holds, and how to find it again.
-pub struct Held {
-    /// As it was asked for.
-    pub name: String,
-    pub device: Box<dyn Device + Send>,
-    pub driver: &'static dyn Driver,
-    pub argument: Option<String>,
+/// The device a person holds, and another hand if one joins.
+pub struct Hands {
+    pub first: Held,
     pub second: Option<SecondHand>,
 }
 
@@ -42,17 +38,18 @@ pub enum From<'a> {
 }
 
 /// Lets a second hand join.
-pub fn join(held: &mut Held, from: &From, role: Role) -> Result<(), Failure> {
-    let max_damping = held.device.spec().max_damping;
+pub fn join(hands: &mut Hands, from: &From, role: Role) -> Result<(), Failure> {
+    let first = &hands.first;
+    let max_damping = first.device.spec().max_damping;
     let (link, assist) = match from {
-        From::Device(name) if *name == held.name => {
+        From::Device(name) if *name == first.name => {
             return Err(Failure::misuse(format!(
                 "same-device: {name} is in the first hand; name another one, NAME:WHICH, for the second"
             )));
         }
         From::Device(name) => {
             let (ours, theirs) = Link::pair();
-            let assist = Assist::start(open(name)?.device, theirs).map_err(Failure::Wrong)?;
+            let assist = Assist::start(lesson::open(name)?.device, theirs).map_err(Failure::Wrong)?;
             (ours, Some(assist))
         }
         From::Network { at, key } => {
@@ -62,28 +59,8 @@ pub fn join(held: &mut Held, from: &From, role: Role) -> Result<(), Failure> {
             (link, None)
         }
     };
-    held.second = Some(SecondHand { end: Second::new(link, max_damping, role), assist });
+    hands.second = Some(SecondHand { end: Second::new(link, max_damping, role), assist });
     Ok(())
-}
-
-/// Opens the device that `--device NAME[:ARGUMENT]` names.
-pub fn open(asked: &str) -> Result<Held, Failure> {
-    let (name, argument) = match asked.split_once(':') {
-        Some((name, argument)) => (name, Some(argument.to_string())),
-        None => (asked, None),
-    };
-    let Some(driver) = crate::device::driver(name) else {
-        let known = crate::device::DRIVERS.iter().map(|d| d.name()).collect::<Vec<_>>().join(", ");
-        return Err(Failure::Misuse(format!(
-            "unknown-device: no device is named \"{name}\"; known: scripted, {known} (see `typodont devices`)"
-        )));
-    };
-    let device = driver.open(argument.as_deref()).map_err(|trouble| no_device(name, &trouble))?;
-    Ok(Held { name: asked.to_string(), device, driver, argument, second: None })
-}
-
-fn no_device(name: &str, trouble: &Trouble) -> Failure {
-    Failure::Wrong(format!("{name}: no-device: {trouble}"))
 }
 
 /// How often letters are fetched: a person at a terminal sees nothing faster.
@@ -92,53 +69,41 @@ const LISTEN_EVERY: Duration = Duration::from_millis(4);
 /// How often a device that is gone is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
-/// What ended a session at the terminal.
-type Stopped = Broken<Unwritable>;
-
-/// Plays a session to its end; returns what is written at the end of its recording.
-pub fn play(
-    session: &mut Session,
-    simulation: Simulation,
-    held: Held,
-    recorder: &mut Recorder,
-) -> Result<EndFile, Stopped> {
-    let Held { device, driver, argument, second, .. } = held;
+/// Plays a prepared lesson to its end.
+pub fn play(prepared: Prepared, hands: Hands) -> Result<Recorded, Failed> {
+    let Hands { first: Held { device, driver, argument, .. }, second } = hands;
     let (second, mut assist) = second.map_or((None, None), |s| (Some(s.end), s.assist));
     let lines = typed_lines();
     let is_interrupted = interruptions();
-    let (mut live, heard) = Live::begin(session, simulation, device, second, recorder)?;
-    tell(&heard, session);
+    let (mut lesson, heard) = prepared.begin(device, second)?;
+    tell(&heard, lesson.session());
     let mut looked = Instant::now();
     let mut is_listening = true;
-    while !session.is_complete() {
+    while !lesson.session().is_complete() {
         std::thread::sleep(LISTEN_EVERY);
-        let heard = live.listen(session, recorder)?;
-        tell(&heard, session);
+        let heard = lesson.listen()?;
+        tell(&heard, lesson.session());
         if let Some(assist) = &mut assist {
             tell_second(assist);
         }
-        if live.is_waiting() && looked.elapsed() > LOOK_EVERY {
+        if lesson.live().is_waiting() && looked.elapsed() > LOOK_EVERY {
             looked = Instant::now();
             if let Ok(device) = driver.open(argument.as_deref()) {
-                speak(match live.go_on::<Recorder>(device)? {
+                speak(match lesson.go_on(device)? {
                     true => "the device is back; take the instrument out of the tooth, then go on",
                     false => "this is another device than the session began with; plug that one in again",
                 });
             }
         }
         if is_interrupted.swap(false, Ordering::Relaxed) {
-            let heard = live.say(&Input::Abort, session, recorder)?;
-            tell(&heard, session);
+            say_to(&mut lesson, &Input::Abort)?;
             break;
         }
         match lines.try_recv() {
-            Ok(line) => match understood(&line, session, &live) {
-                Said::Input(input) => {
-                    let heard = live.say(&input, session, recorder)?;
-                    tell(&heard, session);
-                }
-                Said::Pause(is_paused) => live.pause(is_paused),
-                Said::End if session.are_stages_over() => break,
+            Ok(line) => match understood(&line, lesson.session(), lesson.live()) {
+                Said::Input(input) => say_to(&mut lesson, &input)?,
+                Said::Pause(is_paused) => lesson.pause(is_paused),
+                Said::End if lesson.session().are_stages_over() => break,
                 Said::End => speak("the exercise is not over; abort ends it before its time"),
                 Said::Show(text) => speak(text),
                 Said::Nothing => {}
@@ -146,14 +111,18 @@ pub fn play(
             Err(TryRecvError::Disconnected) if is_listening => is_listening = false,
             Err(_) => {}
         }
-        if session.are_stages_over() && !is_listening {
+        if lesson.session().are_stages_over() && !is_listening {
             // Nobody is there to answer the questionnaire.
             break;
         }
     }
-    let reason = if session.outcome().aborted { "aborted" } else { "complete" };
-    let kept = live.end::<Recorder>()?;
-    Ok(EndFile { reason: reason.into(), servo: ServoFile::of_live(&kept) })
+    lesson.end()
+}
+
+fn say_to(lesson: &mut Lesson, input: &Input) -> Result<(), Failed> {
+    let heard = lesson.say(input)?;
+    tell(&heard, lesson.session());
+    Ok(())
 }
 
 /// Whether somebody asked the program to stop (Ctrl-C, or the system's word for it): the session is aborted then, its hand

@@ -18,7 +18,9 @@ mod run;
 mod score;
 mod verify;
 
+use crate::app;
 use crate::diagnostic::{Diagnostic, headlines};
+use crate::lesson::Failed;
 use clap::{Parser, Subcommand};
 use std::fmt;
 use std::io::Write;
@@ -27,10 +29,10 @@ use std::process::ExitCode;
 
 /// The open haptic simulator and assessment platform for dental training.
 #[derive(Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, after_help = "Without a command the desktop program opens its window.")]
 struct Arguments {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
 
 #[derive(Subcommand)]
@@ -90,6 +92,15 @@ impl From<Diagnostic> for Failure {
     }
 }
 
+impl From<Failed> for Failure {
+    fn from(failed: Failed) -> Failure {
+        match failed {
+            Failed::UnknownDevice { .. } => Failure::misuse(failed),
+            _ => Failure::wrong(failed),
+        }
+    }
+}
+
 impl Failure {
     fn misuse(what: impl fmt::Display) -> Failure {
         Failure::Misuse(what.to_string())
@@ -127,20 +138,21 @@ impl Failure {
 /// Parses the arguments, carries out the command, and says what went wrong.
 pub fn main() -> ExitCode {
     let result = match Arguments::parse().command {
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Demo(arguments) => demo::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments),
-        Command::Schema => say(crate::scenario::schema_text().trim_end()),
-        Command::Preview(arguments) => preview::run(&arguments),
-        Command::Path(arguments) => path::run(&arguments),
-        Command::Devices => devices::run(),
-        Command::Assist(arguments) => assist::run(&arguments),
-        Command::Verify(arguments) => verify::run(&arguments),
-        Command::Finish(arguments) => finish::run(&arguments),
-        Command::Score(arguments) => score::run(&arguments),
-        Command::Cohort(arguments) => cohort::run(&arguments),
-        Command::Import(arguments) => import::run(&arguments),
-        Command::Bench(arguments) => bench::run(&arguments),
+        None => templates().and_then(|templates| desktop(app::Options::at_shelf(at_home(), templates))),
+        Some(Command::Run(arguments)) => run::run(&arguments),
+        Some(Command::Demo(arguments)) => demo::run(&arguments),
+        Some(Command::Check(arguments)) => check::run(&arguments),
+        Some(Command::Schema) => say(crate::scenario::schema_text().trim_end()),
+        Some(Command::Preview(arguments)) => preview::run(&arguments),
+        Some(Command::Path(arguments)) => path::run(&arguments),
+        Some(Command::Devices) => devices::run(),
+        Some(Command::Assist(arguments)) => assist::run(&arguments),
+        Some(Command::Verify(arguments)) => verify::run(&arguments),
+        Some(Command::Finish(arguments)) => finish::run(&arguments),
+        Some(Command::Score(arguments)) => score::run(&arguments),
+        Some(Command::Cohort(arguments)) => cohort::run(&arguments),
+        Some(Command::Import(arguments)) => import::run(&arguments),
+        Some(Command::Bench(arguments)) => bench::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -151,8 +163,24 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Opens the desktop program's window.
+fn desktop(options: app::Options) -> Result<(), Failure> {
+    app::open(options).map_err(Failure::Wrong)
+}
+
 /// Where finished bundles go unless told otherwise.
 const SESSIONS: &str = "reports/sessions";
+
+/// Where they go when the program was opened by its icon, in whatever folder that is: here, if this folder has `reports`, else in
+/// the person's own.
+fn at_home() -> PathBuf {
+    match directories::UserDirs::new() {
+        Some(dirs) if !Path::new("reports").is_dir() => {
+            dirs.document_dir().unwrap_or(dirs.home_dir()).join("Typodont").join("sessions")
+        }
+        _ => PathBuf::from(SESSIONS),
+    }
+}
 
 /// Templates of the folder `reports/templates` here, if there is one; otherwise those that ship with the program.
 fn templates() -> Result<crate::report::Templates, Failure> {

@@ -1,7 +1,8 @@
 //! `typodont preview`: what the trainee will see.
 
-use super::{Failure, check};
+use super::Failure;
 use crate::content;
+use crate::lesson;
 use crate::render::{Changes, Image, Lamp, Lights, Painter, Scene, Shown, Tooth};
 use crate::report::{SEEN, preview_png};
 use crate::scenario::{self, Forms, Layout, Scenario, Workpiece};
@@ -32,7 +33,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         return Err(Failure::misuse(format!("{}: the picture is a .png file", arguments.output.display())));
     }
     let source = content::read_text(&arguments.scenario)?;
-    let scenario = scenario::resolve(source, &check::library_for(&arguments.scenario), Forms::Made)?;
+    let scenario = scenario::resolve(source, &lesson::library_for(&arguments.scenario), Forms::Made)?;
     let workpiece = Workpiece::make(&scenario, arguments.seed).map_err(Failure::wrong)?;
     let is_in_mouth = arguments.jaw || (!arguments.no_jaw && scenario.scene.layout == Layout::Jaw);
     let seen = seen(&scenario, &workpiece, is_in_mouth)?;

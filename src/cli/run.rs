@@ -1,20 +1,23 @@
 //! `typodont run`: one exercise, one bundle.
 
-use super::{Failure, SESSIONS, check, live, say};
+use super::{Failure, SESSIONS, live, say};
+use crate::app;
 use crate::content::{self, Library, nrrd, scan};
 use crate::device::Spec;
-use crate::record::{EndFile, HeadFile, Recorder, ServoFile};
-use crate::report::bundle;
-use crate::scenario::{self, Form, Forms, Scenario, Workpiece, hex};
-use crate::session::{self, Broken, Operator, OperatorFile, Progress, Session};
-use crate::sim::{Role, Simulation};
+use crate::lesson::{self, Opening};
+use crate::scenario::{self, Form, Forms, Scenario, hex};
+use crate::session::OperatorFile;
+use crate::sim::Role;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
+
+/// The window's own pointer.
+const MOUSE: &str = "mouse";
 
 /// The device that no person holds.
 const SCRIPTED: &str = "scripted";
@@ -27,7 +30,7 @@ pub struct Arguments {
     #[arg(long)]
     headless: bool,
     /// Who plays the trainee: careful, expert, hasty, timid, or a file
-    #[arg(long, value_name = "NAME|FILE.json", default_value = "careful")]
+    #[arg(long, value_name = "NAME|FILE.json", default_value = "careful", requires = "headless")]
     operator: String,
     /// The device a person holds; see `typodont devices`
     #[arg(long, value_name = "NAME[:WHICH]", default_value = SCRIPTED)]
@@ -59,6 +62,12 @@ pub struct Arguments {
     /// Folder in which the bundle is made
     #[arg(long, value_name = "DIR", default_value = SESSIONS)]
     out: PathBuf,
+    /// Begin at once, without the instructions
+    #[arg(long, conflicts_with = "headless")]
+    begin: bool,
+    /// Draws a picture only this often: shows that a session does not wait for it
+    #[arg(long, hide = true)]
+    slow_picture_ms: Option<u64>,
 }
 
 pub fn spacing(text: &str) -> Result<f32, String> {
@@ -96,8 +105,7 @@ fn key(text: &str) -> Result<String, String> {
 }
 
 fn participant(text: &str) -> Result<String, String> {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    match text.len() <= 64 && text.chars().all(is_plain) {
+    match lesson::is_code(text) {
         true => Ok(text.to_string()),
         false => Err("a code has up to 64 letters, digits, \"-\", \"_\" or \".\", and is never a name".into()),
     }
@@ -119,32 +127,28 @@ pub enum Player {
     /// A script on a simulated device, as fast as the machine can.
     Script(Box<OperatorFile>),
     /// A person with a device, in real time.
-    Person(Box<live::Held>),
+    Person(Box<live::Hands>),
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let is_scripted = arguments.device == SCRIPTED;
-    if is_scripted && !arguments.headless {
-        return Err(Failure::misuse(
-            "no-window: this version has no window yet; add --headless for a scripted run, or --device NAME to work with a \
-             device at the terminal (see `typodont devices`)",
-        ));
+    if !arguments.headless && (is_scripted || arguments.device == MOUSE) {
+        return window(arguments);
     }
-    let source = content::read_text(&arguments.scenario)?;
-    let library = check::library_for(&arguments.scenario);
-    let mut scenario = scenario::resolve(source, &library, Forms::Made)?;
+    let library = lesson::library_for(&arguments.scenario);
+    let mut scenario = lesson::read(&arguments.scenario, Forms::Made)?;
     let mut digests = BTreeMap::new();
     if let Some(path) = &arguments.tooth {
         digests.insert("tooth".to_string(), replace_teeth(&mut scenario, path, arguments.tooth_spacing_mm)?);
     }
     let player = match is_scripted {
         true => Player::Script(Box::new(operator(&arguments.operator, &library)?)),
-        false => Player::Person(Box::new(held(arguments)?)),
+        false => Player::Person(Box::new(hands(arguments)?)),
     };
     let run = Run {
         scenario: Arc::new(scenario),
         player,
-        seed: arguments.seed.unwrap_or_else(seed_from_clock),
+        seed: arguments.seed.unwrap_or_else(|| lesson::seed_from(jiff::Timestamp::now())),
         participant: &arguments.participant,
         out: &arguments.out,
         digests,
@@ -152,16 +156,35 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     say(perform(run)?.display())
 }
 
+/// The same exercise in the desktop program's window.
+fn window(arguments: &Arguments) -> Result<(), Failure> {
+    if arguments.tooth.is_some() || arguments.second.is_some() || arguments.second_at.is_some() {
+        return Err(Failure::misuse(
+            "window-only: --tooth and a second hand work without a window so far; add --headless, or --device NAME",
+        ));
+    }
+    super::desktop(app::Options {
+        exercise: Some(arguments.scenario.clone()),
+        begins: arguments.begin,
+        device: (arguments.device == MOUSE).then(|| MOUSE.into()),
+        seed: arguments.seed,
+        participant: arguments.participant.clone(),
+        out: arguments.out.clone(),
+        templates: super::templates()?,
+        slow_picture: arguments.slow_picture_ms.map(Duration::from_millis),
+    })
+}
+
 /// The device a person holds, and the second hand if one is to join.
-fn held(arguments: &Arguments) -> Result<live::Held, Failure> {
-    let mut held = live::open(&arguments.device)?;
+fn hands(arguments: &Arguments) -> Result<live::Hands, Failure> {
+    let mut hands = live::Hands { first: lesson::open(&arguments.device)?, second: None };
     if let Some(name) = &arguments.second {
-        live::join(&mut held, &live::From::Device(name), arguments.second_role.into())?;
+        live::join(&mut hands, &live::From::Device(name), arguments.second_role.into())?;
     }
     if let Some((at, key)) = arguments.second_at.as_deref().zip(arguments.second_key.as_deref()) {
-        live::join(&mut held, &live::From::Network { at, key }, arguments.second_role.into())?;
+        live::join(&mut hands, &live::From::Network { at, key }, arguments.second_role.into())?;
     }
-    Ok(held)
+    Ok(hands)
 }
 
 /// Puts a scan in the place of every tooth; returns the scan's SHA-256.
@@ -195,80 +218,21 @@ pub fn operator(name: &str, library: &Library) -> Result<OperatorFile, Failure> 
 /// Runs, records, scores and reports; returns the bundle's path.
 pub fn perform(run: Run) -> Result<PathBuf, Failure> {
     let Run { scenario, player, seed, participant, out, digests } = run;
-    let workpiece = Workpiece::make(&scenario, seed)
-        .map_err(|e| Failure::Wrong(format!("{}: impossible-scene: {e}", scenario.id)))?;
-    let workpiece = Arc::new(workpiece);
-    let (spec, operator) = match &player {
-        Player::Script(operator) => (Spec::phantom_omni(), Some(operator.id.clone())),
-        Player::Person(held) => (held.device.spec().clone(), None),
-    };
-    let now = jiff::Timestamp::now();
-    let head = HeadFile {
-        participant: participant.to_string(),
-        started: format!("{:.0}", now),
-        live: operator.is_none(),
-        operator,
-        digests,
-        ..HeadFile::of(&scenario, &spec, seed)
-    };
-    let name = bundle_name(&head, now);
     // A page that cannot be made should be known before the work, not after.
     let templates = super::templates()?;
-    let unfinished = bundle::Unfinished::begin(out, &name).map_err(Failure::wrong)?;
-    let mut recorder = match Recorder::create(&unfinished.recording(), &head, &scenario, &workpiece.volume) {
-        Ok(recorder) => recorder,
-        Err(error) => {
-            unfinished.abandon();
-            return Err(Failure::wrong(error));
+    let started = jiff::Timestamp::now();
+    let opening = Opening { scenario, seed, participant, out, digests, templates, started };
+    let recorded = match player {
+        Player::Script(operator) => opening.prepare(Spec::phantom_omni(), Some(&operator))?.play(*operator)?,
+        Player::Person(hands) => {
+            let prepared = opening.prepare(hands.first.device.spec().clone(), None)?;
+            live::play(prepared, *hands)?
         }
     };
-    let mut session = Session::new(scenario.clone(), &workpiece);
-    let mut simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
-    // What was recorded so far stays, and is told of.
-    let stopped = |error: &dyn fmt::Display| {
-        let left = unfinished.recording();
-        let folder = left.parent().unwrap_or(&left).display().to_string();
-        Failure::Wrong(format!("{error}\nwhat was recorded is in {folder}; `typodont finish` makes a bundle of it"))
-    };
-    let end = match player {
-        Player::Script(operator) => {
-            let mut trainee = Operator::new(*operator, scenario, workpiece.clone(), spec, seed);
-            let progress = session::run(&mut session, &mut simulation, &mut trainee, &mut recorder);
-            let reason = match progress.map_err(|e| stopped(&e))? {
-                Progress::Complete if session.outcome().aborted => "aborted".to_string(),
-                Progress::Complete => "complete".to_string(),
-                Progress::DeviceGone(gone) => gone.to_string(),
-            };
-            let end = EndFile { reason, servo: ServoFile::of(&simulation) };
-            // Scoring starts from the recording alone, and large volumes should not lie in memory twice.
-            drop(simulation);
-            end
-        }
-        Player::Person(held) => {
-            live::play(&mut session, simulation, *held, &mut recorder).map_err(|broken| match broken {
-                Broken::Observer(error) => stopped(&error),
-                Broken::Servo(what) => stopped(&what),
-            })?
-        }
-    };
-    recorder.finish(&end).map_err(|e| stopped(&e))?;
-    drop((session, workpiece));
     let bar = spinner("scoring and drawing");
-    let bundle = unfinished.complete(&templates).map_err(Failure::wrong);
+    let bundle = recorded.complete();
     bar.finish_and_clear();
-    bundle
-}
-
-/// `exercise_time_digest`: sorts by exercise and time, and two sessions of one second differ. It names nobody.
-fn bundle_name(head: &HeadFile, now: jiff::Timestamp) -> String {
-    let mark = Sha256::digest(format!("{}/{}/{}/{now}", head.participant, head.seed, std::process::id()));
-    format!("{}_{}_{}", head.scenario_id, now.strftime("%Y%m%dT%H%M%SZ"), hex(&mark[..4]))
-}
-
-fn seed_from_clock() -> u64 {
-    let nanoseconds = jiff::Timestamp::now().as_nanosecond();
-    // Whole numbers up to 2⁵³ survive every JSON reader.
-    (nanoseconds as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11
+    Ok(bundle?)
 }
 
 /// A sign of life on a terminal; silent elsewhere.

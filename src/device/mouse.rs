@@ -4,7 +4,7 @@
 //! the pointer, and to the window where that hand is and what it would feel. Never reads a mouse by itself.
 
 use super::{Beat, Device, Driver, Found, Gone, Output, Reading, Spec, Trouble, UPRIGHT};
-use crate::frame::{Pose, Vec3};
+use crate::frame::{Pose, Quat, Vec3};
 use crate::mailbox::Newest;
 use crate::tick::TICK_S;
 use std::sync::Arc;
@@ -52,14 +52,15 @@ impl Mouse {
         (Mouse(shared), handle)
     }
 
-    /// The pointer went so many pixels to the right and down, as windows count.
-    pub fn moved(&self, right_px: f32, down_px: f32) {
-        self.advance(Vec3::new(right_px, -down_px, 0.0) * MM_PER_PIXEL);
+    /// The pointer went so many pixels to the right and down, as windows count; `world_from_view` tells how the picture under
+    /// it lies in the world (right, up, toward the eye).
+    pub fn moved(&self, right_px: f32, down_px: f32, world_from_view: Quat) {
+        self.advance(world_from_view * Vec3::new(number(right_px), -number(down_px), 0.0) * MM_PER_PIXEL);
     }
 
-    /// The wheel was turned; forward, away from the user, is positive and takes the hand into the screen.
-    pub fn wheel(&self, steps: f32) {
-        self.advance(Vec3::new(0.0, 0.0, -steps) * MM_PER_STEP);
+    /// The wheel was turned; forward, away from the user, is positive and takes the hand into the picture.
+    pub fn wheel(&self, steps: f32, world_from_view: Quat) {
+        self.advance(world_from_view * Vec3::new(0.0, 0.0, -number(steps)) * MM_PER_STEP);
     }
 
     /// A button went down or up; bit 0 is the main one. There are 32.
@@ -69,6 +70,15 @@ impl Mouse {
             true => self.0.buttons.fetch_or(mask, Ordering::Relaxed),
             false => self.0.buttons.fetch_and(!mask, Ordering::Relaxed),
         };
+    }
+
+    /// Lets go: the pointer is brought to a place (world space, mm) and no button is down. At the working end's place nothing
+    /// presses any more.
+    pub fn rest_at(&self, place: Vec3) {
+        for ((at, mm), half) in self.0.pointer.iter().zip(place.to_array()).zip(WORKSPACE_HALF.to_array()) {
+            at.store((mm.clamp(-half, half) * UM_PER_MM).round() as i32, Ordering::Relaxed);
+        }
+        self.0.buttons.store(0, Ordering::Relaxed);
     }
 
     /// Where the hand is (world space, mm) and the force that it does not feel (N), for a spring on the screen. `None`
@@ -87,6 +97,11 @@ impl Mouse {
             let _ = at.fetch_update(Ordering::Relaxed, Ordering::Relaxed, moved);
         }
     }
+}
+
+/// Zero for what is no number, which would spoil the other directions as well.
+fn number(told: f32) -> f32 {
+    if told.is_nan() { 0.0 } else { told }
 }
 
 /// The device that a [`Mouse`] moves.

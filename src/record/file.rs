@@ -93,16 +93,24 @@ pub struct ServoFile {
     /// Times the device was gone or not ready in the middle; time stood still.
     #[serde(default)]
     pub interruptions: u64,
+    /// Times a person let time stand still.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pauses: u64,
     /// Readings refused and forces that were not finite.
     pub faults: u64,
     /// Forces shortened to the device's limit.
     pub clamped: u64,
 }
 
+/// Left out of files, as recordings before it had none.
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
 impl ServoFile {
     /// What a live session leaves.
     pub fn of_live(kept: &Kept) -> ServoFile {
-        let Kept { ticks, gate, beats, interruptions } = kept;
+        let Kept { ticks, gate, beats, interruptions, pauses } = kept;
         let beats = beats.unwrap_or_default();
         let us = |d: Duration| Some(d.as_secs_f64() * 1e6);
         ServoFile {
@@ -115,6 +123,7 @@ impl ServoFile {
             dropped: beats.dropped,
             let_go: beats.let_go,
             interruptions: *interruptions,
+            pauses: *pauses,
             faults: gate.faults(),
             clamped: gate.clamped_forces,
         }

@@ -100,8 +100,13 @@ impl Orbit {
         Orbit { middle: self.middle - (eye.right * right + eye.up * up) * high, ..self }
     }
 
+    /// How the picture lies in the world: its right, its up, and out of it toward the eye.
+    pub fn world_from_view(&self) -> Quat {
+        Quat::from_rotation_y(self.turn) * Quat::from_rotation_x(-self.tilt)
+    }
+
     pub fn viewpoint(&self) -> Viewpoint {
-        let turned = Quat::from_rotation_y(self.turn) * Quat::from_rotation_x(-self.tilt);
+        let turned = self.world_from_view();
         Viewpoint::looking(self.middle + turned * Vec3::Z * self.distance, self.middle, turned * Vec3::Y)
     }
 

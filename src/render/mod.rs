@@ -66,7 +66,7 @@ pub use renderer::{Renderer, Target};
 pub use scene::{Background, Changes, Finish, Lamp, Lights, Palette, Rgb, Scene, Shown, Solid, Tooth};
 pub use stereo::{Layout, Stereo};
 pub use tooth::Uploads;
-pub use transfer::TransferFunction;
+pub use transfer::{Table, TransferFunction};
 
 use crate::frame::Vec3;
 use crate::volume::{BRICK, Volume};

@@ -2,6 +2,7 @@
 
 use super::scene::{Palette, Rgb};
 use crate::volume::Label;
+use std::collections::BTreeMap;
 
 /// Colour and opacity for each of 256 densities: red, green, blue, alpha.
 pub type Table = [[u8; 4]; 256];
@@ -36,6 +37,27 @@ impl TransferFunction {
         self.tables.push(table);
         labels.into_iter().for_each(|label| self.of_label[usize::from(label.0)] = own);
         self
+    }
+
+    /// The same with the tables of some labels changed; tables that labels share are changed once and stay shared.
+    pub fn changed(
+        &self,
+        labels: impl IntoIterator<Item = Label>,
+        change: impl Fn(&Table) -> Table,
+    ) -> TransferFunction {
+        let mut changed = TransferFunction { tables: Vec::new(), of_label: [0; 256], ..*self };
+        let mut is_changed = [false; 256];
+        labels.into_iter().for_each(|label| is_changed[usize::from(label.0)] = true);
+        // Which new table stands for an old one, as it was and as it is changed.
+        let mut known: BTreeMap<(u8, bool), u8> = BTreeMap::new();
+        for ((own, &old), is_changed) in changed.of_label.iter_mut().zip(&self.of_label).zip(is_changed) {
+            *own = *known.entry((old, is_changed)).or_insert_with(|| {
+                let table = &self.tables[usize::from(old)];
+                changed.tables.push(if is_changed { change(table) } else { *table });
+                (changed.tables.len() - 1) as u8
+            });
+        }
+        changed
     }
 
     pub fn table(&self, label: Label) -> &Table {

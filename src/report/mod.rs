@@ -19,3 +19,4 @@ pub use session_file::{
     AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
     StageFile,
 };
+pub use words::measure as measure_in_words;

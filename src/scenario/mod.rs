@@ -14,7 +14,7 @@ pub use metric::Metric;
 pub use questionnaire::{Category, Item, Questionnaire};
 pub use resolve::{Forms, hex, resolve};
 pub use schema::schema_text;
-pub use workpiece::{Lesion, ToothPlace, Workpiece, anatomy_tissues};
+pub use workpiece::{Lesion, ToothPlace, Unmakeable, Workpiece, anatomy_tissues};
 
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;

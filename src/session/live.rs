@@ -40,6 +40,7 @@ pub struct Live {
     screen: Option<Step>,
     buttons: u32,
     interruptions: u64,
+    pauses: u64,
     /// What the recording's head says of the device.
     spec: Spec,
     is_paused: bool,
@@ -78,6 +79,8 @@ pub struct Kept {
     pub beats: Option<BeatSummary>,
     /// Times the device was gone or not ready in the middle.
     pub interruptions: u64,
+    /// Times a person let time stand still.
+    pub pauses: u64,
 }
 
 /// Why a live session cannot go on.
@@ -113,6 +116,7 @@ impl Live {
             screen: None,
             buttons: 0,
             interruptions: 0,
+            pauses: 0,
             spec: device.spec().clone(),
             is_paused: false,
             was_ready: false,
@@ -275,6 +279,7 @@ impl Live {
 
     /// Lets time stand still and the hand go, or ends that.
     pub fn pause(&mut self, is_paused: bool) {
+        self.pauses += u64::from(is_paused && !self.is_paused);
         self.is_paused = is_paused;
         if let Some(servo) = self.servo_mut() {
             servo.order(if is_paused { Order::Pause } else { Order::Resume });
@@ -309,8 +314,8 @@ impl Live {
     pub fn end<O: Observer>(mut self) -> Result<Kept, Broken<O::Error>> {
         self.rest()?;
         let beats = self.beats();
-        let Live { tick, gate, interruptions, .. } = self;
-        Ok(Kept { ticks: tick.0, gate, beats, interruptions })
+        let Live { tick, gate, interruptions, pauses, .. } = self;
+        Ok(Kept { ticks: tick.0, gate, beats, interruptions, pauses })
     }
 
     fn rest<E>(&mut self) -> Result<(), Broken<E>> {

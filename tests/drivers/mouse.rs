@@ -2,7 +2,7 @@
 
 use typodont::device::mouse::Mouse;
 use typodont::device::{Beat, Device, Output, State, UPRIGHT, driver};
-use typodont::frame::Vec3;
+use typodont::frame::{Quat, Vec3};
 
 /// Half a second of beats.
 fn settle(device: &mut impl Device) -> Vec3 {
@@ -16,11 +16,11 @@ fn the_hand_follows_the_pointer() {
         // Aim: right is right, down is down, the wheel goes into the screen, in millimetres. Method: each alone.
         let (mouse, mut device) = Mouse::new();
         assert_eq!((device.beat(), device.state()), (Beat::Ours, State::Ready));
-        mouse.moved(50.0, 0.0);
+        mouse.moved(50.0, 0.0, Quat::IDENTITY);
         assert!(settle(&mut device).distance(Vec3::new(5.0, 0.0, 0.0)) < 0.01);
-        mouse.clone().moved(0.0, 30.0);
+        mouse.clone().moved(0.0, 30.0, Quat::IDENTITY);
         assert!(settle(&mut device).distance(Vec3::new(5.0, -3.0, 0.0)) < 0.01);
-        mouse.wheel(4.0);
+        mouse.wheel(4.0, Quat::IDENTITY);
         assert!(settle(&mut device).distance(Vec3::new(5.0, -3.0, -2.0)) < 0.01);
         mouse.button(0, true);
         mouse.button(2, true);
@@ -33,11 +33,34 @@ fn the_hand_follows_the_pointer() {
 }
 
 #[test]
+fn the_hand_moves_as_the_picture_lies() {
+    // Aim: right on the screen is the hand's right however the view is turned. Method: a picture looked at from the world's
+    // +x, whose right is the world's -z and whose depth is -x.
+    let (mouse, mut device) = Mouse::new();
+    let from_the_side = Quat::from_rotation_y(std::f32::consts::FRAC_PI_2);
+    mouse.moved(50.0, 30.0, from_the_side);
+    assert!(settle(&mut device).distance(Vec3::new(0.0, -3.0, -5.0)) < 0.01);
+    mouse.wheel(4.0, from_the_side);
+    assert!(settle(&mut device).distance(Vec3::new(-2.0, -3.0, -5.0)) < 0.01);
+}
+
+#[test]
+fn a_mouse_that_lets_go_presses_nothing() {
+    let (mouse, mut device) = Mouse::new();
+    mouse.moved(100.0, 0.0, Quat::IDENTITY);
+    mouse.button(1, true);
+    settle(&mut device);
+    mouse.rest_at(Vec3::new(4.0, 1.0, -2.0));
+    assert!(settle(&mut device).distance(Vec3::new(4.0, 1.0, -2.0)) < 0.01);
+    assert_eq!(device.exchange(&Output::NONE).unwrap().buttons, 0);
+}
+
+#[test]
 fn a_pointer_that_jumps_is_followed_as_a_hand_moves() {
     // Aim: steps of the pointer are no blows. Method: a jump across the screen; no beat moves the hand further than a hand
     // can, and the pointer comes back from the border at once.
     let (mouse, mut device) = Mouse::new();
-    mouse.moved(1e6, f32::NAN);
+    mouse.moved(1e6, f32::NAN, Quat::IDENTITY);
     let mut last = Vec3::ZERO;
     for _ in 0..1000 {
         let now = device.exchange(&Output::NONE).unwrap().pose.position;
@@ -45,7 +68,7 @@ fn a_pointer_that_jumps_is_followed_as_a_hand_moves() {
         last = now;
     }
     assert!((last.x - device.spec().workspace_half.x).abs() < 0.01, "{last}");
-    mouse.moved(-100.0, 0.0);
+    mouse.moved(-100.0, 0.0, Quat::IDENTITY);
     assert!((settle(&mut device).x - (device.spec().workspace_half.x - 10.0)).abs() < 0.01);
 }
 
@@ -53,7 +76,7 @@ fn a_pointer_that_jumps_is_followed_as_a_hand_moves() {
 fn the_spring_is_kept_for_the_window() {
     let (mouse, mut device) = Mouse::new();
     assert_eq!(mouse.spring(), None);
-    mouse.moved(50.0, 0.0);
+    mouse.moved(50.0, 0.0, Quat::IDENTITY);
     let hand = settle(&mut device);
     assert_eq!(mouse.spring(), Some((hand, Vec3::new(0.0, 0.5, 0.0))));
 }

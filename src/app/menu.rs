@@ -1,0 +1,111 @@
+//! The menu beside the practice, as the thesis has it: instrument, rendering, haptics, materials, and how the beat is kept.
+
+use super::command::Command;
+use super::language::Words;
+use super::look;
+use super::sitting::{Sitting, Way};
+use super::transfer::transfer_ui;
+use super::views::View;
+use eframe::egui;
+
+pub fn menu_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<Command>) {
+    tray_ui(ui, sitting, words, asked);
+    part(ui, words.of("menu.rendering"));
+    for (way, key) in Way::offered(sitting.stage()) {
+        if ui.radio(sitting.shown == way, words.of(key)).clicked() {
+            asked.push(Command::Show(way));
+        }
+    }
+    if sitting.shown.looks_inside()
+        && let Some(matter) = &sitting.matter
+    {
+        egui::CollapsingHeader::new(words.of("transfer.title")).show(ui, |ui| {
+            let tissues = &sitting.scenario.tissues;
+            transfer_ui(ui, &matter.curves, &matter.histogram, tissues, &matter.palette, words, asked);
+        });
+    }
+    part(ui, words.of("menu.views"));
+    if let Some(matter) = &sitting.matter {
+        let choice = egui::ComboBox::from_id_salt("views").selected_text(words.of("views.choose")).width(200.0);
+        choice.height(400.0).show_ui(ui, |ui| {
+            for (view, key) in View::offered(matter) {
+                if ui.selectable_label(false, words.of(key)).clicked() {
+                    asked.push(Command::Look(view));
+                }
+            }
+        });
+    }
+    part(ui, words.of("menu.haptics"));
+    let mut is_on = !sitting.is_paused;
+    if ui.checkbox(&mut is_on, words.of("menu.haptics_on")).on_hover_text(words.of("menu.haptics_about")).changed() {
+        asked.push(Command::Pause(!is_on));
+    }
+    part(ui, words.of("menu.materials"));
+    materials_ui(ui, sitting, words);
+    part(ui, words.of("menu.beat"));
+    beat_ui(ui, sitting, words);
+    for complaint in &sitting.complaints {
+        ui.colored_label(look::CARE, complaint);
+    }
+    if let Some(why) = &sitting.silence {
+        part(ui, words.of("menu.sound"));
+        ui.small(why);
+    }
+    ui.add_space(16.0);
+    if ui.button(words.of("menu.keys")).clicked() {
+        asked.push(Command::ShowKeys(true));
+    }
+    if ui.button(words.of("menu.settings")).clicked() {
+        asked.push(Command::ShowSettings(true));
+    }
+}
+
+fn part(ui: &mut egui::Ui, title: &str) {
+    ui.add_space(14.0);
+    ui.strong(title);
+}
+
+/// The instruments that this stage offers.
+fn tray_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<Command>) {
+    ui.strong(words.of("menu.tray"));
+    let held = sitting.seen.map(|seen| seen.instrument as usize);
+    let tray = sitting.stage().map(|stage| stage.instruments.as_slice()).unwrap_or_default();
+    for &instrument in tray {
+        let title = &sitting.scenario.instruments[instrument].title;
+        if ui.radio(held == Some(instrument), title).clicked() {
+            asked.push(Command::Take(instrument));
+        }
+    }
+}
+
+/// The coefficients by which each tissue feels as it does.
+fn materials_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words) {
+    egui::CollapsingHeader::new(words.of("menu.coefficients")).show(ui, |ui| {
+        for entry in sitting.scenario.tissues.entries() {
+            ui.label(egui::RichText::new(&entry.title).size(14.0).strong());
+            let cut = entry.cut_force_n.map_or("—".to_string(), |force| format!("{force:.2} N"));
+            let rows = [
+                ("menu.stiffness", format!("{:.2}", entry.stiffness)),
+                ("menu.damping", format!("{:.2}", entry.damping)),
+                ("menu.friction", format!("{:.2} / {:.2}", entry.static_friction, entry.dynamic_friction)),
+                ("menu.cut_force", cut),
+            ];
+            egui::Grid::new(entry.id).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
+                for (key, value) in rows {
+                    ui.small(words.of(key));
+                    ui.small(value);
+                    ui.end_row();
+                }
+            });
+        }
+    });
+}
+
+/// Pictures a second, and how late the servo's ticks come.
+fn beat_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words) {
+    let beats = sitting.seen.unwrap_or_default().beats;
+    ui.small(words.with("menu.pictures", format!("{:.0}", sitting.pictures_per_second)));
+    ui.small(words.with("menu.ticks", beats.ticks));
+    ui.small(words.with("menu.late", format!("{:.2}", f64::from(beats.late_p99) / 1000.0)));
+    ui.small(words.with("menu.missed", beats.missed));
+}

@@ -1,0 +1,94 @@
+//! The desktop program: the window at which a trainee sits.
+//!
+//! Takes the pointer, the keys and what is chosen. Gives lessons on a thread of their own, and pictures of how they go.
+//! Never scores, never carves: every number that counts comes from below, and no session waits for the picture.
+
+mod briefing;
+mod chair;
+mod command;
+mod desk;
+mod diary;
+mod keys;
+mod language;
+mod look;
+mod menu;
+mod pointer;
+mod practice;
+mod questionnaire;
+mod questions;
+mod results;
+mod seen;
+mod settings;
+mod shelf;
+mod sitting;
+mod sound;
+mod transfer;
+mod viewport;
+mod views;
+
+use crate::report::Templates;
+use desk::Desk;
+use eframe::egui;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// What the window opens with.
+pub struct Options {
+    /// The exercise to begin with; without one the shelf.
+    pub exercise: Option<PathBuf>,
+    /// Begins that exercise at once, without its instructions.
+    pub begins: bool,
+    /// What is in the hand, as `--device` takes it; without it as the settings say.
+    pub device: Option<String>,
+    /// Decides what exercises leave to chance; without one the clock does.
+    pub seed: Option<u64>,
+    /// A code for the trainee; never a name.
+    pub participant: String,
+    /// Folder in which bundles are made.
+    pub out: PathBuf,
+    pub templates: Templates,
+    /// Draws a picture only this often: for a test that the session does not wait for it.
+    pub slow_picture: Option<Duration>,
+}
+
+impl Options {
+    /// The shelf, for whoever sits down.
+    pub fn at_shelf(out: impl Into<PathBuf>, templates: Templates) -> Options {
+        let (exercise, seed, slow_picture) = (None, None, None);
+        Options {
+            exercise,
+            begins: false,
+            device: None,
+            seed,
+            participant: String::new(),
+            out: out.into(),
+            templates,
+            slow_picture,
+        }
+    }
+}
+
+/// Width and height of a new window, points: fits a small laptop's screen.
+const SIZE: [f32; 2] = [1280.0, 780.0];
+
+/// Below this something would be cut off.
+const SIZE_LEAST: [f32; 2] = [960.0, 640.0];
+
+/// Opens the window; returns when it is closed. `Err` says why there is none, and what to do.
+pub fn open(options: Options) -> Result<(), String> {
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("Typodont")
+        .with_app_id("typodont")
+        .with_inner_size(SIZE)
+        .with_min_inner_size(SIZE_LEAST);
+    let native = eframe::NativeOptions { viewport, ..Default::default() };
+    let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
+        Ok(Box::new(Desk::new(context, options)))
+    });
+    eframe::run_native("typodont", native, made).map_err(|error| {
+        format!(
+            "no-window: {error}; a window needs a display and a graphics driver (Debian: mesa-vulkan-drivers). Without \
+             one, `typodont run SCENARIO --headless` works at the terminal"
+        )
+    })
+}

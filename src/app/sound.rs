@@ -1,0 +1,151 @@
+//! What a lesson lets be heard: the drill by its load, and a patient who is hurt.
+
+use crate::audio::{DrillLoad, Sounds, Tool};
+use crate::content::{Role, ToolKind};
+use crate::frame::Vec3;
+use crate::scenario::Scenario;
+use crate::sim::Step;
+use crate::tick::TICK_S;
+use crate::touch::CuttingLaw;
+use std::f32::consts::PI;
+
+/// Turns of a bur where the scenario names none, 1/min: an air turbine under light load, and a contra-angle with round steel
+/// burs. Handpieces of ISO 14457.
+const TURBINE_RPM: f32 = 300_000.0;
+const LOW_SPEED_RPM: f32 = 20_000.0;
+
+/// From which an electric contra-angle is heard, and from which a turbine, 1/min.
+const ELECTRIC_FROM_RPM: f32 = 40_000.0;
+const TURBINE_FROM_RPM: f32 = 220_000.0;
+
+/// Force that hurts, N. The thesis (6.3) names no number; its dentists cut with less than 2.
+const PAINFUL_FORCE: f32 = 2.5;
+
+/// How far beyond that a cry is at its loudest, N.
+const PAINFUL_SPAN: f32 = 2.0;
+
+/// Time without pain after which the next pain is a new one, s.
+const RELIEF: f32 = 0.6;
+
+/// Time constant in which the working end's speed is made even, s.
+const SPEED_TIME: f32 = 0.02;
+
+/// Listens to a lesson and tells the sound.
+pub struct Treatment {
+    sounds: Sounds,
+    tools: Vec<Voice>,
+    /// By label: hardness, HV, and whether it is soft.
+    hardness: [f32; 256],
+    is_soft: [bool; 256],
+    last: Option<(u64, Vec3)>,
+    /// Of the working end, mm/s.
+    speed: f32,
+    /// Since the patient was last hurt, s.
+    relief: f32,
+}
+
+/// An instrument as it is heard.
+#[derive(Clone, Copy)]
+struct Voice {
+    tool: Tool,
+    /// 1/min; 0 for what does not turn.
+    rpm: f32,
+    /// At the circumference, mm/s.
+    surface_speed: f32,
+}
+
+impl Treatment {
+    pub fn of(scenario: &Scenario, sounds: Sounds) -> Treatment {
+        let rpm = match scenario.carving.law {
+            CuttingLaw::Rate(rate) => Some(rate.rpm),
+            CuttingLaw::Threshold => None,
+        };
+        let voice = |entry: &crate::content::InstrumentEntry| {
+            if !entry.cuts {
+                return Voice { tool: Tool::Hand, rpm: 0.0, surface_speed: 0.0 };
+            }
+            let usual = if entry.kind == Some(ToolKind::SteelBur) { LOW_SPEED_RPM } else { TURBINE_RPM };
+            let rpm = rpm.unwrap_or(usual);
+            let tool = match rpm {
+                rpm if rpm >= TURBINE_FROM_RPM => Tool::AirTurbine,
+                rpm if rpm >= ELECTRIC_FROM_RPM => Tool::Electric,
+                _ => Tool::LowSpeed,
+            };
+            Voice { tool, rpm, surface_speed: 2.0 * PI * entry.make().radius() * rpm / 60.0 }
+        };
+        let mut treatment = Treatment {
+            sounds,
+            tools: scenario.instruments.iter().map(voice).collect(),
+            hardness: [0.0; 256],
+            is_soft: [false; 256],
+            last: None,
+            speed: 0.0,
+            relief: RELIEF,
+        };
+        for entry in scenario.tissues.entries() {
+            let place = usize::from(entry.id);
+            treatment.hardness[place] = entry.hardness_hv.unwrap_or(0.0);
+            treatment.is_soft[place] = entry.role == Role::Soft;
+        }
+        treatment
+    }
+
+    /// Follows the newest tick. `is_running`: the foot is on the pedal.
+    pub fn follow(&mut self, step: &Step, is_running: bool) {
+        let Some(&Voice { tool, rpm, surface_speed }) = self.tools.get(step.instrument) else { return };
+        let seconds = self.move_on(step);
+        let label = step.touch.map(|touch| usize::from(touch.label.0));
+        let force = step.touch.map_or(0.0, |touch| touch.spring);
+        let is_running = is_running && rpm > 0.0;
+        self.sounds.load(&DrillLoad {
+            tool,
+            is_running,
+            speed: rpm,
+            is_touching: label.is_some(),
+            is_cutting: step.cutting,
+            force,
+            surface_speed: if is_running { surface_speed } else { self.speed },
+            hardness: label.map_or(0.0, |label| self.hardness[label]),
+            is_suction_on: is_running,
+            is_spray_on: is_running,
+        });
+        let is_drilled = is_running && label.is_some_and(|label| self.is_soft[label]);
+        self.hurt(is_drilled, force, seconds);
+    }
+
+    /// Nothing runs and nothing is touched.
+    pub fn rest(&mut self) {
+        self.sounds.load(&DrillLoad { tool: Tool::Hand, ..DrillLoad::default() });
+        self.last = None;
+    }
+
+    /// Learns the working end's speed; gives the time since the last tick that was heard, s.
+    fn move_on(&mut self, step: &Step) -> f32 {
+        let now = step.tick.0;
+        let seconds = match self.last {
+            Some((before, tip)) if now > before => {
+                let seconds = (now - before) as f32 * TICK_S as f32;
+                let share = 1.0 - libm::expf(-seconds / SPEED_TIME);
+                self.speed += share * (step.tip.distance(tip) / seconds - self.speed);
+                seconds
+            }
+            Some(_) => return 0.0,
+            None => 0.0,
+        };
+        self.last = Some((now, step.tip));
+        seconds
+    }
+
+    fn hurt(&mut self, is_drilled: bool, force: f32, seconds: f32) {
+        self.relief += seconds;
+        if !is_drilled && force <= PAINFUL_FORCE {
+            return;
+        }
+        if self.relief >= RELIEF {
+            let strength = if is_drilled { 1.0 } else { 0.4 + 0.6 * ((force - PAINFUL_FORCE) / PAINFUL_SPAN).min(1.0) };
+            // Nobody misses a cry too many.
+            self.sounds.cry(strength);
+        }
+        self.relief = 0.0;
+    }
+}
