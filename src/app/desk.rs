@@ -356,10 +356,13 @@ impl Desk {
 /// A page over the screen that takes the keys and the pointer for itself.
 fn page(ctx: &egui::Context, title: &str, contents: impl FnOnce(&mut egui::Ui)) {
     let room = ctx.content_rect().size() - egui::vec2(80.0, 120.0);
-    egui::Modal::new(egui::Id::unique(title)).show(ctx, |ui| {
+    let height = room.y.max(200.0);
+    let frame = egui::Frame::popup(&ctx.global_style()).inner_margin(24);
+    egui::Modal::new(egui::Id::unique(title)).frame(frame).show(ctx, |ui| {
         ui.heading(title);
         ui.add_space(10.0);
-        egui::ScrollArea::vertical().max_height(room.y.max(200.0)).show(ui, contents);
+        // As high as it needs to be, up to the window's own height.
+        egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, contents);
     });
 }
 

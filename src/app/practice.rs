@@ -148,7 +148,7 @@ fn force_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words) {
         ui.monospace(format!("{force:4.1} N"));
         if let Some(key) = warning(sitting, &seen) {
             ui.add_space(16.0);
-            ui.label(egui::RichText::new(format!("⚠ {}", words.of(key))).strong().color(look::WRONG));
+            ui.label(egui::RichText::new(format!("! {}", words.of(key))).strong().color(look::WRONG));
         }
     });
 }
@@ -213,11 +213,9 @@ fn view_ui(
     if sitting.has_mouse() && sitting.matter.is_some() {
         let key = if sitting.is_pointer_held { "practice.held" } else { "practice.free" };
         let at = rect.center_bottom() - egui::vec2(0.0, 26.0);
-        let font = egui::FontId::proportional(16.0);
-        let galley = ui.painter().layout_no_wrap(words.of(key).to_string(), font, Color32::WHITE);
-        let place = Rect::from_center_size(at, galley.size() + egui::vec2(28.0, 12.0));
+        let place = Rect::from_center_size(at, egui::vec2((rect.width() - 24.0).clamp(40.0, 440.0), 32.0));
         ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
-        ui.painter().galley(place.min + egui::vec2(14.0, 6.0), galley, Color32::WHITE);
+        ui.put(place, egui::Label::new(egui::RichText::new(words.of(key)).color(Color32::WHITE)).selectable(false));
     }
 }
 

@@ -30,7 +30,7 @@ pub fn questions_ui(ui: &mut egui::Ui, stage: &Stage, sitting: &mut Sitting, wor
                 Some(Answer::Number(number)) => format!(": {number}"),
                 _ => String::new(),
             };
-            ui.colored_label(look::GOOD, format!("✔ {}{noted}", words.of("questions.noted")));
+            ui.colored_label(look::GOOD, format!("{}{noted}", words.of("questions.noted")));
         }
     }
 }

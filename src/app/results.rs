@@ -93,7 +93,7 @@ fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, words: &Words) {
     });
     ui.weak(words.with("results.pass_at", format!("{:.0}", grade.pass_points)));
     for fail in &grade.hard_fails {
-        ui.colored_label(look::WRONG, format!("✖ {fail}"));
+        ui.colored_label(look::WRONG, format!("× {fail}"));
     }
 }
 
