@@ -6,7 +6,7 @@ use super::form::Form;
 use super::relief::Ground;
 use super::shape::{Column, Depths, Shape, Slice};
 use crate::frame::Vec3;
-use crate::volume::{Density, Grid, Label, Volume, ramp};
+use crate::volume::{Density, Grid, Label, Volume, ramp, rows};
 
 /// Half the width of the density ramp across the surface, voxels: what the hand feels as a surface needs three voxels.
 const BAND: f32 = 1.5;
@@ -48,9 +48,7 @@ pub fn grid_fitting(form: &Form, dims: [u32; 3]) -> Grid {
 /// Grows a tooth on a grid in tooth space; what lies outside the grid is not there.
 pub fn grow(form: &Form, grid: Grid, tissues: &Tissues) -> Volume {
     let shape = Shape::new(form, THINNEST * grid.spacing.max_element());
-    let mut growing = Growing::on(grid, tissues);
-    growing.fill(&shape);
-    growing.finish()
+    Growing::on(grid, tissues).fill(&shape)
 }
 
 /// Where a shape is asked: the corners of cells of `step` voxels each way.
@@ -110,16 +108,20 @@ impl Nodes {
     }
 }
 
-/// A volume being filled.
+/// How a volume is filled.
 struct Growing {
     grid: Grid,
     nodes: Nodes,
     band: f32,
     /// A block whose middle is farther than this from every surface holds none, mm.
     reach: f32,
-    density: Vec<Density>,
-    label: Vec<Label>,
     tissues: Tissues,
+}
+
+/// A layer of blocks being filled: all voxels of some heights.
+struct Layer<'a> {
+    density: &'a mut [Density],
+    label: &'a mut [Label],
 }
 
 /// What is known of a place: signed distances, mm.
@@ -137,36 +139,39 @@ impl Growing {
             nodes: Nodes::over(&grid),
             band,
             reach: STEEPEST * 0.5 * BLOCK as f32 * grid.spacing.length() + band,
-            density: vec![Density::EMPTY; grid.len()],
-            label: vec![Label::AIR; grid.len()],
             tissues: *tissues,
             grid,
         }
     }
 
-    fn finish(self) -> Volume {
-        Volume::new(self.grid, self.band, self.density, self.label, self.tissues.dentine)
-    }
-
-    fn fill(&mut self, shape: &Shape) {
+    fn fill(self, shape: &Shape) -> Volume {
         let columns = self.nodes.columns(shape);
         let per_block = self.nodes.per_block();
-        let blocks = self.grid.dims.map(|n| (n as usize).div_ceil(BLOCK));
-        let mut scratch = Vec::new();
-        for bz in 0..blocks[2] {
+        let [nx, ny, _] = self.grid.dims.map(|n| n as usize);
+        let mut density = vec![Density::EMPTY; self.grid.len()];
+        let mut label = vec![Label::AIR; self.grid.len()];
+        let chunk = BLOCK * nx * ny;
+        let chunks = density.chunks_mut(chunk).zip(label.chunks_mut(chunk));
+        let mut layers: Vec<Layer> = chunks.map(|(density, label)| Layer { density, label }).collect();
+        rows::in_rows(&mut layers, 1, rows::processors(), |number, layers| {
+            let bz = number as usize;
             let level = |k: usize| shape.cut(self.nodes.height(bz * per_block + k));
             let levels: Vec<Slice> = (0..=per_block).map(level).collect();
-            for by in 0..blocks[1] {
-                for bx in 0..blocks[0] {
-                    let block = Block { shape, levels: &levels, columns: &columns, at: [bx, by, bz] };
-                    self.fill_block(&block, &mut scratch);
+            let mut scratch = Vec::new();
+            for layer in layers {
+                for by in 0..ny.div_ceil(BLOCK) {
+                    for bx in 0..nx.div_ceil(BLOCK) {
+                        let block = Block { shape, levels: &levels, columns: &columns, at: [bx, by, bz] };
+                        self.fill_block(&block, layer, &mut scratch);
+                    }
                 }
             }
-        }
+        });
+        Volume::new(self.grid, self.band, density, label, self.tissues.dentine)
     }
 
     /// Leaves a block empty or fills it as a whole where its middle says so; else asks all its nodes.
-    fn fill_block(&mut self, block: &Block, known: &mut Vec<Known>) {
+    fn fill_block(&self, block: &Block, layer: &mut Layer, known: &mut Vec<Known>) {
         let reach = self.reach;
         let middle = block.middle(&self.nodes);
         if middle.tooth > reach {
@@ -175,17 +180,17 @@ impl Growing {
         let far_from_pulp = middle.pulp.abs() > reach;
         if far_from_pulp && middle.tooth < -reach && middle.dentine.abs() > reach {
             let label = self.tissue(middle);
-            self.for_voxels(block.at, |tooth, index, _| {
-                tooth.density[index] = Density::FULL;
-                tooth.label[index] = label;
+            self.for_voxels(block.at, |index, _| {
+                layer.density[index] = Density::FULL;
+                layer.label[index] = label;
             });
             return;
         }
         block.ask(&self.nodes, far_from_pulp.then_some(middle.pulp), known);
-        self.for_voxels(block.at, |tooth, index, voxel| {
-            let (here, slope) = tooth.between(known, voxel);
-            tooth.density[index] = ramp(here.tooth / slope, tooth.band);
-            tooth.label[index] = tooth.tissue(here);
+        self.for_voxels(block.at, |index, voxel| {
+            let (here, slope) = self.between(known, voxel);
+            layer.density[index] = ramp(here.tooth / slope, self.band);
+            layer.label[index] = self.tissue(here);
         });
     }
 
@@ -198,14 +203,14 @@ impl Growing {
         }
     }
 
-    /// The voxels of a block that lie in the grid: array index, and steps from the block's first voxel.
-    fn for_voxels(&mut self, block: [usize; 3], mut each: impl FnMut(&mut Growing, usize, [usize; 3])) {
+    /// The voxels of a block that lie in the grid: index within their layer, and steps from the block's first voxel.
+    fn for_voxels(&self, block: [usize; 3], mut each: impl FnMut(usize, [usize; 3])) {
         let [nx, ny, nz] = self.grid.dims.map(|n| n as usize);
         let [x0, y0, z0] = block.map(|b| b * BLOCK);
         for z in z0..(z0 + BLOCK).min(nz) {
             for y in y0..(y0 + BLOCK).min(ny) {
                 for x in x0..(x0 + BLOCK).min(nx) {
-                    each(self, (z * ny + y) * nx + x, [x - x0, y - y0, z - z0]);
+                    each(((z - z0) * ny + y) * nx + x, [x - x0, y - y0, z - z0]);
                 }
             }
         }
@@ -287,9 +292,8 @@ mod tests {
             let centred = Grid::centred(dims, Vec3::splat(spacing));
             let grid = Grid { origin: centred.origin - Vec3::new(0.0, 0.0, 3.4), ..centred };
             let volume = grow(&LOWER_FIRST, grid, &TISSUES);
-            let mut asked = Growing { reach: f32::INFINITY, ..Growing::on(grid, &TISSUES) };
-            asked.fill(&Shape::new(&LOWER_FIRST, THINNEST * spacing));
-            let asked = asked.finish();
+            let asked = Growing { reach: f32::INFINITY, ..Growing::on(grid, &TISSUES) };
+            let asked = asked.fill(&Shape::new(&LOWER_FIRST, THINNEST * spacing));
             let differing = (0..grid.len()).filter(|&i| asked.voxel(i) != volume.voxel(i)).count();
             assert_eq!(differing, 0, "at {spacing} mm");
         }

@@ -5,7 +5,7 @@ use super::language::Words;
 use super::seen::Seen;
 use super::settings::Settings;
 use super::sitting::Sitting;
-use super::viewport::Viewport;
+use super::viewport::{Place, Viewport};
 use super::{look, menu, pointer, questions};
 use crate::content::Role;
 use crate::frame::{Pose, Vec3};
@@ -189,7 +189,8 @@ fn view_ui(
     }
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
-    match viewport.map(|viewport| picture(sitting, settings, viewport, size)) {
+    let mut viewport = viewport;
+    match viewport.as_deref_mut().map(|viewport| picture(sitting, settings, viewport, size)) {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, Color32::WHITE);
@@ -209,6 +210,9 @@ fn view_ui(
         None => {
             ui.put(rect.shrink(40.0), egui::Label::new(words.of("practice.no_picture")));
         }
+    }
+    if let Some(viewport) = viewport.filter(|_| settings.second_eye().is_some()) {
+        second_window(ui.ctx(), viewport, words);
     }
     if sitting.has_mouse() && sitting.matter.is_some() {
         let key = if sitting.is_pointer_held { "practice.held" } else { "practice.free" };
@@ -239,7 +243,7 @@ fn picture(
         mirror =
             sitting.scenario.instruments.get(seen.instrument as usize).and_then(|entry| scene::mirror(entry, held));
     }
-    let scene = Scene {
+    let mut scene = Scene {
         tooth: Some(Tooth {
             volume: &matter.volume,
             changes: if matter.is_new { Changes::Anew } else { Changes::Bricks(&changed) },
@@ -252,9 +256,34 @@ fn picture(
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
         ..Scene::empty()
     };
-    let drawn = viewport.draw(&scene, &viewpoint, settings.stereo(), size);
+    let mut drawn = viewport.draw(Place::Main, &scene, &viewpoint, settings.stereo(), size);
+    if let Some(second) = settings.second_eye()
+        && drawn.is_ok()
+    {
+        // Nothing has changed between the two eyes.
+        scene.tooth.iter_mut().for_each(|tooth| tooth.changes = Changes::Bricks(&[]));
+        let other = viewport.draw(Place::Second, &scene, &viewpoint, Some(second), viewport.second_size());
+        drawn = other.and(drawn);
+    }
     matter.is_new = false;
     drawn.map(Some)
+}
+
+/// The right eye's window; where the system has no second window, one within this.
+fn second_window(ctx: &egui::Context, viewport: &mut Viewport, words: &Words) {
+    let title = words.of("practice.right_eye");
+    let builder =
+        egui::ViewportBuilder::default().with_title(format!("Typodont · {title}")).with_inner_size([640.0, 480.0]);
+    let id = egui::ViewportId::from_hash_of("right eye");
+    ctx.show_viewport_immediate(id, builder, |ui, _| {
+        let rect = ui.max_rect();
+        let scale = ui.pixels_per_point();
+        viewport.size_second([rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32));
+        if let Some(picture) = viewport.second() {
+            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+            ui.painter().image(picture, rect, whole, Color32::WHITE);
+        }
+    });
 }
 
 /// What a mouse cannot push back: a spring from the instrument to where the hand would be.

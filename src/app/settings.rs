@@ -46,14 +46,17 @@ pub enum StereoMode {
     TopBottom,
     Rows,
     Anaglyph,
+    /// The left eye in this window, the right one in a window of its own, for two projectors.
+    TwoWindows,
 }
 
-const STEREO_MODES: [(StereoMode, &str); 5] = [
+const STEREO_MODES: [(StereoMode, &str); 6] = [
     (StereoMode::Off, "settings.stereo_off"),
     (StereoMode::SideBySide, "settings.stereo_side"),
     (StereoMode::TopBottom, "settings.stereo_top"),
     (StereoMode::Rows, "settings.stereo_rows"),
     (StereoMode::Anaglyph, "settings.stereo_anaglyph"),
+    (StereoMode::TwoWindows, "settings.stereo_two"),
 ];
 
 impl Default for Settings {
@@ -111,8 +114,15 @@ impl Settings {
             StereoMode::TopBottom => Layout::TopBottom,
             StereoMode::Rows => Layout::Rows,
             StereoMode::Anaglyph => Layout::Anaglyph,
+            StereoMode::TwoWindows => Layout::Left,
         };
         Some(Stereo { layout, eye_distance: self.eye_distance_mm })
+    }
+
+    /// What the second window shows, if there is one.
+    pub fn second_eye(&self) -> Option<Stereo> {
+        let has_two = self.stereo == StereoMode::TwoWindows;
+        has_two.then_some(Stereo { layout: Layout::Right, eye_distance: self.eye_distance_mm })
     }
 }
 

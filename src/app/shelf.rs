@@ -53,7 +53,7 @@ impl Shelf {
     pub fn stock(folder: &Path) -> Shelf {
         let library = Library::shipped();
         let shipped = SHIPPED.map(|(name, text)| {
-            let read = scenario::resolve(Source::new(name, text), &library, Forms::Made);
+            let read = scenario::resolve(Source::new(name, text), &library, Forms::Read);
             Exercise {
                 name: name.into(),
                 library: library.clone(),
@@ -89,7 +89,7 @@ impl Shelf {
 }
 
 fn from_file(path: &Path) -> Exercise {
-    let read = lesson::read(path, Forms::Made).map(Arc::new).map_err(|found| headlines(&found));
+    let read = lesson::read(path, Forms::Read).map(Arc::new).map_err(|found| headlines(&found));
     Exercise { name: path.display().to_string(), library: lesson::library_for(path), read }
 }
 

@@ -12,12 +12,25 @@ pub fn has_graphics(state: &RenderState) -> bool {
     state.adapter.get_info().device_type != wgpu::DeviceType::Cpu
 }
 
+/// The second window's picture until its size is known, pixels.
+const SECOND_SIZE: [u32; 2] = [1024, 768];
+
 /// Draws scenes for the window.
 pub struct Viewport {
     state: RenderState,
     renderer: Renderer,
     watch: Watch,
-    canvas: Option<Canvas>,
+    canvases: [Option<Canvas>; 2],
+    /// Pixels of the second window, as it was last seen.
+    second_size: [u32; 2],
+}
+
+/// The window that a picture is for.
+#[derive(Clone, Copy)]
+pub enum Place {
+    Main,
+    /// The right eye's own, where each eye has a projector.
+    Second,
 }
 
 struct Canvas {
@@ -29,25 +42,46 @@ struct Canvas {
 impl Viewport {
     pub fn new(state: &RenderState) -> Viewport {
         let renderer = Renderer::new(&state.device, &state.queue, FORMAT);
-        Viewport { state: state.clone(), renderer, watch: Watch::over(&state.device), canvas: None }
+        Viewport {
+            state: state.clone(),
+            renderer,
+            watch: Watch::over(&state.device),
+            canvases: [None, None],
+            second_size: SECOND_SIZE,
+        }
+    }
+
+    /// Pixels of the second window from now on.
+    pub fn size_second(&mut self, size: [u32; 2]) {
+        self.second_size = size;
+    }
+
+    pub fn second_size(&self) -> [u32; 2] {
+        self.second_size
+    }
+
+    /// The picture that was last drawn for the second window, if one was.
+    pub fn second(&self) -> Option<egui::TextureId> {
+        self.canvases[Place::Second as usize].as_ref().map(|canvas| canvas.id)
     }
 
     /// Draws a scene at a size in pixels; gives the picture for egui to place.
     pub fn draw(
         &mut self,
+        place: Place,
         scene: &Scene,
         viewpoint: &Viewpoint,
         stereo: Option<Stereo>,
         size: [u32; 2],
     ) -> Result<egui::TextureId, Error> {
-        let known = self.canvas.take();
+        let known = self.canvases[place as usize].take();
         let canvas = match known {
             Some(canvas) if canvas.size == size => canvas,
             known => canvas(&self.state, size, known.map(|c| c.id)),
         };
         let drawn = self.renderer.draw(scene, viewpoint, stereo, Target { view: &canvas.view, size });
         let id = canvas.id;
-        self.canvas = Some(canvas);
+        self.canvases[place as usize] = Some(canvas);
         drawn?;
         self.watch.check()?;
         Ok(id)

@@ -6,7 +6,7 @@
 use super::scene::Palette;
 use super::surface_mesh;
 use super::vertex::Vertex;
-use crate::volume::march::rows::each;
+use crate::volume::rows::each;
 use crate::volume::{Volume, surface};
 use std::ops::Range;
 

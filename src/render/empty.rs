@@ -2,7 +2,7 @@
 
 use super::scene::Shown;
 use super::transfer::TransferFunction;
-use crate::volume::march::rows::each;
+use crate::volume::rows::each;
 use crate::volume::{BRICK, ISO, Label, Volume};
 
 /// What rays through a brick can meet. A brick's cells mix its voxels with the next bricks' first.

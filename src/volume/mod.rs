@@ -8,6 +8,7 @@ pub mod distance;
 mod edit;
 mod grid;
 pub mod march;
+pub mod rows;
 mod sample;
 pub mod surface;
 

@@ -20,7 +20,7 @@ use super::mirror::{self, Mirror};
 use super::picture::Image;
 use super::scene::{Background, Changes, Lights, Rgb, Scene, Shown, Tooth};
 use super::{empty::Empty, hollow::Hollow};
-use crate::volume::march::rows::{in_rows, processors};
+use crate::volume::rows::{in_rows, processors};
 use matter::Matter;
 
 /// What the twin keeps between pictures of the same volume.

@@ -2,7 +2,7 @@
 //! belongs to the triangle that its middle lies in, on an edge to the one below or to the right.
 
 use super::{Canvas, Pixel};
-use crate::volume::march::rows::{in_rows, processors};
+use crate::volume::rows::{in_rows, processors};
 
 /// What varies over a triangle: see `surface_pass`.
 pub const VARYING: usize = 10;

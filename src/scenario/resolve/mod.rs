@@ -25,6 +25,8 @@ use std::sync::Arc;
 pub enum Forms {
     /// Scans are read and the workpiece is made once, for what only shows in the matter itself.
     Made,
+    /// Scans are read, and nothing is made: what only shows in the matter shows when a lesson begins.
+    Read,
     /// The volume comes from a recording: scans are not asked for.
     Recorded,
 }

@@ -4,9 +4,9 @@
 //! Shade in hollows is the depth of a place below its surroundings in the picture, at three sizes of surroundings. After
 //! Luft, Colditz & Deussen, *Image Enhancement by Unsharp Masking the Depth Buffer* (2006).
 
-use super::rows::in_rows;
 use super::{Camera, Hit};
 use crate::frame::Vec3;
+use crate::volume::rows::in_rows;
 
 /// Toward the lamps as (right, up, back), need not be unit; chosen by eye on teeth.
 const KEY: Vec3 = Vec3::new(-0.55, 0.65, 0.8);

@@ -7,7 +7,6 @@ mod camera;
 mod light;
 mod picture;
 mod ray;
-pub mod rows;
 mod slice;
 
 pub use camera::{Camera, Shot, Side};
@@ -16,8 +15,8 @@ pub use slice::{outline, slice};
 
 use super::{Label, Volume};
 use crate::frame::Vec3;
+use crate::volume::rows::{in_rows, processors};
 use ray::Marcher;
-use rows::{in_rows, processors};
 
 /// Samples along each side of a pixel where the picture has an edge; elsewhere one does.
 const FINE: u32 = 3;

@@ -1,8 +1,8 @@
 //! A cut through a volume, flat and crisp.
 
-use super::rows::{in_rows, processors};
 use super::{Picture, Shot, add, around};
 use crate::frame::Vec3;
+use crate::volume::rows::{in_rows, processors};
 use crate::volume::{ISO, Label, Volume};
 
 /// Samples along each side of a pixel at the border of two colours.
