@@ -123,8 +123,10 @@ pub fn transfer_ui(
         })
         .response
         .labelled_by(label);
-    ui.horizontal(|ui| {
+    // A row that is wider than the menu would push it out of the window.
+    ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().button_padding.x = 6.0;
         for (channel, (key, ink)) in CHANNELS.into_iter().enumerate() {
             let text = egui::RichText::new(words.of(key)).small().color(ink);
             ui.selectable_value(&mut new.channel, channel, text);
