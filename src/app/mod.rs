@@ -86,8 +86,12 @@ pub fn open(options: Options) -> Result<(), String> {
         Ok(Box::new(Desk::new(context, options)))
     });
     eframe::run_native("typodont", native, made).map_err(|error| {
+        let said = error.to_string();
+        // winit begins with a line of its own source, which tells a person nothing.
+        let after_place = said.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+        let why = after_place.map_or(said.as_str(), |(_, why)| why).trim_end_matches('.');
         format!(
-            "no-window: {error}; a window needs a display and a graphics driver (Debian: mesa-vulkan-drivers). Without \
+            "no-window: {why}; a window needs a display and a graphics driver (Debian: mesa-vulkan-drivers). Without \
              one, `typodont run SCENARIO --headless` works at the terminal"
         )
     })
