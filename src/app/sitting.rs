@@ -5,7 +5,7 @@ use super::questions;
 use super::seen::Seen;
 use super::transfer::{Curves, Histogram};
 use crate::audio::{self, News as SoundNews, Output, Player};
-use crate::content::{Library, Role};
+use crate::content::{Library, Role, TissueTable};
 use crate::diagnostic::Diagnostic;
 use crate::frame::Vec3;
 use crate::render::{Orbit, Palette, Shown, Solid, TransferFunction};
@@ -85,8 +85,7 @@ pub struct Matter {
     pub is_new: bool,
     pub histogram: Histogram,
     pub curves: Curves,
-    /// The labels of decay.
-    decay: Vec<Label>,
+    presets: Presets,
 }
 
 impl Matter {
@@ -98,15 +97,32 @@ impl Matter {
     }
 
     pub fn shown(&self, way: Way) -> Shown {
-        let function = match way {
-            Way::Surface => return Shown::Surface,
-            Way::Iso => return Shown::Iso,
-            Way::Tissue => TransferFunction::tissue(&self.palette),
-            Way::Xray => TransferFunction::x_ray(),
-            Way::Decay => TransferFunction::only(&self.decay, &self.palette),
-            Way::Drawn => return Shown::Volume(self.curves.function.clone()),
-        };
-        Shown::Volume(Arc::new(function))
+        match way {
+            Way::Surface => Shown::Surface,
+            Way::Iso => Shown::Iso,
+            Way::Tissue => Shown::Volume(self.presets.tissue.clone()),
+            Way::Xray => Shown::Volume(self.presets.x_ray.clone()),
+            Way::Decay => Shown::Volume(self.presets.decay.clone()),
+            Way::Drawn => Shown::Volume(self.curves.function.clone()),
+        }
+    }
+}
+
+/// The transfer functions that nobody draws: made anew with the palette, not with each picture.
+struct Presets {
+    tissue: Arc<TransferFunction>,
+    x_ray: Arc<TransferFunction>,
+    decay: Arc<TransferFunction>,
+}
+
+impl Presets {
+    fn of(tissues: &TissueTable, palette: &Palette) -> Presets {
+        let decay: Vec<Label> = tissues.entries().iter().filter(|e| e.role == Role::Decay).map(|e| e.label()).collect();
+        Presets {
+            tissue: Arc::new(TransferFunction::tissue(palette)),
+            x_ray: Arc::new(TransferFunction::x_ray()),
+            decay: Arc::new(TransferFunction::only(&decay, palette)),
+        }
     }
 }
 
@@ -298,7 +314,7 @@ impl Sitting {
         Matter {
             histogram: Histogram::of(&volume),
             curves: Curves::from(TransferFunction::tissue(&palette)),
-            decay: tissues.entries().iter().filter(|e| e.role == Role::Decay).map(|e| e.label()).collect(),
+            presets: Presets::of(tissues, &palette),
             volume,
             palette,
             around: match &mouth {
@@ -324,6 +340,7 @@ impl Sitting {
         let is_shown = self.is_decay_shown();
         if let Some(matter) = &mut self.matter {
             matter.palette = scene::palette(&self.scenario.tissues, is_shown);
+            matter.presets = Presets::of(&self.scenario.tissues, &matter.palette);
         }
     }
 

@@ -109,18 +109,6 @@ impl Orbit {
         let turned = self.world_from_view();
         Viewpoint::looking(self.middle + turned * Vec3::Z * self.distance, self.middle, turned * Vec3::Y)
     }
-
-    /// The usual place for work in a quadrant (FDI: 1 upper right to 4 lower left), around a tooth in a jaw whose midline is
-    /// the world's x = 0: lower teeth are looked down on, upper teeth up at, from the patient's own side.
-    pub fn for_quadrant(quadrant: Quadrant, middle: Vec3, distance: f32) -> Orbit {
-        let (turn, tilt) = match quadrant {
-            Quadrant::UpperRight => (0.5, -0.6),
-            Quadrant::UpperLeft => (-0.5, -0.6),
-            Quadrant::LowerLeft => (-0.5, 0.75),
-            Quadrant::LowerRight => (0.5, 0.75),
-        };
-        Orbit { middle, turn, tilt, distance: distance.clamp(DISTANCES[0], DISTANCES[1]) }
-    }
 }
 
 /// A quarter of the teeth, from the patient's point of view.
