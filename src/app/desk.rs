@@ -408,6 +408,7 @@ fn carry_out_in(sitting: &mut Sitting, command: Command, ctx: &egui::Context) {
         }
         Command::GiveUp(is_giving_up) => sitting.is_giving_up = is_giving_up,
         Command::Abort => sitting.give_up(),
+        Command::Adjust(label, coefficient, value) => sitting.adjust(label, coefficient, value),
         Command::Show(way) => sitting.shown = way,
         Command::Draw(curves) => {
             if let Some(matter) = &mut sitting.matter {

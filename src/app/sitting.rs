@@ -12,6 +12,8 @@ use crate::render::{Orbit, Palette, Shown, Solid, TransferFunction};
 use crate::scenario::{Layout, Scenario, Stage, Workpiece};
 use crate::scene::{self, Mouth};
 use crate::session::{Answer, Effect, Heard, Input};
+use crate::sim::Command as Tell;
+use crate::touch::{Coefficient, Materials};
 use crate::volume::{Label, Volume};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -55,6 +57,8 @@ pub struct Sitting {
     /// What could not be drawn as the exercise asks.
     pub complaints: Vec<String>,
     pub shown: Way,
+    /// How the tissues feel now, before any instrument's own factors.
+    pub felt: Materials,
     /// Steps chosen on the questionnaire's scale, by statement.
     pub ratings: BTreeMap<String, u8>,
     /// The statement that a digit rates, and whether it was just come to.
@@ -171,6 +175,7 @@ impl Sitting {
     /// Begins a lesson that is heard through an output and shown in a way at first.
     pub fn begin(order: Order, library: Library, output: Output, shown: Way) -> Result<Sitting, String> {
         let scenario = order.scenario.clone();
+        let felt = scenario.tissues.materials();
         let (sounds, heard) = audio::sounds();
         let chair = Chair::take(order, sounds).map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
         Ok(Sitting {
@@ -195,6 +200,7 @@ impl Sitting {
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
             library,
             shown,
+            felt,
             ratings: BTreeMap::new(),
             statement: 0,
             is_statement_new: false,
@@ -297,6 +303,9 @@ impl Sitting {
                 self.let_go();
             }
             Effect::Refused { why } => self.refused = Some((*why).to_string()),
+            Effect::Tell(Tell::Set { label, coefficient, value }) => {
+                self.felt.set(*label, self.felt.get(*label).with(*coefficient, *value));
+            }
             Effect::Tell(_) | Effect::StepStarted { .. } | Effect::StageEnded { .. } => {}
         }
     }
@@ -364,6 +373,14 @@ impl Sitting {
         let Some(stage) = self.stage else { return };
         self.said.insert(question.clone(), value.clone());
         self.tell(Said::InStage(stage, Input::Answer { question, value }));
+    }
+
+    /// Gives a coefficient another value, where the stage allows it.
+    pub fn adjust(&mut self, label: Label, coefficient: Coefficient, value: f32) {
+        let Some(stage) = self.stage else { return };
+        // Shown at once; what the session says of it comes some milliseconds later.
+        self.felt.set(label, self.felt.get(label).with(coefficient, value));
+        self.tell(Said::InStage(stage, Input::Adjust { label, coefficient, value }));
     }
 
     /// The running stage is done; what was typed and not said is said first. Not while a number is none.
