@@ -23,7 +23,7 @@ pub fn menu_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut 
     {
         egui::CollapsingHeader::new(words.of("transfer.title")).show(ui, |ui| {
             let tissues = &sitting.scenario.tissues;
-            transfer_ui(ui, &matter.curves, &matter.histogram, tissues, &matter.palette, words, asked);
+            transfer_ui(ui, &matter.curves, matter.histogram(), tissues, &matter.palette, words, asked);
         });
     }
     part(ui, words.of("menu.views"));

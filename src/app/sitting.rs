@@ -15,6 +15,7 @@ use crate::session::{Answer, Effect, Heard, Input};
 use crate::sim::Command as Tell;
 use crate::touch::{Coefficient, Materials};
 use crate::volume::{Label, Volume};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -87,7 +88,7 @@ pub struct Matter {
     pub instruments: Vec<Solid>,
     /// Nothing of the volume has been drawn yet.
     pub is_new: bool,
-    pub histogram: Histogram,
+    histogram: OnceCell<Histogram>,
     pub curves: Curves,
     presets: Presets,
 }
@@ -98,6 +99,11 @@ impl Matter {
         let Some(mouth) = &self.mouth else { return };
         self.open = (self.open + by).clamp(0.0, OPEN_MOST);
         self.around = mouth.solids(self.open);
+    }
+
+    /// Of the matter as it was when somebody first asked: few do, and counting a fine tooth takes a while.
+    pub fn histogram(&self) -> &Histogram {
+        self.histogram.get_or_init(|| Histogram::of(&self.volume))
     }
 
     pub fn shown(&self, way: Way) -> Shown {
@@ -262,7 +268,7 @@ impl Sitting {
 
     fn learn(&mut self, news: News) {
         match news {
-            News::Begun(workpiece) => {
+            News::Made(workpiece) => {
                 self.orbit = scene::work_view(&workpiece);
                 self.matter = Some(self.matter_of(workpiece));
             }
@@ -321,7 +327,7 @@ impl Sitting {
         let (instruments, complaints): (Vec<Solid>, Vec<_>) = drawn.unzip();
         self.complaints = complaints.iter().flatten().map(Diagnostic::headline).collect();
         Matter {
-            histogram: Histogram::of(&volume),
+            histogram: OnceCell::new(),
             curves: Curves::from(TransferFunction::tissue(&palette)),
             presets: Presets::of(tissues, &palette),
             volume,
