@@ -6,7 +6,7 @@ use super::sitting::Sitting;
 use eframe::egui::{self, Event, Key, Modifiers};
 
 /// Keys and what they do, as the page lists them.
-const LISTED: [(&str, &str); 21] = [
+const LISTED: [(&str, &str); 24] = [
     ("F1", "keys.help"),
     ("F2", "keys.settings"),
     ("Tab", "keys.tab"),
@@ -19,6 +19,9 @@ const LISTED: [(&str, &str); 21] = [
     ("P", "keys.pause"),
     ("V", "keys.view"),
     ("J M", "keys.mouth"),
+    ("Arrows", "keys.turn_by_key"),
+    ("+ -", "keys.nearer_by_key"),
+    ("Shift Arrows", "keys.shift_by_key"),
     ("1 to 9", "keys.rate"),
     ("Mouse", "keys.mouse"),
     ("Wheel", "keys.wheel"),
@@ -151,11 +154,41 @@ fn practice(ctx: &egui::Context, sitting: &Sitting, is_done: bool, asked: &mut V
             asked.push(Command::OpenMouth(by));
         }
     }
+    camera(ctx, asked);
     if pressed(Key::Escape) {
         asked.push(match sitting.is_pointer_held {
             true => Command::HoldPointer(false),
             false => Command::GiveUp(!sitting.is_giving_up),
         });
+    }
+}
+
+/// The camera, for whoever has no mouse to spare.
+fn camera(ctx: &egui::Context, asked: &mut Vec<Command>) {
+    /// rad
+    const TURN: f32 = 0.1;
+    /// Share of the picture's height.
+    const SHIFT: f32 = 0.05;
+    /// Share of the distance.
+    const NEARER: f32 = 0.9;
+    let arrows = [
+        (Key::ArrowRight, 1.0, 0.0),
+        (Key::ArrowLeft, -1.0, 0.0),
+        (Key::ArrowUp, 0.0, 1.0),
+        (Key::ArrowDown, 0.0, -1.0),
+    ];
+    for (key, right, up) in arrows {
+        // Shift first: without it the same key would turn.
+        if ctx.input_mut(|input| input.consume_key(Modifiers::SHIFT, key)) {
+            asked.push(Command::Shift { right: SHIFT * right, up: SHIFT * up });
+        } else if is_down(ctx, key) {
+            asked.push(Command::Turn { right: TURN * right, up: TURN * up });
+        }
+    }
+    for (key, factor) in [(Key::Plus, NEARER), (Key::Equals, NEARER), (Key::Minus, 1.0 / NEARER)] {
+        if is_down(ctx, key) {
+            asked.push(Command::Nearer(factor));
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use super::look;
 use super::sitting::{Sitting, Way};
 use super::transfer::transfer_ui;
 use super::views::View;
+use crate::content::TissueEntry;
 use crate::touch::Coefficient;
 use crate::volume::Label;
 use eframe::egui;
@@ -88,28 +89,40 @@ fn materials_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut
         for entry in sitting.scenario.tissues.entries() {
             ui.label(egui::RichText::new(&entry.title).size(14.0).strong());
             let now = sitting.felt.get(entry.label());
-            egui::Grid::new(entry.id).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
-                for which in Coefficient::ALL {
-                    let name = ui.small(words.of(key_of(which)));
-                    match now.coefficient(which) {
-                        Some(value) if is_adjustable => {
-                            let mut chosen = value;
-                            let slider = ui.add(slider_of(which, &mut chosen)).labelled_by(name.id);
-                            if slider.changed() && chosen != value {
-                                asked.push(Command::Adjust(entry.label(), which, chosen));
-                            }
-                        }
-                        Some(value) => _ = ui.small(format!("{value:.2}{}", unit_of(which))),
-                        None => _ = ui.small("—"),
-                    }
-                    ui.end_row();
-                }
-            });
+            for which in Coefficient::ALL {
+                coefficient_ui(ui, (entry, which), now.coefficient(which), is_adjustable, words, asked);
+            }
         }
         if is_adjustable && ui.button(words.of("menu.as_written")).clicked() {
             asked.extend(changed(sitting).map(|(label, which, value)| Command::Adjust(label, which, value)));
         }
     });
+}
+
+/// One number: as wide as the menu is, its name above its slider.
+fn coefficient_ui(
+    ui: &mut egui::Ui,
+    (tissue, which): (&TissueEntry, Coefficient),
+    now: Option<f32>,
+    is_adjustable: bool,
+    words: &Words,
+    asked: &mut Vec<Command>,
+) {
+    /// Points; its number stands beside it.
+    const SLIDER: f32 = 110.0;
+    let name = words.of(key_of(which));
+    let Some(value) = now.filter(|_| is_adjustable) else {
+        let value = now.map_or("—".to_string(), |value| format!("{value:.2}{}", unit_of(which)));
+        ui.small(format!("{name}: {value}"));
+        return;
+    };
+    let name = ui.small(name);
+    ui.spacing_mut().slider_width = SLIDER;
+    let mut chosen = value;
+    let slider = ui.add(slider_of(which, &mut chosen)).labelled_by(name.id);
+    if slider.changed() && chosen != value {
+        asked.push(Command::Adjust(tissue.label(), which, chosen));
+    }
 }
 
 /// What differs from the exercise's own coefficients, with their values there.

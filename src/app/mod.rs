@@ -22,6 +22,7 @@ mod settings;
 mod shelf;
 mod sitting;
 mod sound;
+mod told;
 mod transfer;
 mod viewport;
 mod views;

@@ -79,7 +79,7 @@ fn task_ui(ui: &mut egui::Ui, sitting: &mut Sitting, words: &Words, asked: &mut 
     }
     ui.add_space(8.0);
     if let Some(why) = &sitting.standstill {
-        ui.colored_label(look::CARE, words.with("practice.standstill", why));
+        ui.colored_label(look::CARE, words.with("practice.standstill", why.text(words)));
     }
     if sitting.is_paused {
         ui.colored_label(look::CARE, words.of("practice.paused"));
@@ -94,7 +94,7 @@ fn task_ui(ui: &mut egui::Ui, sitting: &mut Sitting, words: &Words, asked: &mut 
         }
     }
     if let Some(why) = &sitting.refused {
-        ui.colored_label(look::WRONG, words.with("practice.refused", why));
+        ui.colored_label(look::WRONG, words.with("practice.refused", words.of(why)));
     }
     ui.add_space(16.0);
     leave_ui(ui, sitting, words, asked);

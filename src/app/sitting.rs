@@ -3,6 +3,7 @@
 use super::chair::{Chair, News, Order, Said};
 use super::questions;
 use super::seen::Seen;
+use super::told::{self, Standstill};
 use super::transfer::{Curves, Histogram};
 use crate::audio::{self, News as SoundNews, Output, Player};
 use crate::content::{Library, Role, TissueTable};
@@ -44,10 +45,10 @@ pub struct Sitting {
     pub drafts: BTreeMap<String, String>,
     /// What was last said, by question.
     pub said: BTreeMap<String, Answer>,
-    /// Why something that was said is not taken.
-    pub refused: Option<String>,
+    /// Why something that was said is not taken: a key of the language's texts.
+    pub refused: Option<&'static str>,
     /// Why time stands still, if it does by itself.
-    pub standstill: Option<String>,
+    pub standstill: Option<Standstill>,
     pub is_paused: bool,
     /// The pointer is the hand.
     pub is_pointer_held: bool,
@@ -274,11 +275,11 @@ impl Sitting {
             }
             News::Heard(Heard::Effect(effect)) => self.effect(&effect),
             News::Heard(Heard::Device(state)) => {
-                self.standstill = (!state.is_ready()).then(|| state.to_string());
+                self.standstill = Standstill::of(state);
             }
-            News::Heard(Heard::Gone(gone)) => self.standstill = Some(gone.to_string()),
+            News::Heard(Heard::Gone(gone)) => self.standstill = Some(Standstill::gone(gone)),
             News::Heard(Heard::Begun(_)) => {}
-            News::OtherDevice => self.standstill = Some("another device than the lesson began with".into()),
+            News::OtherDevice => self.standstill = Some(Standstill::other_device()),
             News::Scoring => self.is_scoring = true,
             News::Done(path) => self.end = Some(Ok(path)),
             News::Failed(why) => self.end = Some(Err(why)),
@@ -308,7 +309,7 @@ impl Sitting {
                 (self.stage, self.are_stages_over) = (None, true);
                 self.let_go();
             }
-            Effect::Refused { why } => self.refused = Some((*why).to_string()),
+            Effect::Refused { why } => self.refused = Some(told::refusal(*why)),
             Effect::Tell(Tell::Set { label, coefficient, value }) => {
                 self.felt.set(*label, self.felt.get(*label).with(*coefficient, *value));
             }
@@ -370,7 +371,7 @@ impl Sitting {
 
     fn tell(&mut self, said: Said) {
         if !self.chair.say(said) {
-            self.refused = Some("the lesson does not listen now".into());
+            self.refused = Some(told::NOT_LISTENING);
         }
     }
 

@@ -147,7 +147,7 @@ impl Observer for Recorder {
                 WhatFile::StageEnded { stage: id(*stage), by: ended_by_name(*by).into() }
             }
             Effect::StagesOver => WhatFile::StagesOver {},
-            Effect::Refused { why } => WhatFile::Refused { why: (*why).into() },
+            Effect::Refused { why } => WhatFile::Refused { why: why.to_string() },
             // Commands are written as such; steps and answers follow from commands and inputs.
             Effect::Tell(_) | Effect::StepStarted { .. } | Effect::Answered { .. } => return Ok(()),
         };

@@ -7,10 +7,12 @@ mod run;
 mod live;
 mod operator;
 mod operator_file;
+mod refusal;
 
 pub use live::{Broken, COMMAND_LAG_TICKS, Heard, Kept, Live};
 pub use operator::Operator;
 pub use operator_file::{ActionFile, OperatorFile};
+pub use refusal::Refusal;
 pub use run::{Observer, Progress, Trainee, run};
 
 use crate::content::Role;
@@ -99,7 +101,7 @@ pub enum Effect {
     StagesOver,
     /// An input that does not fit, and why. It changes nothing.
     Refused {
-        why: &'static str,
+        why: Refusal,
     },
 }
 
@@ -364,11 +366,11 @@ impl Session {
         let refused = |why| vec![Effect::Refused { why }];
         match (input, self.phase) {
             (Input::Rate { item, value }, Phase::Over) => self.rate(item, *value),
-            (Input::Rate { .. }, _) => refused("the questionnaire comes after the last stage"),
-            (_, Phase::Waiting | Phase::Over) => refused("no stage is running"),
+            (Input::Rate { .. }, _) => refused(Refusal::TooEarly),
+            (_, Phase::Waiting | Phase::Over) => refused(Refusal::NoStage),
             (Input::Take { instrument }, Phase::In(index)) => {
                 if !self.scenario.stages[index].instruments.contains(instrument) {
-                    return refused("this instrument is not offered in this stage");
+                    return refused(Refusal::NotOnTray);
                 }
                 self.instrument = *instrument;
                 vec![Effect::Tell(Command::Take { instrument: *instrument })]
@@ -380,7 +382,7 @@ impl Session {
             (Input::Confirm, Phase::In(index)) if self.scenario.stages[index].ends.confirmed => {
                 self.end_stage(index, EndedBy::Confirmation)
             }
-            (Input::Confirm, Phase::In(_)) => refused("this stage does not end by confirmation"),
+            (Input::Confirm, Phase::In(_)) => refused(Refusal::NotByConfirmation),
             (Input::Abort, Phase::In(index)) => self.end_stage(index, EndedBy::Abort),
         }
     }
@@ -389,18 +391,18 @@ impl Session {
         let refused = |why| vec![Effect::Refused { why }];
         let stage = &self.scenario.stages[index];
         if !stage.is_adjustable {
-            return refused("this stage keeps the tissues as they are");
+            return refused(Refusal::FixedTissues);
         }
         if stage.steps.as_ref().is_some_and(|steps| (steps.label, Coefficient::Stiffness) == (label, coefficient)) {
-            return refused("this stage changes that stiffness itself");
+            return refused(Refusal::SteppedStiffness);
         }
         let (least, most) = coefficient.range();
         if !(least..=most).contains(&value) {
-            return refused("the coefficient cannot be that");
+            return refused(Refusal::OutOfRange);
         }
         let entry = self.scenario.tissues.by_label(label);
         if entry.and_then(|entry| entry.material().coefficient(coefficient)).is_none() {
-            return refused("no tissue has this coefficient");
+            return refused(Refusal::NoCoefficient);
         }
         if !self.adjusted.contains(&(label, coefficient)) {
             self.adjusted.push((label, coefficient));
@@ -412,10 +414,10 @@ impl Session {
         let scenario = self.scenario.clone();
         let stage = &scenario.stages[index];
         let Some(place) = stage.ask.iter().position(|q| q.id == question) else {
-            return vec![Effect::Refused { why: "this stage does not ask that" }];
+            return vec![Effect::Refused { why: Refusal::NotAsked }];
         };
         let Ok(right) = self.judge(&stage.ask[place].kind, value) else {
-            return vec![Effect::Refused { why: "this is not an answer to that question" }];
+            return vec![Effect::Refused { why: Refusal::NoAnswer }];
         };
         let step = stage.steps.as_ref().map(|s| (s.coefficients[self.step], self.step_started));
         self.answers[place] = Some(Given { value: value.clone(), at: self.now, right, step });
@@ -454,16 +456,16 @@ impl Session {
 
     fn rate(&mut self, item: &str, value: u8) -> Vec<Effect> {
         let refused = |why| vec![Effect::Refused { why }];
-        let Some(questionnaire) = &self.scenario.questionnaire else { return refused("there is no questionnaire") };
+        let Some(questionnaire) = &self.scenario.questionnaire else { return refused(Refusal::NoQuestionnaire) };
         if value < 1 || value > questionnaire.steps {
-            return refused("the scale has no such step");
+            return refused(Refusal::NoStep);
         }
         match questionnaire.items().position(|i| i.id == item) {
             Some(place) => {
                 self.outcome.ratings[place] = Some(value);
                 Vec::new()
             }
-            None => refused("the questionnaire has no such statement"),
+            None => refused(Refusal::NoStatement),
         }
     }
 }
