@@ -11,6 +11,7 @@ use crate::content::Role;
 use crate::frame::{Pose, Vec3};
 use crate::render::{Changes, Eye, Lamp, Lights, Scene, Solid, Tooth};
 use crate::scene;
+use crate::scene::field::Field;
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 
 /// Full width of the force bar, N: what a PHANTOM Omni can push.
@@ -234,6 +235,10 @@ fn picture(
     let Some(matter) = &mut sitting.matter else { return Ok(None) };
     let changed = matter.volume.take_dirty();
     let mut solids = matter.around.clone();
+    solids.extend(matter.ejector.clone());
+    if let Some(field) = &mut matter.field {
+        field.look(&viewpoint);
+    }
     let mut mirror = None;
     if let Some(seen) = seen
         && let Some(instrument) = matter.instruments.get(seen.instrument as usize)
@@ -252,8 +257,11 @@ fn picture(
             shown: matter.shown(way),
         }),
         solids,
+        grains: matter.field.as_ref().map(Field::grains).unwrap_or_default(),
+        drops: matter.field.as_ref().map(Field::drops).unwrap_or_default(),
         mirror,
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+        is_smooth: settings.is_smooth(viewport.has_graphics()),
         ..Scene::empty()
     };
     let mut drawn = viewport.draw(Place::Main, &scene, &viewpoint, settings.stereo(), size);
