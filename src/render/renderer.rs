@@ -141,9 +141,10 @@ impl Renderer {
             Some(stereo) => {
                 let size = stereo.layout.eye_size(target.size);
                 for (side, eye) in stereo.eyes(viewpoint, ratio).iter().enumerate() {
-                    self.fit_canvas(side, size, scene);
-                    self.fit_mirror(side, scene);
+                    // Two windows of one eye each would otherwise resize each other's canvases in every picture.
                     if stereo.layout.needs()[side] {
+                        self.fit_canvas(side, size, scene);
+                        self.fit_mirror(side, scene);
                         self.draw_eye(&mut encoder, scene, eye, side, None);
                     }
                 }
@@ -356,7 +357,14 @@ impl Renderer {
         size: [u32; 2],
         target: &wgpu::TextureView,
     ) {
-        let [Some(left), Some(right)] = &self.canvases else { return };
+        let [left, right] = &self.canvases;
+        let (Some(left), Some(right)) = (match stereo.layout.needs() {
+            [true, true] => (left, right),
+            [_, false] => (left, left),
+            [false, _] => (right, right),
+        }) else {
+            return;
+        };
         let eyes = [left.seen(scene), right.seen(scene)];
         let group = self.stereo_pass.group(&self.device, &self.queue, eyes, stereo.layout, size);
         let mut pass = begin(encoder, target, wgpu::LoadOp::Clear(wgpu::Color::BLACK), None);
