@@ -273,7 +273,8 @@ fn picture(
         let other = viewport.draw(Place::Second, &scene, &viewpoint, Some(second), viewport.second_size());
         drawn = other.and(drawn);
     }
-    matter.is_new = false;
+    // What a picture that failed should have brought to the adapter is lost.
+    matter.is_new = drawn.is_err();
     drawn.map(Some)
 }
 
