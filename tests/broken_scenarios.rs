@@ -486,6 +486,19 @@ fn all_mistakes_are_told_at_once_in_order_of_place() {
 }
 
 #[test]
+fn an_operating_field_without_anything_in_it_is_complained_about() {
+    let with = |field: Value| edited("5-grinding.json", "/operating_field", Some(field));
+    let idle = with(json!({ "suction": true }));
+    check_text("suction alone", &idle, &[("idle-suction", "/operating_field/suction")]);
+    let unknown = with(json!({ "dust": true, "spray": true }));
+    check_text("a wrong word", &unknown, &[("unknown-key", "/operating_field/spray")]);
+    let mut undrilled: Value = serde_json::from_str(&shipped("3-detection.json")).unwrap();
+    undrilled["operating_field"] = json!({ "dust": true });
+    check_text("nothing drills", &undrilled.to_string(), &[("nothing-drilled", "/operating_field")]);
+    check_text("all of it", &with(json!({ "dust": true, "water_spray": true, "suction": true })), &[]);
+}
+
+#[test]
 fn a_complaint_reads_like_this() {
     // Aim: the very text an author sees. A change here is a change for every author.
     let text = shipped("5-grinding.json").replacen("\"round_bur_014\"", "\"round_bur_14\"", 1);

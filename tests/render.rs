@@ -55,7 +55,8 @@ fn adapter_and_processor_draw_the_same_picture() {
     let Some((mut gpu, _turn)) = adapter() else { return };
     let (volume, palette) = (molar([128, 128, 80]), palette());
     let mut wrong = Vec::new();
-    for Story { name, scene, viewpoint, stereo, size } in stories(&volume, &palette) {
+    let (grains, drops) = (grains(), drops());
+    for Story { name, scene, viewpoint, stereo, size } in stories(&volume, &palette, &grains, &drops) {
         let drawn = gpu.draw(&scene, &viewpoint, stereo, size).unwrap();
         let twin = Painter::cpu().draw(&scene, &viewpoint, stereo, size).unwrap();
         keep(&format!("{name}-gpu"), &drawn);
@@ -295,6 +296,93 @@ fn a_mirror_shows_what_is_before_it_and_nothing_behind() {
 }
 
 #[test]
+fn specks_are_where_they_are_as_large_as_they_are_and_hidden_by_what_is_before_them() {
+    // Aim: dust and water share the scene's depth in each eye. Method: a ball of 1 mm to the left; its pixels' number and
+    // middle are what geometry says. A block before it hides it, one behind it does not; a drop lets the block through.
+    let (focus, apart) = (100.0f32, 6.0f32);
+    let viewpoint = Viewpoint::looking(Vec3::new(0.0, 0.0, focus), Vec3::ZERO, Vec3::Y);
+    let size = [600, 400];
+    let per_mm = size[1] as f32 / (2.0 * focus * (0.5 * viewpoint.field_of_view).tan());
+    let white = Finish { colour: [1.0; 3], gloss: 0.0 };
+    let blue = Finish { colour: [0.1, 0.1, 0.9], gloss: 0.0 };
+    let speck = Speck { place: Vec3::new(-5.0, 2.0, 0.0), radius: 1.0, facing: None, finish: white, opacity: 1.0 };
+    let disc = Speck { facing: Some(Vec3::Z), ..speck };
+    let (gpu, _turn) = adapter().unzip();
+    for mut painter in [Some(Painter::cpu()), gpu].into_iter().flatten() {
+        let adapter = painter.adapter().to_string();
+        let mut seen = |grains: &[Speck], drops: &[Speck], block_at: f32, layout| {
+            let place = Pose::at(Vec3::new(-5.0, 2.0, block_at));
+            let scene = Scene {
+                solids: vec![Solid::plain(block(Vec3::new(4.0, 4.0, 0.5)), place, blue)],
+                lights: Lights { ambient: 1.0, chair: Lamp::OFF, head: Lamp::OFF },
+                background: Background::plain([0.0; 3]),
+                grains,
+                drops,
+                ..Scene::empty()
+            };
+            let stereo = Some(Stereo { layout, eye_distance: apart });
+            let image = painter.draw(&scene, &viewpoint, stereo, size).unwrap();
+            let all = (0..size[0] * size[1]).map(|i| (i % size[0], i / size[0]));
+            let lit: Vec<(u32, u32)> = all.filter(|&(x, y)| image.pixel(x, y)[0] > 70).collect();
+            let middle = lit.iter().map(|p| p.0 as f32 + 0.5).sum::<f32>() / lit.len() as f32;
+            (lit.len() as f32, middle)
+        };
+        let expected = std::f32::consts::PI * per_mm * per_mm;
+        for layout in [Layout::Left, Layout::Right] {
+            for (grains, drops) in [(&[speck][..], &[][..]), (&[disc], &[]), (&[], &[disc])] {
+                let (count, middle) = seen(grains, drops, -5.0, layout);
+                // A drop fades toward its rim.
+                let least = if drops.is_empty() { 0.94 } else { 0.75 };
+                let share = count / expected;
+                assert!((least..1.06).contains(&share), "{adapter}: {count} pixels, not {expected}");
+                // Both lie in the plane on which both eyes agree.
+                assert!((middle - (300.0 - 5.0 * per_mm)).abs() < 0.5, "{adapter}: {middle}");
+                assert_eq!(seen(grains, drops, 5.0, layout).0, 0.0, "{adapter}: hidden by the block");
+            }
+        }
+        // Mostly the block's colour.
+        let faint = Speck { opacity: 0.2, ..speck };
+        assert_eq!(seen(&[], &[faint], -5.0, Layout::Left).0, 0.0, "{adapter}: a faint drop lets the block through");
+    }
+}
+
+#[test]
+fn smoothing_brings_edges_nearer_to_the_truth_and_leaves_the_rest() {
+    // Aim: what is smoothed is nearer to what an endlessly fine picture shows, and nothing but edges changes. Method: a
+    // turned block drawn four times as large and averaged is the truth.
+    let viewpoint = Viewpoint::looking(Vec3::new(10.0, 20.0, 80.0), Vec3::ZERO, Vec3::Y);
+    let orientation = typodont::frame::Quat::from_rotation_z(0.21) * typodont::frame::Quat::from_rotation_y(0.4);
+    let finish = Finish { colour: [0.95, 0.93, 0.9], gloss: 0.0 };
+    let scene = |is_smooth| Scene {
+        solids: vec![Solid::plain(block(Vec3::new(9.0, 6.0, 5.0)), Pose { position: Vec3::ZERO, orientation }, finish)],
+        background: Background::plain([0.15; 3]),
+        is_smooth,
+        ..Scene::empty()
+    };
+    let (gpu, _turn) = adapter().unzip();
+    for mut painter in [Some(Painter::cpu()), gpu].into_iter().flatten() {
+        let size = [240, 200];
+        let plain = painter.draw(&scene(false), &viewpoint, None, size).unwrap();
+        let smooth = painter.draw(&scene(true), &viewpoint, None, size).unwrap();
+        let fine = painter.draw(&scene(false), &viewpoint, None, size.map(|n| 4 * n)).unwrap();
+        let truth = |x: u32, y: u32| {
+            let parts = (0..16).map(|i| f32::from(fine.pixel(4 * x + i % 4, 4 * y + i / 4)[0]));
+            parts.sum::<f32>() / 16.0
+        };
+        let (mut before, mut after, mut changed) = (0.0, 0.0, 0);
+        for (x, y) in (0..size[0] * size[1]).map(|i| (i % size[0], i / size[0])) {
+            let [own, now] = [&plain, &smooth].map(|image| f32::from(image.pixel(x, y)[0]));
+            before += (own - truth(x, y)).powi(2);
+            after += (now - truth(x, y)).powi(2);
+            changed += u32::from(own != now);
+        }
+        println!("{}: squared error {before:.0}, smoothed {after:.0}; {changed} pixels", painter.adapter());
+        assert!(after < 0.5 * before, "{}: from {before} to {after}", painter.adapter());
+        assert!((100..3000).contains(&changed), "{}: {changed} pixels changed", painter.adapter());
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_in_words() {
     let viewpoint = Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
     let (gpu, _turn) = adapter().unzip();
@@ -312,6 +400,8 @@ fn what_cannot_be_drawn_is_refused_in_words() {
         let flat = Mirror { world_from_mirror: Pose::IDENTITY, radius: 0.0, shine: 1.0 };
         assert!(refused(&Scene { mirror: Some(flat), ..Scene::empty() }, viewpoint, [20, 20]).contains("mirror"));
         let grey = Finish { colour: [0.5; 3], gloss: 0.0 };
+        let speck = Speck { place: Vec3::ZERO, radius: f32::NAN, facing: None, finish: grey, opacity: 1.0 };
+        assert!(refused(&Scene { grains: &[speck], ..Scene::empty() }, viewpoint, [20, 20]).contains("speck"));
         let nowhere = Solid::plain(ball(1.0), Pose::at(Vec3::splat(f32::INFINITY)), grey);
         let scene = Scene { solids: vec![nowhere], ..Scene::empty() };
         assert!(refused(&scene, viewpoint, [20, 20]).contains("solid 0"));

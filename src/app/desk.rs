@@ -307,7 +307,7 @@ impl Desk {
         }
         if self.open.settings {
             page(ctx, words.of("settings.title"), |ui| {
-                settings_ui(ui, &self.settings, &self.languages, words, asked);
+                settings_ui(ui, &self.settings, self.has_graphics, &self.languages, words, asked);
             });
         }
         if self.closing == Closing::Asked {
@@ -384,6 +384,9 @@ fn note_lesson(diary: &mut Diary, sitting: &Sitting) {
     diary.note("view", format!("{:.4} {:.4}", sitting.orbit.turn, sitting.orbit.tilt));
     if let Some(matter) = &sitting.matter {
         diary.note("open", matter.open);
+        let specks = matter.field.as_ref().map_or((0, 0), |field| (field.grains().len(), field.drops().len()));
+        diary.note("dust", specks.0);
+        diary.note("water", specks.1);
         diary.note("tooth", if matter.is_new { "made" } else { "drawn" });
     }
     diary.note("shown", format!("{:?}", sitting.shown));

@@ -11,6 +11,7 @@ use crate::content::Role;
 use crate::frame::{Pose, Vec3};
 use crate::render::{Changes, Eye, Lamp, Lights, Scene, Solid, Tooth};
 use crate::scene;
+use crate::scene::field::Field;
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 
 /// Full width of the force bar, N: what a PHANTOM Omni can push.
@@ -233,6 +234,10 @@ fn picture(
     let Some(matter) = &mut sitting.matter else { return Ok(None) };
     let changed = matter.volume.take_dirty();
     let mut solids = matter.around.clone();
+    solids.extend(matter.ejector.clone());
+    if let Some(field) = &mut matter.field {
+        field.look(&viewpoint);
+    }
     let mut mirror = None;
     if let Some(seen) = seen
         && let Some(instrument) = matter.instruments.get(seen.instrument as usize)
@@ -251,11 +256,13 @@ fn picture(
             shown: matter.shown(way),
         }),
         solids,
+        grains: matter.field.as_ref().map(Field::grains).unwrap_or_default(),
+        drops: matter.field.as_ref().map(Field::drops).unwrap_or_default(),
         mirror,
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+        is_smooth: settings.is_smooth(viewport.has_graphics()),
         ..Scene::empty()
     };
-    if matter.is_new {}
     let mut drawn = viewport.draw(Place::Main, &scene, &viewpoint, settings.stereo(), size);
     if let Some(second) = settings.second_eye()
         && drawn.is_ok()
@@ -265,8 +272,8 @@ fn picture(
         let other = viewport.draw(Place::Second, &scene, &viewpoint, Some(second), viewport.second_size());
         drawn = other.and(drawn);
     }
-    if matter.is_new {}
-    matter.is_new = false;
+    // What a picture that failed should have brought to the adapter is lost.
+    matter.is_new = drawn.is_err();
     drawn.map(Some)
 }
 

@@ -28,6 +28,8 @@ pub struct Settings {
     pub device: String,
     pub stereo: StereoMode,
     pub eye_distance_mm: f32,
+    /// Whether edges are smoothed; unset as this machine can afford it.
+    pub smooth_edges: Option<bool>,
     /// Share of full scale, 0 to 1.
     pub volume: f32,
     pub high_contrast: bool,
@@ -66,6 +68,7 @@ impl Default for Settings {
             device: "mouse".into(),
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,
+            smooth_edges: None,
             volume: VOLUME,
             high_contrast: false,
             font_size: 1.0,
@@ -119,6 +122,12 @@ impl Settings {
         Some(Stereo { layout, eye_distance: self.eye_distance_mm })
     }
 
+    /// Whether edges are smoothed. Where nobody has chosen, a graphics processor does it; in software it costs too much of
+    /// each picture.
+    pub fn is_smooth(&self, has_graphics: bool) -> bool {
+        self.smooth_edges.unwrap_or(has_graphics)
+    }
+
     /// What the second window shows, if there is one.
     pub fn second_eye(&self) -> Option<Stereo> {
         let has_two = self.stereo == StereoMode::TwoWindows;
@@ -139,6 +148,7 @@ fn file() -> Option<PathBuf> {
 pub fn settings_ui(
     ui: &mut egui::Ui,
     settings: &Settings,
+    has_graphics: bool,
     languages: &[Words],
     words: &Words,
     asked: &mut Vec<Command>,
@@ -197,6 +207,13 @@ pub fn settings_ui(
         let label = ui.label(words.of("settings.font")).id;
         let slider = egui::Slider::new(&mut new.font_size, FONT_SIZES).step_by(0.1).fixed_decimals(1);
         ui.add(slider).labelled_by(label);
+        ui.end_row();
+
+        ui.label("");
+        let mut is_smooth = settings.is_smooth(has_graphics);
+        if ui.checkbox(&mut is_smooth, words.of("settings.smooth")).changed() {
+            new.smooth_edges = Some(is_smooth);
+        }
         ui.end_row();
 
         ui.label("");

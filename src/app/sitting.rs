@@ -8,9 +8,10 @@ use super::transfer::{Curves, Histogram};
 use crate::audio::{self, News as SoundNews, Output, Player};
 use crate::content::{Library, Role, TissueTable};
 use crate::diagnostic::Diagnostic;
-use crate::frame::Vec3;
+use crate::frame::{Pose, Vec3};
 use crate::render::{Orbit, Palette, Shown, Solid, TransferFunction};
 use crate::scenario::{Layout, Scenario, Stage, Workpiece};
+use crate::scene::field::{self, Field, Ground};
 use crate::scene::{self, Mouth};
 use crate::session::{Answer, Effect, Heard, Input};
 use crate::sim::Command as Tell;
@@ -87,6 +88,10 @@ pub struct Matter {
     /// What stands around the tooth.
     pub around: Vec<Solid>,
     pub instruments: Vec<Solid>,
+    /// The dust and the water, where the exercise has any.
+    pub field: Option<Field>,
+    /// What takes them away, drawn.
+    pub ejector: Option<Solid>,
     /// Nothing of the volume has been drawn yet.
     pub is_new: bool,
     histogram: OnceCell<Histogram>,
@@ -254,10 +259,14 @@ impl Sitting {
         if let Some(matter) = &mut self.matter {
             for _ in 0..EDITS_AT_ONCE {
                 let Some(edit) = self.chair.next_edit() else { break };
+                if let Some(field) = &mut matter.field {
+                    field.carved(&edit, matter.volume.grid());
+                }
                 matter.volume.repeat(&edit);
             }
         }
         self.seen = self.chair.seen().or(self.seen);
+        self.stir_field(since);
         if self.end.is_none() && self.chair.is_empty() {
             self.end = Some(Err(
                 "broken-off: the lesson ended without a word; what was recorded lies in the folder of finished \
@@ -265,6 +274,21 @@ impl Sitting {
                     .into(),
             ));
         }
+    }
+
+    /// Lets dust and water go on while the lesson does.
+    fn stir_field(&mut self, since: f32) {
+        let does_drill_run = self.stage().is_some_and(|stage| stage.cutting);
+        let seen = self.seen.filter(|_| does_drill_run);
+        let is_still = self.is_paused || self.standstill.is_some();
+        let Some(Matter { field: Some(field), volume, workpiece, palette, .. }) = &mut self.matter else { return };
+        if is_still {
+            return;
+        }
+        let held = |seen: Seen| Pose { position: seen.tip, orientation: seen.held };
+        let bur = seen.and_then(|seen| field.bur(seen.instrument as usize, held(seen)));
+        let ground = Ground { volume, world_from_tooth: workpiece.world_from_tooth, around: &workpiece.around };
+        field.pass(since, bur.as_ref(), &ground, palette);
     }
 
     fn learn(&mut self, news: News) {
@@ -327,6 +351,11 @@ impl Sitting {
         let drawn = self.scenario.instruments.iter().map(|entry| scene::instrument(entry, &self.library));
         let (instruments, complaints): (Vec<Solid>, Vec<_>) = drawn.unzip();
         self.complaints = complaints.iter().flatten().map(Diagnostic::headline).collect();
+        let options = self.scenario.operating_field;
+        let (ejector, mouth_of_suction) = match options.suction {
+            true => Some(field::ejector(&workpiece)).unzip(),
+            false => (None, None),
+        };
         Matter {
             histogram: OnceCell::new(),
             curves: Curves::from(TransferFunction::tissue(&palette)),
@@ -339,6 +368,8 @@ impl Sitting {
             },
             mouth,
             open: scene::OPEN,
+            field: options.is_any().then(|| Field::new(options, &self.scenario.instruments, mouth_of_suction)),
+            ejector,
             instruments,
             workpiece,
             is_new: true,

@@ -51,6 +51,11 @@ impl Viewport {
         }
     }
 
+    /// True where a graphics processor draws.
+    pub fn has_graphics(&self) -> bool {
+        has_graphics(&self.state)
+    }
+
     /// Pixels of the second window from now on.
     pub fn size_second(&mut self, size: [u32; 2]) {
         self.second_size = size;

@@ -152,6 +152,8 @@ impl Results {
         }
         for (dims, cases) in &self.frame_ms {
             line(format!("frame_ms.{dims}.surface"), &cases.surface);
+            line(format!("frame_ms.{dims}.surface_smooth"), &cases.surface_smooth);
+            line(format!("frame_ms.{dims}.surface_specks"), &cases.surface_specks);
             line(format!("frame_ms.{dims}.iso"), &cases.iso);
             line(format!("frame_ms.{dims}.volume"), &cases.volume);
         }

@@ -45,6 +45,8 @@ mod picture;
 mod renderer;
 mod resources;
 mod scene;
+mod smooth_pass;
+mod speck_pass;
 mod stereo;
 mod stereo_pass;
 mod surface_mesh;
@@ -63,7 +65,7 @@ pub use mirror::Mirror;
 pub use painter::{GpuPainter, Painter};
 pub use picture::Image;
 pub use renderer::{Renderer, Target};
-pub use scene::{Background, Changes, Finish, Lamp, Lights, Palette, Rgb, Scene, Shown, Solid, Tooth};
+pub use scene::{Background, Changes, Finish, Lamp, Lights, Palette, Rgb, Scene, Shown, Solid, Speck, Tooth};
 pub use stereo::{Layout, Stereo};
 pub use tooth::Uploads;
 pub use transfer::{Table, TransferFunction};
@@ -94,6 +96,8 @@ pub fn shaders() -> Vec<Shader> {
         shader("surface_pass", surface_pass::SOURCE, &[("Solid", size_of::<surface_pass::gpu::Solid>())]),
         shader("iso_pass", iso_pass::SOURCE, &[]),
         shader("volume_pass", volume_pass::SOURCE, &[]),
+        shader("speck_pass", speck_pass::SOURCE, &[("Speck", size_of::<speck_pass::gpu::Speck>())]),
+        shader("smooth_pass", smooth_pass::SOURCE, &[]),
         shader("mirror_pass", mirror_pass::SOURCE, &[("Mirror", size_of::<mirror_pass::gpu::Mirror>())]),
         Shader {
             name: "stereo_pass",
@@ -142,6 +146,9 @@ fn sound(
     }
     if scene.mirror.is_some_and(|mirror| !mirror.is_sound()) {
         return impossible(format!("the mirror has numbers that make no picture: {:?}", scene.mirror));
+    }
+    if let Some(speck) = scene.grains.iter().chain(scene.drops).find(|speck| !speck.is_sound()) {
+        return impossible(format!("a speck has numbers that make no picture: {speck:?}"));
     }
     match scene.solids.iter().position(|solid| !solid.world_from_solid.is_sound()) {
         Some(place) => impossible(format!("the pose of solid {place} has numbers that are none")),

@@ -34,6 +34,8 @@ pub enum Depth {
     Ignored,
     /// Nearer wins and is written.
     Nearest,
+    /// What is nearer is drawn and leaves the depth as it was.
+    Compared,
 }
 
 impl Pass<'_> {
@@ -76,6 +78,7 @@ impl Pass<'_> {
                 Depth::None => None,
                 Depth::Ignored => Some(depth(false, wgpu::CompareFunction::Always)),
                 Depth::Nearest => Some(depth(true, wgpu::CompareFunction::Less)),
+                Depth::Compared => Some(depth(false, wgpu::CompareFunction::Less)),
             },
             multisample: wgpu::MultisampleState::default(),
             multiview_mask: None,

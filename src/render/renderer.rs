@@ -9,6 +9,8 @@ use super::mirror;
 use super::mirror_pass::MirrorPass;
 use super::passes::DEPTH;
 use super::scene::{Background, Changes, Scene, Shown, Tooth};
+use super::smooth_pass::SmoothPass;
+use super::speck_pass::SpeckPass;
 use super::stereo::Stereo;
 use super::stereo_pass::StereoPass;
 use super::surface_pass::SurfacePass;
@@ -26,6 +28,8 @@ pub struct Renderer {
     surface_pass: SurfacePass,
     iso_pass: wgpu::RenderPipeline,
     volume_pass: VolumePass,
+    speck_pass: SpeckPass,
+    smooth_pass: SmoothPass,
     stereo_pass: StereoPass,
     mirror_pass: MirrorPass,
     views: [ViewGroup; 2],
@@ -66,6 +70,22 @@ struct Canvas {
     colour: wgpu::TextureView,
     depth: wgpu::TextureView,
     depth_group: wgpu::BindGroup,
+    /// Once a scene has asked for smooth edges.
+    smooth: Option<Smoothed>,
+}
+
+/// A canvas's colours with edges smoothed.
+struct Smoothed {
+    /// The canvas, to be read.
+    group: wgpu::BindGroup,
+    colour: wgpu::TextureView,
+}
+
+impl Canvas {
+    /// What an eye sees of a scene in the end.
+    fn seen(&self, scene: &Scene) -> &wgpu::TextureView {
+        self.smooth.as_ref().filter(|_| scene.is_smooth).map_or(&self.colour, |smooth| &smooth.colour)
+    }
 }
 
 impl Renderer {
@@ -78,6 +98,8 @@ impl Renderer {
             surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout),
             iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout),
             volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout),
+            speck_pass: SpeckPass::new(device, format, &view_layout),
+            smooth_pass: SmoothPass::new(device, format),
             stereo_pass: StereoPass::new(device, format),
             mirror_pass: MirrorPass::new(device, format, &view_layout),
             mirrors: [None, None],
@@ -112,20 +134,21 @@ impl Renderer {
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         match stereo {
             None => {
-                self.fit_canvas(0, target.size);
+                self.fit_canvas(0, target.size, scene);
                 self.fit_mirror(0, scene);
                 self.draw_eye(&mut encoder, scene, &viewpoint.eye(ratio), 0, Some(target.view));
             }
             Some(stereo) => {
                 let size = stereo.layout.eye_size(target.size);
                 for (side, eye) in stereo.eyes(viewpoint, ratio).iter().enumerate() {
-                    self.fit_canvas(side, size);
-                    self.fit_mirror(side, scene);
+                    // Two windows of one eye each would otherwise resize each other's canvases in every picture.
                     if stereo.layout.needs()[side] {
+                        self.fit_canvas(side, size, scene);
+                        self.fit_mirror(side, scene);
                         self.draw_eye(&mut encoder, scene, eye, side, None);
                     }
                 }
-                self.join(&mut encoder, stereo, size, target.view);
+                self.join(&mut encoder, scene, stereo, size, target.view);
             }
         }
         self.queue.submit([encoder.finish()]);
@@ -135,6 +158,7 @@ impl Renderer {
     /// Brings to the device what the scene has new.
     fn prepare(&mut self, scene: &Scene) -> Uploads {
         self.surface_pass.prepare(&self.device, &self.queue, &scene.solids);
+        self.speck_pass.prepare(&self.device, &self.queue, scene.grains, scene.drops);
         let Some(tooth) = &scene.tooth else { return Uploads::default() };
         let limit = self.device.limits().max_texture_dimension_3d;
         let joined = Coarse::needed(tooth.volume.grid().dims, limit);
@@ -202,20 +226,25 @@ impl Renderer {
         }
     }
 
-    fn fit_canvas(&mut self, side: usize, size: [u32; 2]) {
-        if self.canvases[side].as_ref().is_none_or(|canvas| canvas.size != size) {
-            self.canvases[side] = Some(self.canvas(size));
+    fn fit_canvas(&mut self, side: usize, size: [u32; 2], scene: &Scene) {
+        let known = self.canvases[side].take().filter(|canvas| canvas.size == size);
+        let mut canvas = known.unwrap_or_else(|| self.canvas(size));
+        if scene.is_smooth && canvas.smooth.is_none() {
+            let group = self.smooth_pass.group(&self.device, &canvas.colour);
+            canvas.smooth = Some(Smoothed { group, colour: self.plane("smooth", size, self.format) });
         }
+        self.canvases[side] = Some(canvas);
     }
 
     fn canvas(&self, size: [u32; 2]) -> Canvas {
-        let plane = |label, format| {
-            let texture = resources::target_texture(&self.device, label, size, format);
-            texture.create_view(&wgpu::TextureViewDescriptor::default())
-        };
-        let depth = plane("depth", DEPTH);
+        let depth = self.plane("depth", size, DEPTH);
         let depth_group = self.volume_pass.group(&self.device, &depth);
-        Canvas { size, colour: plane("eye", self.format), depth, depth_group }
+        Canvas { size, colour: self.plane("eye", size, self.format), depth, depth_group, smooth: None }
+    }
+
+    fn plane(&self, label: &str, size: [u32; 2], format: wgpu::TextureFormat) -> wgpu::TextureView {
+        let texture = resources::target_texture(&self.device, label, size, format);
+        texture.create_view(&wgpu::TextureViewDescriptor::default())
     }
 
     /// Makes room for what the mirror shows, if the scene has one.
@@ -247,8 +276,16 @@ impl Renderer {
             self.draw_world(encoder, &mirror.lit(scene), (&image, view), canvas, &canvas.colour, None);
             reflected = Some(group);
         }
-        let colour = target.unwrap_or(&canvas.colour);
-        self.draw_world(encoder, scene, (eye, &self.views[side]), canvas, colour, reflected);
+        let view = (eye, &self.views[side]);
+        let Some(Smoothed { group, colour }) = canvas.smooth.as_ref().filter(|_| scene.is_smooth) else {
+            return self.draw_world(encoder, scene, view, canvas, target.unwrap_or(&canvas.colour), reflected);
+        };
+        self.draw_world(encoder, scene, view, canvas, &canvas.colour, reflected);
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+        let mut pass = begin(encoder, target.unwrap_or(colour), clear, None);
+        pass.set_pipeline(&self.smooth_pass.pipeline);
+        pass.set_bind_group(2, group, &[]);
+        pass.draw(0..3, 0..1);
     }
 
     /// Everything through one eye; the mirror with what it shows.
@@ -266,7 +303,7 @@ impl Renderer {
         let Background { top, bottom } = scene.background;
         let [r, g, b] = top.map(f64::from);
         let clear = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
-        let mut pass = begin(encoder, colour, clear, Some(&canvas.depth));
+        let mut pass = begin(encoder, colour, clear, Some((&canvas.depth, wgpu::LoadOp::Clear(1.0))));
         pass.set_bind_group(0, group, &[]);
         // One colour needs no pass; a target that takes linear light would get another.
         if top != bottom || self.format.is_srgb() {
@@ -274,38 +311,61 @@ impl Renderer {
             pass.draw(0..3, 0..1);
         }
         self.surface_pass.draw_solids(&mut pass);
+        self.speck_pass.draw_grains(&mut pass);
         if let Some(reflected) = reflected {
             pass.set_pipeline(&self.mirror_pass.pipeline);
             pass.set_bind_group(2, reflected, &[]);
             pass.draw(0..3, 0..1);
         }
-        let (Some(tooth), Some(textures)) = (&scene.tooth, &self.tooth) else { return };
-        pass.set_bind_group(1, &textures.group, &[]);
-        match (&tooth.shown, &self.surfaces) {
-            (Shown::Surface, Some(surfaces)) => {
+        let shown = scene.tooth.as_ref().map(|tooth| &tooth.shown);
+        match (shown, &self.tooth, &self.surfaces) {
+            (Some(Shown::Surface), Some(textures), Some(surfaces)) => {
+                pass.set_bind_group(1, &textures.group, &[]);
                 pass.set_pipeline(&self.surface_pass.tooth);
                 surfaces.draw(&mut pass);
             }
-            (Shown::Surface, None) => {}
-            (Shown::Iso, _) => {
+            (Some(Shown::Iso), Some(textures), _) => {
+                pass.set_bind_group(1, &textures.group, &[]);
                 pass.set_pipeline(&self.iso_pass);
                 pass.draw(iso_pass::BOX, 0..1);
             }
-            (Shown::Volume(_), _) => {
+            (Some(Shown::Volume(_)), Some(textures), _) => {
                 drop(pass);
-                let mut pass = begin(encoder, colour, wgpu::LoadOp::Load, None);
+                let mut rays = begin(encoder, colour, wgpu::LoadOp::Load, None);
+                rays.set_bind_group(0, group, &[]);
+                rays.set_bind_group(1, &textures.group, &[]);
+                rays.set_bind_group(2, &canvas.depth_group, &[]);
+                rays.set_pipeline(&self.volume_pass.pipeline);
+                rays.draw(iso_pass::BOX, 0..1);
+                drop(rays);
+                if scene.drops.is_empty() {
+                    return;
+                }
+                pass = begin(encoder, colour, wgpu::LoadOp::Load, Some((&canvas.depth, wgpu::LoadOp::Load)));
                 pass.set_bind_group(0, group, &[]);
-                pass.set_bind_group(1, &textures.group, &[]);
-                pass.set_bind_group(2, &canvas.depth_group, &[]);
-                pass.set_pipeline(&self.volume_pass.pipeline);
-                pass.draw(iso_pass::BOX, 0..1);
             }
+            _ => {}
         }
+        self.speck_pass.draw_drops(&mut pass);
     }
 
-    fn join(&self, encoder: &mut wgpu::CommandEncoder, stereo: Stereo, size: [u32; 2], target: &wgpu::TextureView) {
-        let [Some(left), Some(right)] = &self.canvases else { return };
-        let eyes = [&left.colour, &right.colour];
+    fn join(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        scene: &Scene,
+        stereo: Stereo,
+        size: [u32; 2],
+        target: &wgpu::TextureView,
+    ) {
+        let [left, right] = &self.canvases;
+        let (Some(left), Some(right)) = (match stereo.layout.needs() {
+            [true, true] => (left, right),
+            [_, false] => (left, left),
+            [false, _] => (right, right),
+        }) else {
+            return;
+        };
+        let eyes = [left.seen(scene), right.seen(scene)];
         let group = self.stereo_pass.group(&self.device, &self.queue, eyes, stereo.layout, size);
         let mut pass = begin(encoder, target, wgpu::LoadOp::Clear(wgpu::Color::BLACK), None);
         pass.set_pipeline(&self.stereo_pass.pipeline);
@@ -326,11 +386,11 @@ fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     colour: &wgpu::TextureView,
     load: wgpu::LoadOp<wgpu::Color>,
-    depth: Option<&wgpu::TextureView>,
+    depth: Option<(&wgpu::TextureView, wgpu::LoadOp<f32>)>,
 ) -> wgpu::RenderPass<'a> {
-    let depth = depth.map(|view| wgpu::RenderPassDepthStencilAttachment {
+    let depth = depth.map(|(view, load)| wgpu::RenderPassDepthStencilAttachment {
         view,
-        depth_ops: Some(wgpu::Operations { load: wgpu::LoadOp::Clear(1.0), store: wgpu::StoreOp::Store }),
+        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
         stencil_ops: None,
     });
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {

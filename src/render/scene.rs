@@ -15,10 +15,17 @@ pub type Rgb = [f32; 3];
 pub struct Scene<'a> {
     pub tooth: Option<Tooth<'a>>,
     pub solids: Vec<Solid>,
+    /// Opaque specks: dust. At most some thousands.
+    pub grains: &'a [Speck],
+    /// Specks that let light through: water. Painted in this order, the farthest first, after the tooth; what lies behind one
+    /// of them and comes later covers it.
+    pub drops: &'a [Speck],
     /// Shows all of this but itself.
     pub mirror: Option<Mirror>,
     pub lights: Lights,
     pub background: Background,
+    /// Stairs along edges are smoothed once all is drawn.
+    pub is_smooth: bool,
 }
 
 impl Scene<'_> {
@@ -27,9 +34,12 @@ impl Scene<'_> {
         Scene {
             tooth: None,
             solids: Vec::new(),
+            grains: &[],
+            drops: &[],
             mirror: None,
             lights: Lights::default(),
             background: Background { top: [0.80, 0.85, 0.88], bottom: [0.60, 0.66, 0.70] },
+            is_smooth: false,
         }
     }
 }
@@ -104,6 +114,28 @@ impl Solid {
     /// A solid of one colour.
     pub fn plain(mesh: Arc<Mesh>, world_from_solid: Pose, finish: Finish) -> Solid {
         Solid { mesh, tints: Arc::default(), world_from_solid, finish }
+    }
+}
+
+/// One of very many small things: a ball, or a disc that may be looked at from both sides. World space, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Speck {
+    pub place: Vec3,
+    pub radius: f32,
+    /// Out of a disc's face, a unit vector; `None` for a ball.
+    pub facing: Option<Vec3>,
+    pub finish: Finish,
+    /// Share of what lies behind that is covered where a drop is thickest, 0 to 1. A grain covers all.
+    pub opacity: f32,
+}
+
+impl Speck {
+    /// True when its numbers make a picture.
+    pub(super) fn is_sound(&self) -> bool {
+        self.place.is_finite()
+            && (0.0..100.0).contains(&self.radius)
+            && self.facing.is_none_or(Vec3::is_normalized)
+            && (0.0..=1.0).contains(&self.opacity)
     }
 }
 

@@ -46,6 +46,9 @@ pub struct ScenarioFile {
     /// How a bur trembles while it cuts.
     #[serde(default)]
     pub vibration: VibrationFile,
+    /// What drilling brings before the eye besides the tooth.
+    #[serde(default)]
+    pub operating_field: OperatingFieldFile,
     /// Instruments on the tray, by the ids of `content/instruments.json`; the first is in the hand at the start.
     #[schemars(length(min = 1, max = 50))]
     pub instruments: Vec<String>,
@@ -462,6 +465,21 @@ impl Default for VibrationFile {
     fn default() -> Self {
         VibrationFile { frequency_hz: Self::frequency(), amplitude_n: Self::amplitude() }
     }
+}
+
+/// What drilling brings before the eye besides the tooth. Only a picture: no measure knows of it.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OperatingFieldFile {
+    /// Chips of what is carved fly, and lie on tooth and gum.
+    #[serde(default)]
+    pub dust: bool,
+    /// The handpiece sprays while it runs: water washes dust away, and hides what it stands over.
+    #[serde(default)]
+    pub water_spray: bool,
+    /// A saliva ejector beside the tooth takes dust and water near it.
+    #[serde(default)]
+    pub suction: bool,
 }
 
 /// A named region of the tooth.

@@ -41,6 +41,7 @@ pub struct Scenario {
     pub tissues: TissueTable,
     pub carving: Carving,
     pub vibration: Vibration,
+    pub operating_field: OperatingField,
     /// The tray; stages and results refer to it by index.
     pub instruments: Vec<InstrumentEntry>,
     /// What each of them and the patient's age make of the tissues.
@@ -52,6 +53,21 @@ pub struct Scenario {
     pub measures: Measures,
     pub rubric: Option<Rubric>,
     pub questionnaire: Option<Questionnaire>,
+}
+
+/// What drilling brings before the eye besides the tooth. Drawn, and nothing else.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OperatingField {
+    pub dust: bool,
+    pub water_spray: bool,
+    pub suction: bool,
+}
+
+impl OperatingField {
+    /// True when there is anything to draw.
+    pub fn is_any(self) -> bool {
+        self.dust || self.water_spray
+    }
 }
 
 /// What there is to see and touch.

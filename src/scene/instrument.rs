@@ -59,15 +59,36 @@ fn placed(mut mesh: Mesh, pose: Pose) -> Mesh {
     mesh
 }
 
+/// From a working end's tip to the head of the handpiece that turns it, mm; 0 for what no handpiece turns.
+pub(super) fn head_height(end: &EndEntry) -> f32 {
+    bur(end).last().map_or(0.0, |[_, top]| top + NECK)
+}
+
+/// From the top of a bur to the handpiece's head, mm.
+const NECK: f32 = 9.5;
+
 /// An end with what is behind it, about the device's tip, mm. A drawing: what touches is the instrument's own shape.
 fn drawing(end: &EndEntry) -> Mesh {
-    // Radius and height, from the tip upward.
-    let tip = match end {
+    match end {
         EndEntry::Point => {
             let needle = [[0.0, 0.0], [0.12, 0.6], [0.5, 8.0], [1.0, 14.0]];
             return turned(&[&needle[..], &[[2.6, 20.0], [2.6, 90.0], [0.0, 90.0]]].concat());
         }
         EndEntry::Mirror(mirror) => return mirror_body(mirror),
+        _ => {}
+    }
+    let tip = bur(end);
+    let [radius, top] = tip.last().copied().unwrap_or_default();
+    // Neck, friction grip shank (ISO 1797: 1.6 mm) and the handpiece's head.
+    let behind = [[0.8 * radius, top + 0.2], [0.8, top + 3.0], [0.8, top + NECK], [4.5, top + NECK], [5.2, top + 12.0]];
+    let head = [[5.2, top + 22.0], [0.0, top + 22.0]];
+    turned(&[&tip[..], &behind, &head].concat())
+}
+
+/// A bur's outline: radius and height, from the tip upward, mm. None for what does not turn.
+fn bur(end: &EndEntry) -> Vec<[f32; 2]> {
+    match end {
+        EndEntry::Point | EndEntry::Mirror(_) => Vec::new(),
         EndEntry::Ball(e) => arc(0.5 * e.diameter_mm, -1.0, 0.8),
         EndEntry::Pear(e) => {
             let radius = 0.5 * e.diameter_mm;
@@ -80,12 +101,7 @@ fn drawing(end: &EndEntry) -> Mesh {
             let at = |share: f32| [0.5 * e.diameter_mm * libm::sinf(PI * share), e.length_mm * share];
             (0..10).map(|i| at(i as f32 / 10.0)).collect()
         }
-    };
-    let [radius, top] = tip.last().copied().unwrap_or_default();
-    // Neck, friction grip shank (ISO 1797: 1.6 mm) and the handpiece's head.
-    let behind = [[0.8 * radius, top + 0.2], [0.8, top + 3.0], [0.8, top + 9.5], [4.5, top + 9.5], [5.2, top + 12.0]];
-    let head = [[5.2, top + 22.0], [0.0, top + 22.0]];
-    turned(&[&tip[..], &behind, &head].concat())
+    }
 }
 
 /// Part of a circle about the origin, from one share of its radius in height to another.
@@ -107,7 +123,7 @@ fn straight(low: f32, high: f32, length: f32) -> Vec<[f32; 2]> {
 }
 
 /// An outline turned about z; each stretch has its own normals, so that edges stay edges.
-fn turned(outline: &[[f32; 2]]) -> Mesh {
+pub(super) fn turned(outline: &[[f32; 2]]) -> Mesh {
     const SIDES: usize = 32;
     let mut mesh = Mesh::default();
     for pair in outline.windows(2) {

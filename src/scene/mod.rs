@@ -1,9 +1,11 @@
-//! What stands before the trainee: the tooth as it is now, what is around it, and the instrument in the hand.
+//! What stands before the trainee: the tooth as it is now, what is around it, the instrument in the hand, and what flies and
+//! lies about it.
 //!
 //! Takes a workpiece and the tables of tissues and instruments. Gives plain solids, palettes and viewpoints for
 //! [`render`](crate::render); mm, world space. Never knows a window, a clock or a session, and draws nothing itself.
 
 mod around;
+pub mod field;
 mod instrument;
 mod jaw;
 mod palette;

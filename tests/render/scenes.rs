@@ -103,8 +103,40 @@ pub fn tissue(palette: &Palette) -> Shown {
     Shown::Volume(Arc::new(TransferFunction::tissue(palette)))
 }
 
+/// Dust on and about a tooth: balls, some hidden by it, some before it.
+pub fn grains() -> Vec<Speck> {
+    let grain = |i: usize| {
+        let (turn, height) = (2.4 * i as f32, -6.0 + 16.0 * i as f32 / 300.0);
+        let (sin, cos) = turn.sin_cos();
+        let ring = 3.0 + 0.02 * i as f32;
+        let colour = [0.95, 0.90, 0.60 + 0.001 * i as f32];
+        let finish = Finish { colour, gloss: 0.03 };
+        let place = Vec3::new(ring * cos, height, ring * sin);
+        Speck { place, radius: 0.08 + 0.0006 * i as f32, facing: None, finish, opacity: 1.0 }
+    };
+    (0..300).map(grain).collect()
+}
+
+/// Water before and behind a tooth: balls, and discs that face all ways.
+pub fn drops() -> Vec<Speck> {
+    let drop = |i: usize| {
+        let (turn, height) = (1.7 * i as f32, 8.0 - 12.0 * i as f32 / 120.0);
+        let (sin, cos) = turn.sin_cos();
+        let place = Vec3::new(6.0 * cos, height, 6.0 * sin);
+        let facing = i.is_multiple_of(2).then(|| Vec3::new(0.4 * cos, 1.0, 0.4 * sin).normalize());
+        let finish = Finish { colour: [0.80, 0.89, 0.95], gloss: 0.7 };
+        Speck { place, radius: 0.2 + 0.006 * i as f32, facing, finish, opacity: 0.3 }
+    };
+    (0..120).map(drop).collect()
+}
+
 /// One of each kind, and some together.
-pub fn stories<'a>(volume: &'a Volume, palette: &'a Palette) -> Vec<Story<'a>> {
+pub fn stories<'a>(
+    volume: &'a Volume,
+    palette: &'a Palette,
+    grains: &'a [Speck],
+    drops: &'a [Speck],
+) -> Vec<Story<'a>> {
     let near = Orbit { middle: Vec3::new(0.0, 1.0, 0.0), turn: 0.5, tilt: 0.75, distance: 42.0 };
     let whole = Orbit { middle: Vec3::new(0.0, -4.0, 0.0), turn: -0.6, tilt: 0.2, distance: 62.0 };
     let steel = Finish { colour: [0.62, 0.64, 0.66], gloss: 0.6 };
@@ -139,7 +171,24 @@ pub fn stories<'a>(volume: &'a Volume, palette: &'a Palette) -> Vec<Story<'a>> {
         story.scene.mirror = Some(Mirror { world_from_mirror, radius: 9.0, shine: 0.8 });
         story
     };
+    let in_work = |mut story: Story<'a>| {
+        (story.scene.grains, story.scene.drops) = (grains, drops);
+        story
+    };
+    let smooth = |mut story: Story<'a>| {
+        story.scene.is_smooth = true;
+        story
+    };
     vec![
+        in_work(story("specks-surface", Shown::Surface, &solids, near)),
+        head_lit(in_work(story("specks-iso", Shown::Iso, &solids, whole))),
+        in_work(story("specks-volume", tissue(palette), &solids, near)),
+        mirrored(in_work(story("specks-mirror", Shown::Iso, &solids, whole))),
+        in_work(with_stereo(Layout::SideBySide, story("specks-side-by-side", Shown::Surface, &solids, near))),
+        smooth(story("smooth-surface", Shown::Surface, &solids, whole)),
+        smooth(in_work(story("smooth-specks-iso", Shown::Iso, &solids, near))),
+        smooth(mirrored(with_stereo(Layout::Anaglyph, story("smooth-mirror-anaglyph", Shown::Iso, &solids, whole)))),
+        smooth(story("smooth-volume", tissue(palette), &solids, near)),
         mirrored(story("mirror-iso", Shown::Iso, &solids, whole)),
         mirrored(with_stereo(Layout::Anaglyph, story("mirror-surface-anaglyph", Shown::Surface, &solids, whole))),
         head_lit(mirrored(story("mirror-volume", tissue(palette), &solids, near))),

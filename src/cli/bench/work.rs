@@ -6,7 +6,7 @@ use crate::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
 use crate::content::{Library, TissueTable};
 use crate::diagnostic::{Source, headlines};
 use crate::frame::{Pose, Quat, Vec3};
-use crate::render::{Changes, Orbit, Painter, Palette, Scene, Shown, Tooth, TransferFunction};
+use crate::render::{Changes, Finish, Orbit, Painter, Palette, Scene, Shown, Speck, Tooth, TransferFunction};
 use crate::scenario::{self, Form, Forms, Scenario, Workpiece};
 use crate::volume::{Label, Volume, Voxel, distance, surface};
 use serde::Serialize;
@@ -62,6 +62,10 @@ pub struct Frames {
     /// What draws it: an adapter's name, or `cpu`.
     pub adapter: String,
     pub surface: Figures,
+    /// The same with its edges smoothed.
+    pub surface_smooth: Figures,
+    /// The same among all the dust and water that there can be.
+    pub surface_specks: Figures,
     pub iso: Figures,
     pub volume: Figures,
 }
@@ -112,14 +116,17 @@ fn frames(tooth: &Volume) -> Result<Frames, String> {
     let upright = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
     let orbit = Orbit::around(upright * (0.5 * (low + high)), 0.5 * (high - low).length());
     let mut failed = None;
-    let mut times = |shown: Shown| {
+    let middle = upright * (0.5 * (low + high));
+    let (grains, drops) = (strewn(middle, 2000, 1.0), strewn(middle, 800, 0.3));
+    let mut times = |shown: Shown, is_smooth: bool, specks: [&[Speck]; 2]| {
         let mut view = orbit;
         // Shaders are translated with the first picture; the next are what a trainee waits for.
         let mut changes = Changes::Anew;
         let mut picture = || {
             let seen =
                 Tooth { volume: tooth, changes, world_from_tooth: upright, palette: &palette, shown: shown.clone() };
-            let scene = Scene { tooth: Some(seen), ..Scene::empty() };
+            let [grains, drops] = specks;
+            let scene = Scene { tooth: Some(seen), is_smooth, grains, drops, ..Scene::empty() };
             let drawn = painter.draw_only(&scene, &view.viewpoint(), None, [780, 690]);
             failed = drawn.err().or(failed.take());
             changes = Changes::Bricks(&[]);
@@ -128,11 +135,29 @@ fn frames(tooth: &Volume) -> Result<Frames, String> {
         picture();
         repeated(1e3, picture)
     };
-    let [surface, iso, volume] = [Shown::Surface, Shown::Iso, Shown::Volume(function)].map(&mut times);
+    let [surface, iso, volume] =
+        [Shown::Surface, Shown::Iso, Shown::Volume(function)].map(|shown| times(shown, false, [&[]; 2]));
+    let surface_smooth = times(Shown::Surface, true, [&[]; 2]);
+    let surface_specks = times(Shown::Surface, false, [&grains, &drops]);
     match failed {
         Some(error) => Err(error.to_string()),
-        None => Ok(Frames { adapter: painter.adapter().to_string(), surface, iso, volume }),
+        None => {
+            let adapter = painter.adapter().to_string();
+            Ok(Frames { adapter, surface, surface_smooth, surface_specks, iso, volume })
+        }
     }
+}
+
+/// Specks of a tenth of a millimetre, spread evenly over a ball of 9 mm by a Fibonacci lattice, the farthest first.
+fn strewn(middle: Vec3, count: usize, opacity: f32) -> Vec<Speck> {
+    let finish = Finish { colour: [0.9; 3], gloss: 0.1 };
+    let speck = |i: usize| {
+        let height = 1.0 - 2.0 * (i as f32 + 0.5) / count as f32;
+        let (ring, turn) = ((1.0 - height * height).max(0.0).sqrt(), 2.399_963 * i as f32);
+        let place = middle + 9.0 * Vec3::new(ring * libm::cosf(turn), ring * libm::sinf(turn), -height);
+        Speck { place, radius: 0.1, facing: None, finish, opacity }
+    };
+    (0..count).map(speck).collect()
 }
 
 /// 40°: nine pictures go once round the tooth.

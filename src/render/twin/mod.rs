@@ -8,6 +8,8 @@ mod light;
 mod matter;
 mod mirror_pass;
 mod raster;
+mod smooth_pass;
+mod speck_pass;
 mod stereo_pass;
 mod surface_pass;
 mod volume_pass;
@@ -58,7 +60,8 @@ impl Twin {
         let seen = scene.mirror.as_ref().and_then(|mirror| Some((mirror, mirror.image_of(eye)?)));
         let reflected =
             seen.map(|(mirror, image)| (mirror, self.world(&mirror.lit(scene), None, &image, [mirror::PIXELS; 2])));
-        self.world(scene, reflected.as_ref().map(|(mirror, picture)| (*mirror, picture)), eye, [width, height])
+        let drawn = self.world(scene, reflected.as_ref().map(|(mirror, seen)| (*mirror, seen)), eye, [width, height]);
+        if scene.is_smooth { smooth_pass::smooth_pass(&drawn) } else { drawn }
     }
 
     /// Everything through one eye; the mirror with what it shows.
@@ -68,6 +71,7 @@ impl Twin {
         for solid in &scene.solids {
             surface_pass::solid(solid, &sight, &mut canvas);
         }
+        speck_pass::grains(scene.grains, &sight, &mut canvas);
         if let Some((mirror, reflected)) = mirror {
             mirror_pass::mirror_pass(mirror, reflected, &sight, &mut canvas);
         }
@@ -79,6 +83,7 @@ impl Twin {
                 Shown::Volume(function) => volume_pass::volume_pass(&matter, function, &sight, &mut canvas),
             }
         }
+        speck_pass::drops(scene.drops, &sight, &mut canvas);
         canvas.image()
     }
 }

@@ -10,7 +10,7 @@ mod trial;
 mod zones;
 
 use super::file::{self, ScenarioFile};
-use super::{Measures, Questionnaire, Scenario};
+use super::{Measures, OperatingField, Questionnaire, Scenario};
 use crate::content::json::Places;
 use crate::content::{AgeBand, FeelTable, InstrumentEntry, InstrumentTable, Library, TissueEntry, TissueTable, json};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
@@ -117,6 +117,7 @@ impl Resolver<'_> {
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
         let factors = self.factors(written, &instruments);
         let carving = self.carving(&written.carving);
+        let operating_field = self.operating_field(written);
         Some(Scenario {
             id: written.id.clone(),
             title: written.title.clone(),
@@ -132,6 +133,7 @@ impl Resolver<'_> {
                 amplitude: written.vibration.amplitude_n,
                 axis: crate::frame::Vec3::Y,
             },
+            operating_field,
             instruments,
             factors,
             zones,
@@ -251,6 +253,20 @@ impl Resolver<'_> {
             }
         };
         Carving { dwell, dwell_share, max_feed, law }
+    }
+
+    fn operating_field(&mut self, written: &ScenarioFile) -> OperatingField {
+        let file::OperatingFieldFile { dust, water_spray, suction } = written.operating_field;
+        let field = OperatingField { dust, water_spray, suction };
+        if suction && !field.is_any() {
+            let help = "give \"operating_field\" dust, water_spray or both, or leave \"suction\" out";
+            self.complain("/operating_field/suction", "idle-suction", "there is nothing for the suction to take", help);
+        }
+        if field.is_any() && !written.stages.iter().any(|stage| stage.cutting) {
+            let help = "give a stage \"cutting\": true, or leave \"operating_field\" out";
+            self.complain("/operating_field", "nothing-drilled", "no stage lets a bur run", help);
+        }
+        field
     }
 
     fn questionnaire(&mut self, name: &str) -> Option<Questionnaire> {

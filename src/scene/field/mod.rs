@@ -1,0 +1,373 @@
+//! The operating field: the dust that a bur throws, the water that cools it, and the suction that takes both away.
+//!
+//! Takes what was carved, where the working end is and how much time has gone by. Gives specks to draw. A picture only: it
+//! looks at a copy of the matter and never at a clock, and no tick, recording or score knows of it. The same edits and times
+//! give the same specks.
+
+mod chance;
+mod dust;
+mod ground;
+mod suction;
+mod water;
+
+pub use ground::Ground;
+pub use suction::ejector;
+
+use self::chance::Chance;
+use self::dust::Dust;
+use self::suction::Suction;
+use self::water::Water;
+use super::instrument::head_height;
+use crate::content::InstrumentEntry;
+use crate::frame::{Pose, Vec3};
+use crate::render::{Palette, Speck, Viewpoint};
+use crate::scenario::OperatingField;
+use crate::volume::{Edit, Grid};
+
+/// Time is cut into steps of this length, s, so that no chip comes through enamel: at its fastest it goes 2 mm in one.
+const STEP: f32 = 0.004;
+
+/// Longest time between two pictures that is followed, s. A window that stood still does not catch up.
+const LONGEST: f32 = 0.1;
+
+/// Weight, mm/s². Down is down on the screen.
+const GRAVITY: Vec3 = Vec3::new(0.0, -9810.0, 0.0);
+
+/// Farther from the middle of the world than this everything has left the mouth, mm.
+const MOUTH: f32 = 60.0;
+
+/// Everything that flies or lies about, in pools of a fixed size in which the newest take the place of the oldest.
+pub struct Field {
+    options: OperatingField,
+    drills: Vec<Drill>,
+    suction: Option<Suction>,
+    dust: Dust,
+    water: Water,
+    chance: Chance,
+    /// Time that is not yet a whole step, s.
+    left: f32,
+    grains: Vec<Speck>,
+    drops: Vec<Speck>,
+}
+
+/// What turns and sprays, for an instrument of the tray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Drill {
+    cuts: bool,
+    /// Of the bur, mm.
+    radius: f32,
+    /// From the tip to the handpiece's head, from which the water comes, mm.
+    height: f32,
+}
+
+/// The working end while it runs, world space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bur {
+    /// Its tip, +z along the shaft toward the hand.
+    pub world_from_tip: Pose,
+    /// mm
+    pub radius: f32,
+    /// From the tip to where the water comes from, mm.
+    pub height: f32,
+}
+
+impl Field {
+    /// A clean field. `mouth_of_suction`: where a suction tip is, if there is one, world space, mm.
+    ///
+    /// This allocates; what follows does not.
+    pub fn new(options: OperatingField, tray: &[InstrumentEntry], mouth_of_suction: Option<Vec3>) -> Field {
+        let drill = |entry: &InstrumentEntry| Drill {
+            cuts: entry.cuts,
+            radius: entry.make().head_radius(),
+            height: head_height(&entry.end),
+        };
+        Field {
+            options,
+            drills: tray.iter().map(drill).collect(),
+            suction: mouth_of_suction.filter(|_| options.suction).map(Suction::at),
+            dust: Dust::new(),
+            water: Water::new(),
+            chance: Chance::new(),
+            left: 0.0,
+            grains: Vec::with_capacity(dust::MOST),
+            drops: Vec::with_capacity(water::MOST),
+        }
+    }
+
+    /// An instrument of the tray as a running bur; `None` for what does not turn.
+    pub fn bur(&self, instrument: usize, world_from_tip: Pose) -> Option<Bur> {
+        let Drill { cuts, radius, height } = *self.drills.get(instrument)?;
+        cuts.then_some(Bur { world_from_tip, radius, height })
+    }
+
+    /// Hears of a changed voxel, before the next [`Field::pass`].
+    pub fn carved(&mut self, edit: &Edit, grid: &Grid) {
+        if self.options.dust && edit.removes() {
+            self.dust.carved(edit, grid);
+        }
+    }
+
+    /// Lets time go by, s. `bur`: what runs, if anything does. Chips have the colours in which their tissues are shown.
+    pub fn pass(&mut self, seconds: f32, bur: Option<&Bur>, ground: &Ground, palette: &Palette) {
+        let Field { options, suction, dust, water, chance, left, .. } = self;
+        let is_wet = options.water_spray && bur.is_some();
+        dust.leave(bur, is_wet, ground, palette, chance);
+        *left += if seconds.is_finite() { seconds.clamp(0.0, LONGEST) } else { 0.0 };
+        while *left >= STEP {
+            *left -= STEP;
+            if let Some(bur) = bur.filter(|_| is_wet) {
+                water.spray(bur, chance);
+            }
+            water.fly(ground, suction.as_ref(), dust, chance);
+            water.run(ground, suction.as_ref());
+            dust.fly(ground, suction.as_ref());
+            if let Some(bur) = bur {
+                dust.stir(bur, chance);
+            }
+        }
+    }
+
+    /// Brings the lists of specks up to date for whoever looks from a place.
+    pub fn look(&mut self, viewpoint: &Viewpoint) {
+        let Field { dust, water, grains, drops, .. } = self;
+        grains.clear();
+        grains.extend(dust.specks());
+        drops.clear();
+        drops.extend(water.specks());
+        let ahead = viewpoint.focus - viewpoint.position;
+        let depth = |speck: &Speck| (speck.place - viewpoint.position).dot(ahead);
+        drops.sort_unstable_by(|a, b| depth(b).total_cmp(&depth(a)));
+    }
+
+    /// The dust, as of the last [`Field::look`].
+    pub fn grains(&self) -> &[Speck] {
+        &self.grains
+    }
+
+    /// The water, the farthest first, as of the last [`Field::look`].
+    pub fn drops(&self) -> &[Speck] {
+        &self.drops
+    }
+}
+
+/// The velocity after a step under weight and the drag of air that moves itself: `time` is that in which a thing of its size
+/// takes on the air's velocity, s (Stokes: density times diameter squared by 18 times the air's viscosity).
+fn slowed(velocity: Vec3, air: Vec3, time: f32) -> Vec3 {
+    (velocity + (GRAVITY + air / time) * STEP) / (1.0 + STEP / time)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::content::{InstrumentTable, Library};
+    use crate::volume::{Label, Volume, Voxel};
+
+    const ALL: OperatingField = OperatingField { dust: true, water_spray: true, suction: true };
+    const DUST: OperatingField = OperatingField { dust: true, water_spray: false, suction: false };
+
+    fn tray() -> Vec<InstrumentEntry> {
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        ["round_bur_014", "explorer"].map(|id| table.by_id(id).unwrap().clone()).into()
+    }
+
+    /// World space is tooth space with y up, and the shaft of the bur stands upright.
+    fn upright(position: Vec3) -> Pose {
+        Pose { position, orientation: crate::frame::Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) }
+    }
+
+    fn palette() -> Palette {
+        Palette::of(|label| [[0.0; 3], [0.9, 0.8, 0.5]][usize::from(label.0.min(1))], 0.1)
+    }
+
+    /// All that is below a plane, with a round pit of 2 mm in its middle.
+    fn slab() -> Volume {
+        let grid = Grid::centred([101, 33, 101], Vec3::splat(0.25));
+        Volume::from_distance(grid, 0.4, |p| (p.y.max(2.0 - p.length()), Label(1)))
+    }
+
+    /// Where the bur works: near the bottom of the pit.
+    const AT_WORK: Vec3 = Vec3::new(0.0, -1.5, 0.0);
+
+    fn ground(volume: &Volume) -> Ground<'_> {
+        Ground { volume, world_from_tooth: Pose::IDENTITY, around: &[] }
+    }
+
+    /// Takes a ball of matter away and tells the field of it.
+    fn carve(volume: &mut Volume, field: &mut Field, middle: Vec3, radius: f32) {
+        let grid = *volume.grid();
+        let [xs, ys, zs] = grid.cells_within(middle - radius, middle + radius);
+        for z in zs {
+            for y in ys.clone() {
+                for x in xs.clone() {
+                    if grid.centre([x, y, z]).distance(middle) < radius {
+                        let edit = volume.set_cell([x, y, z], Voxel::AIR);
+                        field.carved(&edit, &grid);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Works in the pit for a while with what the field's options leave out of water, and lets the dust come down.
+    fn grind(volume: &mut Volume, field: &mut Field) {
+        for round in 0..12 {
+            let angle = 0.5 * round as f32;
+            let aside = Vec3::new(libm::cosf(angle), 0.0, libm::sinf(angle)) * 0.8;
+            let bur = field.bur(0, upright(AT_WORK + aside)).unwrap();
+            carve(volume, field, AT_WORK + aside, 1.0);
+            field.dust.leave(Some(&bur), false, &ground(volume), &palette(), &mut field.chance);
+            field.pass(0.05, None, &ground(volume), &palette());
+        }
+        for _ in 0..10 {
+            field.pass(0.1, None, &ground(volume), &palette());
+        }
+    }
+
+    #[test]
+    fn dust_leaves_the_rim_the_way_it_turns_and_up_the_flutes() {
+        // Aim: momentum. Method: seen from the handpiece a bur turns clockwise; what it cuts at its +x side, seen from above
+        // with the user at +z, must leave toward the user, and upward.
+        let (mut volume, mut field) = (slab(), Field::new(DUST, &tray(), None));
+        let bur = field.bur(0, upright(Vec3::new(5.0, 0.2, 0.0))).unwrap();
+        carve(&mut volume, &mut field, Vec3::new(5.7, -0.2, 0.0), 0.5);
+        field.pass(0.0, Some(&bur), &ground(&volume), &palette());
+        let mean = field.dust.mean_velocity();
+        assert!(mean.z > 100.0 && mean.z > 2.0 * mean.x.abs() && mean.y > 50.0, "{mean}");
+    }
+
+    #[test]
+    fn dust_has_the_colour_in_which_its_tissue_is_shown() {
+        // Aim: decay that an exercise hides does not give itself away by its dust. Method: the palette decides, and chips are
+        // paler than it by a little, as powder is.
+        let (mut volume, mut field) = (slab(), Field::new(DUST, &tray(), None));
+        let bur = field.bur(0, upright(AT_WORK)).unwrap();
+        carve(&mut volume, &mut field, AT_WORK, 1.0);
+        field.pass(0.0, Some(&bur), &ground(&volume), &palette());
+        field.look(&Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y));
+        assert!(field.grains().len() > 20);
+        let shown = palette().finish(Label(1)).colour;
+        for grain in field.grains() {
+            let colour = grain.finish.colour;
+            assert!((0..3).all(|c| (0.0..0.3).contains(&(colour[c] - shown[c]))), "{colour:?}");
+        }
+    }
+
+    #[test]
+    fn dust_comes_to_lie_on_the_tooth_and_falls_when_that_is_carved_away() {
+        // Aim: chips stay on surfaces, never inside them, and only while there is one.
+        let (mut volume, mut field) = (slab(), Field::new(DUST, &tray(), None));
+        grind(&mut volume, &mut field);
+        let lying: Vec<Vec3> = field.dust.places().collect();
+        assert!(lying.len() > 30, "{} chips lie", lying.len());
+        for place in &lying {
+            let near = (0..6).map(|n| Vec3::AXES[n / 2] * if usize::is_multiple_of(n, 2) { 0.35 } else { -0.35 });
+            let most = near.map(|aside| volume.density_at(*place + aside)).fold(0.0, f32::max);
+            assert!(volume.density_at(*place) < 0.5 && most > 0.3, "{place}: {most}");
+        }
+        for index in 0..volume.grid().len() {
+            volume.set(index, Voxel::AIR);
+        }
+        for _ in 0..20 {
+            field.pass(0.1, None, &ground(&volume), &palette());
+        }
+        assert_eq!(field.dust.places().count(), 0, "without a tooth all of it has fallen out of the mouth");
+    }
+
+    #[test]
+    fn there_is_never_more_than_the_pools_hold_and_nothing_is_allocated() {
+        // Aim: a bound on number and on memory. Method: far more is carved and sprayed than there is room for.
+        let far_off = Some(Vec3::new(30.0, 0.0, 0.0));
+        let volume = slab();
+        let [mut wet, mut dry] = [ALL, DUST].map(|options| Field::new(options, &tray(), far_off));
+        // Matter that stood over the plane, in no order.
+        let grid = *volume.grid();
+        let over: Vec<usize> = (0..grid.len()).filter(|i| grid.centre(grid.cell(*i)).y > 0.3).collect();
+        let before = Voxel { density: crate::volume::Density::FULL, label: Label(1) };
+        // Over a flat place, where water spreads.
+        let bur = wet.bur(0, upright(Vec3::new(6.0, 0.6, 0.0))).unwrap();
+        let palette = palette();
+        let viewpoint = Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
+        let counted = allocation_counter::measure(|| {
+            for round in 0..100 {
+                for field in [&mut wet, &mut dry] {
+                    for n in 0..400 {
+                        let index = over[(round * 104_729 + n * 7919) % over.len()] as u32;
+                        field.carved(&Edit { index, before, after: Voxel::AIR }, &grid);
+                    }
+                    field.pass(0.1, Some(&bur), &ground(&volume), &palette);
+                    field.look(&viewpoint);
+                }
+            }
+        });
+        assert_eq!(counted.count_total, 0, "allocations");
+        let chips = dry.grains().len();
+        assert!((1800..=dust::MOST).contains(&chips), "{chips} chips of nearly ten thousand");
+        assert!((50..=water::MOST).contains(&wet.drops().len()), "{} drops", wet.drops().len());
+    }
+
+    #[test]
+    fn water_washes_dust_away_and_leaves_a_pool_that_suction_clears() {
+        // Aim: the three options work on each other. Method: the same dust lies in a pit; with spray less of it is left than
+        // without; when the drill stops, the water stays without suction and goes with it.
+        let worked = |options: OperatingField| {
+            let (mut volume, mut field) = (slab(), Field::new(options, &tray(), Some(Vec3::new(4.0, 3.5, 0.0))));
+            grind(&mut volume, &mut field);
+            let in_pit = |field: &Field| field.dust.places().filter(|p| p.distance(AT_WORK) < 2.5).count();
+            let before = in_pit(&field);
+            let bur = field.bur(0, upright(AT_WORK)).unwrap();
+            for _ in 0..30 {
+                field.pass(0.1, Some(&bur), &ground(&volume), &palette());
+            }
+            let (after, wet) = (in_pit(&field), field.water.lying_mm3());
+            for _ in 0..30 {
+                field.pass(0.1, None, &ground(&volume), &palette());
+            }
+            (before, after, wet, field.water.lying_mm3())
+        };
+        let (_, dry, none, _) = worked(DUST);
+        let (before, after, wet, still_wet) = worked(OperatingField { suction: false, ..ALL });
+        let (_, _, _, drawn) = worked(ALL);
+        println!(
+            "{before} chips, then {after}, or {dry} without water; {wet} mm³, then {still_wet}, or {drawn} with suction"
+        );
+        assert!(after * 3 < dry, "{after} chips are left, and {dry} without water");
+        assert!(none == 0.0 && wet > 0.5 && still_wet > 0.7 * wet, "{wet} mm³ of water, then {still_wet}");
+        assert!(drawn < 0.1 * still_wet, "{drawn} mm³ with suction, {still_wet} without");
+    }
+
+    #[test]
+    fn suction_takes_dust_that_is_near_its_mouth() {
+        let mouth = Vec3::new(2.0, 1.0, 0.0);
+        let left = |options| {
+            let (mut volume, mut field) = (slab(), Field::new(options, &tray(), Some(mouth)));
+            grind(&mut volume, &mut field);
+            field.dust.places().filter(|place| place.distance(mouth) < 3.5).count()
+        };
+        let (dusty, clean) = (left(DUST), left(OperatingField { suction: true, ..DUST }));
+        assert!(dusty > 5 && clean == 0, "{dusty} chips without suction, {clean} with it");
+    }
+
+    #[test]
+    fn the_same_edits_and_times_give_the_same_specks() {
+        // Aim: nothing looks at a clock or at true chance. Method: twice the same; then the same time in other pictures.
+        let run = |times: &[f32]| {
+            let (mut volume, mut field) = (slab(), Field::new(ALL, &tray(), Some(Vec3::new(9.0, 3.0, 0.0))));
+            let bur = field.bur(0, upright(AT_WORK)).unwrap();
+            carve(&mut volume, &mut field, AT_WORK, 1.0);
+            times.iter().for_each(|s| field.pass(*s, Some(&bur), &ground(&volume), &palette()));
+            field.look(&Viewpoint::looking(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y));
+            (field.grains().to_vec(), field.drops().to_vec())
+        };
+        // Whole sixteenths, so that no time is lost by rounding.
+        let seldom = run(&[0.0625; 2]);
+        assert!(seldom == run(&[0.0625; 2]) && !seldom.1.is_empty());
+        assert!(seldom == run(&[0.03125; 4]), "how often a picture is drawn changes nothing");
+    }
+
+    #[test]
+    fn an_explorer_neither_turns_nor_sprays() {
+        let field = Field::new(ALL, &tray(), None);
+        assert_eq!(field.bur(1, Pose::IDENTITY), None);
+        assert!(field.bur(0, Pose::IDENTITY).is_some_and(|bur| bur.radius > 0.5 && bur.height > 5.0));
+    }
+}
