@@ -15,6 +15,7 @@ pub mod frame;
 pub mod mesh;
 pub mod mailbox;
 pub mod diagnostic;
+pub mod statistics;
 pub mod volume;
 pub mod anatomy;
 pub mod touch;
