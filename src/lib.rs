@@ -30,6 +30,7 @@ pub mod score;
 pub mod render;
 pub mod scene;
 pub mod report;
+pub mod handover;
 pub mod lesson;
 pub mod app;
 pub mod cli;

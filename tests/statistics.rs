@@ -29,7 +29,8 @@ fn cases() -> Vec<Value> {
     for people in [2usize, 3, 10, 40, 400] {
         let values: Vec<f64> = (0..people).map(|_| made.next(-5.0, 120.0)).collect();
         let s = statistics::spread(&values).unwrap();
-        cases.push(json!({ "what": "spread", "values": values, "mean": s.mean, "sd": s.sd, "interval": s.mean_interval,
+        cases
+            .push(json!({ "what": "spread", "values": values, "mean": s.mean, "sd": s.sd, "interval": s.mean_interval,
             "quartiles": s.quartiles, "median": s.median }));
         let had = (made.next(0.0, 1.0) * people as f64) as usize;
         let share = statistics::share(had, people).unwrap();
@@ -62,8 +63,10 @@ fn cases() -> Vec<Value> {
         let not_yet: Vec<f64> = (0..people).map(|_| made.next(20.0, 70.0)).collect();
         let competent: Vec<f64> = (0..people + 3).map(|_| made.next(55.0, 98.0)).collect();
         let found = statistics::contrasting_groups(&not_yet, &competent);
-        cases.push(json!({ "what": "contrasting", "not_yet": not_yet, "competent": competent, "cut": found.map(|f| f.cut),
-            "wrong": found.map(|f| [f.failed_wrongly, f.passed_wrongly]) }));
+        cases.push(
+            json!({ "what": "contrasting", "not_yet": not_yet, "competent": competent, "cut": found.map(|f| f.cut),
+            "wrong": found.map(|f| [f.failed_wrongly, f.passed_wrongly]) }),
+        );
         let judged: Vec<(f64, f64)> = (0..people + 4)
             .map(|n| {
                 let rating = (1 + n % 5) as f64;
@@ -82,7 +85,10 @@ fn cases() -> Vec<Value> {
 fn python_comes_to_the_same_to_nine_digits() {
     let Some(python) = std::env::var_os("TYPODONT_PYTHON") else {
         // Straight to the terminal: the test harness would keep what a passing test prints to itself.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no other program checks our statistics; set TYPODONT_PYTHON (see scripts/test)");
+        let _ = writeln!(
+            std::io::stderr(),
+            "SKIPPED: no other program checks our statistics; set TYPODONT_PYTHON (see scripts/test)"
+        );
         return;
     };
     let file = folder("statistics").join("cases.json");
@@ -114,7 +120,8 @@ fn the_figures_stay_what_python_found() {
         [1.0, 2.0, 2.0, 2.0],
     ]
     .map(Vec::from);
-    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} where {expected} was found");
+    let near =
+        |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} where {expected} was found");
     let alpha = statistics::alpha(&answers).unwrap();
     near(alpha.alpha, ALPHA.0);
     near(alpha.interval[0], ALPHA.1);

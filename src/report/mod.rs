@@ -22,4 +22,4 @@ pub use session_file::{
     AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
     StageFile,
 };
-pub use words::{harmless, measure as measure_in_words, title as measure_title};
+pub use words::{harmless, measure as measure_in_words};

@@ -164,13 +164,15 @@ pub fn curves(progress: &Progress, measure: &str, title: &str) -> String {
         0.5 * (LEFT + SIZE.0),
         SIZE.1 - 2.0
     );
+    // Many lines stay a veil through which the mean is seen.
+    let faint = (15.0 / progress.participants.len() as f64).clamp(0.05, 0.45);
     for person in &progress.participants {
         let points = person.values.iter().enumerate().filter_map(|(n, v)| Some(format!("{:.1},{:.1}", x(n), y((*v)?))));
         let name = escape(&words::harmless(&person.participant, 60));
         let points = points.collect::<Vec<_>>().join(" ");
         let _ = write!(
             svg,
-            "<polyline points=\"{points}\" fill=\"none\" stroke=\"#0b6ea8\" stroke-opacity=\".45\"><title>{name}</title></polyline>"
+            "<polyline points=\"{points}\" fill=\"none\" stroke=\"#0b6ea8\" stroke-opacity=\"{faint:.2}\"><title>{name}</title></polyline>"
         );
     }
     let means: Vec<String> =
