@@ -18,6 +18,9 @@ const LANGUAGE: &str = "und";
 /// The scale of a questionnaire whose own words are not to be had.
 const STEPS: u8 = 5;
 
+/// The longest scale that a questionnaire may have.
+const STEPS_MAX: u8 = 11;
+
 /// How a school calls its people, places and activities.
 #[derive(Clone)]
 pub struct Naming {
@@ -128,9 +131,10 @@ impl Teller<'_> {
 
     /// A statement of the questionnaire, on its scale; none where it was not answered.
     fn rated(&self, of: &QuestionnaireFile, item: &RatingFile, wording: Option<&Questionnaire>) -> Option<Json> {
-        let value = item.value?;
+        // A step of a scale; whatever else somebody entered by hand is none.
+        let value = item.value.filter(|v| v.fract() == 0.0 && (1.0..=f64::from(STEPS_MAX)).contains(v))?;
         let own = wording.and_then(|w| w.items().find(|i| i.id == item.id));
-        let steps = wording.map_or(STEPS, |w| w.steps).max(value.clamp(1.0, 11.0) as u8);
+        let steps = wording.map_or(STEPS, |w| w.steps).max(value as u8);
         let step = |n: u8| {
             let meaning = wording.filter(|_| n == 1 || n == steps).map(|w| if n == 1 { &w.lowest } else { &w.highest });
             let text = meaning.map_or_else(|| n.to_string(), |m| format!("{n} – {m}"));

@@ -110,6 +110,8 @@ struct SpreadLine {
     min: String,
     median: String,
     max: String,
+    /// Mean and standard deviation of the experts' sessions.
+    experts: String,
     svg: String,
 }
 
@@ -220,13 +222,21 @@ fn scenario(cohort: &Cohort, summary: &ScenarioSummary, links: &[String]) -> Res
         row
     });
     let values = |name: &str| own.iter().filter_map(|&i| value(&cohort.sessions[i].1, name)).collect::<Vec<f64>>();
-    let points = summary.points.iter().map(|s| spread_line("Points".into(), s, words::number, &values(POINTS)));
+    let experts = |name: &str, told: &dyn Fn(f64) -> String| {
+        let sd = |s: &Spread| s.sd.map_or(String::new(), |sd| format!(" (SD {})", told(sd)));
+        summary.expert_metrics.get(name).map_or(String::new(), |s| told(s.mean) + &sd(s))
+    };
+    let points = summary.points.iter().map(|s| {
+        let line = spread_line("Points".into(), s, words::number, &values(POINTS));
+        SpreadLine { experts: experts(POINTS, &words::number), ..line }
+    });
     let metric = |name: &String| {
         let spread = summary.metrics.get(name)?;
         // A mean of right and wrong is a share, not "right".
         let is_flag = matches!(name.as_str(), "detect_tooth" | "detect_quadrant" | "pulp_exposed");
         let told = |v: f64| if is_flag { words::number(v) } else { words::measure(name, Some(v)) };
-        Some(spread_line(shown(&words::title(name)), spread, told, &values(name)))
+        let line = spread_line(shown(&words::title(name)), spread, told, &values(name));
+        Some(SpreadLine { experts: experts(name, &told), ..line })
     };
     let progress = summary.progress.iter().map(|(name, progress)| {
         let title = measure_title(name);
@@ -301,6 +311,7 @@ fn spread_line(title: String, spread: &Spread, told: impl Fn(f64) -> String, val
         median: told(spread.median),
         max: told(spread.max),
         svg: charts::strip(values, spread, &alt),
+        experts: String::new(),
         title,
     }
 }

@@ -58,10 +58,29 @@ pub struct RemovalSummary {
     pub by_any_mm3: f64,
     pub by_half_mm3: f64,
     pub by_all_mm3: f64,
+    /// How far each session's cavity is from the experts'; empty without experts.
+    pub distances: Vec<DistanceFile>,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DistanceFile {
+    pub participant: String,
+    pub bundle: String,
+    pub differs_mm3: f64,
+    pub dice: f64,
 }
 
 impl RemovalSummary {
-    pub fn of(removal: &Removal) -> RemovalSummary {
+    pub fn of(cohort: &Cohort, removal: &Removal) -> RemovalSummary {
+        let distance = |&(index, distance): &(usize, Distance)| {
+            let (path, session) = &cohort.sessions[index];
+            DistanceFile {
+                participant: session.participant.clone(),
+                bundle: path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+                differs_mm3: distance.differs_mm3,
+                dice: distance.dice,
+            }
+        };
         let volume = |least: f32| {
             let count = removal.share.iter().filter(|s| **s > 0.0 && **s >= least).count();
             count as f64 * removal.grid.voxel_mm3()
@@ -74,6 +93,7 @@ impl RemovalSummary {
             by_any_mm3: volume(0.0),
             by_half_mm3: volume(0.5),
             by_all_mm3: volume(1.0),
+            distances: removal.distances.iter().map(distance).collect(),
         }
     }
 }

@@ -4,7 +4,7 @@ use super::progress::{Progress, Repeated};
 use super::questionnaire::QuestionnaireSummary;
 use super::removal::RemovalSummary;
 use super::standard::Standard;
-use super::{Cohort, dedup};
+use super::{Cohort, POINTS, dedup, value};
 use crate::report::session_file::{SessionFile, mean};
 use crate::report::words;
 use crate::statistics::{self, Interval};
@@ -41,6 +41,8 @@ pub struct ScenarioSummary {
     pub points_mean: Option<f64>,
     pub points: Option<Spread>,
     pub metrics: BTreeMap<String, Spread>,
+    /// Of the named experts' sessions alone, `points` among them; empty without experts.
+    pub expert_metrics: BTreeMap<String, Spread>,
     /// Why these sessions should not be compared without a second look.
     pub cautions: Vec<String>,
     /// Answers that were right, of those that were asked for, by the measure that says so.
@@ -125,6 +127,13 @@ impl Cohort {
             let values: Vec<f64> = sessions.iter().filter_map(|s| s.metric(name)).collect();
             Some((name.to_string(), Spread::of(&values)?))
         });
+        let theirs: Vec<&&SessionFile> = sessions.iter().filter(|s| self.is_expert(s)).collect();
+        let measures =
+            dedup(theirs.iter().flat_map(|s| s.metrics.keys().map(String::as_str))).into_iter().chain([POINTS]);
+        let expert_metrics = measures.filter_map(|name| {
+            let values: Vec<f64> = theirs.iter().filter_map(|s| value(s, name)).collect();
+            Some((name.to_string(), Spread::of(&values)?))
+        });
         let points: Vec<f64> = grades.iter().map(|g| g.points).collect();
         let points = Spread::of(&points);
         ScenarioSummary {
@@ -138,12 +147,13 @@ impl Cohort {
             points_mean: points.as_ref().map(|p| p.mean),
             points,
             metrics: metrics.collect(),
+            expert_metrics: expert_metrics.collect(),
             cautions: cautions(&sessions),
             right: right(&sessions),
             progress: self.progress(&attempts),
             repeated: self.repeated(&attempts),
             standard: self.standard(id, &attempts),
-            removals: self.removals.iter().filter(|r| r.scenario == id).map(RemovalSummary::of).collect(),
+            removals: self.removals.iter().filter(|r| r.scenario == id).map(|r| RemovalSummary::of(self, r)).collect(),
         }
     }
 }
