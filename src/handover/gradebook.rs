@@ -151,7 +151,7 @@ pub fn gradebook(cohort: &Cohort, system: System, take: Take, students: Option<&
         };
         for exercise in &exercises {
             let own = graded.iter().filter(|(s, _)| s.participant == person && s.scenario.id == exercise.scenario.id);
-            let grade = taken(own.copied().collect(), take);
+            let grade = taken(&own.copied().collect::<Vec<_>>(), take);
             line.push(grade.map_or_else(String::new, |g| g.points.to_string()));
             if system == System::Moodle {
                 line.push(grade.map_or_else(String::new, feedback));
@@ -174,15 +174,15 @@ fn title(session: &SessionFile, system: System) -> String {
     }
 }
 
-/// Sessions come in the order of time.
-fn taken<'a>(sessions: Vec<(&'a SessionFile, &'a GradeFile)>, take: Take) -> Option<&'a GradeFile> {
-    let grades = sessions.into_iter().map(|(_, g)| g);
+/// Sessions come in the order of time; of equally good ones the last counts.
+fn taken<'a>(sessions: &[(&'a SessionFile, &'a GradeFile)], take: Take) -> Option<&'a GradeFile> {
+    let of = |session: &(&'a SessionFile, &'a GradeFile)| session.1;
     match take {
-        Take::First => grades.into_iter().next(),
-        Take::Last => grades.last(),
-        Take::Best => grades.max_by(|a, b| {
-            (a.passed, a.points).partial_cmp(&(b.passed, b.points)).unwrap_or(std::cmp::Ordering::Equal)
-        }),
+        Take::First => sessions.first().map(of),
+        Take::Last => sessions.last().map(of),
+        Take::Best => {
+            sessions.iter().map(of).max_by(|a, b| a.passed.cmp(&b.passed).then(a.points.total_cmp(&b.points)))
+        }
     }
 }
 

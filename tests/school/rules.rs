@@ -42,7 +42,7 @@ impl Judge {
     }
 
     /// An object whose keys are among these.
-    fn object<'a>(&mut self, value: &'a Value, keys: &[&str], what: &str) -> Map<String, Value> {
+    fn object(&mut self, value: &Value, keys: &[&str], what: &str) -> Map<String, Value> {
         let Some(object) = value.as_object() else {
             self.claim(false, format!("{what} is no object: {value}"));
             return Map::new();

@@ -81,7 +81,7 @@ fn serve(stream: TcpStream, state: &Mutex<State>) -> std::io::Result<()> {
         let found = state.kept.iter().any(|s| head[0].contains(s["id"].as_str().unwrap()));
         return reply(if found { "200 OK" } else { "404 Not Found" });
     }
-    if state.requests % 5 == 0 {
+    if state.requests.is_multiple_of(5) {
         return reply("503 Service Unavailable");
     }
     let sent: Vec<Value> = serde_json::from_slice(&body).unwrap();
@@ -91,7 +91,7 @@ fn serve(stream: TcpStream, state: &Mutex<State>) -> std::io::Result<()> {
         return reply(if sent.len() == 1 && same { "204 No Content" } else { "409 Conflict" });
     }
     state.kept.extend(new);
-    if state.requests % 3 == 0 {
+    if state.requests.is_multiple_of(3) {
         state.hung_up += 1;
         return stream.shutdown(Shutdown::Both);
     }

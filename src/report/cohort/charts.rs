@@ -95,7 +95,7 @@ pub fn answers(counts: &BTreeMap<String, usize>, steps: usize, alt: &str) -> Str
         format!("<svg class=\"answers\" viewBox=\"0 0 {width} 40\" role=\"img\" aria-label=\"{}\">", escape(alt));
     for step in 1..=steps {
         let count = counts.get(&step.to_string()).copied().unwrap_or(0);
-        let (x, tall) = (WIDE * (step - 1) as f64, 20.0 * count as f64 / most);
+        let (x, tall) = (WIDE * (step - 1) as f64, 14.0 * count as f64 / most);
         let _ = write!(
             svg,
             "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#0b6ea8\" fill-opacity=\".7\"/>\

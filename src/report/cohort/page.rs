@@ -110,8 +110,9 @@ struct SpreadLine {
     min: String,
     median: String,
     max: String,
-    /// Mean and standard deviation of the experts' sessions.
+    /// Mean and standard deviation of the experts' sessions; empty without.
     experts: String,
+    experts_sd: String,
     svg: String,
 }
 
@@ -222,13 +223,14 @@ fn scenario(cohort: &Cohort, summary: &ScenarioSummary, links: &[String]) -> Res
         row
     });
     let values = |name: &str| own.iter().filter_map(|&i| value(&cohort.sessions[i].1, name)).collect::<Vec<f64>>();
-    let experts = |name: &str, told: &dyn Fn(f64) -> String| {
-        let sd = |s: &Spread| s.sd.map_or(String::new(), |sd| format!(" (SD {})", told(sd)));
-        summary.expert_metrics.get(name).map_or(String::new(), |s| told(s.mean) + &sd(s))
-    };
+    let with_experts =
+        |line: SpreadLine, name: &str, told: &dyn Fn(f64) -> String| match summary.expert_metrics.get(name) {
+            None => line,
+            Some(s) => SpreadLine { experts: told(s.mean), experts_sd: s.sd.map_or(String::new(), told), ..line },
+        };
     let points = summary.points.iter().map(|s| {
         let line = spread_line("Points".into(), s, words::number, &values(POINTS));
-        SpreadLine { experts: experts(POINTS, &words::number), ..line }
+        with_experts(line, POINTS, &words::number)
     });
     let metric = |name: &String| {
         let spread = summary.metrics.get(name)?;
@@ -236,7 +238,7 @@ fn scenario(cohort: &Cohort, summary: &ScenarioSummary, links: &[String]) -> Res
         let is_flag = matches!(name.as_str(), "detect_tooth" | "detect_quadrant" | "pulp_exposed");
         let told = |v: f64| if is_flag { words::number(v) } else { words::measure(name, Some(v)) };
         let line = spread_line(shown(&words::title(name)), spread, told, &values(name));
-        Some(SpreadLine { experts: experts(name, &told), ..line })
+        Some(with_experts(line, name, &told))
     };
     let progress = summary.progress.iter().map(|(name, progress)| {
         let title = measure_title(name);
@@ -312,6 +314,7 @@ fn spread_line(title: String, spread: &Spread, told: impl Fn(f64) -> String, val
         max: told(spread.max),
         svg: charts::strip(values, spread, &alt),
         experts: String::new(),
+        experts_sd: String::new(),
         title,
     }
 }
