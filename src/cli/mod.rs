@@ -10,13 +10,16 @@ mod cohort;
 mod demo;
 mod devices;
 mod finish;
+mod gradebook;
 mod import;
 mod live;
+mod parquet;
 mod path;
 mod preview;
 mod run;
 mod score;
 mod verify;
+mod xapi;
 
 use crate::app;
 use crate::diagnostic::{Diagnostic, headlines};
@@ -59,8 +62,14 @@ enum Command {
     Finish(finish::Arguments),
     /// Score a bundle again from its recording alone
     Score(score::Arguments),
-    /// Put many bundles into one table
+    /// Compare many bundles: a table, a page, maps of what was removed
     Cohort(cohort::Arguments),
+    /// Grades as a table that Moodle or Canvas imports
+    Gradebook(gradebook::Arguments),
+    /// Sessions as xAPI statements, spooled on disk and sent to a learning record store
+    Xapi(xapi::Arguments),
+    /// Sessions, measures and events as Parquet, for analysis
+    Parquet(parquet::Arguments),
     /// Turn a scan into a labelled volume
     Import(import::Arguments),
     /// Measure the program's own speed and memory
@@ -151,6 +160,9 @@ pub fn main() -> ExitCode {
         Some(Command::Finish(arguments)) => finish::run(&arguments),
         Some(Command::Score(arguments)) => score::run(&arguments),
         Some(Command::Cohort(arguments)) => cohort::run(&arguments),
+        Some(Command::Gradebook(arguments)) => gradebook::run(&arguments),
+        Some(Command::Xapi(arguments)) => xapi::run(&arguments),
+        Some(Command::Parquet(arguments)) => parquet::run(&arguments),
         Some(Command::Import(arguments)) => import::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
     };

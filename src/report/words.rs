@@ -45,6 +45,22 @@ pub fn plain(value: f64) -> String {
     rounded.to_string()
 }
 
+/// What a person wrote, on one line of a terminal or a table: at most `most` letters, and none that moves the cursor, colours the
+/// screen or turns the direction of reading around.
+pub fn harmless(text: &str, most: usize) -> String {
+    let turns =
+        |c: char| matches!(c, '\u{061c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let safe = text
+        .chars()
+        .map(|c| if c.is_control() || turns(c) || c == '\u{2028}' || c == '\u{2029}' { '\u{fffd}' } else { c });
+    let mut safe: Vec<char> = safe.take(most + 1).collect();
+    if safe.len() > most {
+        safe.truncate(most.saturating_sub(1));
+        safe.push('…');
+    }
+    safe.into_iter().collect()
+}
+
 pub fn yes_no(yes: bool) -> &'static str {
     if yes { "yes" } else { "no" }
 }
@@ -72,6 +88,13 @@ mod tests {
         {
             assert_eq!(duration(seconds), text);
         }
+    }
+
+    #[test]
+    fn what_is_written_moves_no_cursor() {
+        assert_eq!(harmless("a\x1b[2Jb\nc\u{202e}d", 60), "a\u{fffd}[2Jb\u{fffd}c\u{fffd}d");
+        assert_eq!(harmless("مرحبا", 60), "مرحبا");
+        assert_eq!(harmless(&"x".repeat(10_000), 20), "x".repeat(19) + "…");
     }
 
     #[test]

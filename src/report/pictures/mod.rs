@@ -5,9 +5,11 @@
 
 mod marks;
 mod preview;
+mod shares;
 mod tint;
 
 pub use preview::{SEEN, preview_png};
+pub use shares::{BANDS, shares};
 
 use super::glb::Part;
 use crate::frame::Vec3;

@@ -69,7 +69,7 @@ impl<'a> Tint<'a> {
     }
 }
 
-fn mixed(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
+pub fn mixed(from: [f32; 3], to: [f32; 3], share: f32) -> [f32; 3] {
     std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share)
 }
 

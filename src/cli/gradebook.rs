@@ -1,0 +1,65 @@
+//! `typodont gradebook`: grades as a table that a school's system imports.
+
+use super::{Failure, cohort, say, write};
+use crate::handover::gradebook::{Students, System, Take, gradebook};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// Folder that holds bundles, at any depth
+    folder: PathBuf,
+    /// Whose gradebook
+    #[arg(long = "for", value_name = "SYSTEM")]
+    system: Systems,
+    /// The table
+    #[arg(short, long, value_name = "FILE.csv")]
+    output: PathBuf,
+    /// Which session of an exercise counts
+    #[arg(long, value_name = "WHICH", default_value = "last")]
+    take: Taken,
+    /// The school's names of people: a CSV with the column participant, and those that the system knows people by
+    #[arg(long, value_name = "FILE.csv")]
+    students: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Systems {
+    Moodle,
+    Canvas,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Taken {
+    Last,
+    Best,
+    First,
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+    let cohort = cohort::read(&arguments.folder)?;
+    let students = arguments.students.as_ref().map(|path| -> Result<Students, Failure> {
+        let source = crate::content::read_text(path)?;
+        Students::read(&path.display().to_string(), &source.text).map_err(Failure::Wrong)
+    });
+    let students = students.transpose()?;
+    let system = match arguments.system {
+        Systems::Moodle => System::Moodle,
+        Systems::Canvas => System::Canvas,
+    };
+    let take = match arguments.take {
+        Taken::Last => Take::Last,
+        Taken::Best => Take::Best,
+        Taken::First => Take::First,
+    };
+    let made = gradebook(&cohort, system, take, students.as_ref());
+    for what in &made.left_out {
+        eprintln!("left out: {what}");
+    }
+    if made.students == 0 {
+        let what = "no-grades: nobody with a code has a grade here";
+        return Err(Failure::wrong(format!("{}: {what}", arguments.folder.display())));
+    }
+    write(&arguments.output, made.csv)?;
+    say(format!("{}: {} students", arguments.output.display(), made.students))
+}

@@ -1,0 +1,130 @@
+//! A learning record store, spoken to by xAPI 1.0.3 (Part Three): one request, one answer.
+
+use base64::Engine;
+use serde_json::Value as Json;
+use std::time::Duration;
+use ureq::Agent;
+use ureq::tls::{Certificate, PemItem, RootCerts, TlsConfig, parse_pem};
+
+const VERSION: &str = "1.0.3";
+
+/// For one request with its answer: a slow store over a bad line. Longer is as good as gone.
+const TIMEOUT: Duration = Duration::from_secs(30);
+
+/// Letters of a store's own words that are told.
+const WORDS_MAX: usize = 400;
+
+pub struct Lrs {
+    agent: Agent,
+    statements: String,
+    authorization: String,
+}
+
+/// What a store makes of statements.
+#[derive(Debug, PartialEq)]
+pub enum Answer {
+    /// It has them now, or had the very same before.
+    Taken,
+    /// It has one of them already, with other content.
+    Conflict,
+    /// It will never take them.
+    Refused(String),
+    /// It does not let us in.
+    LockedOut(String),
+    /// It cannot be reached, or not now.
+    Later(String),
+}
+
+impl Lrs {
+    /// `endpoint` is the address that `statements` is appended to. `roots` are certificates in PEM to trust in place of the usual.
+    ///
+    /// `Err` for an address that would send the secret in the clear, or is none.
+    pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>) -> Result<Lrs, String> {
+        let url = url::Url::parse(endpoint).map_err(|e| format!("\"{endpoint}\" is no address: {e}"))?;
+        let near = match url.host() {
+            Some(url::Host::Domain(name)) => name == "localhost",
+            Some(url::Host::Ipv4(ip)) => ip.is_loopback(),
+            Some(url::Host::Ipv6(ip)) => ip.is_loopback(),
+            None => false,
+        };
+        match url.scheme() {
+            "https" => {}
+            "http" if near => {}
+            "http" => return Err("over http the secret could be read on the way; use https".into()),
+            other => return Err(format!("a store is reached by https, not by {other}")),
+        }
+        let mut tls = TlsConfig::builder();
+        if let Some(pem) = roots {
+            let certificates: Vec<Certificate<'static>> = parse_pem(pem)
+                .filter_map(|item| match item {
+                    Ok(PemItem::Certificate(certificate)) => Some(certificate),
+                    _ => None,
+                })
+                .collect();
+            if certificates.is_empty() {
+                return Err("the file of certificates holds none in PEM".into());
+            }
+            tls = tls.root_certs(RootCerts::from(certificates));
+        }
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(TIMEOUT))
+            .max_redirects(0)
+            .tls_config(tls.build())
+            .user_agent(concat!("typodont/", env!("CARGO_PKG_VERSION")))
+            .build();
+        let login = base64::engine::general_purpose::STANDARD.encode(format!("{key}:{secret}"));
+        Ok(Lrs {
+            agent: config.into(),
+            statements: format!("{}/statements", endpoint.trim_end_matches('/')),
+            authorization: format!("Basic {login}"),
+        })
+    }
+
+    /// Sends statements, all or none.
+    pub fn post(&self, statements: &[Json]) -> Answer {
+        let body = serde_json::to_string(statements).unwrap_or_default();
+        let request = self
+            .agent
+            .post(&self.statements)
+            .header("X-Experience-API-Version", VERSION)
+            .header("Authorization", &self.authorization)
+            .header("Content-Type", "application/json");
+        answer(request.send(body))
+    }
+
+    /// Whether it has a statement of this id.
+    pub fn has(&self, id: &str) -> bool {
+        let request = self
+            .agent
+            .get(&self.statements)
+            .query("statementId", id)
+            .header("X-Experience-API-Version", VERSION)
+            .header("Authorization", &self.authorization);
+        request.call().is_ok_and(|response| response.status() == 200)
+    }
+}
+
+fn answer(response: Result<ureq::http::Response<ureq::Body>, ureq::Error>) -> Answer {
+    let mut response = match response {
+        Ok(response) => response,
+        Err(error) => return Answer::Later(error.to_string()),
+    };
+    let status = response.status().as_u16();
+    let words = response.body_mut().read_to_string();
+    match (status, words) {
+        // Whoever hangs up while answering may not have written it down.
+        (200 | 204, Ok(_)) => Answer::Taken,
+        (200 | 204, Err(error)) => Answer::Later(error.to_string()),
+        (status, words) => {
+            let words = crate::report::harmless(&words.unwrap_or_default(), WORDS_MAX);
+            let said = format!("the store answers {status}: {words}");
+            match status {
+                409 => Answer::Conflict,
+                401 | 403 => Answer::LockedOut(said),
+                408 | 425 | 429 | 500.. => Answer::Later(said),
+                _ => Answer::Refused(said),
+            }
+        }
+    }
+}

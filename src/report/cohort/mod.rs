@@ -1,0 +1,142 @@
+//! Many sessions, compared.
+//!
+//! Takes the `session.json` of every bundle below a folder, and of each that stands in a map its `removal_time.nrrd`. Gives
+//! tables, a page, and maps of what people removed. A file that cannot be read is listed and left out; it never stops the rest.
+//! Never opens more than one recording per questionnaire, and verifies none.
+
+mod reading;
+mod summary;
+mod questionnaire;
+mod progress;
+mod standard;
+mod removal;
+mod table;
+mod charts;
+mod page;
+
+pub use progress::Progress;
+pub use questionnaire::{QuestionnaireSummary, wording};
+pub use removal::{Distance, Removal};
+pub use standard::{Rating, ratings};
+pub(super) use summary::in_words;
+pub use summary::{RightCount, ScenarioSummary, Spread, Summary};
+
+use super::html::Templates;
+use super::session_file::SessionFile;
+use super::words;
+use std::path::{Path, PathBuf};
+
+/// Sessions that were read, and files that were not.
+#[derive(Clone, Debug, Default)]
+pub struct Cohort {
+    /// In order of exercise, participant, beginning and path.
+    pub sessions: Vec<(PathBuf, SessionFile)>,
+    /// Path and reason.
+    pub skipped: Vec<(PathBuf, String)>,
+    /// Codes of the participants whom the others are compared with.
+    pub experts: Vec<String>,
+    /// What examiners judged of participants, on a scale of their own.
+    pub ratings: Vec<Rating>,
+    /// What was removed where; filled by [`Cohort::map_removals`].
+    pub removals: Vec<Removal>,
+}
+
+impl Cohort {
+    /// Reads every `session.json` below a folder.
+    pub fn read(folder: &Path) -> Cohort {
+        reading::below(folder)
+    }
+
+    /// A page for people. `at` is where the page will be: sessions are linked from there.
+    pub fn html(&self, templates: &Templates, at: &Path) -> Result<String, String> {
+        page::html(templates, self, &self.links(at))
+    }
+
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(&self.summary()).unwrap_or_default() + "\n"
+    }
+
+    /// The main numbers as lines for a terminal.
+    pub fn text(&self) -> String {
+        let mut lines = Vec::new();
+        for scenario in self.summary().scenarios {
+            let plural = if scenario.sessions == 1 { "" } else { "s" };
+            lines.push(format!("{} ({} session{plural})", words::harmless(&scenario.title, 100), scenario.sessions));
+            if let Some(points) = scenario.points_mean {
+                let (passed, graded) = (scenario.passed, scenario.graded);
+                lines.push(format!("  {passed} of {graded} passed, {} points on average", words::number(points)));
+            }
+            lines.extend(in_words(&scenario).into_iter().map(|(what, text)| format!("  {what}: {text}")));
+            for name in ["decay_cleared_pct", "healthy_per_decay_pct", "time_to_clear_s"] {
+                if let Some(spread) = scenario.metrics.get(name) {
+                    let mean = words::measure(name, Some(spread.mean));
+                    lines.push(format!("  {}: {mean} on average", words::title(name)));
+                }
+            }
+            lines.extend(scenario.cautions.iter().map(|caution| format!("  caution: {caution}")));
+        }
+        lines.join("\n") + "\n"
+    }
+
+    /// Where each session's page is, seen from a file; empty for a session without a page.
+    fn links(&self, at: &Path) -> Vec<String> {
+        let folder = at.parent().unwrap_or(Path::new(""));
+        let link = |path: &PathBuf| {
+            let page = path.join("report.html");
+            let below = page.strip_prefix(folder).ok().filter(|_| page.is_file());
+            let parts = below.map(|b| b.components().map(|c| percent_encoded(&c.as_os_str().to_string_lossy())));
+            parts.map_or_else(String::new, |parts| parts.collect::<Vec<_>>().join("/"))
+        };
+        self.sessions.iter().map(|(path, _)| link(path)).collect()
+    }
+
+    /// Whether a session is one of the experts'.
+    fn is_expert(&self, session: &SessionFile) -> bool {
+        self.experts.contains(&session.participant)
+    }
+
+    /// How far a session's cavity is from the experts', where that is known.
+    fn distance(&self, session: usize) -> Option<&Distance> {
+        self.removals.iter().flat_map(|r| &r.distances).find(|(index, _)| *index == session).map(|(_, d)| d)
+    }
+
+    /// Each participant's sessions of an exercise in the order of time, as indices. People without a code are nobody's second
+    /// attempt: each of their sessions stands alone.
+    fn attempts(&self, scenario: &str) -> Vec<Vec<usize>> {
+        let mut people: Vec<Vec<usize>> = Vec::new();
+        // Sessions stand in the order of participant and beginning.
+        for (index, (_, session)) in self.sessions.iter().enumerate().filter(|(_, (_, s))| s.scenario.id == scenario) {
+            match people.last_mut().filter(|p| is_same_person(&self.sessions[p[0]].1, session)) {
+                Some(person) => person.push(index),
+                None => people.push(vec![index]),
+            }
+        }
+        people
+    }
+}
+
+fn is_same_person(a: &SessionFile, b: &SessionFile) -> bool {
+    !a.participant.is_empty() && a.participant == b.participant
+}
+
+/// A score or a measure of a session: `points`, or a measure's name.
+fn value(session: &SessionFile, measure: &str) -> Option<f64> {
+    match measure {
+        POINTS => session.grade.as_ref().map(|g| g.points),
+        name => session.metric(name),
+    }
+}
+
+/// What the grade comes to, beside the measures.
+const POINTS: &str = "points";
+
+fn dedup<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut seen = std::collections::BTreeSet::new();
+    names.filter(|name| seen.insert(*name)).collect()
+}
+
+/// A part of a relative link.
+fn percent_encoded(text: &str) -> String {
+    let keep = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
+    text.bytes().map(|b| if keep(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
+}

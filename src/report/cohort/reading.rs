@@ -1,0 +1,54 @@
+//! Finds bundles and reads their results.
+
+use super::Cohort;
+use crate::report::session_file::{SessionFile, VERSION};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Folders are looked into this deep: a class of sessions within a year within a school.
+const DEPTH_MAX: usize = 4;
+
+/// Every `session.json` below a folder, in order of exercise, participant, beginning and path.
+pub fn below(folder: &Path) -> Cohort {
+    let mut cohort = Cohort::default();
+    look_into(&mut cohort, folder, 0);
+    cohort.sessions.sort_by(|(pa, a), (pb, b)| {
+        let key = |s: &SessionFile| (s.scenario.id.clone(), s.participant.clone(), s.started.clone());
+        (key(a), pa).cmp(&(key(b), pb))
+    });
+    cohort
+}
+
+fn look_into(cohort: &mut Cohort, folder: &Path, depth: usize) {
+    let file = folder.join("session.json");
+    if file.is_file() {
+        match read_session(&file) {
+            Ok(session) => cohort.sessions.push((folder.to_path_buf(), session)),
+            Err(reason) => cohort.skipped.push((file, reason)),
+        }
+        return;
+    }
+    if depth == DEPTH_MAX {
+        return;
+    }
+    let entries = match fs::read_dir(folder) {
+        Ok(entries) => entries,
+        Err(error) => return cohort.skipped.push((folder.to_path_buf(), error.to_string())),
+    };
+    let mut folders: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir()).collect();
+    folders.sort();
+    // What is still being written is not a session yet.
+    for folder in folders.iter().filter(|f| f.extension().is_none_or(|e| e != "partial")) {
+        look_into(cohort, folder, depth + 1);
+    }
+}
+
+fn read_session(file: &Path) -> Result<SessionFile, String> {
+    let text = crate::content::read_text(file).map_err(|d| d.message)?;
+    let session: SessionFile = serde_json::from_str(&text.text).map_err(|e| format!("not a session: {e}"))?;
+    match session.version {
+        VERSION => Ok(session),
+        version if version > VERSION => Err(format!("made by a newer program (version {version})")),
+        version => Err(format!("not a session: version {version}")),
+    }
+}
