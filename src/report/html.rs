@@ -45,7 +45,8 @@ const LANGUAGES: [(&str, &str); 2] = [
 /// The texts that pages are made from.
 #[derive(Clone, Debug)]
 pub struct Templates {
-    cohort: String,
+    /// Of a cohort’s page.
+    pub cohort: String,
     /// Of a session's page, by name.
     session: BTreeMap<String, String>,
     /// By code.
