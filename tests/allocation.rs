@@ -7,8 +7,8 @@ use typodont::device::Reading;
 use typodont::frame::{Pose, Quat, Vec3};
 use typodont::sim::{Command, Simulation};
 use typodont::touch::{
-    Body, EDGE, Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Profile, Shank, Shape, Space,
-    WorkingEnd,
+    Body, Coefficient, EDGE, Fixture, ForceRow, Forces, Form, Guidance, Instrument, Kind, Path, Profile, Shank, Shape,
+    Space, WorkingEnd,
 };
 use typodont::volume::Label;
 
@@ -43,7 +43,7 @@ fn a_step_never_allocates() {
                 18_000 => sim.apply(&Command::Guide { guidance: None }),
                 8_000 => sim.apply(&Command::Take { instrument: 1 }),
                 12_000 => sim.apply(&Command::Take { instrument: 2 }),
-                15_000 => sim.apply(&Command::SetStiffness { label: SOFT, stiffness: 0.4 }),
+                15_000 => sim.apply(&Command::Set { label: SOFT, coefficient: Coefficient::Stiffness, value: 0.4 }),
                 _ => {}
             }
             let turn = tick as f32 * 0.002;

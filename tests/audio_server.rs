@@ -6,113 +6,20 @@ mod hearing;
 #[path = "drivers/peace.rs"]
 mod peace;
 
+use hearing::server::*;
 use hearing::*;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use typodont::audio::{DrillLoad, News, Output, Player, RETRY, Silence, Sounds, Tool, sounds};
 
-/// Far longer than anything here takes: whoever waits as long waits in vain.
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// A program that ends with the test.
-struct Running(Child);
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// A folder of this test's own. Sockets have short paths, so it is not below the target folder.
-fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("typodont-{name}-{}", std::process::id()));
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let begun = Instant::now();
-    loop {
-        if let Some(found) = look() {
-            return found;
-        }
-        assert!(begun.elapsed() < PATIENCE, "{what} did not come");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-}
-
-/// A private PulseAudio with a null sink; `None`, said loudly, where it is not installed.
-fn server(folder: &Path) -> Option<Running> {
-    let socket = folder.join("socket");
-    let protocol = format!("module-native-protocol-unix socket={} auth-anonymous=1", socket.display());
-    let sink = "module-null-sink sink_name=ear format=float32le rate=48000 channels=1";
-    let mut pulseaudio = Command::new("pulseaudio");
-    pulseaudio.args(["-n", "--daemonize=no", "--use-pid-file=no", "--exit-idle-time=-1", "--disable-shm=yes"]);
-    pulseaudio.args(["--high-priority=no", "-L", &protocol, "-L", sink]);
-    pulseaudio.env("HOME", folder).env("XDG_RUNTIME_DIR", folder).stdout(Stdio::null()).stderr(Stdio::null());
-    let has_recorder = Command::new("parec").arg("--version").stdout(Stdio::null()).status().is_ok();
-    let Some(child) = has_recorder.then(|| pulseaudio.spawn().ok()).flatten() else {
-        eprintln!("SKIPPED: no pulseaudio with parec here: no sound was played to a real server");
-        return None;
-    };
-    let running = Running(child);
-    wait_for("the server's socket", || socket.exists().then_some(()));
-    Some(running)
-}
-
-/// What comes out of the null sink.
-struct Recorder {
-    file: File,
-    _parec: Running,
-}
-
-impl Recorder {
-    fn start(folder: &Path) -> Recorder {
-        let path = folder.join("heard.raw");
-        let mut parec = Command::new("parec");
-        parec.args(["-d", "ear.monitor", "--raw", "--format=float32le", "--rate=48000", "--channels=1"]);
-        parec.arg("--latency-msec=10").stdout(File::create(&path).unwrap()).stderr(Stdio::null());
-        parec.env("HOME", folder).env("PULSE_SERVER", format!("unix:{}", folder.join("socket").display()));
-        let parec = Running(parec.spawn().unwrap());
-        Recorder { file: File::open(path).unwrap(), _parec: parec }
-    }
-
-    /// The next seconds of the recording, as far as it has come.
-    fn take(&mut self, seconds: f32) -> Vec<f32> {
-        let bytes = self.bytes((seconds * RATE as f32) as usize * 4);
-        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
-    }
-
-    fn bytes(&mut self, count: usize) -> Vec<u8> {
-        let (mut bytes, mut read) = (vec![0; count], 0);
-        wait_for("the recording", || {
-            read += self.file.read(&mut bytes[read..]).unwrap();
-            (read == count).then_some(())
-        });
-        bytes
-    }
-
-    /// Goes on to what is recorded from now on.
-    fn catch_up(&mut self) {
-        let mut rest = Vec::new();
-        self.file.read_to_end(&mut rest).unwrap();
-        // Half a sample may be there already; its other half follows.
-        self.bytes(rest.len().wrapping_neg() % 4);
-    }
-
-    /// Half a second of what a load sounds like, after it has settled.
-    fn settled(&mut self, sounds: &mut Sounds, load: &DrillLoad) -> Vec<f32> {
-        sounds.load(load);
-        self.catch_up();
-        self.take(1.5);
-        self.take(0.5)
-    }
+/// Half a second of what a load sounds like, after it has settled.
+fn settled(recorder: &mut Recorder, sounds: &mut Sounds, load: &DrillLoad) -> Vec<f32> {
+    sounds.load(load);
+    recorder.catch_up();
+    recorder.take(1.5);
+    recorder.take(0.5)
 }
 
 fn playing(player: &mut Player) -> (String, Duration) {
@@ -144,11 +51,11 @@ fn a_server_lets_idle_light_and_heavy_grinding_be_heard() {
         assert!(latency <= Duration::from_millis(40), "{latency:?}");
         let mut recorder = Recorder::start(&folder);
 
-        let silence = recorder.settled(&mut sounds, &DrillLoad::default());
+        let silence = settled(&mut recorder, &mut sounds, &DrillLoad::default());
         assert_eq!(level(&silence), 0.0);
         let [idle, light, heavy, dentine] =
             [idle(), grinding(0.3), grinding(2.0), DrillLoad { hardness: 60.0, ..grinding(2.0) }]
-                .map(|load| Spectrum::of(&recorder.settled(&mut sounds, &load)));
+                .map(|load| Spectrum::of(&settled(&mut recorder, &mut sounds, &load)));
         // The rotor: 5000 Hz free, a tenth less at 0.3 N, a third of it at 2 N.
         let pitch = idle.peak(3000.0, 5500.0);
         assert!((pitch / 5000.0 - 1.0).abs() < 0.02, "{pitch}");
@@ -161,7 +68,7 @@ fn a_server_lets_idle_light_and_heavy_grinding_be_heard() {
         assert!(grind(&heavy) > 1.5 * grind(&light), "{} {}", grind(&heavy), grind(&light));
         assert!(heavy.brightness() > 1.2 * dentine.brightness(), "{} {}", heavy.brightness(), dentine.brightness());
 
-        let silence = recorder.settled(&mut sounds, &DrillLoad::default());
+        let silence = settled(&mut recorder, &mut sounds, &DrillLoad::default());
         assert_eq!(level(&silence), 0.0);
         println!("latency {latency:?}, {} gaps", player.gaps());
         let _ = fs::remove_dir_all(folder);
@@ -181,7 +88,7 @@ fn contact_starts_and_stops_within_20_ms_at_the_ear() {
         playing(&mut player);
         let mut recorder = Recorder::start(&folder);
         let rest = DrillLoad { tool: Tool::Hand, ..DrillLoad::default() };
-        recorder.settled(&mut sounds, &rest);
+        settled(&mut recorder, &mut sounds, &rest);
         // Steady enough to have a usual level within 5 ms: drawn so fast that its ridges blur.
         let touching = DrillLoad { surface_speed: 60.0, ..scratching() };
 

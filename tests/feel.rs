@@ -10,7 +10,7 @@ use typodont::diagnostic::Source;
 use typodont::frame::Vec3;
 use typodont::scenario::{self, Forms, Scenario};
 use typodont::sim::{Command, Setup, Simulation};
-use typodont::touch::{Factor, Factors, Instrument, WorkingEnd};
+use typodont::touch::{Coefficient, Factor, Factors, Instrument, WorkingEnd};
 use typodont::volume::Label;
 
 /// N after a second half a millimetre deep in a wall.
@@ -37,7 +37,7 @@ fn an_instrument_feels_the_wall_through_its_own_factors() {
     };
     check(None, 0.5);
     check(Some(Command::Take { instrument: 1 }), 0.25);
-    check(Some(Command::SetStiffness { label: HARD, stiffness: 0.8 }), 0.2);
+    check(Some(Command::Set { label: HARD, coefficient: Coefficient::Stiffness, value: 0.8 }), 0.2);
     check(Some(Command::Take { instrument: 0 }), 0.4);
 }
 

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 use typodont::device::{Device, Gone, Output, Reading, Spec};
 use typodont::frame::Vec3;
 use typodont::sim::{Beats, Command, Ended, Letter, Order, Servo, Setup, Simulation, Turn};
-use typodont::touch::{Instrument, WorkingEnd};
+use typodont::touch::{Coefficient, Instrument, WorkingEnd};
 
 /// A hand without a wire, for beats that the servo keeps itself.
 struct InHand {
@@ -134,7 +134,7 @@ fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
                 6000 => command(servo, Command::Take { instrument: 1 }),
                 6200 => hand.reach(Vec3::Y * 4.0),
                 8000 => command(servo, Command::Take { instrument: 0 }),
-                8500 => command(servo, Command::SetStiffness { label: SOFT, stiffness: 0.2 }),
+                8500 => command(servo, Command::Set { label: SOFT, coefficient: Coefficient::Stiffness, value: 0.2 }),
                 9000 => command(servo, Command::RunBur { running: false }),
                 9300 => command(servo, Command::RunBur { running: true }),
                 _ => {}

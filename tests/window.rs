@@ -5,9 +5,12 @@
 
 mod bundle;
 mod folder;
+mod hearing;
 
 use bundle::*;
 use folder::folder;
+use hearing::Spectrum;
+use hearing::server::{Recorder, server};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -88,6 +91,11 @@ struct Desk {
 
 impl Desk {
     fn sit_down(display: Display, place: &Path, more: &[&str]) -> Desk {
+        Desk::sit_down_with(display, place, more, &[])
+    }
+
+    /// The same, with more in the environment.
+    fn sit_down_with(display: Display, place: &Path, more: &[&str], environment: &[(&str, String)]) -> Desk {
         let (diary, home) = (place.join("diary"), place.join("home"));
         let complaints = place.join("complaints");
         fs::create_dir_all(&home).unwrap();
@@ -101,6 +109,7 @@ impl Desk {
             .env("TYPODONT_DIARY", &diary)
             .env_remove("WAYLAND_DISPLAY")
             .env_remove("LC_ALL")
+            .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdout(Stdio::null())
             .stderr(fs::File::create(&complaints).unwrap())
             .spawn()
@@ -322,4 +331,76 @@ fn the_servo_does_not_wait_for_the_picture() {
     let turned = count(desk.latest("ticks").unwrap()) - first;
     println!("{turned} ticks in about 15 pictures; late (p99, max, missed): {}", desk.latest("late").unwrap());
     assert!(turned > 10 * 100, "{turned} ticks in at least 10 pictures");
+}
+
+#[test]
+fn what_the_window_does_is_heard_at_a_real_server() {
+    // Aim: sound follows the lesson, not only the synthesiser's test. Method: a private server's null sink, recorded: the
+    // handpiece turns freely above the tooth, grinds in it, and is still when the stage is over.
+    let ears = hearing::server::folder("window");
+    let (Some(display), Some(_server)) = (Display::open(), server(&ears)) else { return };
+    let place = folder("heard_window");
+    let exercise = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
+    let begun = ["run", exercise.to_str().unwrap(), "--seed", "1", "--begin", "--out", "bundles"];
+    let socket = format!("unix:{}", ears.join("socket").display());
+    let mut desk = Desk::sit_down_with(display, &place, &begun, &[("PULSE_SERVER", socket)]);
+    desk.until("hand", |_| true);
+    desk.press("o", "pointer", "held");
+    let lesion = lesion_in_world(1);
+    desk.reach(lesion + Vec3::Y * 6.0);
+    let mut recorder = Recorder::start(&ears);
+    let heard = |recorder: &mut Recorder| Spectrum::of(&recorder.take(0.3));
+    // A handpiece that starts needs a while to be at its speed.
+    let begun = Instant::now();
+    let mut free = heard(&mut recorder);
+    while (free.peak(3000.0, 5500.0) / 5000.0 - 1.0).abs() > 0.02 {
+        assert!(begun.elapsed() < PATIENCE, "the free handpiece is heard at {} Hz", free.peak(3000.0, 5500.0));
+        free = heard(&mut recorder);
+    }
+    let grind = |spectrum: &Spectrum| spectrum.power(200.0, 900.0);
+    let mut ground = 0.0f32;
+    for round in 0..40 {
+        let angle = round as f32 * 0.8;
+        recorder.catch_up();
+        desk.reach(lesion + Vec3::new(angle.cos(), 0.0, angle.sin()) * 0.6 - Vec3::Y * 1.2);
+        // What was heard on the way: at its end the hand may have ground itself free.
+        ground = (0..3).map(|_| grind(&heard(&mut recorder))).fold(ground, f32::max);
+        if ground > 3.0 * grind(&free) {
+            break;
+        }
+    }
+    println!("200–900 Hz: {} free, {ground} grinding", grind(&free));
+    assert!(ground > 3.0 * grind(&free), "{ground}, free {}", grind(&free));
+    desk.press("Escape", "pointer", "free");
+    desk.press("ctrl+Return", "screen", "questionnaire");
+    let begun = Instant::now();
+    while heard(&mut recorder).power(100.0, 10_000.0) > 0.0 {
+        assert!(begun.elapsed() < PATIENCE, "it is not still when the stage is over");
+    }
+    let _ = fs::remove_dir_all(ears);
+}
+
+#[test]
+fn each_eye_has_a_window_of_its_own_where_two_projectors_are_asked_for() {
+    let Some(display) = Display::open() else { return };
+    let place = folder("two_windows");
+    let kept = place.join("home/config/typodont");
+    fs::create_dir_all(&kept).unwrap();
+    fs::write(kept.join("settings.json"), r#"{ "stereo": "two_windows", "eye_distance_mm": 6.0 }"#).unwrap();
+    let exercise = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
+    let begun = ["run", exercise.to_str().unwrap(), "--seed", "1", "--begin", "--out", "bundles"];
+    let mut desk = Desk::sit_down(display, &place, &begun);
+    desk.until("tooth", |tooth| tooth == "drawn");
+    let second = ["search", "--onlyvisible", "--name", "right eye"];
+    let begun = Instant::now();
+    while !desk.display.xdotool(&second) {
+        assert!(begun.elapsed() < PATIENCE, "the right eye has no window");
+        std::thread::sleep(LOOK_EVERY);
+    }
+    desk.display.xdotool(&[&second[..], &["windowraise"]].concat());
+    desk.picture("10-two-windows");
+    // Both go on: the diary counts pictures in tens.
+    let tens: u64 = desk.latest("pictures").unwrap().parse().unwrap();
+    desk.until("pictures", |now| now.parse::<u64>().unwrap() > tens);
+    assert_eq!(desk.latest("screen").unwrap(), "practice");
 }

@@ -44,8 +44,8 @@ pub enum Said {
 
 /// What happened, in order.
 pub enum News {
-    /// The matter is made and the servo turns.
-    Begun(Arc<Workpiece>),
+    /// The matter is made; the servo is about to turn.
+    Made(Arc<Workpiece>),
     Heard(Heard),
     /// The device that came back is another one.
     OtherDevice,
@@ -64,6 +64,8 @@ pub struct Order {
     pub templates: Templates,
     pub started: jiff::Timestamp,
     pub hand: Hand,
+    /// Called when there is something to look at that was waited for.
+    pub wake: Box<dyn Fn() + Send>,
 }
 
 /// What is in the trainee's hand.
@@ -195,7 +197,7 @@ fn sit(mut seat: Seat, order: Order, mouse: Option<Box<dyn Device + Send>>) {
 }
 
 fn take_lesson(seat: &mut Seat, order: Order, mouse: Option<Box<dyn Device + Send>>) -> Result<PathBuf, Failed> {
-    let Order { scenario, seed, participant, out, templates, started, hand } = order;
+    let Order { scenario, seed, participant, out, templates, started, hand, wake } = order;
     let held = match hand {
         Hand::Mouse => None,
         Hand::Device(held) => Some(held),
@@ -207,9 +209,12 @@ fn take_lesson(seat: &mut Seat, order: Order, mouse: Option<Box<dyn Device + Sen
     };
     let (out, digests) = (out.as_path(), BTreeMap::new());
     let opening = Opening { scenario, seed, participant: &participant, out, digests, templates, started };
-    let prepared: Prepared = opening.prepare(device.spec().clone(), None)?;
+    let workpiece = opening.make()?;
+    // It is drawn while its recording is opened.
+    seat.news.send(News::Made(workpiece.clone()));
+    wake();
+    let prepared: Prepared = opening.prepare(workpiece, device.spec().clone(), None)?;
     let (mut lesson, heard) = prepared.begin(device, None)?;
-    seat.news.send(News::Begun(lesson.workpiece().clone()));
     seat.tell(heard);
     let mut looked = Instant::now();
     while !lesson.session().is_complete() {

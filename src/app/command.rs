@@ -6,6 +6,8 @@ use super::sitting::{Sitting, Way};
 use super::transfer::Curves;
 use super::views::View;
 use crate::session::Answer;
+use crate::touch::Coefficient;
+use crate::volume::Label;
 use eframe::egui;
 use std::path::PathBuf;
 
@@ -29,6 +31,8 @@ pub enum Command {
     /// Asks whether to give up, or takes that back.
     GiveUp(bool),
     Abort,
+    /// Another value for one of a tissue's coefficients.
+    Adjust(Label, Coefficient, f32),
     Show(Way),
     /// A transfer function of one's own.
     Draw(Box<Curves>),

@@ -100,7 +100,7 @@ impl Desk {
             pictures: 0,
         };
         if begins {
-            desk.begin();
+            desk.begin(ctx);
         }
         desk
     }
@@ -148,7 +148,7 @@ impl Desk {
                 }
                 self.screen = Screen::Shelf;
             }
-            Command::Begin => self.begin(),
+            Command::Begin => self.begin(ctx),
             Command::ShowReport => {
                 if let Screen::Results(results) = &self.screen
                     && let Some(page) = results.page()
@@ -207,7 +207,7 @@ impl Desk {
         }
     }
 
-    fn begin(&mut self) {
+    fn begin(&mut self, ctx: &egui::Context) {
         let Some(exercise) = self.shelf.exercise() else { return };
         let (Ok(scenario), library) = (&exercise.read, exercise.library.clone()) else { return };
         if !lesson::is_code(&self.participant) {
@@ -232,6 +232,10 @@ impl Desk {
             templates: self.options.templates.clone(),
             started,
             hand,
+            wake: Box::new({
+                let ctx = ctx.clone();
+                move || ctx.request_repaint()
+            }),
         };
         self.diary.note("seed", order.seed);
         let output = Output { seed: order.seed, replacements: self.replacements.clone(), ..Output::default() };
@@ -275,8 +279,7 @@ impl Desk {
             }
             Screen::Lesson(sitting) if sitting.are_stages_over || sitting.is_scoring => look::column(ui, |ui| {
                 ui.heading(words.of("practice.scoring"));
-                ui.add_space(12.0);
-                ui.spinner();
+                look::waiting(ui);
             }),
             Screen::Lesson(sitting) => {
                 if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
@@ -408,6 +411,7 @@ fn carry_out_in(sitting: &mut Sitting, command: Command, ctx: &egui::Context) {
         }
         Command::GiveUp(is_giving_up) => sitting.is_giving_up = is_giving_up,
         Command::Abort => sitting.give_up(),
+        Command::Adjust(label, coefficient, value) => sitting.adjust(label, coefficient, value),
         Command::Show(way) => sitting.shown = way,
         Command::Draw(curves) => {
             if let Some(matter) = &mut sitting.matter {
@@ -503,7 +507,9 @@ impl eframe::App for Desk {
         if let Some(wait) = self.options.slow_picture {
             std::thread::sleep(wait);
         }
-        let is_live = matches!(&self.screen, Screen::Lesson(sitting) if !sitting.are_stages_over);
+        // While the matter is made the processors are for that.
+        let is_live = |sitting: &Sitting| !sitting.are_stages_over && sitting.matter.is_some();
+        let is_live = matches!(&self.screen, Screen::Lesson(sitting) if is_live(sitting));
         ctx.request_repaint_after(if is_live { NEXT_PICTURE } else { NEXT_LOOK });
     }
 }

@@ -6,6 +6,8 @@ use super::look;
 use super::sitting::{Sitting, Way};
 use super::transfer::transfer_ui;
 use super::views::View;
+use crate::touch::Coefficient;
+use crate::volume::Label;
 use eframe::egui;
 
 pub fn menu_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<Command>) {
@@ -21,7 +23,7 @@ pub fn menu_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut 
     {
         egui::CollapsingHeader::new(words.of("transfer.title")).show(ui, |ui| {
             let tissues = &sitting.scenario.tissues;
-            transfer_ui(ui, &matter.curves, &matter.histogram, tissues, &matter.palette, words, asked);
+            transfer_ui(ui, &matter.curves, matter.histogram(), tissues, &matter.palette, words, asked);
         });
     }
     part(ui, words.of("menu.views"));
@@ -41,7 +43,7 @@ pub fn menu_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut 
         asked.push(Command::Pause(!is_on));
     }
     part(ui, words.of("menu.materials"));
-    materials_ui(ui, sitting, words);
+    materials_ui(ui, sitting, words, asked);
     part(ui, words.of("menu.beat"));
     beat_ui(ui, sitting, words);
     for complaint in &sitting.complaints {
@@ -78,27 +80,67 @@ fn tray_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<
     }
 }
 
-/// The coefficients by which each tissue feels as it does.
-fn materials_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words) {
-    egui::CollapsingHeader::new(words.of("menu.coefficients")).show(ui, |ui| {
+/// The coefficients by which each tissue feels as it does; to be changed where the stage allows it.
+fn materials_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<Command>) {
+    let is_adjustable = sitting.stage().is_some_and(|stage| stage.is_adjustable);
+    let coefficients = egui::CollapsingHeader::new(words.of("menu.coefficients"));
+    coefficients.show(ui, |ui| {
         for entry in sitting.scenario.tissues.entries() {
             ui.label(egui::RichText::new(&entry.title).size(14.0).strong());
-            let cut = entry.cut_force_n.map_or("—".to_string(), |force| format!("{force:.2} N"));
-            let rows = [
-                ("menu.stiffness", format!("{:.2}", entry.stiffness)),
-                ("menu.damping", format!("{:.2}", entry.damping)),
-                ("menu.friction", format!("{:.2} / {:.2}", entry.static_friction, entry.dynamic_friction)),
-                ("menu.cut_force", cut),
-            ];
+            let now = sitting.felt.get(entry.label());
             egui::Grid::new(entry.id).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
-                for (key, value) in rows {
-                    ui.small(words.of(key));
-                    ui.small(value);
+                for which in Coefficient::ALL {
+                    let name = ui.small(words.of(key_of(which)));
+                    match now.coefficient(which) {
+                        Some(value) if is_adjustable => {
+                            let mut chosen = value;
+                            let slider = ui.add(slider_of(which, &mut chosen)).labelled_by(name.id);
+                            if slider.changed() && chosen != value {
+                                asked.push(Command::Adjust(entry.label(), which, chosen));
+                            }
+                        }
+                        Some(value) => _ = ui.small(format!("{value:.2}{}", unit_of(which))),
+                        None => _ = ui.small("—"),
+                    }
                     ui.end_row();
                 }
             });
         }
+        if is_adjustable && ui.button(words.of("menu.as_written")).clicked() {
+            asked.extend(changed(sitting).map(|(label, which, value)| Command::Adjust(label, which, value)));
+        }
     });
+}
+
+/// What differs from the exercise's own coefficients, with their values there.
+fn changed(sitting: &Sitting) -> impl Iterator<Item = (Label, Coefficient, f32)> + '_ {
+    sitting.scenario.tissues.entries().iter().flat_map(|entry| {
+        let (written, now) = (entry.material(), sitting.felt.get(entry.label()));
+        let differs = move |which: &Coefficient| written.coefficient(*which) != now.coefficient(*which);
+        let back = move |which| Some((entry.label(), which, written.coefficient(which)?));
+        Coefficient::ALL.into_iter().filter(differs).filter_map(back)
+    })
+}
+
+fn key_of(which: Coefficient) -> &'static str {
+    match which {
+        Coefficient::Stiffness => "menu.stiffness",
+        Coefficient::Damping => "menu.damping",
+        Coefficient::StaticFriction => "menu.static_friction",
+        Coefficient::DynamicFriction => "menu.dynamic_friction",
+        Coefficient::CutForce => "menu.cut_force",
+    }
+}
+
+fn unit_of(which: Coefficient) -> &'static str {
+    if which == Coefficient::CutForce { " N" } else { "" }
+}
+
+fn slider_of(which: Coefficient, value: &mut f32) -> egui::Slider<'_> {
+    let (least, most) = which.range();
+    // Forces are chosen between a hundredth of a newton and fifty: by their size, not by their place.
+    let is_force = which == Coefficient::CutForce;
+    egui::Slider::new(value, least..=most).logarithmic(is_force).max_decimals(2).suffix(unit_of(which))
 }
 
 /// Pictures a second, and how late the servo's ticks come.

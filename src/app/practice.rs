@@ -60,8 +60,7 @@ fn task_ui(ui: &mut egui::Ui, sitting: &mut Sitting, words: &Words, asked: &mut 
     let scenario = sitting.scenario.clone();
     let Some(stage) = sitting.stage.and_then(|stage| scenario.stages.get(stage)) else {
         ui.label(words.of("practice.making"));
-        ui.add_space(8.0);
-        ui.spinner();
+        look::waiting(ui);
         return;
     };
     let number = sitting.stage.unwrap_or_default() + 1;
@@ -256,6 +255,7 @@ fn picture(
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
         ..Scene::empty()
     };
+    if matter.is_new {}
     let mut drawn = viewport.draw(Place::Main, &scene, &viewpoint, settings.stereo(), size);
     if let Some(second) = settings.second_eye()
         && drawn.is_ok()
@@ -265,6 +265,7 @@ fn picture(
         let other = viewport.draw(Place::Second, &scene, &viewpoint, Some(second), viewport.second_size());
         drawn = other.and(drawn);
     }
+    if matter.is_new {}
     matter.is_new = false;
     drawn.map(Some)
 }

@@ -11,7 +11,7 @@ pub fn questionnaire_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, ask
     let Some(questionnaire) = &sitting.scenario.questionnaire else {
         look::column(ui, |ui| {
             ui.heading(words.of("questionnaire.scoring"));
-            ui.spinner();
+            look::waiting(ui);
         });
         return;
     };

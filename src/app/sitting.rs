@@ -12,7 +12,10 @@ use crate::render::{Orbit, Palette, Shown, Solid, TransferFunction};
 use crate::scenario::{Layout, Scenario, Stage, Workpiece};
 use crate::scene::{self, Mouth};
 use crate::session::{Answer, Effect, Heard, Input};
+use crate::sim::Command as Tell;
+use crate::touch::{Coefficient, Materials};
 use crate::volume::{Label, Volume};
+use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -55,6 +58,8 @@ pub struct Sitting {
     /// What could not be drawn as the exercise asks.
     pub complaints: Vec<String>,
     pub shown: Way,
+    /// How the tissues feel now, before any instrument's own factors.
+    pub felt: Materials,
     /// Steps chosen on the questionnaire's scale, by statement.
     pub ratings: BTreeMap<String, u8>,
     /// The statement that a digit rates, and whether it was just come to.
@@ -83,7 +88,7 @@ pub struct Matter {
     pub instruments: Vec<Solid>,
     /// Nothing of the volume has been drawn yet.
     pub is_new: bool,
-    pub histogram: Histogram,
+    histogram: OnceCell<Histogram>,
     pub curves: Curves,
     presets: Presets,
 }
@@ -94,6 +99,11 @@ impl Matter {
         let Some(mouth) = &self.mouth else { return };
         self.open = (self.open + by).clamp(0.0, OPEN_MOST);
         self.around = mouth.solids(self.open);
+    }
+
+    /// Of the matter as it was when somebody first asked: few do, and counting a fine tooth takes a while.
+    pub fn histogram(&self) -> &Histogram {
+        self.histogram.get_or_init(|| Histogram::of(&self.volume))
     }
 
     pub fn shown(&self, way: Way) -> Shown {
@@ -171,6 +181,7 @@ impl Sitting {
     /// Begins a lesson that is heard through an output and shown in a way at first.
     pub fn begin(order: Order, library: Library, output: Output, shown: Way) -> Result<Sitting, String> {
         let scenario = order.scenario.clone();
+        let felt = scenario.tissues.materials();
         let (sounds, heard) = audio::sounds();
         let chair = Chair::take(order, sounds).map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
         Ok(Sitting {
@@ -195,6 +206,7 @@ impl Sitting {
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
             library,
             shown,
+            felt,
             ratings: BTreeMap::new(),
             statement: 0,
             is_statement_new: false,
@@ -256,7 +268,7 @@ impl Sitting {
 
     fn learn(&mut self, news: News) {
         match news {
-            News::Begun(workpiece) => {
+            News::Made(workpiece) => {
                 self.orbit = scene::work_view(&workpiece);
                 self.matter = Some(self.matter_of(workpiece));
             }
@@ -297,6 +309,9 @@ impl Sitting {
                 self.let_go();
             }
             Effect::Refused { why } => self.refused = Some((*why).to_string()),
+            Effect::Tell(Tell::Set { label, coefficient, value }) => {
+                self.felt.set(*label, self.felt.get(*label).with(*coefficient, *value));
+            }
             Effect::Tell(_) | Effect::StepStarted { .. } | Effect::StageEnded { .. } => {}
         }
     }
@@ -312,7 +327,7 @@ impl Sitting {
         let (instruments, complaints): (Vec<Solid>, Vec<_>) = drawn.unzip();
         self.complaints = complaints.iter().flatten().map(Diagnostic::headline).collect();
         Matter {
-            histogram: Histogram::of(&volume),
+            histogram: OnceCell::new(),
             curves: Curves::from(TransferFunction::tissue(&palette)),
             presets: Presets::of(tissues, &palette),
             volume,
@@ -364,6 +379,14 @@ impl Sitting {
         let Some(stage) = self.stage else { return };
         self.said.insert(question.clone(), value.clone());
         self.tell(Said::InStage(stage, Input::Answer { question, value }));
+    }
+
+    /// Gives a coefficient another value, where the stage allows it.
+    pub fn adjust(&mut self, label: Label, coefficient: Coefficient, value: f32) {
+        let Some(stage) = self.stage else { return };
+        // Shown at once; what the session says of it comes some milliseconds later.
+        self.felt.set(label, self.felt.get(label).with(coefficient, value));
+        self.tell(Said::InStage(stage, Input::Adjust { label, coefficient, value }));
     }
 
     /// The running stage is done; what was typed and not said is said first. Not while a number is none.

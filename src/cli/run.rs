@@ -222,10 +222,13 @@ pub fn perform(run: Run) -> Result<PathBuf, Failure> {
     let templates = super::templates()?;
     let started = jiff::Timestamp::now();
     let opening = Opening { scenario, seed, participant, out, digests, templates, started };
+    let workpiece = opening.make()?;
     let recorded = match player {
-        Player::Script(operator) => opening.prepare(Spec::phantom_omni(), Some(&operator))?.play(*operator)?,
+        Player::Script(operator) => {
+            opening.prepare(workpiece, Spec::phantom_omni(), Some(&operator))?.play(*operator)?
+        }
         Player::Person(hands) => {
-            let prepared = opening.prepare(hands.first.device.spec().clone(), None)?;
+            let prepared = opening.prepare(workpiece, hands.first.device.spec().clone(), None)?;
             live::play(prepared, *hands)?
         }
     };

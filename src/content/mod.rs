@@ -9,12 +9,14 @@ pub mod obj;
 pub mod picture_mesh;
 pub mod scan;
 mod library;
+mod coefficient;
 mod tissues;
 mod instruments;
 mod feel;
 pub mod measured;
 pub mod sounds;
 
+pub use coefficient::CoefficientName;
 pub use feel::{AgeBand, FeelTable};
 pub use instruments::{EndEntry, InstrumentEntry, InstrumentTable, MirrorEntry, ToolKind};
 pub use library::{Library, read_file, read_text};

@@ -77,7 +77,8 @@ impl TissueEntry {
         parse_color(&self.color).unwrap_or([0.5; 3])
     }
 
-    fn material(&self) -> Material {
+    /// How it feels before any instrument or patient changes that.
+    pub fn material(&self) -> Material {
         Material {
             stiffness: self.stiffness,
             damping: self.damping,

@@ -16,19 +16,16 @@ use crate::frame::Quat;
 use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
 use crate::report::Templates;
 use crate::report::bundle::Unfinished;
-use crate::scenario::Workpiece;
 use crate::session::{Broken, Effect, Heard, Input, Live, Observer, Session};
 use crate::sim::{Command, Second, Simulation, Step};
 use crate::tick::Tick;
 use crate::volume::Edit;
-use std::sync::Arc;
 
 /// A session with a person in it, recorded as it goes.
 pub struct Lesson {
     session: Session,
     live: Live,
     log: Log,
-    workpiece: Arc<Workpiece>,
     unfinished: Unfinished,
     templates: Templates,
 }
@@ -46,7 +43,7 @@ impl Lesson {
         let mut log = Log { recorder, edits: Vec::new(), held: UPRIGHT };
         let begun = Live::begin(&mut session, simulation, device, second, &mut log);
         let (live, heard) = begun.map_err(|broken| stopped(&unfinished, &broken))?;
-        Ok((Lesson { session, live, log, workpiece, unfinished, templates }, heard))
+        Ok((Lesson { session, live, log, unfinished, templates }, heard))
     }
 
     /// Hears everything the servo did since last asked; [`Lesson::edits`] are then those of that time.
@@ -78,11 +75,6 @@ impl Lesson {
 
     pub fn live(&self) -> &Live {
         &self.live
-    }
-
-    /// The matter as it was before the first tick.
-    pub fn workpiece(&self) -> &Arc<Workpiece> {
-        &self.workpiece
     }
 
     /// The voxels that changed before the last [`Lesson::listen`], in order.

@@ -43,12 +43,20 @@ pub struct Prepared {
 }
 
 impl Opening<'_> {
-    /// Makes the matter and opens the recording, for a device and for the script that moves it, if one does.
-    pub fn prepare(self, spec: Spec, operator: Option<&OperatorFile>) -> Result<Prepared, Failed> {
+    /// Makes the matter.
+    pub fn make(&self) -> Result<Arc<Workpiece>, Failed> {
+        let made = Workpiece::make(&self.scenario, self.seed);
+        made.map(Arc::new).map_err(|why| Failed::Impossible { scenario: self.scenario.id.clone(), why })
+    }
+
+    /// Opens the recording of what was made, for a device and for the script that moves it, if one does.
+    pub fn prepare(
+        self,
+        workpiece: Arc<Workpiece>,
+        spec: Spec,
+        operator: Option<&OperatorFile>,
+    ) -> Result<Prepared, Failed> {
         let Opening { scenario, seed, participant, out, digests, templates, started } = self;
-        let workpiece = Workpiece::make(&scenario, seed)
-            .map_err(|why| Failed::Impossible { scenario: scenario.id.clone(), why })?;
-        let workpiece = Arc::new(workpiece);
         let head = HeadFile {
             participant: participant.to_string(),
             started: format!("{started:.0}"),

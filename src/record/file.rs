@@ -1,11 +1,13 @@
 //! The parts of a recording that are text. Readers tolerate additions.
 
+use crate::content::CoefficientName;
 use crate::device::Spec;
 use crate::frame::Vec3;
 use crate::scenario::Scenario;
 use crate::session::{Answer, EndedBy, Input, Kept};
 use crate::sim::{Command, Simulation};
 use crate::tick::TICK_S;
+use crate::touch::Coefficient;
 use crate::volume::Label;
 use core::time::Duration;
 use serde::{Deserialize, Serialize};
@@ -227,6 +229,7 @@ pub enum InputFile {
     AnswerQuadrant { question: String, value: u8 },
     AnswerYesNo { question: String, value: bool },
     AnswerNumber { question: String, value: f64 },
+    Adjust { label: u8, coefficient: CoefficientName, value: f32 },
     Confirm {},
     Rate { item: String, value: u8 },
     Abort {},
@@ -242,6 +245,9 @@ impl From<&Input> for InputFile {
                 Answer::YesNo(value) => InputFile::AnswerYesNo { question, value },
                 Answer::Number(value) => InputFile::AnswerNumber { question, value },
             },
+            Input::Adjust { label, coefficient, value } => {
+                InputFile::Adjust { label: label.0, coefficient: coefficient.into(), value }
+            }
             Input::Confirm => InputFile::Confirm {},
             Input::Rate { item, value } => InputFile::Rate { item, value },
             Input::Abort => InputFile::Abort {},
@@ -257,6 +263,9 @@ impl From<InputFile> for Input {
             InputFile::AnswerQuadrant { question, value } => Input::Answer { question, value: Answer::Quadrant(value) },
             InputFile::AnswerYesNo { question, value } => Input::Answer { question, value: Answer::YesNo(value) },
             InputFile::AnswerNumber { question, value } => Input::Answer { question, value: Answer::Number(value) },
+            InputFile::Adjust { label, coefficient, value } => {
+                Input::Adjust { label: Label(label), coefficient: coefficient.into(), value }
+            }
             InputFile::Confirm {} => Input::Confirm,
             InputFile::Rate { item, value } => Input::Rate { item, value },
             InputFile::Abort {} => Input::Abort,
@@ -267,17 +276,37 @@ impl From<InputFile> for Input {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CommandFile {
-    Take { instrument: usize },
-    SetStiffness { label: u8, stiffness: f32 },
-    RunBur { running: bool },
-    Guide { guidance: Option<usize> },
+    Take {
+        instrument: usize,
+    },
+    /// A stiffness has its own name since before other coefficients could change.
+    SetStiffness {
+        label: u8,
+        stiffness: f32,
+    },
+    Set {
+        label: u8,
+        coefficient: CoefficientName,
+        value: f32,
+    },
+    RunBur {
+        running: bool,
+    },
+    Guide {
+        guidance: Option<usize>,
+    },
 }
 
 impl From<&Command> for CommandFile {
     fn from(command: &Command) -> CommandFile {
         match *command {
             Command::Take { instrument } => CommandFile::Take { instrument },
-            Command::SetStiffness { label, stiffness } => CommandFile::SetStiffness { label: label.0, stiffness },
+            Command::Set { label, coefficient: Coefficient::Stiffness, value } => {
+                CommandFile::SetStiffness { label: label.0, stiffness: value }
+            }
+            Command::Set { label, coefficient, value } => {
+                CommandFile::Set { label: label.0, coefficient: coefficient.into(), value }
+            }
             Command::RunBur { running } => CommandFile::RunBur { running },
             Command::Guide { guidance } => CommandFile::Guide { guidance },
         }
@@ -288,7 +317,12 @@ impl From<&CommandFile> for Command {
     fn from(file: &CommandFile) -> Command {
         match *file {
             CommandFile::Take { instrument } => Command::Take { instrument },
-            CommandFile::SetStiffness { label, stiffness } => Command::SetStiffness { label: Label(label), stiffness },
+            CommandFile::SetStiffness { label, stiffness } => {
+                Command::Set { label: Label(label), coefficient: Coefficient::Stiffness, value: stiffness }
+            }
+            CommandFile::Set { label, coefficient, value } => {
+                Command::Set { label: Label(label), coefficient: coefficient.into(), value }
+            }
             CommandFile::RunBur { running } => Command::RunBur { running },
             CommandFile::Guide { guidance } => Command::Guide { guidance },
         }

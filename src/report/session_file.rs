@@ -1,5 +1,6 @@
 //! `session.json`: the result of a session as other programs read it. Its names are a contract.
 
+use crate::content::CoefficientName;
 use crate::device::Spec;
 use crate::record::{Recording, ServoFile, SpecFile, ended_by_name};
 use crate::scenario::{Limit, QuestionKind, Questionnaire};
@@ -85,6 +86,9 @@ pub struct StageFile {
     /// For how long another person's hand led the trainee's, s; left out where none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub led_s: Option<f64>,
+    /// What the trainee changed of how tissues feel, each as "tissue coefficient"; left out where nothing was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub adjusted: Vec<String>,
     pub answers: Vec<AnswerFile>,
 }
 
@@ -252,6 +256,10 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
                 level: step.map(|(level, _)| (f64::from(level) * 1e6).round() / 1e6),
             })
         });
+        let adjusted = result.adjusted.iter().filter_map(|&(label, coefficient)| {
+            let tissue = recording.scenario.tissues.by_label(label)?;
+            Some(format!("{} {}", tissue.name, CoefficientName::from(coefficient)))
+        });
         StageFile {
             id: stage.id.clone(),
             title: stage.title.clone(),
@@ -260,6 +268,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
             ended_by: ended_by_name(result.ended_by).to_string(),
             guided: stage.guidance.is_some(),
             led_s: (led > 0).then(|| Tick(led).seconds()),
+            adjusted: adjusted.collect(),
             answers: answers.collect(),
         }
     };

@@ -587,6 +587,10 @@ pub struct StageFile {
     /// Whether decay is shown in its colour.
     #[serde(default)]
     pub show_decay: bool,
+    /// Whether the trainee may change how tissues feel, in the menu, to learn what the coefficients do. The report says
+    /// what was changed; the next stage finds the tissues as they were.
+    #[serde(default)]
+    pub adjustable: bool,
     /// Stiffness that falls in steps until the trainee answers.
     #[serde(default)]
     pub stiffness_steps: Option<StiffnessStepsFile>,

@@ -177,6 +177,8 @@ pub struct Stage {
     pub instruments: Vec<usize>,
     pub cutting: bool,
     pub show_decay: bool,
+    /// The trainee may change the tissues' coefficients.
+    pub is_adjustable: bool,
     pub steps: Option<StiffnessSteps>,
     /// Index into [`Scenario::guidances`].
     pub guidance: Option<usize>,

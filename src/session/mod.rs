@@ -18,7 +18,7 @@ use crate::device::Spec;
 use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
 use crate::sim::{Command, RAMP_TICKS, Setup, Step};
 use crate::tick::Tick;
-use crate::touch::Matter;
+use crate::touch::{Coefficient, Matter};
 use crate::volume::{Edit, Label, Volume};
 use std::sync::Arc;
 
@@ -45,6 +45,8 @@ pub enum Input {
     Take { instrument: usize },
     /// Answers a question of the current stage. A second answer replaces the first.
     Answer { question: String, value: Answer },
+    /// Gives one of a tissue's coefficients another value, where the stage lets people try what they feel like.
+    Adjust { label: Label, coefficient: Coefficient, value: f32 },
     /// Says that the stage is done.
     Confirm,
     /// Rates a statement of the questionnaire.
@@ -120,6 +122,8 @@ pub struct StageResult {
     pub ended_by: EndedBy,
     /// In the order of the stage's questions; `None` where none was given.
     pub answers: Vec<Option<Given>>,
+    /// What the person changed of how tissues feel, in the order in which each was first changed.
+    pub adjusted: Vec<(Label, Coefficient)>,
 }
 
 /// An answer that was given.
@@ -156,6 +160,7 @@ pub struct Session {
     step: usize,
     step_started: Tick,
     answers: Vec<Option<Given>>,
+    adjusted: Vec<(Label, Coefficient)>,
     instrument: usize,
     decay_at_start: usize,
     decay_gone: usize,
@@ -197,6 +202,7 @@ impl Session {
             step: 0,
             step_started: Tick::ZERO,
             answers: Vec::new(),
+            adjusted: Vec::new(),
             instrument: 0,
             decay_at_start,
             decay_gone: 0,
@@ -264,7 +270,8 @@ impl Session {
     }
 
     fn result(&self, ended_by: EndedBy) -> StageResult {
-        StageResult { started: self.started, ended: self.now, ended_by, answers: self.answers.clone() }
+        let (answers, adjusted) = (self.answers.clone(), self.adjusted.clone());
+        StageResult { started: self.started, ended: self.now, ended_by, answers, adjusted }
     }
 
     fn start_stage(&mut self, index: usize) -> Vec<Effect> {
@@ -297,7 +304,8 @@ impl Session {
         self.step_started = self.now;
         effects.push(Effect::StepStarted { stage: index, step });
         let stiffness = steps.coefficients[step];
-        effects.push(Effect::Tell(Command::SetStiffness { label: steps.label, stiffness }));
+        let (label, coefficient) = (steps.label, Coefficient::Stiffness);
+        effects.push(Effect::Tell(Command::Set { label, coefficient, value: stiffness }));
     }
 
     fn end_stage(&mut self, index: usize, by: EndedBy) -> Vec<Effect> {
@@ -307,11 +315,13 @@ impl Session {
         if self.scenario.stages[index].guidance.is_some() {
             effects.push(Effect::Tell(Command::Guide { guidance: None }));
         }
-        if let Some(steps) = &self.scenario.stages[index].steps
-            && let Some(entry) = self.scenario.tissues.by_label(steps.label)
-        {
-            // Steps belong to their stage: the next one finds the tissue as the scenario describes it.
-            effects.push(Effect::Tell(Command::SetStiffness { label: steps.label, stiffness: entry.stiffness }));
+        // What was changed belongs to its stage: the next one finds the tissues as the scenario describes them.
+        let stepped = self.scenario.stages[index].steps.as_ref().map(|steps| (steps.label, Coefficient::Stiffness));
+        for (label, coefficient) in stepped.into_iter().chain(std::mem::take(&mut self.adjusted)) {
+            let entry = self.scenario.tissues.by_label(label);
+            if let Some(value) = entry.and_then(|entry| entry.material().coefficient(coefficient)) {
+                effects.push(Effect::Tell(Command::Set { label, coefficient, value }));
+            }
         }
         if by == EndedBy::Abort {
             self.phase = Phase::Over;
@@ -364,12 +374,38 @@ impl Session {
                 vec![Effect::Tell(Command::Take { instrument: *instrument })]
             }
             (Input::Answer { question, value }, Phase::In(index)) => self.answer(index, question, value),
+            (Input::Adjust { label, coefficient, value }, Phase::In(index)) => {
+                self.adjust(index, *label, *coefficient, *value)
+            }
             (Input::Confirm, Phase::In(index)) if self.scenario.stages[index].ends.confirmed => {
                 self.end_stage(index, EndedBy::Confirmation)
             }
             (Input::Confirm, Phase::In(_)) => refused("this stage does not end by confirmation"),
             (Input::Abort, Phase::In(index)) => self.end_stage(index, EndedBy::Abort),
         }
+    }
+
+    fn adjust(&mut self, index: usize, label: Label, coefficient: Coefficient, value: f32) -> Vec<Effect> {
+        let refused = |why| vec![Effect::Refused { why }];
+        let stage = &self.scenario.stages[index];
+        if !stage.is_adjustable {
+            return refused("this stage keeps the tissues as they are");
+        }
+        if stage.steps.as_ref().is_some_and(|steps| (steps.label, Coefficient::Stiffness) == (label, coefficient)) {
+            return refused("this stage changes that stiffness itself");
+        }
+        let (least, most) = coefficient.range();
+        if !(least..=most).contains(&value) {
+            return refused("the coefficient cannot be that");
+        }
+        let entry = self.scenario.tissues.by_label(label);
+        if entry.and_then(|entry| entry.material().coefficient(coefficient)).is_none() {
+            return refused("no tissue has this coefficient");
+        }
+        if !self.adjusted.contains(&(label, coefficient)) {
+            self.adjusted.push((label, coefficient));
+        }
+        vec![Effect::Tell(Command::Set { label, coefficient, value })]
     }
 
     fn answer(&mut self, index: usize, question: &str, value: &Answer) -> Vec<Effect> {

@@ -10,7 +10,7 @@ use crate::device::{Device, Felt, Gone, HandModel, Move, Output, Reading, Script
 use crate::frame::Vec3;
 use crate::scenario::{Lesion, QuestionKind, Scenario, Stage, Workpiece};
 use crate::sim::Step;
-use crate::volume::ISO;
+use crate::volume::{ISO, Label};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -149,6 +149,12 @@ impl Operator {
             ActionFile::Probe(probe) => self.probe(probe, self.radius(*instrument)),
             ActionFile::Cut(cut) => self.cut(cut, self.radius(*instrument)),
             ActionFile::Answer(answer) => self.plan.push_back(Task::Answer(answer.clone())),
+            ActionFile::Adjust(adjust) => {
+                // What the exercise does not know is air, which the session refuses to change.
+                let label = self.scenario.tissues.by_name(&adjust.tissue).map_or(Label::AIR, |tissue| tissue.label());
+                let (coefficient, value) = (adjust.coefficient.into(), adjust.value);
+                self.plan.push_back(Task::Input(Input::Adjust { label, coefficient, value }));
+            }
             ActionFile::Confirm => {
                 self.lift_off();
                 self.plan.push_back(Task::Input(Input::Confirm));

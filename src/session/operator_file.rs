@@ -1,6 +1,6 @@
 //! An operator as written: a script that plays a trainee.
 
-use crate::content::{Library, json};
+use crate::content::{CoefficientName, Library, json};
 use crate::diagnostic::Diagnostic;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -78,8 +78,22 @@ pub enum ActionFile {
     Probe(ProbeFile),
     Cut(CutFile),
     Answer(AnswerActionFile),
+    /// Give one of a tissue's coefficients another value, where the stage allows it.
+    Adjust(AdjustFile),
     /// Say that the stage is done.
     Confirm,
+}
+
+/// Another value for a tissue's coefficient.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AdjustFile {
+    /// The tissue's name, such as "enamel".
+    pub tissue: String,
+    pub coefficient: CoefficientName,
+    /// In the coefficient's unit.
+    #[schemars(range(min = 0.0, max = 50.0))]
+    pub value: f32,
 }
 
 /// A place on a tooth.

@@ -18,8 +18,8 @@ use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
-    Carver, Carving, Contact, Factors, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials, Matter, Press,
-    Proxy, Pull, SpringLimit, Vibration,
+    Carver, Carving, Coefficient, Contact, Factors, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials,
+    Matter, Press, Proxy, Pull, SpringLimit, Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
 
@@ -51,8 +51,8 @@ pub const RAMP_TICKS: u32 = 500;
 pub enum Command {
     /// Takes another instrument into the hand.
     Take { instrument: usize },
-    /// Gives a tissue another stiffness coefficient (0–1).
-    SetStiffness { label: Label, stiffness: f32 },
+    /// Gives one of a tissue's coefficients another value, in its unit, before each instrument's own factors.
+    Set { label: Label, coefficient: Coefficient, value: f32 },
     /// Lets burs run, or stops them.
     RunBur { running: bool },
     /// Leads the hand by a guidance from its beginning, or by none.
@@ -304,11 +304,10 @@ impl Simulation {
                 self.is_out = false;
             }
             Command::Take { .. } => {}
-            Command::SetStiffness { label, stiffness } => {
+            Command::Set { label, coefficient, value } => {
                 for (materials, factors) in self.materials.iter_mut().zip(&self.factors) {
-                    let mut material = *materials.get(label);
-                    material.stiffness = (stiffness * factors.get(label).stiffness).clamp(0.0, 1.0);
-                    materials.set(label, material);
+                    let value = value * factors.get(label).of(coefficient);
+                    materials.set(label, materials.get(label).with(coefficient, value));
                 }
             }
             Command::RunBur { running } => self.bur_runs = running,

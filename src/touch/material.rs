@@ -30,6 +30,31 @@ impl Material {
         hardness: None,
     };
 
+    /// `None`: the tissue cannot be cut.
+    pub fn coefficient(&self, which: Coefficient) -> Option<f32> {
+        match which {
+            Coefficient::Stiffness => Some(self.stiffness),
+            Coefficient::Damping => Some(self.damping),
+            Coefficient::StaticFriction => Some(self.static_friction),
+            Coefficient::DynamicFriction => Some(self.dynamic_friction),
+            Coefficient::CutForce => self.cut_force,
+        }
+    }
+
+    /// The same tissue with one number changed, within what it may be.
+    pub fn with(mut self, which: Coefficient, value: f32) -> Material {
+        let (least, most) = which.range();
+        let value = value.clamp(least, most);
+        match which {
+            Coefficient::Stiffness => self.stiffness = value,
+            Coefficient::Damping => self.damping = value,
+            Coefficient::StaticFriction => self.static_friction = value,
+            Coefficient::DynamicFriction => self.dynamic_friction = value,
+            Coefficient::CutForce => self.cut_force = Some(value),
+        }
+        self
+    }
+
     /// The same tissue as another tool or another patient makes it feel; within what coefficients may be.
     fn times(self, factor: &Factor) -> Material {
         Material {
@@ -68,6 +93,36 @@ impl Material {
 /// Greatest coefficient of friction: beyond it nothing slides.
 const FRICTION_MAX: f32 = 2.0;
 
+/// One of the numbers by which a tissue feels as it does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coefficient {
+    Stiffness,
+    Damping,
+    StaticFriction,
+    DynamicFriction,
+    /// N
+    CutForce,
+}
+
+impl Coefficient {
+    pub const ALL: [Coefficient; 5] = [
+        Coefficient::Stiffness,
+        Coefficient::Damping,
+        Coefficient::StaticFriction,
+        Coefficient::DynamicFriction,
+        Coefficient::CutForce,
+    ];
+
+    /// Least and greatest that it may be, in its unit.
+    pub fn range(self) -> (f32, f32) {
+        match self {
+            Coefficient::Stiffness | Coefficient::Damping => (0.0, 1.0),
+            Coefficient::StaticFriction | Coefficient::DynamicFriction => (0.0, FRICTION_MAX),
+            Coefficient::CutForce => (0.01, 50.0),
+        }
+    }
+}
+
 /// What a tool or a patient makes of a tissue, as multiples of its coefficients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factor {
@@ -82,6 +137,17 @@ impl Factor {
     /// Changes nothing, to the last bit.
     pub const ONE: Factor =
         Factor { stiffness: 1.0, damping: 1.0, static_friction: 1.0, dynamic_friction: 1.0, hardness: 1.0 };
+
+    /// What one number is multiplied by. Nothing changes the force from which a tissue is cut.
+    pub fn of(&self, which: Coefficient) -> f32 {
+        match which {
+            Coefficient::Stiffness => self.stiffness,
+            Coefficient::Damping => self.damping,
+            Coefficient::StaticFriction => self.static_friction,
+            Coefficient::DynamicFriction => self.dynamic_friction,
+            Coefficient::CutForce => 1.0,
+        }
+    }
 
     /// Both together.
     pub fn times(self, other: Factor) -> Factor {

@@ -28,7 +28,7 @@ pub use guidance::{
 };
 pub use instrument::{Instrument, WorkingEnd};
 pub use law::{Law, Pull, SpringLimit};
-pub use material::{Factor, Factors, Material, Materials};
+pub use material::{Coefficient, Factor, Factors, Material, Materials};
 pub use matter::{Form, Matter, Shape};
 pub use obstacle::Obstacle;
 pub use profile::{EDGE, Nearest, Place, Profile};

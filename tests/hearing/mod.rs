@@ -2,6 +2,9 @@
 // Each test program hears with some of it only.
 #![allow(dead_code)]
 
+#[cfg(all(unix, not(target_os = "macos")))]
+pub mod server;
+
 use realfft::RealFftPlanner;
 use typodont::audio::{DrillLoad, Tool};
 

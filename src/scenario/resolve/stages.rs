@@ -92,6 +92,7 @@ impl Resolver<'_> {
             instruments,
             cutting: written.cutting,
             show_decay: written.show_decay,
+            is_adjustable: written.adjustable,
             steps,
             guidance,
             ask,

@@ -16,30 +16,43 @@ impl Edge {
         Edge((axis * 4 + (corner >> b & 1) + 2 * (corner >> c & 1)) as u8)
     }
 
-    pub fn axis(self) -> usize {
-        usize::from(self.0) / 4
-    }
-
-    /// Its lower corner, seen from the cell's lowest.
-    pub fn start(self) -> [i32; 3] {
-        let (b, c) = others(self.axis());
-        let mut start = [0; 3];
-        start[b] = i32::from(self.0 & 1);
-        start[c] = i32::from(self.0 >> 1 & 1);
-        start
+    fn way(self) -> &'static Way {
+        &WAYS[usize::from(self.0)]
     }
 
     /// True when one face of the cell holds both edges.
     fn shares_face(self, other: Edge) -> bool {
-        let holds = |edge: Edge, axis: usize, side: i32| edge.axis() != axis && edge.start()[axis] == side;
+        let holds = |edge: Edge, axis: usize, side: usize| edge.way().axis != axis && edge.way().start[axis] == side;
         (0..3).any(|axis| [0, 1].into_iter().any(|side| holds(self, axis, side) && holds(other, axis, side)))
     }
 }
 
 /// The two axes across one, right-handed.
-fn others(axis: usize) -> (usize, usize) {
+const fn others(axis: usize) -> (usize, usize) {
     ((axis + 1) % 3, (axis + 2) % 3)
 }
+
+/// Where an edge of a cell lies: its axis and its lower corner, seen from the cell's lowest.
+pub struct Way {
+    pub axis: usize,
+    pub start: [usize; 3],
+    /// Axes on whose lower side it lies, one bit each: other cells there have had it before.
+    pub before: u8,
+}
+
+/// By the edge's number.
+pub static WAYS: [Way; 12] = {
+    const fn way(edge: usize) -> Way {
+        let axis = edge / 4;
+        let (b, c) = others(axis);
+        let mut start = [0; 3];
+        start[b] = edge & 1;
+        start[c] = edge >> 1 & 1;
+        let before = ((1 - start[b]) << b | (1 - start[c]) << c) as u8;
+        Way { axis, start, before }
+    }
+    [way(0), way(1), way(2), way(3), way(4), way(5), way(6), way(7), way(8), way(9), way(10), way(11)]
+};
 
 /// The surface in one cell.
 #[derive(Clone, Debug, Default)]

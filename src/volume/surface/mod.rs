@@ -13,7 +13,7 @@ pub use mask::{of_mask, volume_of_mask};
 use super::{BRICK, Density, Grid, Volume};
 use crate::frame::Vec3;
 use crate::mesh::Mesh;
-use cases::{CASES, Edge};
+use cases::{CASES, Case, Edge, WAYS, Way};
 
 /// The whole surface.
 pub fn extract(volume: &Volume) -> Mesh {
@@ -65,10 +65,34 @@ impl Field<'_> {
         if is_inside { self.densities[self.grid.index(sample.map(|v| v as u32))].unit() } else { 0.0 }
     }
 
-    /// Central differences, per mm.
-    fn slope(&self, sample: [i32; 3]) -> Vec3 {
-        let along = |axis: usize| self.at(beside(sample, axis, 1)) - self.at(beside(sample, axis, -1));
-        0.5 * Vec3::new(along(0), along(1), along(2)) / self.grid.spacing
+    /// Densities at both ends of the edge that leaves a sample along an axis, and there the central differences, per mm.
+    fn along(&self, start: [i32; 3], axis: usize) -> [(f32, Vec3); 2] {
+        let end = beside(start, axis, 1);
+        let last = self.grid.dims.map(|n| n as i32 - 1);
+        let is_within = (0..3).all(|a| start[a] > 0 && end[a] < last[a]);
+        if !is_within {
+            return [start, end].map(|sample| {
+                let along = |axis: usize| self.at(beside(sample, axis, 1)) - self.at(beside(sample, axis, -1));
+                (self.at(sample), self.per_mm(Vec3::new(along(0), along(1), along(2))))
+            });
+        }
+        // No neighbour lies beyond the grid: they are so many places away.
+        let [nx, ny, _] = self.grid.dims.map(|n| n as usize);
+        let steps = [1, nx, nx * ny];
+        let first = self.grid.index(start.map(|v| v as u32));
+        let unit = |place: usize| self.densities[place].unit();
+        [first, first + steps[axis]].map(|place| {
+            let across = Vec3::new(
+                unit(place + 1) - unit(place - 1),
+                unit(place + nx) - unit(place - nx),
+                unit(place + nx * ny) - unit(place - nx * ny),
+            );
+            (unit(place), self.per_mm(across))
+        })
+    }
+
+    fn per_mm(&self, across: Vec3) -> Vec3 {
+        0.5 * across / self.grid.spacing
     }
 
     /// One bit per sample of a row: solid or not.
@@ -82,12 +106,27 @@ impl Field<'_> {
         let first = low.max(0);
         let last = (low + count as i32).min(nx);
         let values = &self.densities[row + first as usize..row + last as usize];
-        let shift = (first - low) as usize;
-        for (i, density) in values.iter().enumerate() {
-            let at = i + shift;
+        let mut at = (first - low) as usize;
+        let (eights, rest) = values.as_chunks::<8>();
+        for eight in eights {
+            let solid = solid_of(eight);
+            bits[at / 64] |= solid << (at % 64);
+            if at % 64 > 56 {
+                bits[at / 64 + 1] |= solid >> (64 - at % 64);
+            }
+            at += 8;
+        }
+        for density in rest {
             bits[at / 64] |= u64::from(density.is_solid()) << (at % 64);
+            at += 1;
         }
     }
+}
+
+/// One bit per density: its highest, gathered by one multiplication.
+fn solid_of(eight: &[Density; 8]) -> u64 {
+    let highest = u64::from_le_bytes(eight.map(Density::bits)) & 0x8080_8080_8080_8080;
+    (highest >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56
 }
 
 fn beside(mut sample: [i32; 3], axis: usize, steps: i32) -> [i32; 3] {
@@ -150,58 +189,60 @@ fn crossed_cells(rows: &[&[u64]; 4], word: usize) -> u64 {
 
 /// Which corners of a cell are solid, one bit each, x fastest.
 fn case(rows: &[&[u64]; 4], x: usize) -> usize {
-    let bit = |row: usize, x: usize| ((rows[row][x / 64] >> (x % 64)) & 1) as usize;
-    (0..8).fold(0, |all, corner| all | bit(corner >> 1, x + (corner & 1)) << corner)
+    let (word, shift) = (x / 64, x % 64);
+    let pair = |row: &[u64]| {
+        let next = if shift == 63 { row[word + 1] << 1 } else { 0 };
+        (((row[word] >> shift) | next) & 3) as usize
+    };
+    pair(rows[0]) | pair(rows[1]) << 2 | pair(rows[2]) << 4 | pair(rows[3]) << 6
 }
 
 /// Makes vertices once and triangles from them, cell by cell in array order.
 struct Weaver<'a> {
     field: Field<'a>,
+    cases: &'static [Case],
     low: [i32; 3],
     samples: [usize; 3],
-    /// Per axis: the vertex on the edge that leaves a sample that way, for two layers of samples in turn.
-    vertex: [Vec<u32>; 3],
+    /// For two layers of samples in turn: the vertices on the edges that leave a sample along each axis.
+    vertex: Vec<[u32; 3]>,
     mesh: Mesh,
 }
 
 impl<'a> Weaver<'a> {
     fn new(field: Field<'a>, cells: Cells) -> Weaver<'a> {
         let samples: [usize; 3] = std::array::from_fn(|a| (cells.end[a] - cells.low[a]) as usize + 1);
-        let layers = || vec![0; 2 * samples[0] * samples[1]];
-        Weaver { field, low: cells.low, samples, vertex: [layers(), layers(), layers()], mesh: Mesh::default() }
+        let vertex = vec![[0; 3]; 2 * samples[0] * samples[1]];
+        Weaver { field, cases: &CASES, low: cells.low, samples, vertex, mesh: Mesh::default() }
     }
 
+    #[inline]
     fn cell(&mut self, cell: [i32; 3], case: usize) {
-        let case = &CASES[case];
+        let [x, y, z]: [usize; 3] = std::array::from_fn(|a| (cell[a] - self.low[a]) as usize);
+        let [nx, ny, _] = self.samples;
+        let layers = [z % 2, 1 - z % 2].map(|layer| (layer * ny + y) * nx + x);
+        let at_low = u8::from(x == 0) | u8::from(y == 0) << 1 | u8::from(z == 0) << 2;
         let mut vertices = [0; 12];
-        for &edge in &case.edges {
-            vertices[usize::from(edge.0)] = self.vertex_on(cell, edge);
+        let case = &self.cases[case];
+        for edge in case.edges.iter().map(|edge| usize::from(edge.0)) {
+            let Way { axis, start, before } = WAYS[edge];
+            let slot = layers[start[2]] + start[1] * nx + start[0];
+            // The first cell that has the edge makes its vertex.
+            if before & !at_low == 0 {
+                let start = std::array::from_fn(|a| cell[a] + start[a] as i32);
+                self.vertex[slot][axis] = self.add_vertex(start, axis);
+            }
+            vertices[edge] = self.vertex[slot][axis];
         }
         let corner = |edge: &Edge| vertices[usize::from(edge.0)];
         self.mesh.triangles.extend(case.triangles.iter().map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]));
     }
 
-    /// The vertex on an edge of a cell; the first cell that has the edge makes it.
-    fn vertex_on(&mut self, cell: [i32; 3], edge: Edge) -> u32 {
-        let axis = edge.axis();
-        let start: [i32; 3] = std::array::from_fn(|a| cell[a] + edge.start()[a]);
-        let is_first = (0..3).all(|a| a == axis || start[a] > cell[a] || cell[a] == self.low[a]);
-        let [x, y] = [0, 1].map(|a| (start[a] - self.low[a]) as usize);
-        let layer = (start[2] - self.low[2]) as usize % 2;
-        let slot = (layer * self.samples[1] + y) * self.samples[0] + x;
-        if is_first {
-            self.vertex[axis][slot] = self.add_vertex(start, axis);
-        }
-        self.vertex[axis][slot]
-    }
-
     fn add_vertex(&mut self, start: [i32; 3], axis: usize) -> u32 {
-        let end = beside(start, axis, 1);
-        let (from, to) = (self.field.at(start), self.field.at(end));
+        let [(from, slope_from), (to, slope_to)] = self.field.along(start, axis);
         let part = (super::ISO - from) / (to - from);
         let mut steps = Vec3::from(start.map(|v| v as f32));
         steps[axis] += part;
-        let slope = self.field.slope(start).lerp(self.field.slope(end), part);
+        let slope = slope_from.lerp(slope_to, part);
         // Where differences cancel, the edge itself knows which way is out.
         let out_along_edge = Vec3::AXES[axis] * (from - to).signum();
         self.mesh.positions.push(self.field.grid.origin + steps * self.field.grid.spacing);
