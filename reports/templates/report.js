@@ -32,7 +32,7 @@ const language = {
 };
 
 class Page {
-  constructor(session, voxels) {
+  constructor(session, voxels, begun) {
     this.session = session;
     this.voxels = voxels;
     this.palette = new Palette(session.tissues, session.verdicts);
@@ -41,7 +41,7 @@ class Page {
     this.mark = null;
     this.cuts = [0, 1, 2].map(number => new Cut(byId(`cut-${number}`), number, voxels, this.palette));
     byId('explore').hidden = false;
-    this.solid = this.inSpace();
+    this.solid = this.inSpace(begun);
     this.playing = 0;
     /** Part of the canvas's pixels along each side while things move. */
     this.share = 0.22;
@@ -50,11 +50,11 @@ class Page {
     this.setMoment(this.moment);
   }
 
-  inSpace() {
+  inSpace(begun) {
     try {
-      return new Solid(byId('solid'), this.voxels, this.palette, byId('solid-shader').textContent);
+      return new Solid(byId('solid'), this.voxels, this.palette, begun);
     } catch (reason) {
-      document.querySelector('.solid').hidden = true;
+      document.querySelector('.stage').hidden = true;
       byId('told').textContent = `${this.say('script.no_solid')} (${reason.message})`;
       return null;
     }
@@ -360,7 +360,8 @@ class Page {
     canvas.addEventListener('webglcontextlost', event => event.preventDefault());
     canvas.addEventListener('webglcontextrestored', () => {
       const old = this.solid;
-      this.solid = Object.assign(new Solid(canvas, this.voxels, this.palette, byId('solid-shader').textContent), { eye: old.eye, clips: old.clips });
+      const begun = Solid.begin(canvas, byId('solid-shader').textContent);
+      this.solid = Object.assign(new Solid(canvas, this.voxels, this.palette, begun), { eye: old.eye, clips: old.clips });
       this.drawSoon();
     });
   }
@@ -413,7 +414,8 @@ class Page {
     return;
   }
   const session = JSON.parse(byId('session').textContent);
+  const begun = Solid.begin(byId('solid'), byId('solid-shader').textContent);
   const voxels = new Voxels(session.voxels, await unpacked(packed.textContent));
   packed.remove();
-  new Page(session, voxels);
+  new Page(session, voxels, begun);
 })();

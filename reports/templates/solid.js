@@ -57,17 +57,33 @@ class Eye {
 }
 
 class Solid {
-  /** Throws where the browser has no WebGL 2 or not the memory. */
-  constructor(canvas, voxels, palette, shader) {
-    this.canvas = canvas;
-    this.voxels = voxels;
+  /** Asks for the adapter and begins to translate the shader, which takes a while and needs no voxels yet. */
+  static begin(canvas, shader) {
     const gl = canvas.getContext('webgl2', { antialias: false, preserveDrawingBuffer: true, premultipliedAlpha: true });
-    if (!gl) throw new Error('no WebGL 2');
-    this.gl = gl;
+    if (!gl) return null;
+    const program = gl.createProgram();
+    for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, shader]]) {
+      const part = gl.createShader(kind);
+      gl.shaderSource(part, text.trim());
+      gl.compileShader(part);
+      gl.attachShader(program, part);
+    }
+    gl.linkProgram(program);
+    return { gl, program };
+  }
+
+  /** Throws where the browser has no WebGL 2 or not the memory; `begun` is what [begin] gave. */
+  constructor(canvas, voxels, palette, begun) {
+    if (!begun) throw new Error('no WebGL 2');
+    const { gl, program } = begun;
+    Object.assign(this, { canvas, voxels, gl, program });
     const most = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
     if (voxels.dims.some(n => n > most)) throw new Error('a volume too large for this adapter');
-    this.program = this.link(VERTEX, shader);
-    gl.useProgram(this.program);
+    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
+      const logs = gl.getAttachedShaders(program).map(part => gl.getShaderInfoLog(part));
+      throw new Error(`the tooth's shader: ${gl.getProgramInfoLog(program)} ${logs.join(' ')}`);
+    }
+    gl.useProgram(program);
     gl.bindVertexArray(gl.createVertexArray());
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.textures(palette);
@@ -77,22 +93,6 @@ class Solid {
     this.asked = null;
     this.byVerdict = true;
     this.patterns = true;
-  }
-
-  link(vertex, fragment) {
-    const gl = this.gl, program = gl.createProgram();
-    for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, text.trim());
-      gl.compileShader(shader);
-      gl.attachShader(program, shader);
-    }
-    gl.linkProgram(program);
-    if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
-      const logs = gl.getAttachedShaders(program).map(s => gl.getShaderInfoLog(s));
-      throw new Error(`the tooth's shader: ${gl.getProgramInfoLog(program)} ${logs.join(' ')}`);
-    }
-    return program;
   }
 
   textures(palette) {

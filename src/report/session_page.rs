@@ -152,6 +152,8 @@ struct StageLine {
     guided: bool,
     /// For how long another person's hand did.
     led: Option<String>,
+    /// What the trainee changed of how tissues feel, where anything was.
+    adjusted: Option<String>,
     asked: bool,
     answers: Vec<AnswerLine>,
 }
@@ -444,6 +446,7 @@ impl Speaker<'_> {
             },
             guided: result.guided,
             led: result.led_s.map(words::duration),
+            adjusted: (!result.adjusted.is_empty()).then(|| result.adjusted.join(", ")),
             asked: !stage.ask.is_empty(),
             answers: result.answers.iter().map(|a| self.answer(a, result.started_s)).collect(),
         };
