@@ -3,9 +3,9 @@
 //! While a session runs its recording grows in a folder named `….partial`; when everything is there the folder gets its
 //! name. Everything but the recording follows from the recording: [`verify`] makes it anew and compares.
 
-use super::html::{self, Templates};
+use super::html::Templates;
 use super::session_file::SessionFile;
-use super::{glb, labelmap, pictures};
+use super::{glb, labelmap, pictures, session_page};
 use crate::record::{self, Recording, Watch};
 use crate::scenario::hex;
 use crate::score::{self, Scored};
@@ -119,8 +119,8 @@ fn derive(
     let mut session = SessionFile::of(recording, scored);
     session.digests = files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect();
     session.digests.insert(record::FILE_NAME.to_string(), sha256(bytes));
-    session.template_sha256 = sha256(templates.report.as_bytes());
-    let page = html::session_page(templates, recording, scored, &session, &views)?;
+    session.template_sha256 = sha256(templates.of_session().as_bytes());
+    let page = session_page::render(templates, recording, scored, &session, &views)?;
     session.digests.insert(REPORT_FILE.to_string(), sha256(page.as_bytes()));
     files.insert(REPORT_FILE.to_string(), page.into_bytes());
     files.insert(SESSION_FILE.to_string(), session.text().into_bytes());
@@ -175,7 +175,7 @@ pub fn verify(bundle: &Path, templates: &Templates) -> Result<Judgement, String>
         unjudged.push(format!("its pages and pictures, which typodont {made_by} made; this is {this}"));
     } else if complaints.is_empty() {
         let anew = derive(&recording, &bytes, &scored, templates)?;
-        let is_our_page = session.template_sha256 == sha256(templates.report.as_bytes());
+        let is_our_page = session.template_sha256 == sha256(templates.of_session().as_bytes());
         complaints.extend(compare_derived(bundle, &session, &anew, &written, is_our_page));
         if !is_our_page {
             unjudged.push(format!("{REPORT_FILE}: made from another template than the one here"));

@@ -48,9 +48,9 @@ pub fn removal_times(grid: &Grid, falls: &Falls) -> Result<Vec<u8>, String> {
     let dims = std::array::from_fn(|a| high[a] - low[a] + 1);
     let part = Grid { dims, spacing: grid.spacing, origin: grid.centre(low) };
     let mut seconds = vec![f32::NAN; part.len()];
-    for (voxel, tick) in falls.iter() {
+    for (voxel, fall) in falls.iter() {
         let cell = grid.cell(voxel);
-        seconds[part.index(std::array::from_fn(|a| cell[a] - low[a]))] = tick.seconds() as f32;
+        seconds[part.index(std::array::from_fn(|a| cell[a] - low[a]))] = fall.at.seconds() as f32;
     }
     let geometry = Geometry::of(&part, Space::LeftPosteriorSuperior);
     let keys = vec![

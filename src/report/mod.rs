@@ -6,13 +6,15 @@ pub mod bundle;
 pub mod cohort;
 pub mod csv;
 mod curves;
+mod feedback;
 mod glb;
-// The cohort's page is made in `cohort::page`; what `html` still has for it is nobody's.
-#[allow(dead_code)]
 mod html;
 mod labelmap;
+mod language;
 mod pictures;
 mod session_file;
+mod session_page;
+mod voxels;
 mod words;
 
 pub use html::Templates;
@@ -23,3 +25,12 @@ pub use session_file::{
     StageFile,
 };
 pub use words::{harmless, measure as measure_in_words};
+
+/// The recording of the committed example with its score, for tests that need a whole session.
+#[cfg(test)]
+fn example() -> (crate::record::Recording, crate::score::Scored) {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/example/recording.mcap");
+    let recording = crate::record::Recording::read(&path).unwrap();
+    let scored = crate::score::score(&recording, crate::record::Watch::Nothing).unwrap();
+    (recording, scored)
+}

@@ -55,7 +55,7 @@ pub struct SessionFile {
     pub questionnaire: Option<QuestionnaireFile>,
     #[serde(default)]
     pub servo: ServoFile,
-    /// SHA-256 of the template that the page was made from.
+    /// SHA-256 of the templates that the page was made from.
     #[serde(default)]
     pub template_sha256: String,
     /// SHA-256 of the bundle's other files, by name.

@@ -7,6 +7,7 @@ mod bits;
 mod crop;
 mod falls;
 mod grade;
+mod lapses;
 mod measures;
 mod process;
 mod shape;
@@ -14,8 +15,9 @@ mod verdict;
 mod zones;
 
 pub(crate) use crop::Crop;
-pub use falls::Falls;
+pub use falls::{Fall, Falls};
 pub use grade::{Grade, HardFailResult, ItemResult};
+pub use lapses::{Lapse, Mistake, Way, lapses};
 pub use measures::{Evidence, Measure, Measures};
 pub use process::{Sample, Trace};
 pub use verdict::Verdict;

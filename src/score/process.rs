@@ -1,6 +1,6 @@
 //! How the work was done: force, speed and way, tick by tick.
 
-use super::falls::Falls;
+use super::falls::{Fall, Falls};
 use super::shape::Danger;
 use crate::content::Role;
 use crate::frame::{Pose, Vec3};
@@ -108,7 +108,7 @@ pub struct Watcher {
     /// Places of the tip in contact, every [`SPAN`] ticks, by unbroken spell of contact.
     spells: Vec<Vec<Vec3>>,
     /// Voxels that became air, in the order of time.
-    fallen: Vec<(u32, Tick)>,
+    fallen: Vec<(u32, Fall)>,
 }
 
 impl Watcher {
@@ -149,7 +149,11 @@ impl Watcher {
         let tick = haptic.tick;
         let place = self.tooth_from_world * step.tip;
         self.seen.ticks = tick.0 + 1;
-        self.fallen.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, tick)));
+        // How the exercise or an instructor leads the hand is not how hard the trainee presses.
+        let led = step.guidance + step.lead;
+        let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
+        let fall = Fall { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
+        self.fallen.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, fall)));
         self.seen.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
         self.was_touched |= step.touch.is_some();
@@ -159,9 +163,6 @@ impl Watcher {
             self.seen.led_ticks[stage] += 1;
         }
         if let Some(touch) = &step.touch {
-            // How the exercise or an instructor leads the hand is not how hard the trainee presses.
-            let led = step.guidance + step.lead;
-            let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
             let force = f64::from(pressed.length());
             self.seen.contact_ticks += 1;
             self.seen.force.add(force, tick, place);

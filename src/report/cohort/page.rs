@@ -8,8 +8,6 @@ use crate::report::html::Templates;
 use crate::report::session_file::SessionFile;
 use crate::report::{pictures, words};
 use base64::Engine;
-use minijinja::value::{Serde, Value};
-use minijinja::{AutoEscape, Environment};
 use serde::Serialize;
 
 /// Letters of a code, title or path shown: what is longer was not written to be read.
@@ -42,12 +40,7 @@ pub fn html(templates: &Templates, cohort: &Cohort, links: &[String]) -> Result<
         bands: bands(),
         summary: &summary,
     };
-    let mut environment = Environment::new();
-    environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    let rendered = environment
-        .add_template("page", &templates.cohort)
-        .and_then(|()| environment.get_template("page")?.render(Value::from(Serde(&page))));
-    rendered.map_err(|e| format!("template cohort.html — {e}"))
+    templates.render_cohort(&page)
 }
 
 /// What the template can use. What is named `svg` is a drawing; everything else is text, and is escaped.

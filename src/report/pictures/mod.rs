@@ -203,7 +203,7 @@ fn encoded(drawn: Vec<Drawn>) -> Vec<Picture> {
 
 fn png(pixels: &Pixels) -> Vec<u8> {
     let mut bytes = Vec::new();
-    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
     encoder
         .write_image(&pixels.rgb8(), pixels.width, pixels.height, ExtendedColorType::Rgb8)
         .expect("memory takes every byte, and the size fits");

@@ -1,0 +1,421 @@
+// The page: joins time, tooth, sections, curves and words.
+
+/** How many times finer along each side the tooth is drawn when it rests; all pixels, where the adapter is quick. */
+const FINER = 3;
+
+const byId = id => document.getElementById(id);
+
+/** A duration as the page writes it: 9.5 s, 1:10.3. */
+function duration(seconds) {
+  const tenths = Math.round(Math.max(seconds, 0) * 10);
+  if (tenths < 600) return `${Math.floor(tenths / 10)}.${tenths % 10} s`;
+  return `${Math.floor(tenths / 600)}:${String(Math.floor(tenths / 10) % 60).padStart(2, '0')}.${tenths % 10}`;
+}
+
+/** Languages are chosen by a button, by the address (#tr) or by the browser; all of them are in the page. */
+const language = {
+  codes: [...document.querySelectorAll('[data-language]')].map(b => b.dataset.language),
+  get now() { return document.documentElement.lang; },
+  choose(code) {
+    document.documentElement.lang = code;
+    for (const button of document.querySelectorAll('[data-language]')) button.setAttribute('aria-pressed', button.dataset.language === code);
+    document.dispatchEvent(new Event('language'));
+  },
+  begin() {
+    const wanted = [location.hash.slice(1), ...(navigator.languages || [])].map(code => code.toLowerCase());
+    const fits = code => this.codes.find(own => own.toLowerCase() === code) || this.codes.find(own => own.toLowerCase() === code.split('-')[0]);
+    const found = wanted.map(fits).find(Boolean) || this.codes[0];
+    if (this.codes.length > 1) document.querySelector('.languages').hidden = false;
+    for (const button of document.querySelectorAll('[data-language]')) button.onclick = () => this.choose(button.dataset.language);
+    if (found) this.choose(found);
+  },
+};
+
+class Page {
+  constructor(session, voxels, begun) {
+    this.session = session;
+    this.voxels = voxels;
+    this.palette = new Palette(session.tissues, session.verdicts);
+    this.moment = session.seconds;
+    this.asked = null;
+    this.mark = null;
+    this.cuts = [0, 1, 2].map(number => new Cut(byId(`cut-${number}`), number, voxels, this.palette));
+    byId('explore').hidden = false;
+    this.solid = this.inSpace(begun);
+    this.playing = 0;
+    /** Part of the canvas's pixels along each side while things move. */
+    this.share = 0.22;
+    this.wire();
+    this.look('work');
+    this.setMoment(this.moment);
+  }
+
+  inSpace(begun) {
+    try {
+      return new Solid(byId('solid'), this.voxels, this.palette, begun);
+    } catch (reason) {
+      document.querySelector('.stage').hidden = true;
+      byId('told').textContent = `${this.say('script.no_solid')} (${reason.message})`;
+      return null;
+    }
+  }
+
+  say(key, values = {}) {
+    const words = this.session.words[language.now] || this.session.words.en;
+    return (words[key] || key).replace(/\{(\w+)\}/g, (whole, name) => (name in values ? values[name] : whole));
+  }
+
+  named(thing) {
+    return thing ? thing.title[language.now] || thing.title.en : '–';
+  }
+
+  // Time.
+
+  setMoment(seconds) {
+    this.moment = Math.min(Math.max(seconds, 0), this.session.seconds);
+    this.voxels.standAt(this.moment);
+    if (this.solid) this.solid.refresh();
+    const slider = byId('moment');
+    slider.value = this.moment;
+    slider.setAttribute('aria-valuetext', duration(this.moment));
+    byId('moment-text').textContent = `${duration(this.moment)} / ${duration(this.session.seconds)}`;
+    const now = byId('now');
+    if (now) {
+      const x = this.left + (this.right - this.left) * this.moment / Math.max(this.session.seconds, 1e-9);
+      now.setAttribute('x1', x);
+      now.setAttribute('x2', x);
+    }
+    this.drawSoon();
+  }
+
+  /** Plays from here to the end, or all of it, within twenty seconds or at the session's own pace. */
+  play() {
+    const isPlaying = this.playing !== 0;
+    cancelAnimationFrame(this.playing);
+    this.playing = 0;
+    if (!isPlaying) {
+      if (this.moment >= this.session.seconds) this.setMoment(0);
+      let before = performance.now();
+      const pace = Math.max(1, this.session.seconds / 20);
+      const turn = now => {
+        this.setMoment(this.moment + pace * (now - before) / 1000);
+        before = now;
+        this.playing = this.moment < this.session.seconds ? requestAnimationFrame(turn) : 0;
+        this.showPlaying();
+      };
+      this.playing = requestAnimationFrame(turn);
+    }
+    this.showPlaying();
+  }
+
+  showPlaying() {
+    byId('play-sign').textContent = this.playing ? '❚❚' : '▶';
+  }
+
+  // Places.
+
+  /** Says of a voxel what it was and what became of it. */
+  ask(cell) {
+    this.asked = cell;
+    for (const cut of this.cuts) cut.show(cell);
+    this.showCuts();
+    this.tell();
+    this.drawSoon();
+  }
+
+  tell() {
+    const told = byId('told');
+    if (!this.asked) return;
+    const cell = this.asked, { voxels, palette } = this;
+    const tissue = voxels.tissue(cell), verdict = voxels.verdict[voxels.index(cell)], fall = voxels.fallOf(cell);
+    const way = (axis, high, low) => {
+      const mm = voxels.pointOf(cell)[axis];
+      return this.say(`script.${mm >= 0 ? high : low}`, { mm: Math.abs(mm).toFixed(1) });
+    };
+    const values = {
+      tissue: this.named(palette.tissues.get(tissue)), verdict: this.named(palette.verdicts.get(verdict)),
+      voxel: voxels.inBundle(cell).join(', '),
+      x: way(0, 'buccal', 'lingual'), y: way(1, 'distal', 'mesial'), z: way(2, 'up', 'down'),
+    };
+    if (fall) Object.assign(values, { time: duration(fall.tick / 1000), seconds: (fall.tick / 1000).toFixed(3), force: fall.force.toFixed(2), tool: this.session.tools[fall.tool] || '–' });
+    const parts = [tissue === 0 ? this.say('script.air') : this.say(fall ? 'script.fell' : 'script.kept', values)];
+    if (fall && fall.tick > voxels.moment) parts.push(this.say('script.falls_later'));
+    if (this.mark !== null) parts.unshift(this.say('script.mark', { number: this.mark }));
+    told.textContent = `${parts.join(' ')} ${this.say('script.place', values)}`;
+    // The same for whoever reads the page by program.
+    Object.assign(told.dataset, { voxel: voxels.inBundle(cell).join(' '), tissue, verdict, seconds: fall ? fall.tick / 1000 : '' });
+  }
+
+  /** Shows a place of tooth space, mm, as it was at a moment. */
+  visit(place, seconds, mark) {
+    this.mark = mark;
+    this.setMoment(seconds ?? this.session.seconds);
+    const cell = this.matterNear(this.voxels.cellOf(place));
+    if (this.solid) {
+      const { eye } = this.solid, box = this.voxels;
+      const middle = box.pointOf(box.low.map((v, axis) => v + 0.5 * box.size[axis]));
+      const outward = place.map((v, axis) => v - middle[axis]);
+      // From above, and leaning toward the wall across the cavity, so that the place is seen.
+      eye.lookFrom(unit([-0.45 * Math.sign(outward[0]) * Math.min(Math.abs(outward[0]), 1), -0.45 * Math.sign(outward[1]) * Math.min(Math.abs(outward[1]), 1), 1]));
+      eye.middle = place.slice();
+      eye.half = 3.5;
+      this.solid.clips.fill(null);
+      for (const box of document.querySelectorAll('.clip')) box.checked = false;
+    }
+    if (cell) this.ask(cell);
+    const view = byId('explore'), { top, bottom } = byId('solid').getBoundingClientRect();
+    if (top < 0 || bottom > window.innerHeight) view.scrollIntoView({ block: 'start' });
+  }
+
+  /** The nearest voxel of the tooth around a place. */
+  matterNear(at) {
+    const { voxels } = this;
+    let best = null, least = Infinity;
+    const middle = at.map(Math.round), reach = 4;
+    for (let k = -reach; k <= reach; k++) for (let j = -reach; j <= reach; j++) for (let i = -reach; i <= reach; i++) {
+      const cell = [middle[0] + i, middle[1] + j, middle[2] + k];
+      const far = Math.hypot(...cell.map((v, axis) => v - at[axis]));
+      if (far < least && voxels.holds(cell) && voxels.tissue(cell) !== 0) [best, least] = [cell, far];
+    }
+    return best;
+  }
+
+  look(side) {
+    const { solid, voxels } = this;
+    if (!solid) return;
+    if (side === 'work') {
+      solid.eye.lookFrom([0.25, -0.35, 1]);
+      solid.eye.middle = voxels.pointOf(voxels.low.map((v, axis) => v + 0.5 * (voxels.size[axis] - 1)));
+      solid.eye.half = 0.75 * Math.max(...voxels.size.map((n, axis) => n * voxels.spacing[axis]), 2);
+    } else {
+      [solid.eye.right, solid.eye.up] = SIDES[side];
+      solid.eye.middle = voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1)));
+      const size = voxels.dims.map((n, axis) => n * voxels.spacing[axis]);
+      solid.eye.half = 0.52 * Math.max(...[solid.eye.right, solid.eye.up].map(way => Math.abs(dot(way, size))));
+    }
+    this.drawSoon(false);
+  }
+
+  // Drawing: coarse while something moves, fine when it rests.
+
+  /** Draws the tooth in the next frame, and the sections where what they show has changed. */
+  drawSoon(areCutsOld = true) {
+    this.areCutsOld ||= areCutsOld;
+    delete document.documentElement.dataset.drawn;
+    this.isDirty = true;
+    if (this.awaited) return;
+    this.awaited = requestAnimationFrame(() => {
+      this.awaited = 0;
+      this.isDirty = false;
+      this.draw(this.share);
+      document.documentElement.dataset.shown = this.moment.toFixed(3);
+      clearTimeout(this.fine);
+      this.fine = setTimeout(() => this.drawFine(), 150);
+    });
+  }
+
+  drawFine() {
+    if (this.isDirty) return;
+    this.drawSolid(Math.min(1, FINER * this.share));
+    document.documentElement.dataset.drawn = this.moment.toFixed(3);
+  }
+
+  draw(share) {
+    this.drawSolid(share);
+    if (!this.areCutsOld) return;
+    this.areCutsOld = false;
+    for (const cut of this.cuts) cut.draw(this.asked, this.cuts.filter(other => other !== cut));
+  }
+
+  drawSolid(share) {
+    if (!this.solid) return;
+    const began = performance.now();
+    this.solid.asked = this.asked;
+    this.solid.draw(share);
+    if (share > this.share) return;
+    // A slow adapter gets fewer pixels while things move: the next frame comes when this one is done.
+    requestAnimationFrame(() => {
+      const took = performance.now() - began;
+      this.share = Math.min(Math.max(share * Math.sqrt(50 / Math.max(took, 1)), 0.2), 0.7);
+    });
+  }
+
+  showCuts() {
+    this.cuts.forEach((cut, number) => {
+      const slider = document.querySelector(`[data-cut="${number}"]`);
+      slider.value = cut.at;
+      slider.setAttribute('aria-valuetext', `${this.voxels.pointOf(cut.middle)[cut.axis].toFixed(1)} mm`);
+      if (this.solid && this.solid.clips[cut.axis] !== null) this.solid.clips[cut.axis] = cut.at;
+    });
+  }
+
+  // Hands.
+
+  wire() {
+    const slider = byId('moment');
+    slider.max = this.session.seconds;
+    slider.oninput = () => this.setMoment(Number(slider.value));
+    byId('play').onclick = () => this.play();
+    this.wireCuts();
+    if (this.solid) this.wireSolid();
+    this.wireCurves();
+    for (const button of document.querySelectorAll('[data-side]')) button.onclick = () => this.look(button.dataset.side);
+    for (const choice of document.querySelectorAll('[name="colours"]')) {
+      choice.onchange = () => this.colourBy(view => { view.byVerdict = choice.value === 'verdict'; });
+    }
+    byId('patterns').onchange = event => this.colourBy(view => { view.patterns = event.target.checked; });
+    for (const button of document.querySelectorAll('.show')) {
+      button.hidden = false;
+      button.onclick = () => {
+        const { mark, at, x, y, z } = button.dataset;
+        if (mark) this.visitMark(Number(mark));
+        else this.visit([x, y, z].map(Number), at === undefined ? null : Number(at), null);
+      };
+    }
+    document.addEventListener('language', () => this.tell());
+    window.addEventListener('beforeprint', () => this.drawSolid(1));
+    window.addEventListener('resize', () => this.drawSoon(false));
+  }
+
+  visitMark(number) {
+    const moment = this.session.moments.find(m => m.number === number);
+    if (moment) this.visit(moment.place, moment.at, number);
+  }
+
+  colourBy(change) {
+    for (const view of [this.solid, ...this.cuts]) if (view) change(view);
+    this.drawSoon();
+  }
+
+  wireCuts() {
+    this.cuts.forEach((cut, number) => {
+      const slider = document.querySelector(`[data-cut="${number}"]`);
+      slider.max = this.voxels.dims[cut.axis] - 1;
+      slider.oninput = () => { cut.moveTo(Number(slider.value)); this.showCuts(); this.drawSoon(); };
+      document.querySelector(`[data-clip="${number}"]`).onchange = event => {
+        if (this.solid) this.solid.clips[cut.axis] = event.target.checked ? cut.at : null;
+        this.drawSoon();
+      };
+      cut.canvas.onclick = event => {
+        const box = cut.canvas.getBoundingClientRect();
+        const cell = cut.cellAt((event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height);
+        this.mark = null;
+        if (cell) this.ask(cell);
+      };
+      cut.canvas.onkeydown = event => {
+        const ways = { ArrowRight: [cut.right, 1], ArrowLeft: [cut.right, -1], ArrowUp: [cut.up, 1], ArrowDown: [cut.up, -1] };
+        const way = ways[event.key];
+        if (!way && event.key !== 'Enter') return;
+        event.preventDefault();
+        const from = this.asked && Math.abs(this.asked[cut.axis] - cut.at) < 1 ? this.asked : cut.middle;
+        const cell = way ? added(from, scaled(way[0], way[1] * (event.shiftKey ? 10 : 1))) : from.slice();
+        this.mark = null;
+        if (this.voxels.holds(cell)) this.ask(cell);
+      };
+    });
+    this.showCuts();
+  }
+
+  wireSolid() {
+    const { solid } = this, { canvas, eye } = solid;
+    let from = null, moved = 0;
+    canvas.onpointerdown = event => {
+      from = [event.clientX, event.clientY];
+      moved = 0;
+      canvas.setPointerCapture(event.pointerId);
+    };
+    canvas.onpointermove = event => {
+      if (!from) return;
+      const [x, y] = [event.clientX - from[0], event.clientY - from[1]];
+      moved += Math.abs(x) + Math.abs(y);
+      if (event.shiftKey) {
+        const mm = 2 * eye.half / canvas.clientHeight;
+        eye.middle = added(eye.middle, added(scaled(eye.right, -x * mm), scaled(eye.up, y * mm)));
+      } else eye.turn(x * 0.008, -y * 0.008);
+      from = [event.clientX, event.clientY];
+      this.drawSoon(false);
+    };
+    canvas.onpointerup = event => {
+      const isClick = from && moved < 5;
+      from = null;
+      if (!isClick) return;
+      const box = canvas.getBoundingClientRect();
+      this.mark = null;
+      this.askSolid(2 * (event.clientX - box.left) / box.width - 1, 1 - 2 * (event.clientY - box.top) / box.height);
+    };
+    canvas.onpointercancel = () => { from = null; };
+    const zoom = factor => { eye.half = Math.min(Math.max(eye.half * factor, 0.5), 60); this.drawSoon(false); };
+    canvas.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(0.0012 * event.deltaY)); }, { passive: false });
+    canvas.onkeydown = event => {
+      const turns = { ArrowLeft: [0.12, 0], ArrowRight: [-0.12, 0], ArrowUp: [0, -0.12], ArrowDown: [0, 0.12] };
+      if (turns[event.key]) eye.turn(...turns[event.key]);
+      else if (event.key === '+' || event.key === '=') zoom(0.85);
+      else if (event.key === '-') zoom(1 / 0.85);
+      else if (event.key === 'Home') this.look('occlusal');
+      else if (event.key === 'Enter' || event.key === ' ') { this.mark = null; this.askSolid(0, 0); } else return;
+      event.preventDefault();
+      this.drawSoon(false);
+    };
+    // An adapter that was lost comes back with nothing in it.
+    canvas.addEventListener('webglcontextlost', event => event.preventDefault());
+    canvas.addEventListener('webglcontextrestored', () => {
+      const old = this.solid;
+      const begun = Solid.begin(canvas, byId('solid-shader').textContent);
+      this.solid = Object.assign(new Solid(canvas, this.voxels, this.palette, begun), { eye: old.eye, clips: old.clips });
+      this.drawSoon();
+    });
+  }
+
+  askSolid(x, y) {
+    const cell = this.solid.voxelAt(x, y);
+    if (cell) this.ask(cell);
+  }
+
+  wireCurves() {
+    const curves = byId('curves');
+    if (!curves) return;
+    [this.left, this.right] = [Number(curves.dataset.left), Number(curves.dataset.right)];
+    const box = curves.viewBox.baseVal;
+    const now = document.createElementNS('http://www.w3.org/2000/svg', 'line');
+    now.id = 'now';
+    now.setAttribute('y1', 60);
+    now.setAttribute('y2', box.height - 28);
+    curves.append(now);
+    const markOf = target => target.closest && target.closest('.mark');
+    const toMoment = event => {
+      const place = new DOMPoint(event.clientX, event.clientY).matrixTransform(curves.getScreenCTM().inverse());
+      const share = (place.x - this.left) / (this.right - this.left);
+      if (share >= -0.02 && share <= 1.02) this.setMoment(share * this.session.seconds);
+    };
+    curves.onclick = event => {
+      const mark = markOf(event.target);
+      if (mark) this.visitMark(Number(mark.dataset.mark)); else toMoment(event);
+    };
+    curves.onpointermove = event => { if (event.buttons === 1 && !markOf(event.target)) toMoment(event); };
+    curves.onkeydown = event => {
+      const mark = markOf(event.target);
+      if (!mark || (event.key !== 'Enter' && event.key !== ' ')) return;
+      event.preventDefault();
+      this.visitMark(Number(mark.dataset.mark));
+    };
+  }
+}
+
+(async () => {
+  language.begin();
+  const packed = byId('voxels');
+  if (!packed || typeof DecompressionStream === 'undefined') {
+    if (packed) {
+      const session = JSON.parse(byId('session').textContent);
+      const note = document.createElement('p');
+      note.textContent = (session.words[language.now] || session.words.en)['script.no_voxels'];
+      byId('explore').before(note);
+    }
+    return;
+  }
+  const session = JSON.parse(byId('session').textContent);
+  const begun = Solid.begin(byId('solid'), byId('solid-shader').textContent);
+  const voxels = new Voxels(session.voxels, await unpacked(packed.textContent));
+  packed.remove();
+  new Page(session, voxels, begun);
+})();

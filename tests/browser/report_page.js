@@ -1,0 +1,165 @@
+// Opens a bundle's report.html in Chromium as a reader would: from the disk, without a network, with mouse and keyboard.
+//
+//     node report_page.js PLAYWRIGHT-CORE CHROMIUM BUNDLE [PICTURES]
+//
+// Prints what it measured as JSON. Exits with 1 and a line per claim that does not hold.
+
+const fs = require('fs');
+const path = require('path');
+const zlib = require('zlib');
+
+const [playwright, executablePath, bundle, pictures] = process.argv.slice(2);
+const { chromium } = require(playwright);
+
+const wrong = [];
+const claim = (holds, what) => { if (!holds) wrong.push(what); };
+
+/** A gzipped NRRD of the bundle: sizes, origin, spacing, and its samples. */
+function nrrd(name) {
+  const bytes = fs.readFileSync(path.join(bundle, name));
+  const end = bytes.indexOf('\n\n');
+  const header = bytes.subarray(0, end).toString('latin1');
+  const field = key => header.match(new RegExp(`^${key}: (.*)$`, 'm'))[1];
+  const raw = zlib.gunzipSync(bytes.subarray(end + 2));
+  const samples = field('type') === 'float' ? new Float32Array(raw.buffer, raw.byteOffset, raw.length / 4) : raw;
+  const numbers = text => text.match(/-?[\d.]+(e-?\d+)?/g).map(Number);
+  const directions = numbers(field('space directions'));
+  const volume = { sizes: numbers(field('sizes')), origin: numbers(field('space origin')), spacing: [0, 4, 8].map(i => directions[i]), samples };
+  volume.at = ([i, j, k]) => samples[(k * volume.sizes[1] + j) * volume.sizes[0] + i];
+  return volume;
+}
+
+const tissues = nrrd('initial.seg.nrrd'), verdicts = nrrd('performance.seg.nrrd'), times = nrrd('removal_time.nrrd');
+
+/** When a voxel of the label maps fell, by removal_time.nrrd; NaN where it did not. */
+function fell(voxel) {
+  const cell = voxel.map((v, axis) => Math.round(v + (tissues.origin[axis] - times.origin[axis]) / times.spacing[axis]));
+  return cell.every((v, axis) => v >= 0 && v < times.sizes[axis]) ? times.at(cell) : NaN;
+}
+
+(async () => {
+  const args = ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
+  const browser = await chromium.launch({ executablePath, args });
+  const context = await browser.newContext({ viewport: { width: 1280, height: 1000 }, locale: 'en-GB' });
+  const asked = [];
+  await context.route(url => url.protocol !== 'file:', route => { asked.push(route.request().url()); route.abort(); });
+  const page = await context.newPage();
+  page.on('console', message => { if (message.type() === 'error') wrong.push(`logged: ${message.text()}`); });
+  page.on('pageerror', error => wrong.push(`thrown: ${error.message}`));
+  page.on('dialog', dialog => { wrong.push(`a dialog: ${dialog.message()}`); dialog.dismiss(); });
+  page.on('request', request => { if (!request.url().startsWith('file:') && !request.url().startsWith('data:')) asked.push(request.url()); });
+
+  const file = path.resolve(bundle, 'report.html');
+  const began = Date.now();
+  await page.goto(`file://${file}`);
+  await page.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
+  const shown_ms = Date.now() - began;
+  const settled = async change => {
+    await change();
+    await page.waitForFunction(() => document.documentElement.dataset.drawn, null, { timeout: 60000 });
+  };
+  const picture = id => page.evaluate(id => document.getElementById(id).toDataURL(), id);
+  const told = () => page.evaluate(() => ({ ...document.getElementById('told').dataset, text: document.getElementById('told').textContent }));
+  const moment = () => page.evaluate(() => Number(document.getElementById('moment').value));
+  const slide = to => settled(() => page.evaluate(to => {
+    const slider = document.getElementById('moment');
+    slider.value = to * slider.max;
+    slider.dispatchEvent(new Event('input'));
+  }, to));
+  const photograph = async name => { if (pictures) await page.screenshot({ path: path.join(pictures, name) }); };
+  const bytes = fs.statSync(file).size;
+  claim(bytes < 6e6, `the page has ${bytes} bytes`);
+  await photograph('report-top.png');
+  await page.evaluate(() => document.getElementById('explore').scrollIntoView());
+
+  // The time slider changes every picture.
+  const ids = ['solid', 'cut-0', 'cut-1', 'cut-2'];
+  const seen = {};
+  for (const share of [0, 0.4, 1]) {
+    await slide(share);
+    for (const id of ids) (seen[id] ||= new Set()).add(await picture(id));
+    await photograph(`report-at-${share}.png`);
+  }
+  for (const id of ids) claim(seen[id].size === 3, `${id} shows ${seen[id].size} pictures at three moments`);
+
+  // A mark on the curves moves the time, the eye and what is told; by mouse and by keyboard.
+  const moments = await page.evaluate(() => JSON.parse(document.getElementById('session').textContent).moments);
+  const timed = moments.filter(m => m.at !== null);
+  claim(timed.length > 0, 'no moment is marked on the curves');
+  for (const { number, at } of timed) {
+    const before = await picture('solid');
+    const mark = page.locator(`#curves [data-mark="${number}"]`);
+    if (number % 2) await settled(() => mark.locator('circle').click());
+    else await settled(async () => { await mark.focus(); await page.keyboard.press('Enter'); });
+    claim(Math.abs(await moment() - at) < 0.011, `mark ${number} moves the time to ${await moment()} s, not ${at} s`);
+    claim(await picture('solid') !== before, `mark ${number} does not move the eye`);
+    claim((await told()).text.includes(`Moment ${number}.`), `mark ${number} tells: ${(await told()).text}`);
+    if (number === 1) await photograph('report-mark.png');
+  }
+
+  // A voxel that is clicked says what the bundle's label maps say.
+  await slide(1);
+  await page.locator('[data-side="work"]').click();
+  let clicked = 0, fallen = 0;
+  for (const id of ids) {
+    const box = await page.locator(`#${id}`).boundingBox();
+    for (const [x, y] of [[0.5, 0.5], [0.42, 0.45], [0.55, 0.6], [0.3, 0.5], [0.62, 0.38], [0.5, 0.7]]) {
+      const before = await told();
+      await page.locator(`#${id}`).click({ position: { x: x * box.width, y: y * box.height } });
+      const { voxel, tissue, verdict, seconds, text } = await told();
+      if (text === before.text) continue;
+      clicked++;
+      const cell = voxel.split(' ').map(Number), time = fell(cell);
+      claim(Number(tissue) === tissues.at(cell), `voxel ${voxel}: tissue ${tissue}, the label map has ${tissues.at(cell)}`);
+      claim(Number(verdict) === verdicts.at(cell), `voxel ${voxel}: verdict ${verdict}, the map has ${verdicts.at(cell)}`);
+      if (Number.isNaN(time)) claim(seconds === '', `voxel ${voxel}: fell at ${seconds}, the map says never`);
+      else {
+        fallen++;
+        claim(Math.abs(Number(seconds) - time) < 5e-4, `voxel ${voxel}: fell at ${seconds}, the map says ${time}`);
+        claim(text.includes(`(${time.toFixed(3)} s)`), `voxel ${voxel}: told is ${text}`);
+      }
+    }
+  }
+  claim(clicked >= 10 && fallen >= 3, `${clicked} voxels were told, ${fallen} of them fallen`);
+
+  // All of it by keyboard: the tooth turns, the time moves.
+  const before = await picture('solid');
+  await settled(async () => { await page.locator('#solid').focus(); await page.keyboard.press('ArrowLeft'); await page.keyboard.press('+'); });
+  claim(await picture('solid') !== before, 'arrow keys do not turn the tooth');
+  await page.locator('#moment').focus();
+  await settled(() => page.keyboard.press('Home'));
+  claim(await moment() === 0, 'Home does not lead to the beginning');
+  await settled(() => page.keyboard.press('End'));
+  for (const number of [0, 1]) await page.locator(`[data-clip="${number}"]`).check();
+  await settled(() => page.locator('[data-side="work"]').click());
+  await photograph('report-clipped.png');
+
+  // Whoever cannot see it is told names; nothing is a bare button.
+  const unnamed = await page.evaluate(() => [...document.querySelectorAll('button, input, canvas, [role=button]')].filter(element => {
+    if (element.closest('[hidden]')) return false;
+    const by = (element.getAttribute('aria-labelledby') || '').split(' ').map(id => document.getElementById(id)?.textContent || '').join('');
+    const labels = [...(element.labels || [])].map(label => label.textContent).join('');
+    return !(by + labels + (element.getAttribute('aria-label') || '') + element.textContent).trim();
+  }).map(element => element.outerHTML));
+  claim(unnamed.length === 0, `without a name: ${unnamed.join(' ')}`);
+
+  // The other language: nothing of the first is left to be seen but what an author wrote.
+  const text = () => page.evaluate(() => document.querySelector('main').innerText);
+  const english = await text();
+  await page.locator('[data-language="tr"]').click();
+  const turkish = await text();
+  const isLeft = await page.evaluate(() => [...document.querySelectorAll('span[lang="en"]')].some(span => span.offsetParent !== null));
+  claim(!isLeft && english !== turkish && turkish.includes('Puanlar nasıl verildi'), 'the page does not change its language');
+  await page.evaluate(() => window.scrollTo(0, 0));
+  await photograph('report-turkish.png');
+
+  // A narrow window has nothing beside it; a print holds the pictures.
+  await page.setViewportSize({ width: 400, height: 800 });
+  const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  claim(beyond <= 0, `${beyond} pixels stand out of a window of 400`);
+  claim(asked.length === 0, `asked of a network: ${asked.join(' ')}`);
+  await browser.close();
+  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, clicked, fallen }));
+  for (const line of wrong) console.error(line);
+  process.exit(wrong.length ? 1 : 0);
+})().catch(error => { console.error(error); process.exit(1); });
