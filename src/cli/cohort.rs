@@ -20,7 +20,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Participants whom the others are compared with
-    #[arg(long, value_name = "CODE", value_delimiter = ',')]
+    #[arg(long, value_name = "CODE[,CODE]", value_delimiter = ',')]
     expert: Vec<String>,
     /// Examiners' judgements, for pass marks: a CSV with the columns participant, rating (1 to 5) and, if it matters, scenario
     #[arg(long, value_name = "FILE.csv")]

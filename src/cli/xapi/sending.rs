@@ -15,9 +15,10 @@ pub struct Arguments {
     /// Address of the store's xAPI
     #[arg(long, value_name = "URL")]
     endpoint: String,
-    /// Name under which the store knows this station; its secret stands in --secret-file or in TYPODONT_LRS_SECRET
+    /// Name under which the store knows this station
     #[arg(long, value_name = "NAME")]
     key: String,
+    /// A file with the secret; without it the secret is taken from TYPODONT_LRS_SECRET
     #[arg(long, value_name = "FILE")]
     secret_file: Option<PathBuf>,
     /// Certificates to trust in place of the usual, for a school's own
