@@ -128,7 +128,11 @@ class Voxels {
   /** Where the cut has come so far no ramp of density was ever stored: there the steps are rounded. */
   smoothFront(tick) {
     const GONE = 1, TO_FALL = 2;
-    const state = this.fell.map(at => (at === NEVER ? 0 : at <= tick ? GONE : TO_FALL));
+    const state = new Uint8Array(this.fell.length);
+    for (let own = 0; own < state.length; own++) {
+      const at = this.fell[own];
+      state[own] = at === NEVER ? 0 : at <= tick ? GONE : TO_FALL;
+    }
     const [nx, ny] = this.size;
     let near = state;
     for (const stride of [1, nx, nx * ny]) {
