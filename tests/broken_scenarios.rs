@@ -242,6 +242,8 @@ fn names_that_lead_nowhere() {
     check_text("question about no decay", &text, &[("unknown-decay", "/stages/0/ask/0/answer/tooth_with")]);
     let text = edited("3-detection.json", "/stages/0/stiffness_steps/tissue", Some(json!("decay")));
     check_text("steps of no tissue", &text, &[("unknown-tissue", "/stages/0/stiffness_steps/tissue")]);
+    let text = edited("3-detection.json", "/stages/0/adjustable", Some(json!(true)));
+    check_text("what is tested is left to the trainee", &text, &[("adjustable-steps", "/stages/0/adjustable")]);
     let choice = json!([{ "id": "q", "text": "?", "answer": { "choice": { "options": [{ "id": "a", "text": "A" }, { "id": "b", "text": "B" }], "correct": "c" } } }]);
     check(
         "right answer not offered",

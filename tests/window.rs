@@ -2,6 +2,7 @@
 //!
 //! The program writes what is on its screen into a diary (`TYPODONT_DIARY`), so that these tests wait for states and never
 //! for times. Where there is no Xvfb or xdotool they say SKIPPED.
+#![cfg(all(unix, not(target_os = "macos")))]
 
 mod bundle;
 mod folder;
@@ -389,7 +390,7 @@ fn what_the_window_does_is_heard_at_a_real_server() {
     let mut desk = Desk::sit_down_with(display, &place, &begun, &[("PULSE_SERVER", socket)]);
     desk.until("hand", |_| true);
     desk.press("o", "pointer", "held");
-    let lesion = lesion_in_world("5-grinding", 1);
+    let lesion = lesion_in_world("scenarios/5-grinding.json", 1);
     desk.reach(lesion + Vec3::Y * 6.0);
     let mut recorder = Recorder::start(&ears);
     let heard = |recorder: &mut Recorder| Spectrum::of(&recorder.take(0.3));

@@ -73,5 +73,4 @@ pub fn waiting(ui: &mut egui::Ui) {
     const STEP: Duration = Duration::from_millis(333);
     let steps = (ui.input(|input| input.time) / STEP.as_secs_f64()) as usize;
     ui.label(".".repeat(1 + steps % 3));
-    ui.ctx().request_repaint_after(STEP);
 }

@@ -7,7 +7,7 @@ use super::sitting::{Sitting, Way};
 use super::transfer::transfer_ui;
 use super::views::View;
 use crate::content::TissueEntry;
-use crate::touch::Coefficient;
+use crate::touch::{Coefficient, CuttingLaw};
 use crate::volume::Label;
 use eframe::egui;
 
@@ -83,14 +83,18 @@ fn tray_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<
 
 /// The coefficients by which each tissue feels as it does; to be changed where the stage allows it.
 fn materials_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<Command>) {
-    let is_adjustable = sitting.stage().is_some_and(|stage| stage.is_adjustable);
+    let is_adjustable = sitting.stage().is_some_and(|stage| stage.is_adjustable) && sitting.standstill.is_none();
+    // By the rate law a tissue's hardness decides, not the force from which it is cut.
+    let is_by_force = matches!(sitting.scenario.carving.law, CuttingLaw::Threshold);
     let coefficients = egui::CollapsingHeader::new(words.of("menu.coefficients"));
     coefficients.show(ui, |ui| {
         for entry in sitting.scenario.tissues.entries() {
             ui.label(egui::RichText::new(&entry.title).size(14.0).strong());
-            let now = sitting.felt.get(entry.label());
+            // What a stage does to a stiffness in steps is what it tests: only the exercise's own number is told.
+            let shown = if is_adjustable { *sitting.felt.get(entry.label()) } else { entry.material() };
             for which in Coefficient::ALL {
-                coefficient_ui(ui, (entry, which), now.coefficient(which), is_adjustable, words, asked);
+                let is_free = is_adjustable && (is_by_force || which != Coefficient::CutForce);
+                coefficient_ui(ui, (entry, which), shown.coefficient(which), is_free, words, asked);
             }
         }
         if is_adjustable && ui.button(words.of("menu.as_written")).clicked() {
@@ -118,10 +122,18 @@ fn coefficient_ui(
     };
     let name = ui.small(name);
     ui.spacing_mut().slider_width = SLIDER;
-    let mut chosen = value;
+    // While it is dragged the value is the slider's own: the hand is given, and the recording keeps, where it is let go.
+    let place = ui.scope_id().with((tissue.id, key_of(which)));
+    let dragged: Option<f32> = ui.data(|data| data.get_temp(place));
+    let mut chosen = dragged.unwrap_or(value);
     let slider = ui.add(slider_of(which, &mut chosen)).labelled_by(name.id);
-    if slider.changed() && chosen != value {
-        asked.push(Command::Adjust(tissue.label(), which, chosen));
+    if slider.dragged() {
+        ui.data_mut(|data| data.insert_temp(place, chosen));
+    } else {
+        ui.data_mut(|data| data.remove_temp::<f32>(place));
+        if (slider.changed() || dragged.is_some()) && chosen != value {
+            asked.push(Command::Adjust(tissue.label(), which, chosen));
+        }
     }
 }
 
@@ -153,7 +165,9 @@ fn slider_of(which: Coefficient, value: &mut f32) -> egui::Slider<'_> {
     let (least, most) = which.range();
     // Forces are chosen between a hundredth of a newton and fifty: by their size, not by their place.
     let is_force = which == Coefficient::CutForce;
-    egui::Slider::new(value, least..=most).logarithmic(is_force).max_decimals(2).suffix(unit_of(which))
+    let slider = egui::Slider::new(value, least..=most).logarithmic(is_force).max_decimals(2).suffix(unit_of(which));
+    // A table's own number may be finer than what is shown; and half a typed number is none.
+    slider.clamping(egui::SliderClamping::Edits).update_while_editing(false)
 }
 
 /// Pictures a second, and how late the servo's ticks come.

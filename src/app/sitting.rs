@@ -318,6 +318,7 @@ impl Sitting {
                 self.drafts.clear();
                 self.said.clear();
                 self.refused = None;
+                self.felt = self.scenario.tissues.materials();
                 self.repaint_tissues();
                 if !Way::offered(self.stage()).any(|(way, _)| way == self.shown) {
                     self.shown = Way::Surface;
@@ -400,10 +401,13 @@ impl Sitting {
         self.tell(Said::Input(input));
     }
 
-    fn tell(&mut self, said: Said) {
-        if !self.chair.say(said) {
+    /// False, and said so, when the lesson does not hear it.
+    fn tell(&mut self, said: Said) -> bool {
+        let is_heard = self.chair.say(said);
+        if !is_heard {
             self.refused = Some(told::NOT_LISTENING);
         }
+        is_heard
     }
 
     /// Answers a question of the running stage.
@@ -416,9 +420,10 @@ impl Sitting {
     /// Gives a coefficient another value, where the stage allows it.
     pub fn adjust(&mut self, label: Label, coefficient: Coefficient, value: f32) {
         let Some(stage) = self.stage else { return };
-        // Shown at once; what the session says of it comes some milliseconds later.
-        self.felt.set(label, self.felt.get(label).with(coefficient, value));
-        self.tell(Said::InStage(stage, Input::Adjust { label, coefficient, value }));
+        if self.tell(Said::InStage(stage, Input::Adjust { label, coefficient, value })) {
+            // Shown at once; what the session says of it comes some milliseconds later.
+            self.felt.set(label, self.felt.get(label).with(coefficient, value));
+        }
     }
 
     /// The running stage is done; what was typed and not said is said first. Not while a number is none.

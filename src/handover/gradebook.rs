@@ -128,6 +128,7 @@ pub fn gradebook(cohort: &Cohort, system: System, take: Take, students: Option<&
         table += &csv::line(&possible);
     }
     let mut count = 0;
+    let mut outright = 0;
     for person in people {
         let identity =
             match students {
@@ -152,6 +153,7 @@ pub fn gradebook(cohort: &Cohort, system: System, take: Take, students: Option<&
         for exercise in &exercises {
             let own = graded.iter().filter(|(s, _)| s.participant == person && s.scenario.id == exercise.scenario.id);
             let grade = taken(&own.copied().collect::<Vec<_>>(), take);
+            outright += usize::from(grade.is_some_and(|g| !g.hard_fails.is_empty()));
             line.push(grade.map_or_else(String::new, |g| g.points.to_string()));
             if system == System::Moodle {
                 line.push(grade.map_or_else(String::new, feedback));
@@ -159,6 +161,11 @@ pub fn gradebook(cohort: &Cohort, system: System, take: Take, students: Option<&
         }
         table += &csv::line(&line);
         count += 1;
+    }
+    if outright > 0 {
+        left_out.push(format!(
+            "nothing, but {outright} of these grades failed outright whatever their points, which a gradebook does not know"
+        ));
     }
     Gradebook { csv: table, students: count, left_out }
 }

@@ -114,9 +114,11 @@ impl Rules {
         if found.is_empty() { Ok(Rules(read.value.rules)) } else { Err(headlines(&found)) }
     }
 
-    fn of(&self, metric: &str) -> Option<&Rule> {
+    /// Of a zone that was to be removed nobody says that it must not be touched.
+    fn of(&self, metric: &str, is_less_wanted: bool) -> Option<&Rule> {
         let name = metric.split('(').next().unwrap_or(metric);
-        self.0.iter().find(|r| r.metric == name).or_else(|| self.0.iter().find(|r| r.metric == ANY))
+        let fits = |rule: &Rule| is_less_wanted || rule.lapse.map(Mistake::from) != Some(Mistake::Vulnerable);
+        self.0.iter().find(|r| r.metric == name && fits(r)).or_else(|| self.0.iter().find(|r| r.metric == ANY))
     }
 }
 
@@ -209,7 +211,7 @@ pub fn of(session: &SessionFile, lapses: &[Lapse], rules: &Rules, tissues: &Tiss
     for fail in grade.hard_fail_checks.iter().filter(|f| f.failed) {
         if told.insert(&fail.metric) {
             let goal = fail.above.or(fail.below);
-            feedback.findings.push(teller.tell(&fail.metric, &fail.title, fail.value, goal, None));
+            feedback.findings.push(teller.tell(&fail.metric, &fail.title, fail.value, goal, None, true));
         }
     }
     let mut items: Vec<_> = grade.items.iter().filter(|i| i.max_points - i.points >= POINTS_LEAST).collect();
@@ -217,7 +219,9 @@ pub fn of(session: &SessionFile, lapses: &[Lapse], rules: &Rules, tissues: &Tiss
     for item in items {
         if told.insert(&item.metric) {
             let lost = item.max_points - item.points;
-            feedback.findings.push(teller.tell(&item.metric, &item.title, item.value, Some(item.full_at), Some(lost)));
+            let (goal, is_less_wanted) = (Some(item.full_at), item.full_at < item.zero_at);
+            let found = teller.tell(&item.metric, &item.title, item.value, goal, Some(lost), is_less_wanted);
+            feedback.findings.push(found);
         }
     }
     let is_kept = |i: &&super::ItemFile| i.max_points - i.points < POINTS_LEAST;
@@ -238,11 +242,20 @@ struct Teller<'a> {
 }
 
 impl Teller<'_> {
-    fn tell(&mut self, metric: &str, title: &str, value: Option<f64>, goal: Option<f64>, lost: Option<f64>) -> Finding {
+    /// `is_less_wanted`: points are lost by more of what is measured.
+    fn tell(
+        &mut self,
+        metric: &str,
+        title: &str,
+        value: Option<f64>,
+        goal: Option<f64>,
+        lost: Option<f64>,
+        is_less_wanted: bool,
+    ) -> Finding {
         let rules = self.rules;
         let mut finding =
             Finding { metric: metric.into(), title: title.into(), lost, sentences: Vec::new(), advice: None };
-        let Some(rule) = rules.of(metric) else { return finding };
+        let Some(rule) = rules.of(metric, is_less_wanted) else { return finding };
         let measured = |value: Option<f64>| {
             let text = words::measure(metric, value);
             Said::word(format!("value.{text}"), together(text))

@@ -98,6 +98,9 @@ impl Templates {
         session: BTreeMap<String, String>,
         languages: BTreeMap<String, String>,
     ) -> Result<Templates, String> {
+        // A browser reads line ends as `\n` before it takes a script's digest.
+        let session: BTreeMap<String, String> =
+            session.into_iter().map(|(name, text)| (name, text.replace("\r\n", "\n"))).collect();
         for (name, text) in [(REPORT, &session[REPORT]), ("cohort.html", &cohort)] {
             let parsed = Environment::new().add_template("page", text).map(drop);
             parsed.map_err(|e| format!("{name}: wrong-template: {e}"))?;

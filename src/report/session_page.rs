@@ -218,7 +218,10 @@ pub fn render(
 /// a network, and no script that stands in what a person wrote.
 fn policy(script: &str) -> String {
     let digest = base64::engine::general_purpose::STANDARD.encode(Sha256::digest(script));
-    format!("default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'")
+    format!(
+        "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; \
+         base-uri 'none'; form-action 'none'"
+    )
 }
 
 fn languages(templates: &Templates) -> Vec<LanguageLine> {

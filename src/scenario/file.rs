@@ -606,7 +606,7 @@ pub struct StageFile {
     #[serde(default)]
     pub show_decay: bool,
     /// Whether the trainee may change how tissues feel, in the menu, to learn what the coefficients do. The report says
-    /// what was changed; the next stage finds the tissues as they were.
+    /// what was changed; the next stage finds the tissues as they were. Not together with `stiffness_steps`.
     #[serde(default)]
     pub adjustable: bool,
     /// Stiffness that falls in steps until the trainee answers.

@@ -20,7 +20,7 @@ use crate::device::Spec;
 use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
 use crate::sim::{Command, RAMP_TICKS, Setup, Step};
 use crate::tick::Tick;
-use crate::touch::{Coefficient, Matter};
+use crate::touch::{Coefficient, CuttingLaw, Matter};
 use crate::volume::{Edit, Label, Volume};
 use std::sync::Arc;
 
@@ -401,7 +401,8 @@ impl Session {
             return refused(Refusal::OutOfRange);
         }
         let entry = self.scenario.tissues.by_label(label);
-        if entry.and_then(|entry| entry.material().coefficient(coefficient)).is_none() {
+        let is_idle = coefficient == Coefficient::CutForce && self.scenario.carving.law != CuttingLaw::Threshold;
+        if is_idle || entry.and_then(|entry| entry.material().coefficient(coefficient)).is_none() {
             return refused(Refusal::NoCoefficient);
         }
         if !self.adjusted.contains(&(label, coefficient)) {

@@ -41,6 +41,9 @@ impl Lrs {
     /// `Err` for an address that would send the secret in the clear, or is none.
     pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>) -> Result<Lrs, String> {
         let url = url::Url::parse(endpoint).map_err(|e| format!("\"{endpoint}\" is no address: {e}"))?;
+        if !url.username().is_empty() || url.password().is_some() || url.query().is_some() || url.fragment().is_some() {
+            return Err("give it without a name, secret, query or fragment; the key and its secret have options".into());
+        }
         let near = match url.host() {
             Some(url::Host::Domain(name)) => name == "localhost",
             Some(url::Host::Ipv4(ip)) => ip.is_loopback(),
@@ -70,6 +73,8 @@ impl Lrs {
             .http_status_as_error(false)
             .timeout_global(Some(TIMEOUT))
             .max_redirects(0)
+            // Over http a proxy would read the secret, and `localhost` would be another machine's.
+            .proxy(if url.scheme() == "http" { None } else { ureq::Proxy::try_from_env() })
             .tls_config(tls.build())
             .user_agent(concat!("typodont/", env!("CARGO_PKG_VERSION")))
             .build();
@@ -93,15 +98,20 @@ impl Lrs {
         answer(request.send(body))
     }
 
-    /// Whether it has a statement of this id.
-    pub fn has(&self, id: &str) -> bool {
+    /// Whether it has a statement of this id: taken if so, refused if not.
+    pub fn has(&self, id: &str) -> Answer {
         let request = self
             .agent
             .get(&self.statements)
             .query("statementId", id)
             .header("X-Experience-API-Version", VERSION)
             .header("Authorization", &self.authorization);
-        request.call().is_ok_and(|response| response.status() == 200)
+        match request.call() {
+            Ok(response) if response.status() == 404 => {
+                Answer::Refused(format!("statement {id} is in conflict, and not there"))
+            }
+            response => answer(response),
+        }
     }
 }
 
@@ -123,7 +133,9 @@ fn answer(response: Result<ureq::http::Response<ureq::Body>, ureq::Error>) -> An
                 409 => Answer::Conflict,
                 401 | 403 => Answer::LockedOut(said),
                 408 | 425 | 429 | 500.. => Answer::Later(said),
-                _ => Answer::Refused(said),
+                // What was sent is at fault; anything else is at the wrong address, and would be for every file.
+                400 | 413 | 422 => Answer::Refused(said),
+                _ => Answer::LockedOut(said),
             }
         }
     }

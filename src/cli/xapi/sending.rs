@@ -124,7 +124,7 @@ fn send_file(spool: &Spool, lrs: &Lrs, file: &Path, patience: Duration) -> Resul
         Err(error) => return Ok(Some(format!("the file is damaged: {error}"))),
     };
     for part in statements.chunks(AT_ONCE) {
-        let refused = match patiently(lrs, part, patience)? {
+        let refused = match patiently(patience, || lrs.post(part))? {
             Answer::Refused(why) => Some(why),
             // One of them is there with other content; the others may not be.
             Answer::Conflict => one_by_one(lrs, part, patience)?,
@@ -140,12 +140,14 @@ fn send_file(spool: &Spool, lrs: &Lrs, file: &Path, patience: Duration) -> Resul
 fn one_by_one(lrs: &Lrs, statements: &[Json], patience: Duration) -> Result<Option<String>, Stopped> {
     for statement in statements {
         let id = statement["id"].as_str().unwrap_or_default();
-        match patiently(lrs, std::slice::from_ref(statement), patience)? {
+        match patiently(patience, || lrs.post(std::slice::from_ref(statement)))? {
             Answer::Refused(why) => return Ok(Some(why)),
-            Answer::Conflict if !lrs.has(id) => {
-                return Ok(Some(format!("statement {id} is in conflict, and not there")));
+            // Where it is there it stays as it was first told: a record is not rewritten.
+            Answer::Conflict => {
+                if let Answer::Refused(why) = patiently(patience, || lrs.has(id))? {
+                    return Ok(Some(why));
+                }
             }
-            // It is there, as it was first told: a record is not rewritten.
             _ => {}
         }
     }
@@ -153,11 +155,11 @@ fn one_by_one(lrs: &Lrs, statements: &[Json], patience: Duration) -> Result<Opti
 }
 
 /// The store's answer, once it has one.
-fn patiently(lrs: &Lrs, statements: &[Json], patience: Duration) -> Result<Answer, Stopped> {
+fn patiently(patience: Duration, ask: impl Fn() -> Answer) -> Result<Answer, Stopped> {
     let begun = Instant::now();
     let mut pause = PAUSE;
     loop {
-        match lrs.post(statements) {
+        match ask() {
             Answer::LockedOut(why) => return Err(Stopped::LockedOut(why)),
             Answer::Later(why) if begun.elapsed() + pause > patience => return Err(Stopped::Unanswered(why)),
             Answer::Later(_) => {

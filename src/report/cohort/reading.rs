@@ -2,6 +2,7 @@
 
 use super::Cohort;
 use crate::report::session_file::{SessionFile, VERSION};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -16,7 +17,23 @@ pub fn below(folder: &Path) -> Cohort {
         let key = |s: &SessionFile| (s.scenario.id.clone(), s.participant.clone(), s.started.clone());
         (key(a), pa).cmp(&(key(b), pb))
     });
+    leave_out_copies(&mut cohort);
     cohort
+}
+
+/// A backup beside its original is no second attempt: of sessions of one recording, person and time the first counts.
+fn leave_out_copies(cohort: &mut Cohort) {
+    let mut known: BTreeMap<(String, String, String), PathBuf> = BTreeMap::new();
+    let (sessions, skipped) = (&mut cohort.sessions, &mut cohort.skipped);
+    sessions.retain(|(path, session)| {
+        let Some(digest) = session.digests.get("recording.mcap") else { return true };
+        let key = (digest.clone(), session.participant.clone(), session.started.clone());
+        match known.get(&key) {
+            Some(first) => skipped.push((path.clone(), format!("the same session as {}", first.display()))),
+            None => _ = known.insert(key.clone(), path.clone()),
+        }
+        known[&key] == *path
+    });
 }
 
 fn look_into(cohort: &mut Cohort, folder: &Path, depth: usize) {
@@ -29,7 +46,8 @@ fn look_into(cohort: &mut Cohort, folder: &Path, depth: usize) {
         return;
     }
     if depth == DEPTH_MAX {
-        return;
+        let reason = "lies too deep to be looked into; name a folder nearer to it".into();
+        return cohort.skipped.push((folder.to_path_buf(), reason));
     }
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,

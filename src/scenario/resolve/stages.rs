@@ -77,6 +77,11 @@ impl Resolver<'_> {
             coefficients: steps.coefficients.iter().map(|c| c.0).collect(),
             step_time: steps.step_time_s,
         });
+        if written.adjustable && written.stiffness_steps.is_some() {
+            let help = "leave one of both out: what is tested by steps cannot be left to the trainee";
+            let message = "the trainee may change the tissue whose stiffness falls in steps";
+            self.complain(&format!("{path}/adjustable"), "adjustable-steps", message, help);
+        }
         let guidance = written.guidance.as_ref().and_then(|g| self.guidance(g, &format!("{path}/guidance")));
         let ask = written
             .ask

@@ -177,7 +177,7 @@ impl Water {
             drop.velocity = slowed(drop.velocity, air, AIR_TIME);
             let goal = drop.place + drop.velocity * STEP;
             let is_gone = drop.age > lasts
-                || goal.length_squared() > MOUTH * MOUTH
+                || !(goal.length_squared() <= MOUTH * MOUTH)
                 || suction.is_some_and(|suction| suction.swallows(drop.place, goal));
             if is_gone {
                 return false;
