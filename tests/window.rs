@@ -393,7 +393,8 @@ fn what_the_window_does_is_heard_at_a_real_server() {
     let lesion = lesion_in_world("scenarios/5-grinding.json", 1);
     desk.reach(lesion + Vec3::Y * 6.0);
     let mut recorder = Recorder::start(&ears);
-    let heard = |recorder: &mut Recorder| Spectrum::of(&recorder.take(0.3));
+    const WHILE: usize = hearing::RATE as usize / 4;
+    let heard = |recorder: &mut Recorder| Spectrum::of(&recorder.take(0.25));
     // A handpiece that starts needs a while to be at its speed.
     let begun = Instant::now();
     let mut free = heard(&mut recorder);
@@ -401,20 +402,19 @@ fn what_the_window_does_is_heard_at_a_real_server() {
         assert!(begun.elapsed() < PATIENCE, "the free handpiece is heard at {} Hz", free.peak(3000.0, 5500.0));
         free = heard(&mut recorder);
     }
-    let grind = |spectrum: &Spectrum| spectrum.power(200.0, 900.0);
-    let mut ground = 0.0f32;
-    for round in 0..40 {
-        let angle = round as f32 * 0.8;
+    // What holds a turbine back lowers its pitch; and enamel hisses above it (`audio::contact`).
+    let hiss = |spectrum: &Spectrum| spectrum.power(5200.0, 9000.0);
+    let grinds = |heard: &Spectrum| {
+        heard.peak(2500.0, 5500.0) < 0.95 * free.peak(3000.0, 5500.0) && hiss(heard) > 1.3 * hiss(&free)
+    };
+    // All of the way is listened to, and each goes deeper: at its end the hand has ground itself free.
+    let is_ground = (0..40).map(|round| round as f32).any(|round| {
+        let (sin, cos) = (0.8 * round).sin_cos();
         recorder.catch_up();
-        desk.reach(lesion + Vec3::new(angle.cos(), 0.0, angle.sin()) * 0.6 - Vec3::Y * 1.2);
-        // What was heard on the way: at its end the hand may have ground itself free.
-        ground = (0..3).map(|_| grind(&heard(&mut recorder))).fold(ground, f32::max);
-        if ground > 3.0 * grind(&free) {
-            break;
-        }
-    }
-    println!("200–900 Hz: {} free, {ground} grinding", grind(&free));
-    assert!(ground > 3.0 * grind(&free), "{ground}, free {}", grind(&free));
+        desk.reach(lesion + Vec3::new(0.6 * cos, -1.2 - 0.1 * round, 0.6 * sin));
+        recorder.rest().chunks_exact(WHILE).any(|part| grinds(&Spectrum::of(part)))
+    });
+    assert!(is_ground, "nobody hears that the handpiece grinds");
     desk.press("Escape", "pointer", "free");
     desk.press("ctrl+Return", "screen", "questionnaire");
     let begun = Instant::now();

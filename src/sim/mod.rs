@@ -102,6 +102,16 @@ pub struct Touch {
     pub normal: Vec3,
 }
 
+/// How far a hand may have gone into matter, mm, and how far it may have turned, rad, while it could not be trusted, to take up
+/// its working end where that was: a busy machine's hiccup is no reason to pass through the tooth. Its force comes back softly.
+const SLIP: f32 = 2.0;
+const TWIST: f32 = 0.2;
+
+fn is_back(left: &Pose, held: &Pose) -> bool {
+    let is_near = left.position.distance(held.position) < SLIP;
+    is_near && left.orientation.angle_between(held.orientation) < TWIST
+}
+
 /// The state of one session's world.
 #[derive(Clone, Debug)]
 pub struct Simulation {
@@ -121,6 +131,8 @@ pub struct Simulation {
     /// False until the working end has been out of matter once: whoever starts or changes instruments inside a tooth
     /// feels nothing until then, instead of being thrown out.
     is_out: bool,
+    /// Where the working end was when its hand could not be trusted any more, tooth space.
+    left_at: Option<Pose>,
     ramp: u32,
     /// Ticks since the hand was let go, up to `ramp`.
     eased: u32,
@@ -173,6 +185,7 @@ impl Simulation {
             instrument: 0,
             bur_runs: true,
             is_out: false,
+            left_at: None,
             ramp,
             eased: 0,
             lead: Vec3::ZERO,
@@ -186,11 +199,16 @@ impl Simulation {
 
     /// Turns the world by one tick.
     ///
-    /// A reading that cannot be trusted (not finite, no orientation) gives zero force and leaves the world as it was.
+    /// A reading that cannot be trusted (not finite, no orientation) gives zero force and leaves the world as it was. A hand
+    /// that is trusted again finds the working end where it was, unless it has gone too far on inside matter.
     pub fn step(&mut self, reading: &Reading) -> Step {
         let tick = self.tick;
         self.tick = tick.next();
         let Some(pose) = self.gate.admit(&reading.pose) else {
+            if self.is_out {
+                let orientation = (self.tooth_from_world * self.hand).orientation;
+                self.left_at = Some(Pose { position: self.proxy.tip(), orientation });
+            }
             self.is_out = false;
             return self.let_go(tick);
         };
@@ -200,7 +218,15 @@ impl Simulation {
         let instrument = &self.instruments[self.instrument];
         if !self.is_out {
             self.is_out = Proxy::is_free_at(&self.matter, instrument, &held);
-            return self.let_go(tick);
+            let step = self.let_go(tick);
+            if let Some(left) = self.left_at.take()
+                && !self.is_out
+                && is_back(&left, &held)
+            {
+                self.proxy.let_go(left.position);
+                self.is_out = true;
+            }
+            return step;
         }
         let eased = self.ease_in();
         let instrument = &self.instruments[self.instrument];
@@ -301,7 +327,7 @@ impl Simulation {
         match *command {
             Command::Take { instrument } if instrument < self.instruments.len() => {
                 self.instrument = instrument;
-                self.is_out = false;
+                (self.is_out, self.left_at) = (false, None);
             }
             Command::Take { .. } => {}
             Command::Set { label, coefficient, value } => {

@@ -308,8 +308,8 @@ impl Heard {
     }
 }
 
-/// Leans down to a height until something holds. A hand that was let go inside the wall, as on a machine under load, feels
-/// nothing until it has left it: like a person it lifts off and leans again.
+/// Leans down to a height until something holds. A hand that was let go, as on a machine under load, and sank deep into the
+/// wall meanwhile feels nothing until it has left it: like a person it lifts off and leans again.
 fn press(
     servo: &mut Servo,
     hand: &SharedHand,

@@ -77,8 +77,16 @@ impl Recorder {
 
     /// The next seconds of the recording, as far as it has come.
     pub fn take(&mut self, seconds: f32) -> Vec<f32> {
-        let bytes = self.bytes((seconds * RATE as f32) as usize * 4);
-        bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
+        samples(&self.bytes((seconds * RATE as f32) as usize * 4))
+    }
+
+    /// All that was recorded since.
+    pub fn rest(&mut self) -> Vec<f32> {
+        let mut rest = Vec::new();
+        self.file.read_to_end(&mut rest).unwrap();
+        // Half a sample may be there already; its other half follows.
+        rest.extend(self.bytes(rest.len().wrapping_neg() % 4));
+        samples(&rest)
     }
 
     fn bytes(&mut self, count: usize) -> Vec<u8> {
@@ -92,9 +100,10 @@ impl Recorder {
 
     /// Goes on to what is recorded from now on.
     pub fn catch_up(&mut self) {
-        let mut rest = Vec::new();
-        self.file.read_to_end(&mut rest).unwrap();
-        // Half a sample may be there already; its other half follows.
-        self.bytes(rest.len().wrapping_neg() % 4);
+        self.rest();
     }
+}
+
+fn samples(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect()
 }
