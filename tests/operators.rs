@@ -75,6 +75,21 @@ fn grinding_tells_them_apart() {
 }
 
 #[test]
+fn excavating_a_fissure_tells_them_apart() {
+    let mean = means("scenarios/8-fissure.json");
+    grows(&mean, "force_max_n", &["careful", "hasty"]);
+    grows(&mean, "decay_cleared_pct", &["timid", "careful"]);
+    for better in ["careful", "expert"] {
+        grows(&mean, "healthy_per_decay_pct", &[better, "hasty"]);
+        grows(&mean, "overcut_depth_max_mm", &[better, "hasty"]);
+        for worse in ["timid", "hasty"] {
+            grows(&mean, "dice", &[worse, better]);
+            grows(&mean, "points", &[worse, better]);
+        }
+    }
+}
+
+#[test]
 fn searching_tells_them_apart() {
     for (scenario, right, time) in [
         ("scenarios/3-detection.json", "detect_tooth", "detect_level_time_s"),
@@ -94,6 +109,15 @@ fn searching_tells_them_apart() {
         grows(&mean, time, &["expert", "careful"]);
         assert_eq!(mean("expert", right), Some(1.0), "the expert finds it: {scenario}");
         assert_eq!(mean("careful", right), Some(1.0), "the careful one finds it: {scenario}");
+    }
+}
+
+#[test]
+fn stain_misleads_nobody_who_feels() {
+    let mean = means("scenarios/9-stain.json");
+    grows(&mean, "session_time_s", &["hasty", "expert", "careful"]);
+    for operator in ["expert", "careful"] {
+        assert_eq!(mean(operator, "detect_tooth"), Some(1.0), "{operator} finds it");
     }
 }
 

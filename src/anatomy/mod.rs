@@ -18,6 +18,7 @@ mod slope;
 mod turn;
 pub mod segment;
 mod charted;
+pub mod caries;
 
 pub use charted::charted;
 pub use form::Form;

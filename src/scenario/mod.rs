@@ -4,18 +4,21 @@
 //! the [`Workpiece`] a session starts from. Never runs anything.
 
 pub mod file;
+mod lesion;
 pub mod metric;
 mod questionnaire;
 mod resolve;
 mod schema;
 mod workpiece;
 
+pub use lesion::Lesion;
 pub use metric::Metric;
 pub use questionnaire::{Category, Item, Questionnaire};
 pub use resolve::{Forms, hex, resolve};
 pub use schema::schema_text;
-pub use workpiece::{Lesion, ToothPlace, Unmakeable, Workpiece, anatomy_tissues};
+pub use workpiece::{ToothPlace, Unmakeable, Workpiece, anatomy_tissues};
 
+use crate::anatomy::caries::Reach;
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
 use crate::touch::{Carving, Factors, Guidance, Shape, Vibration};
@@ -98,6 +101,8 @@ pub struct Tooth {
     pub fdi: u8,
     pub form: Form,
     pub decay: Vec<Decay>,
+    /// Colour without softness.
+    pub stains: Vec<Decay>,
 }
 
 /// Where a tooth's shape comes from.
@@ -116,18 +121,49 @@ pub enum Form {
 pub struct Decay {
     pub id: String,
     pub label: Label,
-    /// Half axes: buccolingual, mesiodistal, occlusoapical.
-    pub radii: [f32; 3],
+    pub shape: DecayShape,
     pub surface: SurfaceFile,
     pub place: DecayPlace,
-    /// Of the centre below the surface.
-    pub depth: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum DecayShape {
+    Ellipsoid {
+        /// Half axes: buccolingual, mesiodistal, occlusoapical.
+        radii: [f32; 3],
+        /// Of the centre below the surface.
+        depth: f32,
+    },
+    Grown(Grown),
+}
+
+/// Decay that follows the tooth's tissues; see [`crate::anatomy::caries`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grown {
+    pub entry: GrownEntry,
+    /// The seed draws one.
+    pub reaches: Vec<Reach>,
+    pub spread: f32,
+    /// The rim's tissue, and how far it reaches from the border to the core, 0 to 1.
+    pub rim: Option<(Label, f32)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GrownEntry {
+    Fissure {
+        length: f32,
+    },
+    /// Half axes on the surface.
+    Smooth {
+        half: [f32; 2],
+    },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DecayPlace {
     Centre,
     RandomQuadrant,
+    Random,
     /// 1–4 as seen from above.
     Quadrant(u8),
     Offset([f32; 2]),

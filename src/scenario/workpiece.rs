@@ -3,12 +3,13 @@
 //! Takes a scenario and a seed, or a scenario and the volume of an earlier session. Gives the volume with its decay, where
 //! each tooth and each lesion lies, and what stands around. The same inputs give the same voxels.
 
-use super::{Decay, DecayPlace, Form, Layout, Scenario, Tooth, file::SurfaceFile};
+use super::lesion::{Lesion, NoRoom, locate, put_in};
+use super::{Form, Layout, Scenario, Tooth};
 use crate::anatomy;
-use crate::content::{Role, TissueTable};
+use crate::content::TissueTable;
 use crate::frame::{Pose, Quat, Vec3};
 use crate::touch::{self, Shape};
-use crate::volume::{Grid, ISO, Label, Volume};
+use crate::volume::{Grid, Label, Volume};
 use std::fmt;
 use std::sync::Arc;
 
@@ -36,24 +37,15 @@ pub struct ToothPlace {
     pub crown_high: Vec3,
 }
 
-/// Where a lesion lies, in tooth space, mm.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Lesion {
-    pub id: String,
-    /// Index of the tooth.
-    pub tooth: usize,
-    pub label: Label,
-    pub centre: Vec3,
-    pub radii: Vec3,
-    /// 1–4 as seen from above.
-    pub quadrant: u8,
-}
-
 /// Why a workpiece cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unmakeable {
     /// A decay holds no hard tissue: tooth and decay by index.
     DecayOutside { tooth: usize, decay: usize },
+    /// A decay that follows a groove finds none: tooth and decay by index.
+    NoGroove { tooth: usize, decay: usize },
+    /// A stain holds no sound tissue, or finds no groove to follow: tooth and stain by index.
+    StainOutside { tooth: usize, stain: usize },
     /// Two teeth of a pair have different voxel sizes.
     UnequalSpacing,
     /// A tooth has no enamel, so its crown cannot be told.
@@ -70,6 +62,10 @@ impl fmt::Display for Unmakeable {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Unmakeable::DecayOutside { .. } => f.write_str("the decay lies outside the tooth's hard tissue"),
+            Unmakeable::NoGroove { .. } => {
+                f.write_str("there is no groove in the chewing surface near the decay's place")
+            }
+            Unmakeable::StainOutside { .. } => f.write_str("the stain finds no place in the tooth's sound tissue"),
             Unmakeable::UnequalSpacing => f.write_str("the two teeth have different voxel sizes"),
             Unmakeable::NoEnamel { .. } => f.write_str("the tooth has no enamel, so its crown cannot be told"),
             Unmakeable::ZoneSize { map, workpiece, .. } => write!(
@@ -94,10 +90,14 @@ impl Workpiece {
             let mut volume = form_of(tooth, &scenario.tissues)?;
             let place = place_of(tooth, &volume, &scenario.tissues).ok_or(Unmakeable::NoEnamel { tooth: index })?;
             for (number, decay) in tooth.decay.iter().enumerate() {
-                let lesion = locate(decay, index, &place, &volume, Side::All, seed);
-                if mark(&mut volume, &lesion, &scenario.tissues) == 0 {
-                    return Err(Unmakeable::DecayOutside { tooth: index, decay: number });
-                }
+                volume = put_in(volume, decay, &place, &scenario.tissues, seed).map_err(|reason| match reason {
+                    NoRoom::Outside => Unmakeable::DecayOutside { tooth: index, decay: number },
+                    NoRoom::NoGroove => Unmakeable::NoGroove { tooth: index, decay: number },
+                })?;
+            }
+            for (stain, patch) in tooth.stains.iter().enumerate() {
+                volume = put_in(volume, patch, &place, &scenario.tissues, seed)
+                    .map_err(|_| Unmakeable::StainOutside { tooth: index, stain })?;
             }
             parts.push(volume);
         }
@@ -160,7 +160,7 @@ fn world_above(origin_in_tooth: Vec3) -> Pose {
 
 /// Which part of a shared volume belongs to a tooth.
 #[derive(Clone, Copy)]
-enum Side {
+pub(super) enum Side {
     All,
     /// y > 0: on the left as the trainee sees it.
     Left,
@@ -176,7 +176,7 @@ impl Side {
         }
     }
 
-    fn holds(self, point_in_tooth: Vec3) -> bool {
+    pub(super) fn holds(self, point_in_tooth: Vec3) -> bool {
         match self {
             Side::All => true,
             Side::Left => point_in_tooth.y > 0.0,
@@ -236,70 +236,6 @@ impl Bounds {
         self.low = self.low.min(point);
         self.high = self.high.max(point);
     }
-}
-
-/// Where a decay goes: on a surface of its tooth, in a place of that surface.
-fn locate(decay: &Decay, tooth: usize, place: &ToothPlace, volume: &Volume, side: Side, seed: u64) -> Lesion {
-    /// Of half the crown: where the middle of a quadrant lies.
-    const INTO_QUADRANT: f32 = 0.42;
-    let (middle, half) = (0.5 * (place.crown_low + place.crown_high), 0.5 * (place.crown_high - place.crown_low));
-    // In from which side, and which ways the surface's own two axes go.
-    let (inward, u, v) = match decay.surface {
-        SurfaceFile::O => (Vec3::NEG_Z, Vec3::X, Vec3::Y),
-        SurfaceFile::B => (Vec3::NEG_X, Vec3::Y, Vec3::Z),
-        SurfaceFile::L => (Vec3::X, Vec3::Y, Vec3::Z),
-        SurfaceFile::D => (Vec3::NEG_Y, Vec3::X, Vec3::Z),
-        SurfaceFile::M => (Vec3::Y, Vec3::X, Vec3::Z),
-    };
-    let in_quadrant = |quadrant: u8| {
-        let buccal = if quadrant <= 2 { 1.0 } else { -1.0 };
-        let distal = if quadrant % 2 == 1 { 1.0 } else { -1.0 };
-        (Vec3::X * buccal + Vec3::Y * distal) * half * INTO_QUADRANT
-    };
-    let offset = match decay.place {
-        DecayPlace::Centre => Vec3::ZERO,
-        DecayPlace::Quadrant(quadrant) => in_quadrant(quadrant),
-        DecayPlace::RandomQuadrant => in_quadrant(1 + (draw(seed, &decay.id) % 4) as u8),
-        DecayPlace::Offset([a, b]) => u * a + v * b,
-    };
-    let outside = middle + offset - inward * (half.max_element() + 2.0);
-    let centre = surface_below(volume, side, outside, inward) + inward * decay.depth;
-    let quadrant = Workpiece::quadrant(place, centre);
-    Lesion { id: decay.id.clone(), tooth, label: decay.label, centre, radii: Vec3::from(decay.radii), quadrant }
-}
-
-/// Where a ray first meets matter on a side of the scene; its far end when it meets none.
-fn surface_below(volume: &Volume, side: Side, from: Vec3, along: Vec3) -> Vec3 {
-    let step = 0.5 * volume.grid().spacing.min_element();
-    let steps = (30.0 / step) as u32;
-    let point = |i: u32| from + along * (i as f32 * step);
-    (0..steps).map(point).find(|&p| side.holds(p) && volume.density_at(p) >= ISO).unwrap_or(point(steps))
-}
-
-/// A number from a seed and a name (SplitMix64 over the name's bytes): the same on every machine, for ever.
-fn draw(seed: u64, name: &str) -> u64 {
-    let mix = |mut z: u64| {
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    };
-    name.bytes().fold(mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15)), |state, byte| {
-        mix(state.wrapping_add(u64::from(byte)).wrapping_add(0x9e37_79b9_7f4a_7c15))
-    })
-}
-
-/// Turns the sound tissue within a lesion into decay; returns how many solid voxels that were.
-fn mark(volume: &mut Volume, lesion: &Lesion, tissues: &TissueTable) -> usize {
-    let grid = *volume.grid();
-    let densities: Vec<bool> = volume.densities().iter().map(|d| d.is_solid()).collect();
-    let mut count = 0;
-    volume.relabel(|index, label| {
-        let from_centre = (grid.centre(grid.cell(index)) - lesion.centre) / lesion.radii;
-        let is_hit = from_centre.length_squared() <= 1.0 && tissues.role(label) == Some(Role::Sound);
-        count += usize::from(is_hit && densities[index]);
-        if is_hit { lesion.label } else { label }
-    });
-    count
 }
 
 /// One volume with two teeth, the first on the left (y > 0), each `gap`/2 mm from the plane between them.

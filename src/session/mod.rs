@@ -5,6 +5,7 @@
 
 mod run;
 mod live;
+mod excavation;
 mod operator;
 mod operator_file;
 mod refusal;

@@ -2,10 +2,12 @@
 //!
 //! It sees what a person sees (surfaces, and decay where the scenario shows it) and otherwise knows only what it felt.
 
+use super::excavation::Excavation;
 use super::operator_file::{
     ActionFile, AnswerActionFile, CutFile, FollowFile, OperatorFile, PlaceFile, PressFile, ProbeFile, WhenFile,
 };
 use super::{Answer, Input, Session, Trainee};
+use crate::content::Role;
 use crate::device::{Device, Felt, Gone, HandModel, Move, Output, Reading, Scripted, Spec, Tremor};
 use crate::frame::Vec3;
 use crate::scenario::{Lesion, QuestionKind, Scenario, Stage, Workpiece};
@@ -314,7 +316,10 @@ impl Operator {
         for lesion in &self.workpiece.clone().lesions {
             for pass in 0..cut.passes {
                 let before = self.plan.len();
-                self.cut_pass(cut, lesion, radius, pass);
+                match lesion.radii {
+                    Some(radii) => self.cut_pass(cut, lesion, radii, radius, pass),
+                    None => self.excavate(cut, lesion, radius),
+                }
                 let tasks = self.plan.split_off(before);
                 self.plan.push_back(Task::SkipIfCleared { percent: cut.until_cleared_pct, tasks: tasks.len() });
                 self.plan.extend(tasks);
@@ -325,11 +330,11 @@ impl Operator {
 
     /// Down into the lesion, then round and round from its floor up its walls: where the bur's surface is to run along the
     /// lesion's border, its centre runs on a bowl.
-    fn cut_pass(&mut self, cut: &CutFile, lesion: &Lesion, radius: f32, pass: u32) {
+    fn cut_pass(&mut self, cut: &CutFile, lesion: &Lesion, radii: Vec3, radius: f32, pass: u32) {
         /// Radians above the lesion's equator up to which its walls are followed.
         const TOP: f32 = 0.6;
         const POINTS: u32 = 32;
-        let bowl = (lesion.radii - radius + cut.margin_mm).max(Vec3::splat(0.02));
+        let bowl = (radii - radius + cut.margin_mm).max(Vec3::splat(0.02));
         let floor = -0.5 * core::f32::consts::PI;
         let rings = ((TOP - floor) * bowl.max_element() / cut.pitch_mm).ceil().max(2.0) as u32;
         let on_bowl = |i: u32| {
@@ -344,7 +349,29 @@ impl Operator {
             self.surface_at(lesion.centre.x, lesion.centre.y, self.top()).map_or(lesion.centre.z, |(p, _)| p.z);
         let above = Vec3::new(lesion.centre.x, lesion.centre.y, surface + radius + TOUCH_HEIGHT);
         self.travel_to(above);
-        let path = [above].into_iter().chain((0..rings * POINTS).map(on_bowl)).map(|p| self.in_world(p)).collect();
+        self.lead_bur(cut, [above].into_iter().chain((0..rings * POINTS).map(on_bowl)));
+    }
+
+    /// Decay of any shape, layer by layer from above. What lies nearer to another lesion is left to that one's turn.
+    fn excavate(&mut self, cut: &CutFile, lesion: &Lesion, radius: f32) {
+        let workpiece = self.workpiece.clone();
+        let (lesions, tissues) = (&workpiece.lesions, &self.scenario.tissues);
+        let is_own = |place: Vec3| {
+            let away = lesion.centre.distance_squared(place);
+            lesions.iter().all(|other| other.centre.distance_squared(place) >= away)
+        };
+        let excavation = Excavation { radius, pitch: cut.pitch_mm, margin: cut.margin_mm };
+        let path = excavation
+            .path(&workpiece.volume, |place, label| tissues.role(label) == Some(Role::Decay) && is_own(place));
+        let Some(first) = path.first() else { return };
+        let above = Vec3::new(first.x, first.y, self.top() + radius + TOUCH_HEIGHT);
+        self.travel_to(above);
+        self.lead_bur(cut, [above].into_iter().chain(path));
+    }
+
+    /// Along places of tooth space, waiting where the bur does not get on.
+    fn lead_bur(&mut self, cut: &CutFile, path: impl Iterator<Item = Vec3>) {
+        let path = path.map(|place| self.in_world(place)).collect();
         self.plan.push_back(Task::Move(Move::Guide {
             path,
             speed: cut.speed_mm_s,

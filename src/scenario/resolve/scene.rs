@@ -2,11 +2,12 @@
 
 use super::{Forms, Resolver, tooth_path};
 use crate::anatomy;
+use crate::anatomy::caries::Reach;
 use crate::content;
 use crate::frame::{Pose, Quat, Vec3};
 use crate::scenario::file;
 use crate::scenario::workpiece::anatomy_tissues;
-use crate::scenario::{Decay, DecayPlace, Form, Layout, Scene, Tooth};
+use crate::scenario::{Decay, DecayPlace, DecayShape, Form, Grown, GrownEntry, Layout, Scene, Tooth};
 use crate::touch::{self, Obstacle, Shape};
 use crate::volume::{Label, Volume};
 use std::collections::BTreeMap;
@@ -22,7 +23,11 @@ impl Resolver<'_> {
         let paths: Vec<String> = (0..teeth.len()).map(|i| tooth_path(written, i)).collect();
         self.unique(teeth.iter().zip(&paths).map(|(t, p)| (t.id.as_str(), format!("{p}/id"))));
         let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
-        self.unique(decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id"))));
+        let decay = decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id")));
+        let stains =
+            teeth.iter().zip(&paths).flat_map(|(t, p)| t.stains.iter().enumerate().map(move |(i, s)| (s, p, i)));
+        let stains = stains.map(|(s, p, i)| (s.id.as_str(), format!("{p}/stains/{i}/id")));
+        self.unique(decay.chain(stains));
         let teeth: Vec<Option<Tooth>> = teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path)).collect();
         let around = match written {
             file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
@@ -83,7 +88,9 @@ impl Resolver<'_> {
         let form = self.form(&written.form, written.fdi, path);
         let decay =
             written.decay.iter().enumerate().map(|(i, d)| self.decay(d, &format!("{path}/decay/{i}"))).collect();
-        Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay })
+        let stains =
+            written.stains.iter().enumerate().map(|(i, s)| self.stain(s, &format!("{path}/stains/{i}"))).collect();
+        Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay, stains })
     }
 
     fn form(&mut self, written: &file::FormFile, fdi: u8, path: &str) -> Option<Form> {
@@ -172,39 +179,110 @@ impl Resolver<'_> {
     }
 
     fn decay(&mut self, written: &file::DecayFile, path: &str) -> Decay {
-        let radii = match &written.shape {
-            file::DecayShapeFile::Sphere(sphere) => [sphere.radius_mm; 3],
-            file::DecayShapeFile::Ellipsoid(ellipsoid) => ellipsoid.radii_mm.map(|r| r.0),
-        };
-        let place = match written.at {
+        let patch = Patch { shape: &written.shape, surface: written.surface, at: written.at, depth: written.depth_mm };
+        let place = self.patch_place(&patch, path);
+        let label = self.tissue_with(&written.tissue, content::Role::Decay, &format!("{path}/tissue"));
+        let mut shape = self.patch_shape(&patch, path);
+        match (&mut shape, &written.rim) {
+            (_, None) => {}
+            (DecayShape::Grown(grown), Some(rim)) => {
+                let label = self.tissue_with(&rim.tissue, content::Role::Decay, &format!("{path}/rim/tissue"));
+                grown.rim = Some((label, rim.share));
+            }
+            (DecayShape::Ellipsoid { .. }, Some(_)) => {
+                let message = "a sphere or an ellipsoid has no rim of its own";
+                let help = "take \"fissure\" or \"smooth\", or write two decays, the inner one first";
+                self.complain(&format!("{path}/rim"), "no-rim", message, help);
+            }
+        }
+        Decay { id: written.id.clone(), label, shape, surface: written.surface, place }
+    }
+
+    fn stain(&mut self, written: &file::StainFile, path: &str) -> Decay {
+        let patch = Patch { shape: &written.shape, surface: written.surface, at: written.at, depth: written.depth_mm };
+        let place = self.patch_place(&patch, path);
+        let label = self.tissue_with(&written.tissue, content::Role::Sound, &format!("{path}/tissue"));
+        let shape = self.patch_shape(&patch, path);
+        Decay { id: written.id.clone(), label, shape, surface: written.surface, place }
+    }
+
+    fn patch_place(&mut self, patch: &Patch, path: &str) -> DecayPlace {
+        let place = match patch.at {
             file::DecayPlaceFile::Centre => DecayPlace::Centre,
             file::DecayPlaceFile::RandomQuadrant => DecayPlace::RandomQuadrant,
+            file::DecayPlaceFile::Random => DecayPlace::Random,
             file::DecayPlaceFile::Quadrant(quadrant) => DecayPlace::Quadrant(quadrant),
             file::DecayPlaceFile::OffsetMm(offset) => DecayPlace::Offset(offset.map(|o| o.0)),
         };
         let by_quadrant = matches!(place, DecayPlace::RandomQuadrant | DecayPlace::Quadrant(_));
-        if by_quadrant && written.surface != file::SurfaceFile::O {
+        if by_quadrant && patch.surface != file::SurfaceFile::O {
             let message = "quadrants are counted on the occlusal surface only";
-            self.complain(
-                &format!("{path}/at"),
-                "wrong-place",
-                message,
-                "set surface to \"O\", or place it with offset_mm",
-            );
+            let help = "set surface to \"O\", or place it with offset_mm";
+            self.complain(&format!("{path}/at"), "wrong-place", message, help);
         }
-        let label = self.label(&written.tissue, &format!("{path}/tissue"));
-        if self.tissues.role(label).is_some_and(|role| role != content::Role::Decay) {
-            let decay: Vec<&str> = self
-                .tissues
-                .entries()
-                .iter()
-                .filter(|e| e.role == content::Role::Decay)
-                .map(|e| e.name.as_str())
-                .collect();
-            let help = format!("tissues with the role \"decay\": {}", decay.join(", "));
-            let message = format!("\"{}\" is not a kind of decay", written.tissue);
-            self.complain(&format!("{path}/tissue"), "wrong-tissue", message, help);
+        place
+    }
+
+    fn patch_shape(&mut self, patch: &Patch, path: &str) -> DecayShape {
+        let (entry, reaches, spread) = match patch.shape {
+            file::DecayShapeFile::Sphere(sphere) => {
+                return DecayShape::Ellipsoid { radii: [sphere.radius_mm; 3], depth: patch.depth };
+            }
+            file::DecayShapeFile::Ellipsoid(ellipsoid) => {
+                return DecayShape::Ellipsoid { radii: ellipsoid.radii_mm.map(|r| r.0), depth: patch.depth };
+            }
+            file::DecayShapeFile::Fissure(fissure) => {
+                if patch.surface != file::SurfaceFile::O {
+                    let message = "grooves are looked for in the chewing surface only";
+                    let help = "set surface to \"O\", or take \"smooth\" for another surface";
+                    self.complain(&format!("{path}/surface"), "wrong-place", message, help);
+                }
+                (GrownEntry::Fissure { length: fissure.length_mm }, &fissure.reaches, fissure.spread_mm)
+            }
+            file::DecayShapeFile::Smooth(smooth) => {
+                let half = [0.5 * smooth.width_mm, 0.5 * smooth.height_mm];
+                (GrownEntry::Smooth { half }, &smooth.reaches, smooth.spread_mm)
+            }
+        };
+        if patch.depth != 0.0 {
+            let help = "leave it out: \"reaches\" says how deep it has come";
+            self.complain(&format!("{path}/depth_mm"), "two-depths", "this shape begins at the surface", help);
         }
-        Decay { id: written.id.clone(), label, radii, surface: written.surface, place, depth: written.depth_mm }
+        let reaches = reaches.iter().copied().map(reach_of).collect();
+        DecayShape::Grown(Grown { entry, reaches, spread, rim: None })
+    }
+
+    /// The label of a tissue that must mean something to the score.
+    fn tissue_with(&mut self, name: &str, role: content::Role, path: &str) -> Label {
+        let label = self.label(name, path);
+        if self.tissues.role(label).is_some_and(|own| own != role) {
+            let fits = |e: &&content::TissueEntry| e.role == role;
+            let names: Vec<&str> = self.tissues.entries().iter().filter(fits).map(|e| e.name.as_str()).collect();
+            let (role, kind) = match role {
+                content::Role::Decay => ("decay", "a kind of decay"),
+                _ => ("sound", "a sound tissue"),
+            };
+            let help = format!("tissues with the role \"{role}\": {}", names.join(", "));
+            self.complain(path, "wrong-tissue", format!("\"{name}\" is not {kind}"), help);
+        }
+        label
+    }
+}
+
+/// What decay and stains have in common.
+struct Patch<'a> {
+    shape: &'a file::DecayShapeFile,
+    surface: file::SurfaceFile,
+    at: file::DecayPlaceFile,
+    depth: f32,
+}
+
+fn reach_of(written: file::ReachFile) -> Reach {
+    match written {
+        file::ReachFile::OuterEnamel => Reach::OuterEnamel,
+        file::ReachFile::InnerEnamel => Reach::InnerEnamel,
+        file::ReachFile::OuterDentine => Reach::OuterDentine,
+        file::ReachFile::MiddleDentine => Reach::MiddleDentine,
+        file::ReachFile::InnerDentine => Reach::InnerDentine,
     }
 }

@@ -26,6 +26,14 @@ pub(super) fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &
             format!("{}/decay/{decay}", tooth_path(&written.scene, *tooth)),
             "make it larger, move it toward the surface's middle, or change depth_mm",
         ),
+        Unmakeable::NoGroove { tooth, decay } => (
+            format!("{}/decay/{decay}/at", tooth_path(&written.scene, *tooth)),
+            "move it nearer to a groove, or take \"smooth\" for a lesion of a plain surface",
+        ),
+        Unmakeable::StainOutside { tooth, stain } => (
+            format!("{}/stains/{stain}", tooth_path(&written.scene, *tooth)),
+            "make it larger, or move it toward the surface's middle",
+        ),
         Unmakeable::NoEnamel { tooth } => {
             (format!("{}/form", tooth_path(&written.scene, *tooth)), "check which number or grey value is enamel")
         }

@@ -176,9 +176,10 @@ impl Water {
             let air = suction.map_or(Vec3::ZERO, |suction| suction.wind(drop.place));
             drop.velocity = slowed(drop.velocity, air, AIR_TIME);
             let goal = drop.place + drop.velocity * STEP;
-            let is_gone = drop.age > lasts
-                || !(goal.length_squared() <= MOUTH * MOUTH)
-                || suction.is_some_and(|suction| suction.swallows(drop.place, goal));
+            // A place that is none is outside, too.
+            let is_inside = goal.length_squared() <= MOUTH * MOUTH;
+            let is_gone =
+                drop.age > lasts || !is_inside || suction.is_some_and(|suction| suction.swallows(drop.place, goal));
             if is_gone {
                 return false;
             }
