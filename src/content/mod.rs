@@ -5,6 +5,7 @@
 pub mod json;
 mod syntax;
 pub mod nrrd;
+pub mod imaging;
 pub mod obj;
 pub mod picture_mesh;
 pub mod scan;
