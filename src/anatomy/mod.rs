@@ -23,6 +23,7 @@ mod charted;
 pub use charted::charted;
 pub use form::Form;
 pub use grow::{grid_fitting, grid_of_spacing, grow};
+pub use turn::set_upright;
 
 use crate::volume::Label;
 
