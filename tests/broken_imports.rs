@@ -65,8 +65,14 @@ fn damaged_surfaces_are_refused_or_read_within_bounds() {
 
 /// The series of a folder with one of its files changed.
 fn damaged_series(folder: &Path, bytes: &[u8]) -> Result<Scan, Unread> {
-    std::fs::write(folder.join("b.dcm"), bytes).unwrap();
+    write_anew(&folder.join("b.dcm"), bytes);
     imaging::read(folder, &Told::default())
+}
+
+/// A file's new content. Written over the old one, some file systems would wait for the disk each time.
+fn write_anew(path: &Path, bytes: &[u8]) {
+    let _ = std::fs::remove_file(path);
+    std::fs::write(path, bytes).unwrap();
 }
 
 #[test]
@@ -99,11 +105,11 @@ fn damaged_lossless_pixels_never_bring_the_program_down() {
     for bit in 0..8 * stream.len() {
         let mut broken = stream.clone();
         broken[bit / 8] ^= 1 << (bit % 8);
-        slice(2.0, broken).write(&folder.join("b.dcm"));
+        write_anew(&folder.join("b.dcm"), &slice(2.0, broken).bytes());
         let _ = imaging::read(&folder, &Told::default());
     }
     for end in (0..stream.len()).step_by(2) {
-        slice(2.0, stream[..end].to_vec()).write(&folder.join("b.dcm"));
+        write_anew(&folder.join("b.dcm"), &slice(2.0, stream[..end].to_vec()).bytes());
         let told = imaging::read(&folder, &Told::default());
         assert!(told.is_err() || end + 4 >= stream.len(), "cut at {end}");
     }

@@ -83,17 +83,17 @@ pub struct Arguments {
 }
 
 const HELP: &str = "\
-Read are: NRRD (.nrrd, .nhdr, .seg.nrrd); NIfTI-1 (.nii, .nii.gz); MetaImage (.mha, .mhd); a folder with one DICOM series
-of CT or CBCT, uncompressed, run-length coded or JPEG Lossless; plain voxels (--size, --type, --spacing-mm); surfaces as STL,
+Read are: NRRD (.nrrd, .nhdr, .seg.nrrd); NIfTI-1 (.nii, .nii.gz); MetaImage (.mha, .mhd); a folder with one DICOM series of \
+CT or CBCT, uncompressed, run-length coded or JPEG Lossless; plain voxels (--size, --type, --spacing-mm); surfaces as STL, \
 PLY, OBJ or glTF (.glb, .gltf), closed, one per tissue or nested in one another.
 
-A CT is told apart into enamel, dentine and pulp; a label map is taken as drawn; of surfaces each voxel becomes what its
+A CT is told apart into enamel, dentine and pulp; a label map is taken as drawn; of surfaces each voxel becomes what its \
 centre lies in.
 
   typodont import tooth.nii.gz -o tooth.seg.nrrd --preview tooth.png
   typodont import cbct/ --at -21.5,38,102 --resample 0.1 -o 36.seg.nrrd
-  typodont import labels.nii.gz --labels enamel=1,dentine=2,pulp=3 -o tooth.seg.nrrd
-  typodont import --tissue enamel=e.stl dentine=d.stl pulp=p.stl --spacing-mm 0.1 -o tooth.seg.nrrd";
+  typodont import map.nii.gz --labels enamel=1,dentine=2,pulp=3 -o tooth.seg.nrrd
+  typodont import --tissue enamel=e.stl dentine=d.stl pulp=p.stl -o tooth.seg.nrrd";
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum NumberType {
