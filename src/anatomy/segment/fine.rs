@@ -132,8 +132,8 @@ impl Neighbours<'_> {
         let is_enamel_near = nearest_enamel[nearest];
         if !self.is_sure[nearest] && matter[nearest] != Matter::Pulp {
             let full = if is_enamel_near { self.levels.enamel } else { self.levels.dentine };
-            // Written so that a NaN does not pass.
-            if !(value >= 0.5 * (self.levels.background + full)) {
+            let half_full = 0.5 * (self.levels.background + full);
+            if value.is_nan() || value < half_full {
                 return Matter::Air;
             }
         }
@@ -191,7 +191,7 @@ fn keep_largest([nx, ny, _]: [u32; 3], label: &mut [Label]) {
             runs.push(Run { start: start as u32, end: end as u32, root: number });
             at = end;
         }
-        let beside = [(row as u32 % ny > 0).then(|| row - 1), row.checked_sub(ny as usize)];
+        let beside = [(!(row as u32).is_multiple_of(ny)).then(|| row - 1), row.checked_sub(ny as usize)];
         for other in beside.into_iter().flatten() {
             let (mut theirs, last) = (rows[other], rows[other + 1]);
             let mut ours = own;

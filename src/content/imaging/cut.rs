@@ -103,7 +103,8 @@ fn resampled(image: &Image, spacing: f64, crop: Option<[DVec3; 2]>, holds_labels
     }
     let steps = DMat3::from_cols(geometry.steps[0], geometry.steps[1], geometry.steps[2]);
     let volume = geometry.spacing();
-    if !(steps.determinant().abs() > 1e-6 * volume.x * volume.y * volume.z) {
+    let is_volume = steps.determinant().abs() > 1e-6 * volume.x * volume.y * volume.z;
+    if !is_volume {
         let what = "its axes lie in one plane or have no length";
         return Err(Unread::new(DOING, what, "export the scan again: its orientation is not that of a volume"));
     }

@@ -22,7 +22,7 @@ const EXTENSIONS_MAX: f32 = (1 << 20) as f32;
 
 /// Reads a volume of one value per voxel.
 pub fn read(path: &Path) -> Result<Image, Unread> {
-    let open = || Source::of_file(path).map_err(|problem| shared(problem));
+    let open = || Source::of_file(path).map_err(shared);
     load(&open).map_err(|unread| unread.in_file(path))
 }
 
@@ -107,8 +107,7 @@ impl Header<'_> {
         let element = self.element()?;
         let geometry = self.geometry()?;
         let offset = self.float(108) as f32;
-        // Written so that a NaN does not pass.
-        if !(offset >= 352.0 && offset <= EXTENSIONS_MAX && offset.fract() == 0.0) {
+        if !(352.0..=EXTENSIONS_MAX).contains(&offset) || offset.fract() != 0.0 {
             let what = format!("the voxels cannot begin at byte {offset} (vox_offset)");
             return Err(wrong(what, "export the volume again: a single file has them at byte 352 or a little later"));
         }

@@ -221,8 +221,8 @@ impl Stack {
         for (n, gap) in gaps.into_iter().enumerate() {
             let off = gap / usual;
             let (a, b) = (name(n), name(n + 1));
-            // Written so that a NaN, of slices that all lie in one place, does not pass.
-            if !(gap > 0.5 * usual.max(1e-3)) {
+            // NaN where numbers of a damaged file are beyond all measure.
+            if gap.is_nan() || gap <= 0.5 * usual.max(1e-3) {
                 return Err(wrong(
                     format!("{a} and {b} lie in the same place"),
                     "take one of them out of the folder: a slice is there twice, or two series are mixed",
