@@ -1,6 +1,6 @@
-//! Teeth: grown from tables of measurements, or won from scans.
+//! Teeth: grown from tables of measurements, or won from scans and surfaces.
 //!
-//! Takes forms in mm, CT values or label maps, and a grid. Gives volumes of enamel, dentine and pulp, crown up.
+//! Takes forms in mm, CT values, label maps or closed surfaces, and a grid. Gives volumes of enamel, dentine and pulp, crown up.
 //! Never reads a file, never knows a label's name, never rolls dice.
 
 mod track;
@@ -17,12 +17,14 @@ mod window;
 mod slope;
 mod turn;
 pub mod segment;
+pub mod shells;
 mod charted;
 pub mod caries;
 
 pub use charted::charted;
 pub use form::Form;
 pub use grow::{grid_fitting, grid_of_spacing, grow};
+pub use turn::set_upright;
 
 use crate::volume::Label;
 

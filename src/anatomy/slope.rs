@@ -12,7 +12,7 @@ const BAND: f32 = 1.5;
 const BEYOND: f32 = 2.0;
 
 /// Nearer than this to a surface, voxels, no voxel's centre lies: it would have no side.
-const LEAST: f32 = 1e-3;
+pub(super) const LEAST: f32 = 1e-3;
 
 /// Half the width of the density ramp on a grid, mm.
 pub(super) fn band(grid: &Grid) -> f32 {

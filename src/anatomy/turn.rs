@@ -6,7 +6,7 @@ use crate::volume::{Density, Grid, Label, Volume};
 
 /// A turn by right angles: which axis each new axis was, and whether it runs the other way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Turn {
+pub(super) struct Turn {
     from: [usize; 3],
     is_reversed: [bool; 3],
 }
@@ -28,8 +28,17 @@ pub(super) fn upright(
     Volume::new(turned, band, density, label, tissues.dentine)
 }
 
+/// The same of a volume. One without enamel, in which no crown can be told from a root, stays as it is.
+pub fn set_upright(volume: Volume, tissues: &Tissues) -> Volume {
+    if volume.count(tissues.enamel) == 0 {
+        return volume;
+    }
+    let label = volume.tissues().collect();
+    upright((*volume.grid(), volume.densities().to_vec(), label), volume.band(), tissues)
+}
+
 /// The way from the middle of everything else to the middle of the enamel, mm.
-fn crown_from_root(grid: &Grid, tissue: impl Fn(usize) -> Label, enamel: Label) -> Vec3 {
+pub(super) fn crown_from_root(grid: &Grid, tissue: impl Fn(usize) -> Label, enamel: Label) -> Vec3 {
     // Whole numbers: sums over any scan are exact.
     let mut sums = [[0u64; 4]; 2];
     for (index, cell) in grid.cells().enumerate() {
@@ -46,11 +55,17 @@ fn crown_from_root(grid: &Grid, tissue: impl Fn(usize) -> Label, enamel: Label) 
 }
 
 /// The middle of a crown's box along x and y, its lowest voxel along z.
-fn crown_foot(grid: &Grid, is_crown: impl Fn(usize) -> bool) -> Vec3 {
+pub(super) fn crown_foot(grid: &Grid, is_crown: impl Fn(usize) -> bool) -> Vec3 {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for (_, cell) in grid.cells().enumerate().filter(|&(i, _)| is_crown(i)) {
-        let point = grid.centre(cell);
-        (low, high) = (low.min(point), high.max(point));
+    let [nx, ny, _] = grid.dims;
+    // Row by row: only a row's first and last voxel of the crown can be on the box's sides.
+    for row in 0..(grid.len() / nx as usize) as u32 {
+        let start = row as usize * nx as usize;
+        let of_crown = |x: &u32| is_crown(start + *x as usize);
+        if let Some((first, last)) = (0..nx).find(of_crown).zip((0..nx).rfind(of_crown)) {
+            let ends = [first, last].map(|x| grid.centre([x, row % ny, row / ny]));
+            (low, high) = (low.min(ends[0]), high.max(ends[1]));
+        }
     }
     match low.is_finite() {
         true => Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z),
@@ -60,7 +75,7 @@ fn crown_foot(grid: &Grid, is_crown: impl Fn(usize) -> bool) -> Vec3 {
 
 impl Turn {
     /// The turn that makes z of the axis along which `up` is longest.
-    fn that_lifts(up: Vec3) -> Turn {
+    pub(super) fn that_lifts(up: Vec3) -> Turn {
         let length = up.abs();
         let axis = [1, 0].into_iter().fold(2, |most, axis| if length[axis] > length[most] { axis } else { most });
         let is_down = up[axis] < 0.0;
@@ -68,7 +83,7 @@ impl Turn {
         Turn { from: [(axis + 1) % 3, (axis + 2) % 3, axis], is_reversed: [is_down, false, is_down] }
     }
 
-    fn grid(&self, grid: &Grid) -> Grid {
+    pub(super) fn grid(&self, grid: &Grid) -> Grid {
         let spacing = Vec3::from(self.from.map(|axis| grid.spacing[axis]));
         Grid::centred(self.from.map(|axis| grid.dims[axis]), spacing)
     }
@@ -77,14 +92,16 @@ impl Turn {
         if *self == (Turn { from: [0, 1, 2], is_reversed: [false; 3] }) {
             return values;
         }
-        let value = |cell: [u32; 3]| {
-            let mut old = [0; 3];
-            for (axis, &from) in self.from.iter().enumerate() {
-                old[from] = if self.is_reversed[axis] { grid.dims[from] - 1 - cell[axis] } else { cell[axis] };
-            }
-            values[grid.index(old)]
-        };
-        self.grid(grid).cells().map(value).collect()
+        self.grid(grid).cells().map(|cell| values[grid.index(self.before(grid, cell))]).collect()
+    }
+
+    /// Where a cell was before the turn.
+    pub(super) fn before(&self, grid: &Grid, cell: [u32; 3]) -> [u32; 3] {
+        let mut old = [0; 3];
+        for (axis, &from) in self.from.iter().enumerate() {
+            old[from] = if self.is_reversed[axis] { grid.dims[from] - 1 - cell[axis] } else { cell[axis] };
+        }
+        old
     }
 }
 

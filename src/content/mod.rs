@@ -1,10 +1,12 @@
-//! What the program reads: tables, scans, and the texts that people wrote.
+//! What the program reads: tables, scans, surfaces, and the texts that people wrote.
 //!
 //! Takes bytes by name. Gives checked values, or every complaint there is. Never changes a file it reads.
 
 pub mod json;
 mod syntax;
 pub mod nrrd;
+pub mod imaging;
+pub mod surfaces;
 pub mod obj;
 pub mod picture_mesh;
 pub mod scan;

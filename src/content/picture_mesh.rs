@@ -67,7 +67,10 @@ fn beside(name: &str, uri: &str) -> String {
 }
 
 /// All triangles of a glTF file's scene, in its own units; `fetch` brings files that it names.
-fn triangles_of_gltf(bytes: &[u8], fetch: impl Fn(&str) -> Result<Vec<u8>, Diagnostic>) -> Result<Mesh, String> {
+pub(super) fn triangles_of_gltf(
+    bytes: &[u8],
+    fetch: impl Fn(&str) -> Result<Vec<u8>, Diagnostic>,
+) -> Result<Mesh, String> {
     let (text, blob) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let root = json::Root::from_slice(text).map_err(|e| format!("this is not a glTF 2.0 file: {e}"))?;
     let buffers = root.buffers.iter().map(|buffer| match (&buffer.uri, blob) {

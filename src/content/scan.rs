@@ -15,15 +15,28 @@ const LISTED: usize = 8;
 ///
 /// `spacing` (mm, along x, y and z) stands in for the image's own.
 pub fn segmented(image: &Image, spacing: Option<[f32; 3]>, tissues: &Tissues) -> Result<Volume, String> {
+    let (grid, values) = in_order(image, spacing)?;
+    segment::segment(&grid, values, tissues).map_err(|unclear| unclear.to_string())
+}
+
+/// The same for a label map: large scans are told apart coarse to fine, and density is not smoothed.
+pub fn labels_of(image: Image, tissues: &Tissues) -> Result<Volume, String> {
+    let (grid, values) = in_order(&image, None)?;
+    drop(image);
+    segment::labels(&grid, values, tissues).map_err(|unclear| unclear.to_string())
+}
+
+/// An image's values along +x, +y and +z of its space.
+fn in_order(image: &Image, spacing: Option<[f32; 3]>) -> Result<(Grid, Vec<f32>), String> {
     let order = Order::of(&image.geometry);
     let grid = order.grid(&image.geometry, spacing)?;
     let values: Vec<f32> = match &image.samples {
-        Samples::U8(samples) => order.indices().map(|i| f32::from(samples[i])).collect(),
-        Samples::I16(samples) => order.indices().map(|i| f32::from(samples[i])).collect(),
-        Samples::U16(samples) => order.indices().map(|i| f32::from(samples[i])).collect(),
-        Samples::F32(samples) => order.indices().map(|i| samples[i]).collect(),
+        Samples::U8(samples) => order.walk(samples, |v| v.into()),
+        Samples::I16(samples) => order.walk(samples, |v| v.into()),
+        Samples::U16(samples) => order.walk(samples, |v| v.into()),
+        Samples::F32(samples) => order.walk(samples, |v| v),
     };
-    segment::segment(&grid, values, tissues).map_err(|unclear| unclear.to_string())
+    Ok((grid, values))
 }
 
 /// A label map as it was drawn, its surface smoothed. `names` says which number is which tissue; 0 is air.
@@ -99,6 +112,16 @@ impl Order {
         let Order { dims, first, strides } = self;
         let steps = move |axis: usize| (0..i64::from(dims[axis])).map(move |n| n * strides[axis]);
         steps(2).flat_map(move |z| steps(1).flat_map(move |y| steps(0).map(move |x| (first + x + y + z) as usize)))
+    }
+
+    /// All samples in this order, changed one by one.
+    fn walk<T: Copy>(&self, samples: &[T], change: impl Fn(T) -> f32) -> Vec<f32> {
+        let [nx, ny, _] = self.dims.map(i64::from);
+        // Most arrays are in order already, and then need no index per voxel.
+        match self.first == 0 && self.strides == [1, nx, nx * ny] {
+            true => samples.iter().map(|&sample| change(sample)).collect(),
+            false => self.indices().map(|i| change(samples[i])).collect(),
+        }
     }
 
     /// The grid in this order; a spacing that is given replaces the image's.

@@ -19,7 +19,7 @@ mod words;
 
 pub use html::Templates;
 pub use labelmap::tissues as tissue_map;
-pub use pictures::{SEEN, preview_png};
+pub use pictures::{SEEN, preview_png, sections_png};
 pub use session_file::{
     AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
     StageFile,

@@ -10,6 +10,7 @@ mod grid;
 pub mod march;
 pub mod rows;
 mod sample;
+pub mod solid;
 pub mod surface;
 
 pub use bricks::{BRICK, Bricks};

@@ -4,6 +4,7 @@
 //! Never cuts by a plane: where a voxel is only partly filled, what lies nearest decides and not the value.
 
 mod cavity;
+mod fine;
 mod layers;
 mod levels;
 
@@ -13,6 +14,7 @@ use super::slope::{self, slope_of};
 use super::turn;
 use super::window::Window;
 use crate::volume::{Grid, Label, Volume, ramp};
+pub use fine::labels;
 use levels::Levels;
 use std::fmt;
 
@@ -40,11 +42,18 @@ pub enum Unclear {
 impl fmt::Display for Unclear {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Unclear::Flat => f.write_str("all values are the same; give a CT volume of a tooth"),
-            Unclear::NoBody => f.write_str("nothing in it is solid; give a CT volume in which hard tissue is bright"),
+            Unclear::Flat => f.write_str(
+                "there is no tooth in it: all values are the same; name the CT volume of a tooth, or cut out another part \
+                 of it (--at, --crop)",
+            ),
+            Unclear::NoBody => f.write_str(
+                "there is no tooth in it: nothing is solid; give a CT volume in which hard tissue is bright, or cut out \
+                 another part of it (--at, --crop)",
+            ),
             Unclear::OneLevel => f.write_str(
-                "enamel cannot be told from dentine: the solid matter has one grey value, not two; \
-                 give a CT volume in which enamel is brighter, or a label map",
+                "there is no tooth in it whose enamel can be told from its dentine: the solid matter has one grey value, \
+                 not two; cut out the part with one tooth (--at, --crop), give a CT volume in which enamel is brighter, \
+                 or a label map (--labels)",
             ),
             Unclear::Uneven(times) => write!(
                 f,
@@ -53,8 +62,8 @@ impl fmt::Display for Unclear {
             ),
             Unclear::Size(mm) => write!(
                 f,
-                "its largest solid piece is {mm:.1} mm long, and a tooth is {} to {} mm long; \
-                 give tooth spacing in mm, or crop the scan to one tooth",
+                "there is no tooth by itself in it: its largest solid piece is {mm:.1} mm long, and a tooth is {} to {} mm \
+                 long; cut one out (--at, --crop), or give tooth spacing in mm where the file's is wrong (--spacing-mm)",
                 LENGTH.start(),
                 LENGTH.end()
             ),
@@ -81,17 +90,8 @@ impl Matter {
 ///
 /// Values must rise from background over dentine to enamel; their scale does not matter, NaN counts as background.
 pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &Tissues) -> Result<Volume, Unclear> {
-    let solid_from = levels::solid_from(&values)?;
-    let window = window_of_tooth(grid, &values, solid_from)?;
-    let background = levels::background(&values, solid_from);
-    let mut values = window.cut(values, background);
-    values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = background);
+    let Told { window, levels, mut values, matter, nearest_enamel } = tell_apart(grid, values)?;
     let grid = &window.grid;
-
-    let levels = Levels::of(grid, &values, background, solid_from)?;
-    let mut matter = solid(grid, &values, &levels);
-    let nearest_enamel = layers::part(grid, &values, &levels, &mut matter);
-    cavity::fill(grid, &values, &levels, &mut matter);
     into_field(&mut values, &matter, &levels, &nearest_enamel);
     drop(nearest_enamel);
     keep_one_piece(grid, &mut values);
@@ -103,6 +103,32 @@ pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &Tissues) -> Result<Volum
     let density = slope.into_iter().map(|distance| ramp(distance, band)).collect();
     let label = matter.into_iter().map(|matter| label_of(matter, tissues)).collect();
     Ok(turn::upright(window.paste(density, label), band, tissues))
+}
+
+/// The part of a scan in which the tooth is, and what each of its voxels holds.
+struct Told {
+    window: Window,
+    levels: Levels,
+    /// Of the window, without NaN.
+    values: Vec<f32>,
+    matter: Vec<Matter>,
+    /// Whether the nearest hard matter of a voxel is enamel.
+    nearest_enamel: Vec<bool>,
+}
+
+fn tell_apart(grid: &Grid, values: Vec<f32>) -> Result<Told, Unclear> {
+    let solid_from = levels::solid_from(&values)?;
+    let window = window_of_tooth(grid, &values, solid_from)?;
+    let background = levels::background(&values, solid_from);
+    let mut values = window.cut(values, background);
+    values.iter_mut().filter(|value| value.is_nan()).for_each(|value| *value = background);
+    let grid = &window.grid;
+
+    let levels = Levels::of(grid, &values, background, solid_from)?;
+    let mut matter = solid(grid, &values, &levels);
+    let nearest_enamel = layers::part(grid, &values, &levels, &mut matter);
+    cavity::fill(grid, &values, &levels, &mut matter);
+    Ok(Told { window, levels, values, matter, nearest_enamel })
 }
 
 fn label_of(matter: Matter, tissues: &Tissues) -> Label {

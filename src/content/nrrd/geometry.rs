@@ -107,7 +107,7 @@ impl Geometry {
 }
 
 /// The gates of reader and writer alike.
-pub(super) fn check_dims(dims: [u64; 3]) -> Result<[u32; 3], Problem> {
+pub(in crate::content) fn check_dims(dims: [u64; 3]) -> Result<[u32; 3], Problem> {
     for (axis, voxels) in (1..).zip(dims) {
         if voxels > u64::from(AXIS_MAX) {
             return Err(Problem::TooLarge { axis: Some(axis), voxels });
@@ -119,7 +119,7 @@ pub(super) fn check_dims(dims: [u64; 3]) -> Result<[u32; 3], Problem> {
     }
 }
 
-pub(super) fn check_steps(steps: [DVec3; 3]) -> Result<(), Problem> {
+pub(in crate::content) fn check_steps(steps: [DVec3; 3]) -> Result<(), Problem> {
     let mut owners = [0; 3];
     for (axis, step) in (1..).zip(steps) {
         let mm = step.length();
@@ -140,7 +140,7 @@ pub(super) fn check_steps(steps: [DVec3; 3]) -> Result<(), Problem> {
     Ok(())
 }
 
-pub(super) fn check_origin(origin: DVec3) -> Result<(), Problem> {
+pub(in crate::content) fn check_origin(origin: DVec3) -> Result<(), Problem> {
     let is_near = |v: f64| v.abs() <= ORIGIN_MAX;
     match origin.to_array().into_iter().all(is_near) {
         true => Ok(()),

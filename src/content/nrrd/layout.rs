@@ -10,7 +10,7 @@ use std::path::{Component, Path};
 const SKIP_MAX: u64 = 1 << 20;
 
 /// A header understood: complete and within bounds.
-pub(super) struct Layout {
+pub(in crate::content) struct Layout {
     pub geometry: Geometry,
     pub element: Element,
     pub is_big_endian: bool,
@@ -22,28 +22,33 @@ pub(super) struct Layout {
 
 /// The type of one sample in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Element {
+pub(in crate::content) enum Element {
     I8,
     U8,
     I16,
     U16,
+    /// The wider ones stand in no NRRD that is read here, but in other formats.
+    I32,
+    U32,
+    I64,
+    U64,
     F32,
     F64,
 }
 
-pub(super) enum Skip {
+pub(in crate::content) enum Skip {
     Bytes(u64),
     /// The data are the file's last bytes.
     ToEnd,
 }
 
-pub(super) struct DataFile {
+pub(in crate::content) struct DataFile {
     pub name: String,
     pub line: usize,
 }
 
 impl Layout {
-    pub fn of(header: &Header) -> Result<Layout, Error> {
+    pub(super) fn of(header: &Header) -> Result<Layout, Error> {
         let element = element(header)?;
         let shape = Shape::of(header)?;
         let is_gzip = is_gzip(header)?;
@@ -69,8 +74,8 @@ impl Element {
         match self {
             Element::I8 | Element::U8 => 1,
             Element::I16 | Element::U16 => 2,
-            Element::F32 => 4,
-            Element::F64 => 8,
+            Element::I32 | Element::U32 | Element::F32 => 4,
+            Element::I64 | Element::U64 | Element::F64 => 8,
         }
     }
 }

@@ -19,6 +19,12 @@ pub use geometry::{Axis, Geometry, Space};
 pub use reader::{parse, parse_detached, read};
 pub use writer::{Encoding, bytes, write};
 
+// What readers of other formats share: bytes that know how many they are, and sizes held against them.
+pub(super) use geometry::{check_dims, check_origin, check_steps};
+pub(super) use layout::{Element, Layout, Skip};
+pub(super) use reader::{decode, decode_zlib};
+pub(super) use source::Source;
+
 /// Most voxels along one axis: a scan of a whole head at 0.08 mm has 3000; what claims more is broken or not for us.
 pub const AXIS_MAX: u32 = 4096;
 

@@ -5,7 +5,7 @@ use super::header::Header;
 use super::layout::{Element, Layout, Skip};
 use super::source::Source;
 use super::{Image, Samples};
-use flate2::bufread::GzDecoder;
+use flate2::bufread::{GzDecoder, ZlibDecoder};
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
@@ -18,6 +18,9 @@ const DEFLATE_RATIO_MAX: u64 = 1032;
 /// Most members of a gzip stream. The largest volume in blocks of 64 KiB, as bgzip writes them, has a quarter of it; and
 /// to begin a member takes time whether anything is in it or not.
 const MEMBERS_MAX: u32 = 1 << 16;
+
+/// Room made before anything has come out of a compressed stream; from there it doubles as data really come.
+const ROOM: u64 = 1 << 20;
 
 /// Reads a volume, and the data file beside it if the header names one.
 pub fn read(path: &Path) -> Result<Image, Error> {
@@ -58,7 +61,8 @@ fn load<'a>(mut source: Source<'a>, open: Open<'_, 'a>) -> Result<Image, Error> 
     Ok(Image { geometry: layout.geometry, samples, keys: header.keys })
 }
 
-fn decode(layout: &Layout, source: &mut Source) -> Result<Samples, Error> {
+/// The samples that a layout declares, from where the source stands to its end.
+pub(in crate::content) fn decode(layout: &Layout, source: &mut Source) -> Result<Samples, Error> {
     skip_lines(source, layout.line_skip)?;
     let samples = match layout.is_gzip {
         false => decode_raw(layout, source)?,
@@ -97,6 +101,28 @@ fn decode_raw(layout: &Layout, source: &mut Source) -> Result<Samples, Error> {
     }
 }
 
+/// The same of one zlib stream, as MetaImage files hold.
+pub(in crate::content) fn decode_zlib(layout: &Layout, source: &mut Source) -> Result<Samples, Error> {
+    let wanted = layout.bytes();
+    let compressed = source.left();
+    if compressed.saturating_mul(DEFLATE_RATIO_MAX) < wanted {
+        return Err(Problem::TooSmallForGzip { compressed, wanted }.at_byte(source.at()));
+    }
+    let mut stream = ZlibDecoder::new(&mut *source);
+    let outcome = fill(layout, &mut stream, ROOM).and_then(|samples| Ok((samples, read_full(&mut stream, &mut [0])?)));
+    let found = stream.total_out();
+    let at = source.at();
+    match outcome {
+        Ok((_, 1..)) => Err(Problem::TooMuch { wanted, extra: None }.at_byte(at)),
+        Ok(_) if found < wanted => Err(Problem::Truncated { found, wanted }.at_byte(at)),
+        Ok((samples, _)) => Ok(samples),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof && found < wanted => {
+            Err(Problem::Truncated { found, wanted }.at_byte(at))
+        }
+        Err(error) => Err(Problem::Gzip(error.to_string()).at_byte(at)),
+    }
+}
+
 fn decode_gzip(layout: &Layout, source: &mut Source) -> Result<Samples, Error> {
     let wanted = layout.bytes();
     let skip = match layout.byte_skip {
@@ -124,8 +150,6 @@ fn decode_gzip(layout: &Layout, source: &mut Source) -> Result<Samples, Error> {
 }
 
 fn inflate(layout: &Layout, stream: &mut Stream, skip: u64) -> io::Result<Samples> {
-    /// Room made before anything has come out; from there it doubles as data really come.
-    const ROOM: u64 = 1 << 20;
     skip_bytes(stream, skip)?;
     let samples = fill(layout, stream, ROOM)?;
     // One byte more than wanted should not come, but asking for it makes the checksum be compared.
@@ -173,6 +197,14 @@ fn fill(layout: &Layout, from: &mut dyn Read, room: u64) -> io::Result<Samples> 
         (Element::I16, true) => Samples::I16(collect(from, count, room, i16::from_be_bytes)?),
         (Element::U16, false) => Samples::U16(collect(from, count, room, u16::from_le_bytes)?),
         (Element::U16, true) => Samples::U16(collect(from, count, room, u16::from_be_bytes)?),
+        (Element::I32, false) => Samples::F32(collect(from, count, room, |bytes| i32::from_le_bytes(bytes) as f32)?),
+        (Element::I32, true) => Samples::F32(collect(from, count, room, |bytes| i32::from_be_bytes(bytes) as f32)?),
+        (Element::U32, false) => Samples::F32(collect(from, count, room, |bytes| u32::from_le_bytes(bytes) as f32)?),
+        (Element::U32, true) => Samples::F32(collect(from, count, room, |bytes| u32::from_be_bytes(bytes) as f32)?),
+        (Element::I64, false) => Samples::F32(collect(from, count, room, |bytes| i64::from_le_bytes(bytes) as f32)?),
+        (Element::I64, true) => Samples::F32(collect(from, count, room, |bytes| i64::from_be_bytes(bytes) as f32)?),
+        (Element::U64, false) => Samples::F32(collect(from, count, room, |bytes| u64::from_le_bytes(bytes) as f32)?),
+        (Element::U64, true) => Samples::F32(collect(from, count, room, |bytes| u64::from_be_bytes(bytes) as f32)?),
         (Element::F32, false) => Samples::F32(collect(from, count, room, f32::from_le_bytes)?),
         (Element::F32, true) => Samples::F32(collect(from, count, room, f32::from_be_bytes)?),
         (Element::F64, false) => Samples::F32(collect(from, count, room, |bytes| f64::from_le_bytes(bytes) as f32)?),

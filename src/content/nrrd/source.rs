@@ -6,7 +6,7 @@ use std::io::{self, BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 /// What a header and its data are read from. Knowing the length is what lets sizes be checked before memory is taken.
-pub(super) struct Source<'a> {
+pub(in crate::content) struct Source<'a> {
     bytes: Box<dyn BufRead + 'a>,
     len: u64,
     consumed: u64,

@@ -25,6 +25,14 @@ pub fn on_paper(picture: &Picture, shot: &Shot) -> Picture {
     paper
 }
 
+/// The same without letters: of a tooth whose sides nobody has named.
+pub fn with_scale(picture: &Picture, shot: &Shot) -> Picture {
+    let mut paper = Picture::plain(picture.width, picture.height, PAPER);
+    paper.lay_over(picture);
+    scale_bar(&mut paper, shot);
+    paper
+}
+
 /// A letter at each edge: buccal, lingual, mesial, distal, occlusal, apical.
 fn directions(picture: &mut Picture, shot: &Shot) {
     let letter = |way: Vec3| {

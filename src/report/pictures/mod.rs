@@ -5,10 +5,12 @@
 
 mod marks;
 mod preview;
+mod sections;
 mod shares;
 mod tint;
 
 pub use preview::{SEEN, preview_png};
+pub use sections::sections_png;
 pub use shares::{BANDS, shares};
 
 use super::glb::Part;
