@@ -33,8 +33,10 @@ const THINNEST: f32 = 1.75;
 
 /// The grid of a spacing (mm) that just holds a tooth of this form.
 pub fn grid_of_spacing(form: &Form, spacing: f32) -> Grid {
-    let [low, high] = bounds(form);
-    Grid::covering(low, high, Vec3::splat(spacing), MARGIN)
+    let [low, high] = Shape::new(form, 0.0).bounds();
+    let grid = Grid::covering(low, high, Vec3::splat(spacing), MARGIN);
+    // A mirror image on the mirrored grid has the same voxels, from the other end.
+    if form.is_mirrored { mirrored(grid) } else { grid }
 }
 
 /// The finest grid of so many voxels that holds a tooth of this form, the tooth in its middle.

@@ -8,7 +8,7 @@ use super::form::Form;
 use super::{canines, incisors, lower_molars, molar, premolars, upper_molars};
 
 /// Upper teeth from the midline outward, as in the upper right.
-const UPPER: [Form; 8] = [
+pub const UPPER: [Form; 8] = [
     incisors::UPPER_CENTRAL,
     incisors::UPPER_LATERAL,
     canines::UPPER,
@@ -20,7 +20,7 @@ const UPPER: [Form; 8] = [
 ];
 
 /// Lower teeth from the midline outward, as in the lower left.
-const LOWER: [Form; 8] = [
+pub const LOWER: [Form; 8] = [
     incisors::LOWER_CENTRAL,
     incisors::LOWER_LATERAL,
     canines::LOWER,
