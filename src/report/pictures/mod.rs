@@ -10,6 +10,7 @@ mod tint;
 
 pub use preview::{SEEN, preview_png};
 pub use shares::{BANDS, shares};
+pub(super) use tint::linear;
 
 use super::glb::Part;
 use crate::frame::Vec3;
