@@ -16,6 +16,7 @@ pub use resolve::{Forms, hex, resolve};
 pub use schema::schema_text;
 pub use workpiece::{Lesion, ToothPlace, Unmakeable, Workpiece, anatomy_tissues};
 
+use crate::anatomy;
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
 use crate::touch::{Carving, Factors, Guidance, Shape, Vibration};
@@ -100,10 +101,17 @@ pub struct Tooth {
     pub decay: Vec<Decay>,
 }
 
+impl Tooth {
+    /// Which way is distal in tooth space: +y in the upper right and the lower left of the mouth, −y elsewhere.
+    pub fn distal(&self) -> Vec3 {
+        Vec3::Y * anatomy::teeth::distal(self.fdi)
+    }
+}
+
 /// Where a tooth's shape comes from.
 #[derive(Clone, Debug)]
 pub enum Form {
-    /// Made by the program at a voxel size in mm.
+    /// Made by the program from its number, at a voxel size in mm.
     Procedural { spacing: f32 },
     /// Read from a file and made ready: enamel up, tissues labelled.
     Given(Arc<Volume>),
