@@ -13,6 +13,7 @@ use typodont::frame::{Quat, Vec3};
 use typodont::mesh::Mesh;
 use typodont::scenario::{self, Forms, Workpiece};
 use typodont::scene::Mouth;
+use typodont::volume::march::{self, Camera, Picture, Shot, Side};
 use typodont::volume::{Grid, Label, Volume, distance, surface};
 
 const TISSUES: Tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
@@ -403,4 +404,33 @@ fn aligned(own: &Volume, other: &Volume) -> Alignment {
         }
     }
     best.expect("twelve starts")
+}
+
+#[test]
+fn one_of_each_class_is_drawn_to_be_looked_at() {
+    // The pictures lie in `target/tmp/teeth/`: buccal, lingual, mesial and occlusal side by side.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("teeth");
+    std::fs::create_dir_all(&folder).unwrap();
+    let colour = |label: Label, _| match label {
+        Label(1) => [0.94, 0.93, 0.88],
+        Label(2) => [0.88, 0.78, 0.55],
+        _ => [0.85, 0.3, 0.3],
+    };
+    for fdi in [11, 12, 13, 14, 15, 16, 17, 18, 31, 33, 34, 35, 36, 37, 38] {
+        let tooth = grown(fdi, 0.15);
+        let [width, height] = [300, 480];
+        let views = [Side::Buccal, Side::Lingual, Side::Mesial, Side::Occlusal].map(|side| {
+            let camera = Camera::framing(side, &tooth, width as f32 / height as f32);
+            let mut paper = Picture::plain(width, height, [0.16, 0.17, 0.2]);
+            let seen = march::iso(&tooth, &Shot { camera, width, height }, colour);
+            let share = seen.pixels.iter().map(|p| p[3]).sum::<f32>() / seen.pixels.len() as f32;
+            assert!((0.1..0.9).contains(&share), "{fdi} {side:?}: the tooth fills {share} of its picture");
+            paper.lay_over(&seen);
+            paper
+        });
+        let [first, rest @ ..] = views;
+        let row = rest.iter().fold(first, |row, view| row.beside(view));
+        let file = folder.join(format!("{fdi}.png"));
+        image::save_buffer(file, &row.rgb8(), row.width, row.height, image::ColorType::Rgb8).unwrap();
+    }
 }
