@@ -238,8 +238,7 @@ impl Arch {
     fn teeth(&self, is_taken: &dyn Fn(bool, usize, &Seat) -> bool) -> Coloured {
         let crowns = rows::each(self.plain.models.len(), |index| crown::crown(&self.plain.models[index]));
         let mut all = Coloured::default();
-        for index in 0..self.plain.models.len() {
-            let crown = &crowns[index];
+        for (index, crown) in crowns.iter().enumerate() {
             for (row, is_carved_side) in [(&self.carved, true), (&self.plain, false)] {
                 let seat = &row.half.seats[index];
                 if is_taken(is_carved_side, index, seat) {
