@@ -332,13 +332,7 @@ fn parts_that_do_not_fit_together() {
         json!(["explorer"]),
         &[("nothing-cuts", "/stages/0/cutting")],
     );
-    check("a tooth we cannot make", "/scene/jaw/tooth/fdi", json!(11), &[("unknown-form", "/scene/jaw/tooth/fdi")]);
-    check(
-        "a tooth there is not",
-        "/scene/jaw/tooth/fdi",
-        json!(29),
-        &[("unknown-tooth", "/scene/jaw/tooth/fdi"), ("unknown-form", "/scene/jaw/tooth/fdi")],
-    );
+    check("a tooth there is not", "/scene/jaw/tooth/fdi", json!(29), &[("unknown-tooth", "/scene/jaw/tooth/fdi")]);
     check(
         "a zone beside the tooth",
         "/zones/0/region",

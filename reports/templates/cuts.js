@@ -12,7 +12,7 @@ const HALF_LEAST = 3.5;
 /** Pixels along a section's side. */
 const PIXELS = 260;
 
-/** Letters at the ends of the axes: buccal and lingual, distal and mesial, occlusal and apical. */
+/** Letters at the ends of the axes: buccal and lingual, distal and mesial (or, mirrored, mesial and distal), occlusal and apical. */
 const LETTERS = [['L', 'B'], ['M', 'D'], ['A', 'O']];
 
 /** What a pixel shows. */
@@ -162,7 +162,7 @@ class Cut {
     }
     context.font = 'bold 13px sans-serif';
     context.textAlign = 'center';
-    const letter = (vector, axis, end) => LETTERS[axis][(vector[axis] > 0) === end ? 1 : 0];
+    const letter = (vector, axis, end) => LETTERS[axis][((vector[axis] > 0) === end) === (axis === 1 && this.voxels.mirrored) ? 0 : 1];
     const text = (t, x, y) => {
       context.lineWidth = 3;
       context.strokeStyle = '#fff';

@@ -135,7 +135,7 @@ class Page {
     const values = {
       tissue: this.named(palette.tissues.get(tissue)), verdict: this.named(palette.verdicts.get(verdict)),
       voxel: voxels.inBundle(cell).join(', '),
-      x: way(0, 'buccal', 'lingual'), y: way(1, 'distal', 'mesial'), z: way(2, 'up', 'down'),
+      x: way(0, 'buccal', 'lingual'), y: voxels.mirrored ? way(1, 'mesial', 'distal') : way(1, 'distal', 'mesial'), z: way(2, 'up', 'down'),
     };
     if (fall) Object.assign(values, { time: duration(fall.tick / 1000), seconds: (fall.tick / 1000).toFixed(3), force: fall.force.toFixed(2), tool: this.session.tools[fall.tool] || '–' });
     const parts = [tissue === 0 ? this.say('script.air') : this.say(fall ? 'script.fell' : 'script.kept', values)];
@@ -188,7 +188,7 @@ class Page {
       solid.eye.middle = voxels.pointOf(voxels.low.map((v, axis) => v + 0.5 * (voxels.size[axis] - 1)));
       solid.eye.half = 0.75 * Math.max(...voxels.size.map((n, axis) => n * voxels.spacing[axis]), 2);
     } else {
-      [solid.eye.right, solid.eye.up] = SIDES[side];
+      [solid.eye.right, solid.eye.up] = SIDES[voxels.mirrored ? { mesial: 'distal', distal: 'mesial' }[side] || side : side];
       solid.eye.middle = voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1)));
       const size = voxels.dims.map((n, axis) => n * voxels.spacing[axis]);
       solid.eye.half = 0.52 * Math.max(...[solid.eye.right, solid.eye.up].map(way => Math.abs(dot(way, size))));

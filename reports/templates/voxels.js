@@ -27,6 +27,8 @@ class Voxels {
     this.about = about;
     this.dims = about.dims;
     this.spacing = about.spacing_mm;
+    /** True where y runs toward mesial. */
+    this.mirrored = about.is_mirrored;
     const part = {};
     let from = 0;
     for (const [name, length] of about.parts) {

@@ -6,6 +6,9 @@
 //!
 //! A share of 1 along x or y is half the crown's width above the neck and half the neck's width at and below it. A share
 //! of 1 along z is the crown's length above the neck and the root's below.
+//!
+//! Forms are written so that x, y and z are a right-handed space, as buccal, distal and occlusal are in the lower left and the
+//! upper right of a mouth. Their twins on the other side are grown as mirror images: [`Form::is_mirrored`].
 
 /// One row of a table of tooth sizes, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,6 +36,19 @@ pub struct Form {
     pub relief: Relief,
     pub enamel: Enamel,
     pub pulp: Pulp,
+    pub sides: Sides,
+    /// Grown as its mirror image: y then runs from distal (−) to mesial (+), so that the space stays right-handed.
+    pub is_mirrored: bool,
+}
+
+/// How the distance to a limb's side is taken. Where the side lies is the same in both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// Along the ray from the middle of the level: too long at a slant, so that enamel gets thin on flat sides. The first
+    /// tooth was made so, and stays the same to the last bit.
+    AlongRays,
+    /// Along the side's normal.
+    AlongNormals,
 }
 
 /// A part stacked from outlines along z.
@@ -58,6 +74,8 @@ pub struct Outline {
     pub square: f32,
     /// How much wider than the mean the distal end and the buccal side are; negative: narrower.
     pub taper: [f32; 2],
+    /// How far the distal end is shifted buccally and the mesial end lingually, share of the half width along x.
+    pub skew: f32,
 }
 
 /// A furrow along a limb's side: places of its bottom line.
@@ -125,6 +143,8 @@ pub struct Enamel {
     pub side: f32,
     /// Height at which it is full on the sides, share of the crown.
     pub full_at: f32,
+    /// Share of the depth of furrows in the crown's sides by which the dentine under them sinks too.
+    pub follows: f32,
 }
 
 /// The pulp. Its outlines are shares of the neck's widths at every height.
@@ -139,7 +159,7 @@ pub struct Pulp {
 /// A canal that follows a root.
 #[derive(Clone, Copy, Debug)]
 pub struct Canal {
-    /// Which of the form's roots.
+    /// Which of the form's roots; of a tooth with one root, its body.
     pub root: usize,
     /// Where in the root's cross-section: shares of its half widths.
     pub at: [f32; 2],
@@ -149,4 +169,44 @@ pub struct Canal {
     pub end: f32,
     /// Dentine left between its end and the root's tip, mm.
     pub closed: f32,
+}
+
+/// A row of a table of outlines.
+pub(super) const fn outline(z: f32, x: [f32; 2], y: [f32; 2], square: f32, taper: [f32; 2]) -> Outline {
+    Outline { z, x, y, square, taper, skew: 0.0 }
+}
+
+/// The same, its ends shifted against each other.
+pub(super) const fn skewed(z: f32, x: [f32; 2], y: [f32; 2], square: f32, taper: [f32; 2], skew: f32) -> Outline {
+    Outline { z, x, y, square, taper, skew }
+}
+
+/// A row of a furrow's table.
+pub(super) const fn place(at: [f32; 3], depth: f32, width: f32) -> FurrowPlace {
+    FurrowPlace { at, depth, width }
+}
+
+pub(super) const fn groove(line: &'static [[f32; 3]], depth: f32, width: f32) -> Fissure {
+    Fissure { line, depth, width }
+}
+
+/// A shallow groove beside a triangular ridge.
+pub(super) const fn beside_ridge(line: &'static [[f32; 3]]) -> Fissure {
+    Fissure { line, depth: 0.16, width: 0.34 }
+}
+
+/// A pulp that is all one limb: chamber and canal of a tooth with one root.
+pub(super) const fn single(chamber: &'static [Outline]) -> Pulp {
+    Pulp { chamber: Limb { outlines: chamber, furrows: &[], round: 0.12 }, horn_spread: 0.5, canals: &[] }
+}
+
+/// Sizes as Wheeler's table prints them: lengths of crown and root; widths of crown and neck, mesiodistal and buccolingual;
+/// the neckline's rise mesially and distally.
+pub(super) const fn sizes(
+    length: [f32; 2],
+    mesiodistal: [f32; 2],
+    buccolingual: [f32; 2],
+    neckline_rise: [f32; 2],
+) -> Sizes {
+    Sizes { crown: length[0], root: length[1], mesiodistal, buccolingual, neckline_rise }
 }

@@ -34,12 +34,14 @@ const THINNEST: f32 = 1.75;
 /// The grid of a spacing (mm) that just holds a tooth of this form.
 pub fn grid_of_spacing(form: &Form, spacing: f32) -> Grid {
     let [low, high] = Shape::new(form, 0.0).bounds();
-    Grid::covering(low, high, Vec3::splat(spacing), MARGIN)
+    let grid = Grid::covering(low, high, Vec3::splat(spacing), MARGIN);
+    // A mirror image on the mirrored grid has the same voxels, from the other end.
+    if form.is_mirrored { mirrored(grid) } else { grid }
 }
 
 /// The finest grid of so many voxels that holds a tooth of this form, the tooth in its middle.
 pub fn grid_fitting(form: &Form, dims: [u32; 3]) -> Grid {
-    let [low, high] = Shape::new(form, 0.0).bounds();
+    let [low, high] = bounds(form);
     let steps = Vec3::from(dims.map(|n| n.saturating_sub(2 * MARGIN + 1).max(1) as f32));
     let spacing = ((high - low) / steps).max_element();
     let centred = Grid::centred(dims, Vec3::splat(spacing));
@@ -49,7 +51,40 @@ pub fn grid_fitting(form: &Form, dims: [u32; 3]) -> Grid {
 /// Grows a tooth on a grid in tooth space; what lies outside the grid is not there.
 pub fn grow(form: &Form, grid: Grid, tissues: &Tissues) -> Volume {
     let shape = Shape::new(form, THINNEST * grid.spacing.max_element());
-    Growing::on(grid, tissues).fill(&shape)
+    let growing = Growing::on(if form.is_mirrored { mirrored(grid) } else { grid }, tissues);
+    let band = growing.band;
+    let (mut density, mut label) = growing.fill(&shape);
+    if form.is_mirrored {
+        turn_rows(&grid, &mut density);
+        turn_rows(&grid, &mut label);
+    }
+    Volume::new(grid, band, density, label, tissues.dentine)
+}
+
+/// Corners of a box around a form's tooth, tooth space, mm.
+fn bounds(form: &Form) -> [Vec3; 2] {
+    let [low, high] = Shape::new(form, 0.0).bounds();
+    match form.is_mirrored {
+        true => [low.with_y(-high.y), high.with_y(-low.y)],
+        false => [low, high],
+    }
+}
+
+/// The grid in which a mirror image (y for −y) is what the tooth is in this one.
+fn mirrored(grid: Grid) -> Grid {
+    let last = grid.origin.y + (grid.dims[1] - 1) as f32 * grid.spacing.y;
+    Grid { origin: grid.origin.with_y(-last), ..grid }
+}
+
+/// Puts the last row of every level first, and so on.
+fn turn_rows<T>(grid: &Grid, voxels: &mut [T]) {
+    let [nx, ny, _] = grid.dims.map(|n| n as usize);
+    for level in voxels.chunks_mut(nx * ny) {
+        for row in 0..ny / 2 {
+            let (front, back) = level.split_at_mut((ny - 1 - row) * nx);
+            front[row * nx..][..nx].swap_with_slice(&mut back[..nx]);
+        }
+    }
 }
 
 /// Where a shape is asked: the corners of cells of `step` voxels each way.
@@ -145,7 +180,8 @@ impl Growing {
         }
     }
 
-    fn fill(self, shape: &Shape) -> Volume {
+    /// Density and label of every voxel.
+    fn fill(self, shape: &Shape) -> (Vec<Density>, Vec<Label>) {
         let columns = self.nodes.columns(shape);
         let per_block = self.nodes.per_block();
         let [nx, ny, _] = self.grid.dims.map(|n| n as usize);
@@ -168,7 +204,7 @@ impl Growing {
                 }
             }
         });
-        Volume::new(self.grid, self.band, density, label, self.tissues.dentine)
+        (density, label)
     }
 
     /// Leaves a block empty or fills it as a whole where its middle says so; else asks all its nodes.
@@ -282,6 +318,7 @@ impl Block<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::molar::LOWER_FIRST;
+    use super::super::teeth;
     use super::*;
 
     const TISSUES: Tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
@@ -289,14 +326,24 @@ mod tests {
     #[test]
     fn blocks_filled_as_a_whole_hold_what_their_voxels_would() {
         // Aim: a block's middle speaks for the block. Method: grow with and without asking it. Odd sizes leave cut blocks.
-        for (dims, spacing) in [([131, 127, 233], 0.095), ([69, 66, 119], 0.187), ([61, 59, 77], 0.31)] {
+        for (fdi, dims, spacing) in [
+            (36, [131, 127, 233], 0.095),
+            (36, [69, 66, 119], 0.187),
+            (36, [61, 59, 77], 0.31),
+            (11, [81, 95, 243], 0.101),
+            (31, [41, 43, 121], 0.19),
+            (14, [99, 86, 234], 0.1),
+            (17, [65, 57, 103], 0.2),
+        ] {
             let centred = Grid::centred(dims, Vec3::splat(spacing));
             let grid = Grid { origin: centred.origin - Vec3::new(0.0, 0.0, 3.4), ..centred };
-            let volume = grow(&LOWER_FIRST, grid, &TISSUES);
+            let form = &teeth::tooth(fdi).unwrap();
+            let volume = grow(form, grid, &TISSUES);
             let asked = Growing { reach: f32::INFINITY, ..Growing::on(grid, &TISSUES) };
-            let asked = asked.fill(&Shape::new(&LOWER_FIRST, THINNEST * spacing));
+            let (density, label) = asked.fill(&Shape::new(form, THINNEST * spacing));
+            let asked = Volume::new(grid, volume.band(), density, label, TISSUES.dentine);
             let differing = (0..grid.len()).filter(|&i| asked.voxel(i) != volume.voxel(i)).count();
-            assert_eq!(differing, 0, "at {spacing} mm");
+            assert_eq!(differing, 0, "{fdi} at {spacing} mm");
         }
     }
 

@@ -5,7 +5,9 @@
 //! middle third; mesial root broad, grooved and curved distally, distal root rounder and straighter), put into numbers
 //! by eye. Chamber and furcation: Deutsch & Musikant 2004.
 
-use super::form::{Canal, Crest, Cusp, Enamel, Fissure, Form, FurrowPlace, Limb, Outline, Pulp, Relief, Sizes};
+use super::form::{
+    Canal, Crest, Cusp, Enamel, Fissure, Form, Limb, Pulp, Relief, Sides, Sizes, beside_ridge, outline, place,
+};
 use super::{Tissues, grid_of_spacing, grow};
 use crate::volume::Volume;
 
@@ -25,8 +27,10 @@ pub const LOWER_FIRST: Form = Form {
     body: BODY,
     roots: &[MESIAL_ROOT, DISTAL_ROOT],
     relief: Relief { cusps: CUSPS, crests: &[RIM], fissures: FISSURES, floor: 0.60, flanks: [1.0, 0.7], edge: 0.5 },
-    enamel: Enamel { cusp: 2.15, fissure: 1.12, side: 1.05, full_at: 0.8 },
+    enamel: Enamel { cusp: 2.15, fissure: 1.12, side: 1.05, full_at: 0.8, follows: 0.0 },
     pulp: PULP,
+    sides: Sides::AlongRays,
+    is_mirrored: false,
 };
 
 /// From the roof of the furcation to the cusps.
@@ -218,19 +222,6 @@ const PULP: Pulp = Pulp {
         Canal { root: 1, at: [0.0, 0.0], orifice: [0.8, 0.4], end: 0.18, closed: 0.8 },
     ],
 };
-
-const fn outline(z: f32, x: [f32; 2], y: [f32; 2], square: f32, taper: [f32; 2]) -> Outline {
-    Outline { z, x, y, square, taper }
-}
-
-const fn place(at: [f32; 3], depth: f32, width: f32) -> FurrowPlace {
-    FurrowPlace { at, depth, width }
-}
-
-/// A shallow groove beside a triangular ridge.
-const fn beside_ridge(line: &'static [[f32; 3]]) -> Fissure {
-    Fissure { line, depth: 0.16, width: 0.34 }
-}
 
 #[cfg(test)]
 mod tests {

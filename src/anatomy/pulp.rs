@@ -34,9 +34,9 @@ const FUNNEL: f32 = 0.35;
 const OVERLAP: f32 = 0.4;
 
 impl Pulp {
-    /// `mm` turns shares x, y, z of the neck into mm.
+    /// `roots` are what canals follow; `mm` turns shares x, y, z of the neck into mm.
     pub(super) fn new(form: &Form, roots: &[Limb], mm: impl Fn([f32; 3]) -> [f32; 3], tips: &[[f32; 3]]) -> Pulp {
-        let chamber = Limb::new(&form.pulp.chamber, mm);
+        let chamber = Limb::new(&form.pulp.chamber, form.sides, mm);
         let (floor, roof) = (chamber.lowest(), chamber.highest());
         let horn = |(cusp, tip): (&form::Cusp, &[f32; 3])| {
             let spread = form.pulp.horn_spread;

@@ -1,16 +1,17 @@
 //! A limb cut at one height: how far a point of that level is from its side.
 
 use super::blend::{bump, common};
-use super::form;
+use super::form::{self, Sides};
 use super::track::Track;
 
 /// A limb in mm.
 pub(super) struct Limb {
-    /// Centre x, y; half widths x, y; squareness; taper x, y.
-    outlines: Track<7>,
+    /// Centre x, y; half widths x, y; squareness; taper x, y; skew.
+    outlines: Track<8>,
     /// Bottom line x, y; depth; half width.
     furrows: Vec<Track<4>>,
     round: f32,
+    sides: Sides,
 }
 
 /// How far sideways a taper is followed, in half widths: beyond, an outline would turn inside out.
@@ -31,12 +32,12 @@ const FILLET_GROWTH: f32 = 0.12;
 
 impl Limb {
     /// `mm` turns shares x, y, z into mm.
-    pub(super) fn new(limb: &form::Limb, mm: impl Fn([f32; 3]) -> [f32; 3]) -> Limb {
+    pub(super) fn new(limb: &form::Limb, sides: Sides, mm: impl Fn([f32; 3]) -> [f32; 3]) -> Limb {
         let outline = |o: &form::Outline| {
             let [low, high] = [0, 1].map(|side| mm([o.x[side], o.y[side], o.z]));
             let [cx, cy] = [0, 1].map(|axis| 0.5 * (low[axis] + high[axis]));
             let [ax, ay] = [0, 1].map(|axis| 0.5 * (high[axis] - low[axis]));
-            (low[2], [cx, cy, ax, ay, o.square, o.taper[0], o.taper[1]])
+            (low[2], [cx, cy, ax, ay, o.square, o.taper[0], o.taper[1], o.skew])
         };
         let furrow = |furrow: &form::Furrow| {
             Track::new(furrow.iter().map(|place| {
@@ -48,6 +49,7 @@ impl Limb {
             outlines: Track::new(limb.outlines.iter().map(outline)),
             furrows: limb.furrows.iter().map(furrow).collect(),
             round: limb.round,
+            sides,
         }
     }
 
@@ -60,7 +62,7 @@ impl Limb {
     }
 
     pub(super) fn cut(&self, z: f32) -> Section {
-        let [cx, cy, ax, ay, square, taper_x, taper_y] = self.outlines.at(z);
+        let [cx, cy, ax, ay, square, taper_x, taper_y, skew] = self.outlines.at(z);
         let notch = |track: &Track<4>| {
             let [x, y, depth, width] = track.at(z);
             let beside = z < track.start() || z > track.end() || depth <= 0.0;
@@ -71,10 +73,12 @@ impl Limb {
             half: [ax, ay],
             square,
             taper: [taper_x, taper_y],
+            skew,
             notches: self.furrows.iter().filter_map(notch).collect(),
             below: self.lowest() - z,
             above: z - self.highest(),
             round: self.round,
+            sides: self.sides,
         }
     }
 }
@@ -85,11 +89,13 @@ pub(super) struct Section {
     half: [f32; 2],
     square: f32,
     taper: [f32; 2],
+    skew: f32,
     notches: Vec<Notch>,
     /// Signed distances to the limb's ends.
     below: f32,
     above: f32,
     round: f32,
+    sides: Sides,
 }
 
 /// A furrow cut at one height.
@@ -106,27 +112,44 @@ impl Section {
     }
 
     /// Signed distance to the limb.
-    pub(super) fn distance(&self, [x, y]: [f32; 2]) -> f32 {
-        let side = self.side([x, y]) + self.notched([x, y]);
+    pub(super) fn distance(&self, place: [f32; 2]) -> f32 {
+        self.ended(self.side(place) + self.notched(place))
+    }
+
+    /// Signed distance to the limb of a place so far from its side, furrows and all.
+    pub(super) fn ended(&self, side: f32) -> f32 {
         common(common(side, self.below, self.round), self.above, UPPER_ROUND)
     }
 
-    /// Distance to the outline along the ray from its middle, as if the limb had no ends and no furrows.
+    /// Distance to the outline, as if the limb had no ends and no furrows.
     ///
     /// The outline is a squircle (Fernández-Guasti): closed form, so that no platform's power function is asked.
     pub(super) fn side(&self, [x, y]: [f32; 2]) -> f32 {
         let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
         let [ax, ay] = self.half;
         let along = |d: f32, half: f32| (d / half).clamp(-TAPER_REACH, TAPER_REACH);
-        let u = dx / (ax * (1.0 + self.taper[0] * along(dy, ay)));
-        let v = dy / (ay * (1.0 + self.taper[1] * along(dx, ax)));
+        let [wide_x, wide_y] = [ax * (1.0 + self.taper[0] * along(dy, ay)), ay * (1.0 + self.taper[1] * along(dx, ax))];
+        let u = (dx - self.skew * ax * along(dy, ay)) / wide_x;
+        let v = dy / wide_y;
         let (uu, vv) = (u * u, v * v);
         let sum = uu + vv;
-        let norm_squared = 0.5 * (sum + (sum * sum - 4.0 * self.square * uu * vv).max(0.0).sqrt());
+        let root = (sum * sum - 4.0 * self.square * uu * vv).max(0.0).sqrt();
+        let norm_squared = 0.5 * (sum + root);
         if norm_squared < 1e-6 {
             return -ax.min(ay);
         }
-        (dx * dx + dy * dy).sqrt() * (1.0 - 1.0 / norm_squared.sqrt())
+        if self.sides == Sides::AlongRays {
+            return (dx * dx + dy * dy).sqrt() * (1.0 - 1.0 / norm_squared.sqrt());
+        }
+        let norm = norm_squared.sqrt();
+        // The norm's rise along x and y; how taper and skew change it is small, but for the skew's slant.
+        let share = |other: f32| if root > 1e-6 { 0.5 * (1.0 + (sum - 2.0 * self.square * other) / root) } else { 0.5 };
+        let (rise_u, rise_v) = (share(vv) * u / (norm * wide_x), share(uu) * v / (norm * wide_y));
+        let rise_v = rise_v - rise_u * self.skew * ax / ay;
+        let distance = (norm - 1.0) / (rise_u * rise_u + rise_v * rise_v).sqrt().max(1e-3);
+        // Near the middle line of a flat outline the normal points along it; the nearest side is beside it.
+        let most = ax.min(ay) * (1.0 - norm_squared).max(0.0).sqrt();
+        if norm < 1.0 { distance.max(-most) } else { distance }
     }
 
     /// What the furrows take away here, mm.

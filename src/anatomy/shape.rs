@@ -69,21 +69,22 @@ impl Slice<'_> {
 impl Shape {
     /// `thinnest` is the thinnest enamel to make, mm.
     pub(super) fn new(form: &Form, thinnest: f32) -> Shape {
-        let Form { sizes, body, roots, relief, enamel, pulp: _ } = form;
+        let Form { sizes, body, roots, relief, enamel, pulp: _, sides, is_mirrored: _ } = form;
         let crown = |p| crown_mm(sizes, p);
         let neck = |p| neck_mm(sizes, p);
-        let limbs: Vec<Limb> = roots.iter().map(|root| Limb::new(root, neck)).collect();
+        let limbs: Vec<Limb> = roots.iter().map(|root| Limb::new(root, *sides, neck)).collect();
+        let body = Limb::new(body, *sides, crown);
         let tips: Vec<[f32; 3]> = relief.cusps.iter().map(|cusp| crown(cusp.tip)).collect();
         let [low, high] = bounds(form);
         Shape {
             sizes: *sizes,
-            body: Limb::new(body, crown),
             relief: Relief::new(relief, crown),
             edge: relief.edge,
             enamel: *enamel,
             fissure: relief.fissures.iter().map(|f| f.depth).fold(0.0, f32::max),
             thinnest,
-            pulp: Pulp::new(form, &limbs, neck, &tips),
+            pulp: Pulp::new(form, if limbs.is_empty() { std::slice::from_ref(&body) } else { &limbs }, neck, &tips),
+            body,
             roots: limbs,
             low,
             high,
@@ -92,7 +93,9 @@ impl Shape {
 
     pub(super) fn cut(&self, z: f32) -> Slice<'_> {
         let roots: Vec<Section> = self.roots.iter().map(|root| root.cut(z)).collect();
-        Slice { z, body: self.body.cut(z), pulp: self.pulp.cut(z, &roots), roots }
+        let body = self.body.cut(z);
+        let pulp = self.pulp.cut(z, if roots.is_empty() { std::slice::from_ref(&body) } else { &roots });
+        Slice { z, body, pulp, roots }
     }
 
     pub(super) fn ground(&self, place: [f32; 2]) -> Ground {
@@ -110,13 +113,14 @@ impl Shape {
 
     pub(super) fn at(&self, slice: &Slice, column: &Column, place: [f32; 2]) -> Depths {
         let side = slice.body.side(place);
+        let notched = slice.body.notched(place);
         let above = (slice.z - column.ground.height + column.ground.carved) * column.upright;
-        let body = common(slice.body.distance(place), above, self.edge);
+        let body = common(slice.body.ended(side + notched), above, self.edge);
         let tooth = slice.roots.iter().fold(body, |tooth, root| {
             let distance = root.distance(place) + root.sunk();
             joined(tooth, distance, root.fillet())
         });
-        Depths { tooth, dentine: self.dentine(slice, column, side) }
+        Depths { tooth, dentine: self.dentine(slice, column, side + self.enamel.follows * notched) }
     }
 
     /// Distance to the surface under the enamel; below the neckline there is none, however far out.

@@ -3,6 +3,7 @@
 //! Takes arguments. Gives files, lines and an exit status: 0 done, 1 the input is wrong or the check fails, 2 misuse. Never
 //! decides anything a library call could not.
 
+mod anatomy;
 mod assist;
 mod bench;
 mod check;
@@ -70,6 +71,8 @@ enum Command {
     Xapi(xapi::Arguments),
     /// Sessions, measures and events as Parquet, for analysis
     Parquet(parquet::Arguments),
+    /// Grow permanent teeth: label maps, surfaces, a table of sizes
+    Anatomy(anatomy::Arguments),
     /// Turn a scan into a labelled volume
     Import(import::Arguments),
     /// Measure the program's own speed and memory
@@ -163,6 +166,7 @@ pub fn main() -> ExitCode {
         Some(Command::Gradebook(arguments)) => gradebook::run(&arguments),
         Some(Command::Xapi(arguments)) => xapi::run(&arguments),
         Some(Command::Parquet(arguments)) => parquet::run(&arguments),
+        Some(Command::Anatomy(arguments)) => anatomy::run(&arguments),
         Some(Command::Import(arguments)) => import::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),
     };

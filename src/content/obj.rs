@@ -1,7 +1,7 @@
 //! Wavefront OBJ files.
 //!
 //! Takes a file's bytes. Gives one closed mesh in millimetres, facing outward, or the first thing that is wrong with it;
-//! or just the triangles, for what is only looked at. What a file says of materials and colours is not read.
+//! or just the triangles, for what is only looked at. Or takes a mesh and gives the file. What a file says of materials and colours is not read.
 
 use crate::frame::Vec3;
 use crate::mesh::Mesh;
@@ -198,6 +198,17 @@ fn check_edges(mesh: &Mesh) -> Result<(), Unusable> {
         (0, edges, _) => Err(Unusable::Tangled { edges }),
         (edges, ..) => Err(Unusable::Open { edges }),
     }
+}
+
+/// A mesh as a file, to a tenth of a micrometre.
+pub fn text(mesh: &Mesh) -> String {
+    let mut text = String::from("# millimetres\n");
+    mesh.positions.iter().for_each(|p| text += &format!("v {:.4} {:.4} {:.4}\n", p.x, p.y, p.z));
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| i + 1);
+        text += &format!("f {a} {b} {c}\n");
+    }
+    text
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Surfaces as one glTF 2.0 binary file, coloured per vertex.
 
+use super::pictures::linear;
 use crate::mesh::Mesh;
 use gltf_json as json;
 use json::validation::{Checked, USize64, Validate};
@@ -12,6 +13,14 @@ pub struct Part {
     pub mesh: Mesh,
     /// Linear red, green, blue in 0–1, one per position.
     pub colors: Vec<[f32; 3]>,
+}
+
+impl Part {
+    /// A surface of one colour, given as screens take it.
+    pub fn plain(name: &str, mesh: Mesh, rgb: [f32; 3]) -> Part {
+        let colors = vec![linear(rgb); mesh.positions.len()];
+        Part { name: name.into(), mesh, colors }
+    }
 }
 
 /// Millimetres become the metres that glTF asks for, and z up becomes y up.

@@ -17,6 +17,7 @@ mod session_page;
 mod voxels;
 mod words;
 
+pub use glb::{Part as SurfacePart, bytes as surfaces_glb};
 pub use html::Templates;
 pub use labelmap::tissues as tissue_map;
 pub use pictures::{SEEN, preview_png, sections_png};

@@ -114,7 +114,7 @@ pub struct AnswerFile {
 pub struct EvidenceFile {
     /// When it arose, s.
     pub at_s: Option<f64>,
-    /// Where, in tooth space, mm: buccal, distal, occlusal from the crown's middle at the neck.
+    /// Where, in tooth space, mm: buccal, distal (mesial for 21–28 and 41–48), occlusal from the crown's middle at the neck.
     pub place_mm: [f64; 3],
 }
 

@@ -175,7 +175,8 @@ pub fn render(
     session: &SessionFile,
     pictures: &[Picture],
 ) -> Result<String, String> {
-    let in_all = Speaker { languages: templates.languages(), session };
+    let is_mirrored = scored.replay.workpiece.teeth.first().is_some_and(|tooth| tooth.distal().y < 0.0);
+    let in_all = Speaker { languages: templates.languages(), session, is_mirrored };
     let grade = session.grade.as_ref();
     let figures =
         |shows: fn(&Shows) -> bool| pictures.iter().filter(|p| shows(&p.shows)).map(|p| in_all.figure(p)).collect();
@@ -312,6 +313,8 @@ fn data(
 struct Speaker<'a> {
     languages: &'a Languages,
     session: &'a SessionFile,
+    /// True where y of tooth space runs toward mesial.
+    is_mirrored: bool,
 }
 
 impl Speaker<'_> {
@@ -352,8 +355,12 @@ impl Speaker<'_> {
             Said::text(format!("way.{way}"), &[("mm", Said::plain(format!("{:.1}", v.abs())))])
         };
         let [x, y, z] = evidence.place_mm;
-        let place =
-            [("x", part(x, "buccal", "lingual")), ("y", part(y, "distal", "mesial")), ("z", part(z, "up", "down"))];
+        let distal = y * if self.is_mirrored { -1.0 } else { 1.0 };
+        let place = [
+            ("x", part(x, "buccal", "lingual")),
+            ("y", part(distal, "distal", "mesial")),
+            ("z", part(z, "up", "down")),
+        ];
         let place = Said::text("place.at", &place);
         self.html(&match evidence.at_s {
             Some(at) => Said::text("place.when", &[("at", Said::plain(words::duration(at))), ("place", place)]),

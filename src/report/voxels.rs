@@ -35,6 +35,8 @@ pub struct About {
     pub spacing_mm: [f32; 3],
     /// Centre of the first, in tooth space.
     pub origin_mm: [f32; 3],
+    /// True where y of tooth space runs toward mesial: in the upper left and the lower right.
+    pub is_mirrored: bool,
     /// Which voxel of the bundle's label maps the first one is.
     pub first: [u32; 3],
     /// Every so-manieth voxel of the label maps is carried.
@@ -90,6 +92,7 @@ fn pack_every(scored: &Scored, stride: u32) -> Option<Voxels> {
         dims,
         spacing_mm: (all.whole.spacing * stride as f32).to_array(),
         origin_mm: all.whole.centre(first).to_array(),
+        is_mirrored: scored.replay.workpiece.teeth.first().is_some_and(|tooth| tooth.distal().y < 0.0),
         first,
         stride,
         changed_low: std::array::from_fn(|a| (changed.first[a] - first[a]) / stride),

@@ -123,7 +123,8 @@ pub struct ObstacleFile {
     pub mesh: String,
     /// Tissue that it feels like.
     pub tissue: String,
-    /// Where the mesh's origin lies in tooth space: buccal, distal, occlusal, from the crown's middle at the neck.
+    /// Where the mesh's origin lies in tooth space: buccal, distal (mesial for 21–28 and 41–48), occlusal, from the crown's
+    /// middle at the neck.
     #[serde(default = "ObstacleFile::origin")]
     pub position_mm: [CoordinateFile; 3],
     /// How far the mesh is turned about tooth space's x, then y, then z.
@@ -153,7 +154,7 @@ pub struct ToothFile {
     /// Name by which questions and results refer to the tooth: small letters, digits, hyphens, underscores.
     #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
     pub id: String,
-    /// Number of the tooth by ISO 3950 (FDI), such as 36.
+    /// Number of the tooth by ISO 3950 (FDI): 11–18, 21–28, 31–38, 41–48.
     #[schemars(range(min = 11, max = 48))]
     pub fdi: u8,
     /// Where the tooth's shape comes from.
@@ -622,7 +623,8 @@ pub enum ZoneRole {
     NeverRemove,
 }
 
-/// Which voxels belong to a zone. Points in tooth space: x buccal, y distal, z occlusal, from the crown's middle at the neck.
+/// Which voxels belong to a zone. Points in tooth space: x buccal, y distal (mesial for 21–28 and 41–48), z occlusal, from the
+/// crown's middle at the neck.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RegionFile {
@@ -764,7 +766,7 @@ pub enum GuidanceFile {
 #[serde(deny_unknown_fields)]
 pub struct FixtureFile {
     /// CSV file with the header x_mm,y_mm,z_mm (time_s may come first), relative to the scenario's folder; tooth space: x
-    /// buccal, y distal, z occlusal. `typodont path` makes one of a session.
+    /// buccal, y distal (mesial for 21–28 and 41–48), z occlusal. `typodont path` makes one of a session.
     #[schemars(length(min = 1, max = 500), regex(pattern = r"\.csv$"))]
     pub file: String,
     /// Where on the path the hand is drawn to.
@@ -846,7 +848,7 @@ fn one() -> f32 {
 pub enum SpaceFile {
     /// x right, y up, z toward the trainee.
     World,
-    /// x buccal, y distal, z occlusal.
+    /// x buccal, y distal (mesial for 21–28 and 41–48), z occlusal.
     Tooth,
 }
 

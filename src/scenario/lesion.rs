@@ -49,17 +49,18 @@ impl Site {
         const INTO_QUADRANT: f32 = 0.42;
         const BY_CHANCE: f32 = 0.4;
         let (middle, half) = (0.5 * (place.crown_low + place.crown_high), 0.5 * (place.crown_high - place.crown_low));
+        let distal = place.distal();
         let (inward, u, v) = match decay.surface {
-            SurfaceFile::O => (Vec3::NEG_Z, Vec3::X, Vec3::Y),
-            SurfaceFile::B => (Vec3::NEG_X, Vec3::Y, Vec3::Z),
-            SurfaceFile::L => (Vec3::X, Vec3::Y, Vec3::Z),
-            SurfaceFile::D => (Vec3::NEG_Y, Vec3::X, Vec3::Z),
-            SurfaceFile::M => (Vec3::Y, Vec3::X, Vec3::Z),
+            SurfaceFile::O => (Vec3::NEG_Z, Vec3::X, distal),
+            SurfaceFile::B => (Vec3::NEG_X, distal, Vec3::Z),
+            SurfaceFile::L => (Vec3::X, distal, Vec3::Z),
+            SurfaceFile::D => (-distal, Vec3::X, Vec3::Z),
+            SurfaceFile::M => (distal, Vec3::X, Vec3::Z),
         };
         let in_quadrant = |quadrant: u8| {
             let buccal = if quadrant <= 2 { 1.0 } else { -1.0 };
-            let distal = if quadrant % 2 == 1 { 1.0 } else { -1.0 };
-            (Vec3::X * buccal + Vec3::Y * distal) * half * INTO_QUADRANT
+            let left = if quadrant % 2 == 1 { 1.0 } else { -1.0 };
+            (Vec3::X * buccal + Vec3::Y * left) * half * INTO_QUADRANT
         };
         let by_chance = |axis: Vec3, name: &str| {
             // 24 bits fill a single float's mantissa.

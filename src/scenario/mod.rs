@@ -18,7 +18,7 @@ pub use resolve::{Forms, hex, resolve};
 pub use schema::schema_text;
 pub use workpiece::{ToothPlace, Unmakeable, Workpiece, anatomy_tissues};
 
-use crate::anatomy::caries::Reach;
+use crate::anatomy::{self, caries::Reach};
 use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
 use crate::touch::{Carving, Factors, Guidance, Shape, Vibration};
@@ -105,10 +105,17 @@ pub struct Tooth {
     pub stains: Vec<Decay>,
 }
 
+impl Tooth {
+    /// Which way is distal in tooth space: +y in the upper right and the lower left of the mouth, −y elsewhere.
+    pub fn distal(&self) -> Vec3 {
+        Vec3::Y * anatomy::teeth::distal(self.fdi)
+    }
+}
+
 /// Where a tooth's shape comes from.
 #[derive(Clone, Debug)]
 pub enum Form {
-    /// Made by the program at a voxel size in mm.
+    /// Made by the program from its number, at a voxel size in mm.
     Procedural { spacing: f32 },
     /// Read from a file and made ready: enamel up, tissues labelled.
     Given(Arc<Volume>),

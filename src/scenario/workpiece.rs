@@ -37,6 +37,13 @@ pub struct ToothPlace {
     pub crown_high: Vec3,
 }
 
+impl ToothPlace {
+    /// Which way is distal in tooth space: +y in the upper right and the lower left of the mouth, −y elsewhere.
+    pub fn distal(&self) -> Vec3 {
+        Vec3::Y * anatomy::teeth::distal(self.fdi)
+    }
+}
+
 /// Why a workpiece cannot be made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Unmakeable {
@@ -54,6 +61,8 @@ pub enum Unmakeable {
     ZoneSize { zone: usize, map: [u32; 3], workpiece: [u32; 3] },
     /// The volume would have too many voxels.
     TooLarge { voxels: u64 },
+    /// There is no tooth of this number.
+    NoSuchTooth { fdi: u8 },
     /// The forms were not read: the volume is to be taken from the recording.
     OnlyRecorded,
 }
@@ -73,6 +82,7 @@ impl fmt::Display for Unmakeable {
                 "the zone's label map has {}×{}×{} voxels, the workpiece {}×{}×{}",
                 map[0], map[1], map[2], workpiece[0], workpiece[1], workpiece[2]
             ),
+            Unmakeable::NoSuchTooth { fdi } => write!(f, "there is no tooth {fdi}"),
             Unmakeable::OnlyRecorded => f.write_str("the teeth's forms are in the recording only"),
             Unmakeable::TooLarge { voxels } => write!(f, "the volume would have {voxels} voxels"),
         }
@@ -150,10 +160,11 @@ impl Workpiece {
     }
 }
 
-/// World space as the trainee sees it: the tooth stands upright, buccal side away, mesial side to the right, and the given
-/// point of tooth space is the middle of the device's workspace.
+/// World space as the trainee sees it: the tooth stands upright, an upper one too, as in a model jaw on the bench; its buccal
+/// side is away, +x of the picture is −y of tooth space (mesial in the upper right and the lower left, distal elsewhere), and the
+/// given point of tooth space is the middle of the device's workspace.
 fn world_above(origin_in_tooth: Vec3) -> Pose {
-    // x right = mesial (-y), y up = occlusal (z), z toward the user = lingual (-x).
+    // x right = -y, y up = occlusal (z), z toward the user = lingual (-x).
     let orientation = Quat::from_xyzw(-0.5, 0.5, 0.5, 0.5);
     Pose { position: -(orientation * origin_in_tooth), orientation }
 }
@@ -189,7 +200,11 @@ fn form_of(tooth: &Tooth, tissues: &TissueTable) -> Result<Volume, Unmakeable> {
     match &tooth.form {
         Form::Given(volume) => Ok(volume.as_ref().clone()),
         Form::Recorded => Err(Unmakeable::OnlyRecorded),
-        Form::Procedural { spacing } => Ok(anatomy::molar::lower_first(*spacing, &anatomy_tissues(tissues))),
+        Form::Procedural { spacing } => {
+            let form = anatomy::teeth::tooth(tooth.fdi).ok_or(Unmakeable::NoSuchTooth { fdi: tooth.fdi })?;
+            let grid = anatomy::grid_of_spacing(&form, *spacing);
+            Ok(anatomy::grow(&form, grid, &anatomy_tissues(tissues)))
+        }
     }
 }
 
@@ -288,25 +303,47 @@ fn tight_extent(volume: &Volume) -> [Vec3; 2] {
 fn surroundings(tooth: &ToothPlace, tissues: &TissueTable) -> Vec<Shape> {
     /// Distance between neighbouring crowns, mm: in contact, but for what a bur's run-out needs.
     const CONTACT_GAP: f32 = 0.05;
+    /// Rounding of a crown, mm.
+    const ROUNDING: f32 = 1.8;
     let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
     let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
     let (neck, top) = (tooth.crown_low.z, tooth.crown_high.z);
-    // Second premolar and second molar: width along the arch and across it, mm (Wheeler's averages).
-    let neighbour = |y: f32, half: Vec3| Shape {
-        label: label("neighbour"),
-        tooth_from_shape: Pose::at(Vec3::new(middle.x, y, top - 0.3 - half.z)),
-        form: touch::Form::RoundBox { half, rounding: 1.8 },
+    // Across the arch and along it, mm.
+    let own = sizes(tooth.fdi).map_or([10.5, 11.0], |s| [s.buccolingual[0], s.mesiodistal[0]]);
+    let neighbour = |fdi: u8, toward: Vec3| {
+        let sizes = sizes(fdi)?;
+        let half = Vec3::new(0.5 * sizes.buccolingual[0], 0.5 * sizes.mesiodistal[0], 4.5);
+        let side = match toward.y < 0.0 {
+            true => tooth.crown_low.y - CONTACT_GAP - half.y,
+            false => tooth.crown_high.y + CONTACT_GAP + half.y,
+        };
+        Some(Shape {
+            label: label("neighbour"),
+            tooth_from_shape: Pose::at(Vec3::new(middle.x, side, top - 0.3 - half.z)),
+            form: touch::Form::RoundBox { half, rounding: ROUNDING.min(0.6 * half.min_element()) },
+        })
     };
-    let premolar = Vec3::new(4.0, 3.5, 4.5);
-    let molar = Vec3::new(5.0, 5.25, 4.5);
-    let gum_half = Vec3::new(6.5, 22.0, 8.0);
-    vec![
-        neighbour(tooth.crown_low.y - CONTACT_GAP - premolar.y, premolar),
-        neighbour(tooth.crown_high.y + CONTACT_GAP + molar.y, molar),
-        Shape {
-            label: label("gingiva"),
-            tooth_from_shape: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gum_half.z)),
-            form: touch::Form::RoundBox { half: gum_half, rounding: 4.0 },
-        },
-    ]
+    let [mesial, distal] = beside(tooth.fdi);
+    let gum_half = Vec3::new(0.5 * own[0] + 1.25, 22.0, 8.0);
+    let gum = Shape {
+        label: label("gingiva"),
+        tooth_from_shape: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gum_half.z)),
+        form: touch::Form::RoundBox { half: gum_half, rounding: 4.0 },
+    };
+    let mesial = mesial.and_then(|fdi| neighbour(fdi, -tooth.distal()));
+    let distal = distal.and_then(|fdi| neighbour(fdi, tooth.distal()));
+    mesial.into_iter().chain(distal).chain([gum]).collect()
+}
+
+fn sizes(fdi: u8) -> Option<anatomy::form::Sizes> {
+    anatomy::teeth::tooth(fdi).map(|form| form.sizes)
+}
+
+/// The mesial and the distal neighbour of a tooth in a jaw of 28 teeth; a third molar has the second before it.
+fn beside(fdi: u8) -> [Option<u8>; 2] {
+    let (quadrant, position) = (fdi / 10, fdi % 10);
+    // Over the midline: 11 stands beside 21, 31 beside 41.
+    let other = [0, 2, 1, 4, 3].get(usize::from(quadrant)).map(|q| 10 * q + 1);
+    let mesial = if position == 1 { other } else { Some(fdi - 1) };
+    [mesial, (position < 7).then_some(fdi + 1)]
 }

@@ -3,7 +3,7 @@
 use super::jaw::Mouth;
 use crate::frame::Vec3;
 use crate::render::{Orbit, Quadrant};
-use crate::scenario::Workpiece;
+use crate::scenario::{ToothPlace, Workpiece};
 
 /// A side of the tooth, looked at squarely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,14 +19,14 @@ impl ToothSide {
     pub const ALL: [ToothSide; 5] =
         [ToothSide::Occlusal, ToothSide::Buccal, ToothSide::Lingual, ToothSide::Mesial, ToothSide::Distal];
 
-    /// From the tooth toward the eye, tooth space.
-    fn toward_eye(self) -> Vec3 {
+    /// From the tooth toward the eye, tooth space; `distal` is that way in it.
+    fn toward_eye(self, distal: Vec3) -> Vec3 {
         match self {
             ToothSide::Occlusal => Vec3::Z,
             ToothSide::Buccal => Vec3::X,
             ToothSide::Lingual => Vec3::NEG_X,
-            ToothSide::Mesial => Vec3::NEG_Y,
-            ToothSide::Distal => Vec3::Y,
+            ToothSide::Mesial => -distal,
+            ToothSide::Distal => distal,
         }
     }
 }
@@ -47,8 +47,9 @@ const QUADRANT_MIDDLE: [f32; 2] = [18.0, 20.0];
 pub fn tooth_view(workpiece: &Workpiece, side: ToothSide) -> Orbit {
     let [low, high] = crowns(workpiece);
     let middle = workpiece.world_from_tooth * (0.5 * (low + high));
+    let distal = workpiece.teeth.first().map_or(Vec3::Y, ToothPlace::distal);
     let radius = 0.5 * CROWN_ROOM * (high - low).max_element();
-    toward(middle, radius, workpiece.world_from_tooth.turn(side.toward_eye()))
+    toward(middle, radius, workpiece.world_from_tooth.turn(side.toward_eye(distal)))
 }
 
 /// Corners of the box around all crowns, tooth space.

@@ -184,6 +184,8 @@ fn of_pieces(scored: &Scored, mistake: Mistake, pieces: &[Piece]) -> Lapse {
 /// How far and which way a voxel lies from the nearest one of a set.
 struct Offsets {
     near: Option<(Crop, Vec<f32>, Vec<u32>)>,
+    /// Which way is distal, tooth space.
+    distal: Vec3,
 }
 
 impl Offsets {
@@ -196,7 +198,7 @@ impl Offsets {
             let (distances, nearest) = distance::to_nearest(&crop.grid, |i| is_in(crop.whole_index(i)));
             (crop, distances, nearest)
         });
-        Offsets { near }
+        Offsets { near, distal: scored.replay.workpiece.teeth.first().map_or(Vec3::Y, |tooth| tooth.distal()) }
     }
 
     /// `None` with an empty set, or far from all that was asked about.
@@ -204,12 +206,12 @@ impl Offsets {
         let (crop, distances, nearest) = self.near.as_ref()?;
         let place = crop.index_of(voxel).filter(|&i| distances[i].is_finite())?;
         let centre = |i: usize| crop.grid.centre(crop.grid.cell(i));
-        Some((distances[place], way(centre(place) - centre(nearest[place] as usize))))
+        Some((distances[place], way(centre(place) - centre(nearest[place] as usize), self.distal)))
     }
 }
 
 /// The side toward which a vector of tooth space points most.
-fn way(vector: Vec3) -> Way {
+fn way(vector: Vec3, distal: Vec3) -> Way {
     let Vec3 { x, y, z } = vector;
     match (x.abs(), y.abs(), z.abs()) {
         (a, b, c) if c >= a && c >= b => {
@@ -227,7 +229,7 @@ fn way(vector: Vec3) -> Way {
             }
         }
         _ => {
-            if y > 0.0 {
+            if y * distal.y > 0.0 {
                 Way::Distal
             } else {
                 Way::Mesial
@@ -328,7 +330,7 @@ mod tests {
             (Vec3::new(0.5, 0.1, -0.6), Way::Apical),
             (Vec3::Z, Way::Occlusal),
         ] {
-            assert_eq!(way(vector), expected, "{vector}");
+            assert_eq!(way(vector, Vec3::Y), expected, "{vector}");
         }
     }
 }

@@ -4,11 +4,14 @@ use super::questionnaire::{QuestionnaireSummary, Statement};
 use super::standard::Standard;
 use super::summary::{ScenarioSummary, Spread, Summary, in_words};
 use super::{Cohort, POINTS, Removal, charts, value};
+use crate::frame::Vec3;
+use crate::record::{self, Recording};
 use crate::report::html::Templates;
 use crate::report::session_file::SessionFile;
 use crate::report::{pictures, words};
 use base64::Engine;
 use serde::Serialize;
+use std::path::Path;
 
 /// Letters of a code, title or path shown: what is longer was not written to be read.
 const SHOWN_MAX: usize = 80;
@@ -364,7 +367,8 @@ fn standard(standard: &Standard) -> StandardPart {
 
 fn map(removal: &Removal, summary: &super::removal::RemovalSummary) -> MapPart {
     let volume = |v: f64| format!("{} mm³", words::number(v));
-    let drawn = pictures::shares(&removal.tooth.join("initial.seg.nrrd"), &removal.grid, &removal.share);
+    let tooth = removal.tooth.join("initial.seg.nrrd");
+    let drawn = pictures::shares(&tooth, distal(&removal.tooth), &removal.grid, &removal.share);
     let encode =
         |png: &[u8]| format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png));
     let (pictures, complaint) = match drawn {
@@ -381,6 +385,12 @@ fn map(removal: &Removal, summary: &super::removal::RemovalSummary) -> MapPart {
         pictures,
         complaint,
     }
+}
+
+/// Which way is distal in a bundle's first tooth, as its recording says; where that is unreadable, as in the lower left.
+fn distal(bundle: &Path) -> Vec3 {
+    let recording = Recording::read(&bundle.join(record::FILE_NAME)).ok();
+    recording.and_then(|r| r.scenario.scene.teeth.first().map(|tooth| tooth.distal())).unwrap_or(Vec3::Y)
 }
 
 fn questionnaire(summary: &QuestionnaireSummary) -> QuestionnairePart {

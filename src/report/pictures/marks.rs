@@ -16,11 +16,11 @@ const HALO: f32 = 2.5;
 /// Space to the picture's edge, pixels.
 const MARGIN: f32 = 10.0;
 
-/// Lays a picture on paper and writes on it.
-pub fn on_paper(picture: &Picture, shot: &Shot) -> Picture {
+/// Lays a picture on paper and writes on it. `distal` is that way in tooth space.
+pub fn on_paper(picture: &Picture, shot: &Shot, distal: Vec3) -> Picture {
     let mut paper = Picture::plain(picture.width, picture.height, PAPER);
     paper.lay_over(picture);
-    directions(&mut paper, shot);
+    directions(&mut paper, shot, distal);
     scale_bar(&mut paper, shot);
     paper
 }
@@ -34,9 +34,9 @@ pub fn with_scale(picture: &Picture, shot: &Shot) -> Picture {
 }
 
 /// A letter at each edge: buccal, lingual, mesial, distal, occlusal, apical.
-fn directions(picture: &mut Picture, shot: &Shot) {
+fn directions(picture: &mut Picture, shot: &Shot, distal: Vec3) {
     let letter = |way: Vec3| {
-        let names = [(Vec3::X, "B"), (Vec3::NEG_X, "L"), (Vec3::NEG_Y, "M"), (Vec3::Y, "D"), (Vec3::Z, "O")];
+        let names = [(Vec3::X, "B"), (Vec3::NEG_X, "L"), (-distal, "M"), (distal, "D"), (Vec3::Z, "O")];
         names.into_iter().find(|(axis, _)| axis.dot(way) > 0.9).map_or("A", |(_, name)| name)
     };
     let (right, up) = (shot.camera.right, shot.camera.up);

@@ -12,6 +12,7 @@ mod tint;
 pub use preview::{SEEN, preview_png};
 pub use sections::sections_png;
 pub use shares::{BANDS, shares};
+pub(super) use tint::linear;
 
 use super::glb::Part;
 use crate::frame::Vec3;
@@ -95,7 +96,14 @@ fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn;
     let shot = Shot { camera: Camera::framing(side, before, 1.0), width: SIZE, height: SIZE };
     let first = march::look(before, &shot);
     let last = if is_unchanged(scored) { first.clone() } else { march::look_again(after, &shot, &first) };
-    let (name, title) = match side {
+    let distal = distal(scored);
+    // What a side is called where y is mesial.
+    let called = match side {
+        Side::Mesial if distal.y < 0.0 => Side::Distal,
+        Side::Distal if distal.y < 0.0 => Side::Mesial,
+        side => side,
+    };
+    let (name, title) = match called {
         Side::Occlusal => ("occlusal", "Occlusal side"),
         Side::Buccal => ("buccal", "Buccal side"),
         Side::Lingual => ("lingual", "Lingual side"),
@@ -109,7 +117,12 @@ fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn;
         (Shows::After, last.paint(after, |label, _| palette.tissue(label))),
         (Shows::Map, last.paint(after, |label, voxel| tint.colour(voxel, kept(label, voxel)))),
     ]
-    .map(|(shows, pixels)| Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot)))
+    .map(|(shows, pixels)| Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, distal)))
+}
+
+/// Which way is distal in the first tooth.
+fn distal(scored: &Scored) -> Vec3 {
+    scored.replay.workpiece.teeth.first().map_or(Vec3::Y, ToothPlace::distal)
 }
 
 fn is_unchanged(scored: &Scored) -> bool {
@@ -143,7 +156,7 @@ fn cuts(scored: &Scored, palette: &Palette, (side, name, title): (Side, &str, &s
         let mut layers = layers.into_iter();
         let mut pixels = layers.next().unwrap_or_else(|| Pixels::clear(SIZE, SIZE));
         layers.for_each(|layer| pixels.lay_over(&layer));
-        Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot))
+        Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, distal(scored)))
     })
 }
 

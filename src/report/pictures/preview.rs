@@ -32,7 +32,7 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, seen: &Image) -> 
         if let Some(decay) = &decay {
             picture.lay_over(&marked(&march::iso(decay, &shot, |_, _| MARK)));
         }
-        marks::on_paper(&picture, &shot)
+        marks::on_paper(&picture, &shot, tooth.distal())
     };
     let shot = crown_shot(Side::Mesial, tooth_at(&workpiece.teeth, middle));
     let mut cut = march::slice(&workpiece.volume, &shot, middle, |label, _| palette.tissue(label));
@@ -41,7 +41,7 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, seen: &Image) -> 
     }
     cut.lay_over(&march::outline(&workpiece.volume, &shot, middle, LINE, LINE_WIDTH));
     let sides = from(Side::Occlusal).beside(&from(nearest_side(workpiece, middle)));
-    png(&first.beside(&sides).beside(&marks::on_paper(&cut, &shot)))
+    png(&first.beside(&sides).beside(&marks::on_paper(&cut, &shot, tooth.distal())))
 }
 
 /// The decay without the tooth.

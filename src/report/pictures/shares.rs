@@ -29,9 +29,9 @@ const DECAY_LINE: [f32; 3] = [1.0, 0.62, 0.24];
 /// The line around what at least half removed is this much wider than that around the decay.
 const HALF_WIDER: f32 = 1.8;
 
-/// The occlusal side and three cuts through the middle of what was removed. `tooth` is a label map; `share`, of people, lies on
-/// `grid` in the same space.
-pub fn shares(tooth: &Path, grid: &Grid, share: &[f32]) -> Result<Vec<Picture>, String> {
+/// The occlusal side and three cuts through the middle of what was removed. `tooth` is a label map in which `distal` is that way;
+/// `share`, of people, lies on `grid` in the same space.
+pub fn shares(tooth: &Path, distal: Vec3, grid: &Grid, share: &[f32]) -> Result<Vec<Picture>, String> {
     let image = nrrd::read(tooth).map_err(|e| e.to_string())?;
     let names: BTreeMap<u8, Label> = (1..=u8::MAX).map(|n| (n, Label(n))).collect();
     let volume = scan::labelled(&image, None, &names)?;
@@ -67,7 +67,7 @@ pub fn shares(tooth: &Path, grid: &Grid, share: &[f32]) -> Result<Vec<Picture>, 
         name: format!("share-{name}"),
         title: title.to_string(),
         shows: Shows::Map,
-        pixels: marks::on_paper(&pixels, &shot),
+        pixels: marks::on_paper(&pixels, &shot, distal),
     });
     Ok(encoded(on_paper.collect()))
 }

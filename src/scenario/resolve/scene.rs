@@ -75,17 +75,16 @@ impl Resolver<'_> {
     }
 
     fn tooth(&mut self, written: &file::ToothFile, path: &str) -> Option<Tooth> {
-        let (quadrant, position) = (written.fdi / 10, written.fdi % 10);
-        if !(1..=4).contains(&quadrant) || !(1..=8).contains(&position) {
+        if anatomy::teeth::tooth(written.fdi).is_none() {
             let message = format!("there is no tooth {}", written.fdi);
             self.complain(
                 &format!("{path}/fdi"),
                 "unknown-tooth",
                 message,
-                "the first digit is 1–4 (quadrant), the second 1–8 (from the midline)",
+                "FDI numbers run 11–18, 21–28, 31–38, 41–48",
             );
         }
-        let form = self.form(&written.form, written.fdi, path);
+        let form = self.form(&written.form, path);
         let decay =
             written.decay.iter().enumerate().map(|(i, d)| self.decay(d, &format!("{path}/decay/{i}"))).collect();
         let stains =
@@ -93,21 +92,10 @@ impl Resolver<'_> {
         Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay, stains })
     }
 
-    fn form(&mut self, written: &file::FormFile, fdi: u8, path: &str) -> Option<Form> {
+    fn form(&mut self, written: &file::FormFile, path: &str) -> Option<Form> {
         match written {
             _ if self.forms == Forms::Recorded => Some(Form::Recorded),
-            file::FormFile::Procedural(made) => {
-                if fdi != 36 {
-                    let help = "for now the program makes 36; other teeth can be given as ct or labels";
-                    self.complain(
-                        &format!("{path}/fdi"),
-                        "unknown-form",
-                        format!("tooth {fdi} cannot be made procedurally"),
-                        help,
-                    );
-                }
-                Some(Form::Procedural { spacing: made.spacing_mm })
-            }
+            file::FormFile::Procedural(made) => Some(Form::Procedural { spacing: made.spacing_mm }),
             file::FormFile::Ct(scan) => {
                 let path = format!("{path}/form/ct/file");
                 let spacing = scan.spacing_mm.map(|s| s.map(|s| s.0));

@@ -41,6 +41,7 @@ pub(super) fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &
             (format!("/zones/{zone}/region/labels/file"), "draw the map on the very volume that the tooth is made from")
         }
         Unmakeable::UnequalSpacing => ("/scene".to_string(), "give both teeth the same spacing_mm"),
+        Unmakeable::NoSuchTooth { .. } => ("/scene".to_string(), "FDI numbers run 11–18, 21–28, 31–38, 41–48"),
         Unmakeable::TooLarge { .. } | Unmakeable::OnlyRecorded => ("/scene".to_string(), "choose a larger spacing_mm"),
     };
     found.push(places.complain(&path, "impossible-scene", problem.to_string(), Some(help.into())));
@@ -53,7 +54,7 @@ fn find_zones_outside(scenario: &Scenario, workpiece: &Workpiece, places: &Place
         let is_outside = |[from, to]: [Vec3; 2]| from.cmpgt(high).any() || to.cmplt(low).any();
         if zone.region.extent().is_some_and(is_outside) {
             let message = format!("the zone \"{}\" lies outside the tooth", zone.id);
-            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm: buccal, distal, occlusal");
+            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm along x (buccal), y, z (occlusal)");
             found.push(places.complain(&format!("/zones/{index}/region"), "empty-region", message, Some(help)));
         }
     }
@@ -68,7 +69,7 @@ fn find_paths_away(scenario: &Scenario, workpiece: &Workpiece, places: &Places, 
             && !fixture.path.points().iter().any(is_near)
         {
             let message = format!("the path stays more than {PATH_AWAY} mm away from the tooth");
-            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm: buccal, distal, occlusal");
+            let help = format!("the tooth reaches from {low:.1} to {high:.1} mm along x (buccal), y, z (occlusal)");
             let path = format!("/stages/{index}/guidance/path/file");
             found.push(places.complain(&path, "wrong-place", message, Some(help)));
         }

@@ -1,7 +1,8 @@
 //! Where the teeth of one jaw stand.
 //!
-//! *Arch space*: x to the side of the carved tooth, y back from the edges of the central incisors, z occlusal, 0 on the
-//! plane through the incisors' edges; right-handed, mm. Both jaws have such a space of their own.
+//! *Arch space*: x to the patient's left in the lower jaw and to the right in the upper one, y back from the edges of the
+//! central incisors, z occlusal, 0 on the plane through the incisors' edges; right-handed, mm. Both jaws have such a space of
+//! their own.
 
 use super::teeth::Model;
 use crate::frame::{Pose, Quat, Vec3};

@@ -13,13 +13,16 @@ use self::crown::Coloured;
 use self::gum::{Jaw, Side};
 use self::teeth::Model;
 use super::around;
+use crate::anatomy::form::Sizes;
+use crate::anatomy::teeth as teeth_by_number;
 use crate::content::{Role, TissueTable};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::mesh::Mesh;
 use crate::render::{Finish, Quadrant, Rgb, Solid};
 use crate::scenario::{ToothPlace, Workpiece};
 use crate::touch::{Form, Shape};
-use crate::volume::Label;
+use crate::volume::{Label, rows};
+use glam::Mat3;
 use std::sync::Arc;
 
 /// How far the mouth is open at work, degrees: some 40 mm between the incisors.
@@ -58,8 +61,6 @@ pub struct Mouth {
     near_from_opposite: Pose,
     /// What is touched beside the tooth and not part of the near jaw's gum.
     touched: Vec<Solid>,
-    /// True for a tooth of the patient's right side.
-    is_right: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -89,8 +90,8 @@ impl Drawn {
 impl Mouth {
     /// The jaws for a workpiece with one tooth of FDI 11–48; `None` for two teeth side by side, which stand in no jaw.
     ///
-    /// Tooth space knows no left and right (x is buccal on both sides), and so the jaw of a tooth on the right is drawn as that
-    /// of its twin on the left.
+    /// Arch space is right-handed, and so x goes to the patient's left in the lower jaw and to the right in the upper one: there
+    /// stand the quadrants whose forms are grown as they are written, the mirrored ones on the other side.
     pub fn around(workpiece: &Workpiece, tissues: &TissueTable) -> Option<Mouth> {
         let [tooth] = &workpiece.teeth[..] else { return None };
         let (quadrant, number) = (tooth.fdi / 10, usize::from(tooth.fdi % 10));
@@ -103,7 +104,8 @@ impl Mouth {
         let seat = near.carved.half.seats[number - 1];
         let top = 0.5 * (tooth.crown_low + tooth.crown_high);
         let anchor = Vec3::new(top.x, top.y, tooth.crown_low.z);
-        let near_from_tooth = seat.arch_from_tooth() * Pose::at(-anchor);
+        let sign = teeth_by_number::distal(tooth.fdi);
+        let near_from_tooth = sided(seat.arch_from_tooth(), sign) * Pose::at(-anchor);
         let gums = tissues.by_name("gingiva").map(|e| e.label());
         let felt = Felt { tooth, shapes: &workpiece.around, gums, near_from_tooth };
         let colour = |name: &str, otherwise: Rgb| tissues.by_name(name).map_or(otherwise, |e| e.rgb());
@@ -114,7 +116,7 @@ impl Mouth {
                 gum: Drawn::of(arch.gum(fit), pink, GUM_GLOSS),
             };
         let is_taken = |is_carved_side: bool, index: usize, seat: &Seat| {
-            is_carved_side && (index + 1 == number || felt.takes(seat))
+            (is_carved_side && index + 1 == number) || felt.takes(seat, if is_carved_side { sign } else { -sign })
         };
         let is_soft =
             |shape: &Shape| tissues.role(shape.label) == Some(Role::Soft) && !matches!(shape.form, Form::Mesh(_));
@@ -126,7 +128,6 @@ impl Mouth {
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
             near_from_opposite: closed(jaw, &near, &other),
             touched: touched.map(|shape| around::solid(shape, workpiece, tissues)).collect(),
-            is_right: quadrant == 1 || quadrant == 4,
         })
     }
 
@@ -144,23 +145,20 @@ impl Mouth {
         [near.gum.at(*pose), near.teeth.at(*pose)].into_iter().chain(self.touched.iter().cloned()).collect()
     }
 
-    /// The arch space of the jaw with the carved tooth, in world space: x to the carved tooth's side, y back from the
-    /// incisors' edges, z occlusal.
+    /// The arch space of the jaw with the carved tooth, in world space.
     pub fn world_from_arch(&self) -> Pose {
         self.world_from_near
     }
 
     /// The arch space of a quadrant's jaw in world space, and on which side of it the quadrant lies: 1 or −1 along x.
     pub(super) fn arch_of(&self, quadrant: Quadrant, open: f32) -> (Pose, f32) {
-        let (jaw, is_right) = match quadrant {
-            Quadrant::UpperRight => (Jaw::Upper, true),
-            Quadrant::UpperLeft => (Jaw::Upper, false),
-            Quadrant::LowerLeft => (Jaw::Lower, false),
-            Quadrant::LowerRight => (Jaw::Lower, true),
+        let (jaw, side) = match quadrant {
+            Quadrant::UpperRight => (Jaw::Upper, 1.0),
+            Quadrant::UpperLeft => (Jaw::Upper, -1.0),
+            Quadrant::LowerLeft => (Jaw::Lower, 1.0),
+            Quadrant::LowerRight => (Jaw::Lower, -1.0),
         };
-        let side = if is_right == self.is_right { 1.0 } else { -1.0 };
-        // The opposite jaw faces its own x the other way.
-        if jaw == self.jaw { (self.world_from_near, side) } else { (self.world_from_opposite(open), -side) }
+        (if jaw == self.jaw { self.world_from_near } else { self.world_from_opposite(open) }, side)
     }
 
     fn world_from_opposite(&self, open: f32) -> Pose {
@@ -174,7 +172,7 @@ impl Mouth {
             Jaw::Lower => Vec3::new(0.0, back, up),
             Jaw::Upper => self.near_from_opposite * Vec3::new(0.0, back, up),
         };
-        // About x, which points to the carved tooth's side: the other jaw's front, at −y from the axis, goes to +z.
+        // About x, which points to one side: the other jaw's front, at −y from the axis, goes to +z.
         let orientation = Quat::from_rotation_x(-degrees.to_radians());
         Pose { position: axis - orientation * axis, orientation }
     }
@@ -206,7 +204,9 @@ impl Jaw {
 /// One jaw before it is drawn.
 struct Arch {
     jaw: Jaw,
-    /// The side with the carved tooth, x > 0, and the other, which is mirrored.
+    /// On which side of x the carved tooth stands: 1 or −1.
+    sign: f32,
+    /// The side with the carved tooth and the other; each is laid out at x > 0.
     carved: Row,
     plain: Row,
 }
@@ -230,46 +230,59 @@ impl Arch {
             let teeth: Vec<(Model, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
             Row { half: Half::of(jaw.form(), &teeth), models }
         };
-        Arch { jaw, carved: row(models), plain: row(plain) }
+        let sign = carved.map_or(1.0, |(tooth, _)| teeth_by_number::distal(tooth.fdi));
+        Arch { jaw, sign, carved: row(models), plain: row(plain) }
     }
 
     /// All crowns but those that are taken: on the carved tooth's side or the other, by their place from the midline.
     fn teeth(&self, is_taken: &dyn Fn(bool, usize, &Seat) -> bool) -> Coloured {
+        let crowns = rows::each(self.plain.models.len(), |index| crown::crown(&self.plain.models[index]));
         let mut all = Coloured::default();
-        for index in 0..self.plain.models.len() {
-            let crown = crown::crown(&self.plain.models[index]);
+        for (index, crown) in crowns.iter().enumerate() {
             for (row, is_carved_side) in [(&self.carved, true), (&self.plain, false)] {
                 let seat = &row.half.seats[index];
                 if is_taken(is_carved_side, index, seat) {
                     continue;
                 }
                 let pose = seat.arch_from_tooth();
-                let sided = |v: Vec3| if is_carved_side { v } else { v * Vec3::new(-1.0, 1.0, 1.0) };
-                all.add(&crown, |p| sided(pose * p), |n| sided(pose.turn(n)), !is_carved_side);
+                let sign = if is_carved_side { self.sign } else { -self.sign };
+                let side = Vec3::new(sign, 1.0, 1.0);
+                all.add(crown, |p| pose * p * side, |n| pose.turn(n) * side, sign < 0.0);
             }
         }
         all
     }
 
     fn gum(&self, fit: &dyn Fn(Vec3) -> Vec3) -> Coloured {
-        let sides = [(&self.plain, -1.0), (&self.carved, 1.0)];
+        let rows = if self.sign > 0.0 { [&self.plain, &self.carved] } else { [&self.carved, &self.plain] };
+        let sides = [(rows[0], -1.0), (rows[1], 1.0)];
         gum::gum(self.jaw, sides.map(|(row, sign)| Side { half: &row.half, models: &row.models, sign }), fit)
     }
 }
 
-/// A table's tooth with the carved one's own crown, upright as its space is.
+/// A pose at x > 0, or its mirror image at x < 0 for a tooth that is a mirror image (in y) too.
+fn sided(pose: Pose, sign: f32) -> Pose {
+    let across = Mat3::from_diagonal(Vec3::new(sign, 1.0, 1.0));
+    let along = Mat3::from_diagonal(Vec3::new(1.0, sign, 1.0));
+    let orientation = Quat::from_mat3(&(across * Mat3::from_quat(pose.orientation) * along)).normalize();
+    Pose { position: across * pose.position, orientation }
+}
+
+/// A table's tooth with the carved one's own crown.
 fn fitting(model: &Model, tooth: &ToothPlace) -> Model {
     /// Room between the carved crown and its neighbours on each side, mm.
     const CONTACT: f32 = 0.05;
     let size = tooth.crown_high - tooth.crown_low;
     let share = |of: [f32; 2], now: f32| [now, now * of[1] / of[0]];
-    let sizes = crate::anatomy::form::Sizes {
+    let sizes = Sizes {
         crown: size.z,
         mesiodistal: share(model.sizes.mesiodistal, size.y + 2.0 * CONTACT),
         buccolingual: share(model.sizes.buccolingual, size.x),
         ..model.sizes
     };
-    Model { sizes, lean: 0.0, ..*model }
+    // Front teeth lean as in any jaw; the others stand as upright as their space.
+    let lean = if matches!(model.kind, teeth::Kind::Incisor | teeth::Kind::Canine) { model.lean } else { 0.0 };
+    Model { sizes, lean, ..*model }
 }
 
 /// The opposite jaw's arch space in the near one's when the jaws are closed.
@@ -293,8 +306,9 @@ struct Felt<'a> {
 
 impl Felt<'_> {
     /// True when a touched shape other than gum stands where a crown would.
-    fn takes(&self, seat: &Seat) -> bool {
-        let middle_in_arch = seat.top - Vec3::Z * (0.5 * seat.crown);
+    /// `sign` is the side of x on which the seat lies.
+    fn takes(&self, seat: &Seat, sign: f32) -> bool {
+        let middle_in_arch = (seat.top - Vec3::Z * (0.5 * seat.crown)) * Vec3::new(sign, 1.0, 1.0);
         let middle = self.near_from_tooth.inverse() * middle_in_arch;
         self.shapes.iter().any(|shape| Some(shape.label) != self.gums && shape.distance(middle) < TAKEN)
     }
