@@ -77,7 +77,8 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
     let answer = browser.judge(&id, "0", &given);
     assert_eq!((answer.status, answer.header("location")), (303, format!("/session/{id}#item-0").as_str()));
     let page = browser.get(&format!("/session/{id}")).text();
-    for expected in ["<strong>31.50</strong>", "<b>63.50</b>", "<b>70</b>", "✓ Passed", "The wall is sound.", "Dr. Öz"]
+    for expected in
+        ["<strong>31.50</strong>", "<b>63.50</b>", "<b>70.00</b>", "✓ Passed", "The wall is sound.", "Dr. Öz"]
     {
         assert!(page.contains(expected), "{expected} in {page}");
     }
@@ -88,7 +89,7 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
     // The whole grade, then its withdrawal: lines of a chain.
     let whole = [("points", "60"), ("passed", "no"), ("reason", "No rubber dam"), ("name", "Dr. Öz")];
     assert_eq!(browser.judge(&id, "grade", &whole).status, 303);
-    assert!(browser.get(&format!("/session/{id}")).text().contains("<b>60</b>"));
+    assert!(browser.get(&format!("/session/{id}")).text().contains("<b>60.00</b>"));
     let form = browser.form_value();
     let back =
         [("form", form.as_str()), ("item", "grade"), ("seen", "2"), ("reason", "It was there"), ("name", "Dr. Öz")];
@@ -107,7 +108,10 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
     // Never over the machine's, and not only in the cache.
     assert_eq!(fs::read(bundle.join("session.json")).unwrap(), before);
     fs::remove_file(folder.join("review.sqlite")).unwrap();
-    assert!(browser.get(&format!("/session/{id}")).text().contains("<b>70</b>"), "the cache may go while it is open");
+    assert!(
+        browser.get(&format!("/session/{id}")).text().contains("<b>70.00</b>"),
+        "the cache may go while it is open"
+    );
     drop(desk);
     fs::remove_file(folder.join("review.sqlite")).unwrap();
     let desk = Desk::open(&folder, &[]);
@@ -458,6 +462,7 @@ fn what_is_done_to_the_log_is_told() {
             let page = browser.get(path).text();
             assert!(page.contains(told), "{told} at {path}");
         }
+        desk.told("-line");
     }
     // A fresh start tells it as well, by what the cache remembers.
     drop(desk);
@@ -471,15 +476,42 @@ fn what_is_done_to_the_log_is_told() {
     desk.told("torn-line: line 3");
     let browser = desk.browser();
     let page = browser.get(&format!("/session/{id}")).text();
-    assert!(page.contains("Line 3 was begun and not ended") && page.contains("<strong>40</strong>"), "{page}");
+    assert!(page.contains("Line 3 was begun and not ended") && page.contains("<strong>40.00</strong>"), "{page}");
     assert_eq!(browser.judge(&id, "0", &[("points", "20"), ("reason", "r"), ("name", "n")]).status, 303);
     let page = browser.get(&format!("/session/{id}")).text();
-    assert!(page.contains("Line 3 was begun and not ended") && page.contains("<strong>20</strong>"));
+    assert!(page.contains("Line 3 was begun and not ended") && page.contains("<strong>20.00</strong>"));
     // A cache of rubbish is made anew.
     drop(desk);
     fs::write(folder.join("review.sqlite"), "SQLite format 3\0 rubbish").unwrap();
     let desk = Desk::open(&folder, &[]);
     assert_eq!(desk.browser().ids("/"), [id]);
+}
+
+#[test]
+fn a_gradebook_takes_the_examiners_grade() {
+    let folder = folder("review_gradebook");
+    enter(&folder, &graded("anna", [25.0, 38.5]));
+    enter(&folder, &graded("berk", [20.0, 20.0]));
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    let id = browser.ids("/?text=anna").remove(0);
+    assert_eq!(browser.judge(&id, "0", &[("points", "35"), ("reason", "r"), ("name", "n")]).status, 303);
+    let table = |more: &[&str]| {
+        let file = folder.join("grades.csv");
+        let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_typodont"));
+        program.args(["gradebook", folder.to_str().unwrap(), "--for", "moodle", "-o", file.to_str().unwrap()]);
+        assert!(program.args(more).output().unwrap().status.success());
+        fs::read_to_string(file).unwrap()
+    };
+    assert!(table(&[]).contains("anna,63.5,\"Not passed"), "{}", table(&[]));
+    let judged = table(&["--overrides"]);
+    assert!(
+        judged.contains("anna,73.5,")
+            && judged.contains("Passed: 73.5 of 100")
+            && judged.contains("Decay removed: 35 of 50"),
+        "{judged}"
+    );
+    assert!(judged.contains("berk,40,"), "{judged}");
 }
 
 #[test]
@@ -510,7 +542,7 @@ fn two_programs_write_one_log() {
     for browser in &browsers {
         assert!(!browser.get("/").text().contains("role=\"alert\""));
         let page = browser.get(&format!("/session/{}", ids[3])).text();
-        assert!(page.contains("<b>60</b>"), "each sees what the other wrote");
+        assert!(page.contains("<b>60.00</b>"), "each sees what the other wrote");
     }
 }
 
@@ -571,19 +603,15 @@ fn of_anonymous_marking_nothing_says_who() {
     }
     fs::remove_file(folder.join("review.sqlite")).unwrap();
     let desk = Desk::open(&folder, &["--anonymous"]);
-    assert_eq!(codes(&desk.browser()), first, "the same at the next start");
-    drop(desk);
-    // By name again, the table says who has which code.
-    let desk = Desk::open(&folder, &[]);
-    let table = desk.browser().get("/sessions.csv").text();
-    assert!(
-        table.contains(&format!(
-            "Berk Demir,{}",
-            first.iter().find(|c| first.iter().filter(|d| d == c).count() == 1).unwrap()
-        )),
-        "{table}"
-    );
-    drop(desk);
+    let browser = desk.browser();
+    assert_eq!(codes(&browser), first, "the same at the next start");
+    // By name, beside it, the table says who has which code.
+    let named = Desk::open(&folder, &[]);
+    let table = named.browser().get("/sessions.csv").text();
+    let once = first.iter().find(|c| first.iter().filter(|d| d == c).count() == 1).unwrap();
+    assert!(table.contains(&format!("Berk Demir,{once}")), "{table}");
+    assert_eq!(codes(&browser), first, "they share a cache");
+    drop((desk, named));
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

@@ -4,7 +4,7 @@ use super::bundle::{self, VIEWS};
 use super::desk::{Case, Desk, Visit};
 use super::exchange::Response;
 use super::route::is_id;
-use super::sitting::{Facts, View, facts, measure_title, view};
+use super::sitting::{Colour, Facts, View, facts, legend, measure_title, view};
 use super::standing::{Standing, standing};
 use crate::report::words;
 use crate::report::{ItemFile, Said, SessionFile, harmless, said};
@@ -17,6 +17,7 @@ struct Comparison {
     stages: Vec<Row>,
     measures: Vec<Row>,
     views: Vec<Pair>,
+    legend: Vec<Colour>,
     /// They are not of the same exercise.
     differ: bool,
 }
@@ -97,6 +98,7 @@ pub fn page(desk: &Desk, visit: &Visit) -> Response {
         stages: stages(sessions),
         measures: measures(desk, visit, sessions),
         views: pictures.filter(|pair| pair.has != [false; 2]).collect(),
+        legend: legend(desk, visit),
         differ: sessions[0].scenario.id != sessions[1].scenario.id,
     };
     desk.page(visit, &cases[1].told, "compare.html", body)

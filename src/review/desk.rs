@@ -7,7 +7,7 @@ use super::exchange::{BODY_MAX, Request, Response, value};
 use super::index::{Index, Listed};
 use super::look::Look;
 use super::origin::{Foreign, Names};
-use super::overrides::{Log, Told};
+use super::overrides::{Log, Told, Trouble};
 use super::route::Route;
 use super::{compare, export, history, judging, list, sitting};
 use crate::report::cohort::read_session;
@@ -43,6 +43,9 @@ pub(super) struct State {
     pub index: Index,
     pub log: Log,
     pub door: Door,
+    /// What was wrong with the log at the last look, and what is still to be told of it.
+    troubles: Vec<Trouble>,
+    untold: Vec<String>,
 }
 
 /// Somebody who is in, and how they are spoken to.
@@ -118,7 +121,7 @@ impl Desk {
         };
         let index = Index::open(&canonical, codes)?;
         let (door, opens) = Door::new(&lock)?;
-        let state = State { index, log: Log::of(&canonical), door };
+        let state = State { index, log: Log::of(&canonical), door, troubles: Vec::new(), untold: Vec::new() };
         let desk = Desk { folder: canonical, look, anonymous, names: Names(names), state: Mutex::new(state) };
         Ok((desk, opens))
     }
@@ -126,11 +129,11 @@ impl Desk {
     /// How many sessions there are, how many files are left out, and what is wrong with the log: the first look.
     pub fn look_over(&self) -> Result<(usize, usize, Vec<String>), String> {
         let mut state = self.state();
-        let told = state.look_again(&self.folder)?;
+        state.look_again(&self.folder)?;
         let lost = |e: rusqlite::Error| format!("{}: unusable-cache: {e}", super::index::FILE_NAME);
         let (_, count) = state.index.page(&super::query::Query::of(&[]), self.anonymous).map_err(lost)?;
         let left_out = state.index.left_out().map_err(lost)?.len();
-        let mut troubles: Vec<String> = told.troubles.iter().map(|t| format!("{}: {t}", super::OVERRIDES)).collect();
+        let mut troubles = std::mem::take(&mut state.untold);
         troubles.extend(state.index.homeless.as_ref().map(|why| {
             format!("{}: unusable-cache: {why}; every start reads all bundles anew", super::index::FILE_NAME)
         }));
@@ -144,6 +147,12 @@ impl Desk {
 
     /// Answers a question.
     pub fn answer(&self, request: &Request) -> Response {
+        let mut response = self.answered(request);
+        response.told.append(&mut self.state().untold);
+        response
+    }
+
+    fn answered(&self, request: &Request) -> Response {
         if let Err(foreign) = self.names.check(request) {
             let status = if foreign == Foreign::Host { 421 } else { 403 };
             return Response::refusal(status, foreign.why()).telling(foreign.why());
@@ -204,7 +213,8 @@ impl Desk {
             Route::Json => export::json(self, visit),
             Route::Leave => {
                 self.state().door.leave(&visit.cookie);
-                self.door_page(&visit.language, visit.request, 200, "left", 0).with("clear-site-data", "\"cookies\"")
+                let gone = format!("{}; Max-Age=0", set_cookie(visit.request, ""));
+                self.door_page(&visit.language, visit.request, 200, "left", 0).with("set-cookie", gone)
             }
             Route::Enter | Route::Door | Route::Language => Response::see("/"),
         }
@@ -373,7 +383,7 @@ impl Desk {
 
     fn frame(&self, language: &str, request: &Request, form: &str, told: Option<&Told>) -> Frame {
         let say = |said: &Said| self.look.say(language, said);
-        let trouble = |trouble: &super::Trouble| {
+        let trouble = |trouble: &Trouble| {
             let (name, numbers) = trouble.words();
             let numbers: Vec<(&str, Said)> = numbers.iter().map(|(n, v)| (*n, Said::plain(v.to_string()))).collect();
             say(&Said::text(format!("trouble.{name}"), &numbers))
@@ -422,8 +432,12 @@ impl State {
         let known = self.index.known_head();
         let unread = |e: std::io::Error| format!("{}: unreadable-file: {e}", super::OVERRIDES);
         let told = self.log.told(known.as_ref()).map_err(unread)?;
+        if told.troubles != self.troubles {
+            self.untold.extend(told.troubles.iter().map(|trouble| format!("{}: {trouble}", super::OVERRIDES)));
+            self.troubles.clone_from(&told.troubles);
+        }
         self.index.refresh(folder, &told)?;
-        let is_sound = told.troubles.iter().all(super::Trouble::is_accident);
+        let is_sound = told.troubles.iter().all(Trouble::is_accident);
         if is_sound && self.index.known_head().as_ref() != Some(&told.head) && told.head.lines > 0 {
             self.index.know_head(&told.head);
         }
@@ -437,7 +451,10 @@ fn cookie_name(request: &Request) -> String {
 }
 
 fn set_cookie(request: &Request, cookie: &str) -> String {
-    format!("{}={cookie}; Path=/; HttpOnly; SameSite=Strict", cookie_name(request))
+    // Whoever came by HTTPS, through a proxy, never shows it without.
+    let secure = request.header("origin").is_some_and(|origin| origin.starts_with("https://"));
+    let more = if secure { "; Secure" } else { "" };
+    format!("{}={cookie}; Path=/; HttpOnly; SameSite=Strict{more}", cookie_name(request))
 }
 
 /// Letters of a query that a way back keeps; ours have some hundred.

@@ -1,6 +1,6 @@
 //! What examiners judged, line by line, as the log has it.
 
-use super::desk::{Desk, Visit};
+use super::desk::{Desk, SHOWN_MAX, Visit};
 use super::exchange::Response;
 use super::overrides::{Judged, Line};
 use crate::report::harmless;
@@ -31,17 +31,31 @@ pub(super) struct Given {
 
 #[derive(Serialize)]
 struct History {
-    history: Vec<Told>,
+    history: Vec<Named>,
+}
+
+/// A line with the session it is about; empty where that is no longer in the folder.
+#[derive(Serialize)]
+struct Named {
+    #[serde(flatten)]
+    told: Told,
+    exercise: String,
+    who: String,
 }
 
 /// The last first.
 pub fn page(desk: &Desk, visit: &Visit) -> Response {
-    let told = match desk.look_again(visit) {
-        Ok((_, told)) => told,
+    let (state, told) = match desk.look_again(visit) {
+        Ok(now) => now,
         Err(response) => return *response,
     };
-    let mut history = of(told.lines.iter());
-    history.reverse();
+    let named = |told: Told| {
+        let listed = state.index.session(&told.session).ok().flatten();
+        let exercise = listed.as_ref().map_or_else(String::new, |l| harmless(&l.title, SHOWN_MAX));
+        Named { exercise, who: listed.as_ref().map_or_else(String::new, |l| desk.called(l)), told }
+    };
+    let history: Vec<Named> = of(told.lines.iter()).into_iter().rev().map(named).collect();
+    drop(state);
     desk.page(visit, &told, "history.html", History { history })
 }
 

@@ -111,7 +111,8 @@ impl Index {
         let done = self.look_again(folder).and_then(|changed| self.judge(told, changed));
         done.or_else(|_| {
             // Deleted, moved or broken beneath us: it is a cache, and is made anew.
-            *self = Index::open(self.path.parent().unwrap_or(folder), self.codes.clone())?;
+            let codes = Codes::of(folder)?.or(self.codes.take());
+            *self = Index::open(folder, codes)?;
             self.look_again(folder)
                 .and_then(|_| self.judge(told, true))
                 .map_err(|e| format!("{FILE_NAME}: unusable-cache: {e}"))
@@ -121,6 +122,12 @@ impl Index {
     /// Reads what is new or changed and forgets what is gone; whether there was any.
     fn look_again(&mut self, folder: &Path) -> rusqlite::Result<bool> {
         if self.homeless.is_none() && !self.path.exists() {
+            return Err(rusqlite::Error::InvalidQuery);
+        }
+        // Another desk began to mark anonymously: its codes are not ours.
+        let sql = "SELECT value FROM known WHERE name = 'secret'";
+        let secret: String = self.connection.query_row(sql, [], |row| row.get(0))?;
+        if secret != self.codes.as_ref().map(Codes::fingerprint).unwrap_or_default() {
             return Err(rusqlite::Error::InvalidQuery);
         }
         let found = find(folder);
@@ -191,8 +198,7 @@ impl Index {
         change.execute("DELETE FROM judged", [])?;
         for id in sessions {
             let sql = "SELECT grade FROM session WHERE id = ?1 AND problem IS NULL AND twin IS NULL";
-            let text: Option<Option<String>> =
-                change.prepare(sql)?.query_row([id], |row| row.get(0)).optional()?;
+            let text: Option<Option<String>> = change.prepare(sql)?.query_row([id], |row| row.get(0)).optional()?;
             let Some(grade) = text.flatten().and_then(|text| serde_json::from_str::<GradeFile>(&text).ok()) else {
                 continue;
             };

@@ -9,6 +9,7 @@ use super::standing::{Standing, standing};
 use crate::report::words;
 use crate::report::{GradeFile, ItemFile, Said, SessionFile, harmless, said};
 use crate::scenario::Metric;
+use crate::score::Verdict;
 use serde::Serialize;
 
 /// Letters of what a person wrote at length: an answer, a title within a page.
@@ -24,6 +25,7 @@ struct Sitting {
     stages: Vec<StageLine>,
     measures: Vec<MeasureLine>,
     views: Vec<View>,
+    legend: Vec<Colour>,
     /// The examiner's name, as last given.
     name: String,
 }
@@ -147,7 +149,8 @@ pub fn page(desk: &Desk, visit: &Visit, id: &str) -> Response {
         stages: speaker.stages(),
         measures: speaker.measures(),
         views: views.map(|view| self::view(desk, visit, view)).collect(),
-        name: visit.guest.name.clone(),
+        legend: legend(desk, visit),
+        name: harmless(&visit.guest.name, 120),
     };
     desk.page(visit, &told, "session.html", body)
 }
@@ -174,6 +177,22 @@ fn length(session: &SessionFile) -> String {
 pub(super) fn view(desk: &Desk, visit: &Visit, view: &str) -> View {
     let side = Said::text(format!("side.{view}"), &[]);
     View { stem: format!("map-{view}"), title: desk.say(visit, &Said::text("picture.map", &[("what", side)])) }
+}
+
+/// What a colour of the maps means.
+#[derive(Serialize)]
+pub(super) struct Colour {
+    title: String,
+    color: String,
+}
+
+pub(super) fn legend(desk: &Desk, visit: &Visit) -> Vec<Colour> {
+    let colour = |verdict: &Verdict| {
+        let [r, g, b] = verdict.color().map(|c| (c * 255.0).round() as u8);
+        let title = desk.say(visit, &Said::word(format!("verdict.{}", verdict.id()), verdict.title()));
+        Colour { title, color: format!("#{r:02x}{g:02x}{b:02x}") }
+    };
+    Verdict::SEEN.iter().map(colour).collect()
 }
 
 /// What a measure is called.
