@@ -83,7 +83,7 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
         assert!(page.contains(expected), "{expected} in {page}");
     }
     // In the list, filtered and not.
-    assert_eq!(browser.ids("/?overridden=yes&result=passed"), [id.clone()]);
+    assert_eq!(browser.ids("/?overridden=yes&result=passed"), [id.as_str()]);
     assert_eq!(browser.ids("/?result=failed"), Vec::<String>::new());
 
     // The whole grade, then its withdrawal: lines of a chain.
@@ -116,7 +116,7 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
     fs::remove_file(folder.join("review.sqlite")).unwrap();
     let desk = Desk::open(&folder, &[]);
     let browser = desk.browser();
-    assert_eq!(browser.ids("/?overridden=yes&result=passed"), [id.clone()]);
+    assert_eq!(browser.ids("/?overridden=yes&result=passed"), [id.as_str()]);
     let table = browser.get("/sessions.csv").text();
     let cells = table.lines().nth(1).unwrap();
     assert!(

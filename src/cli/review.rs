@@ -63,6 +63,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
             "plain-http: passwords and grades can be read on the way; put an HTTPS proxy or an SSH tunnel before it"
         );
     }
+    if listen.is_unspecified() {
+        eprintln!("{listen} stands for every address of this machine: open the page under one of them");
+    }
     if has_password {
         say(format!("http://{at}/"))?;
     } else {

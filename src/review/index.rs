@@ -78,6 +78,17 @@ pub struct Choices {
     pub folders: Vec<String>,
 }
 
+/// A file's size, and the time of its last change in ns since 1970.
+type Stamp = (i64, i64);
+
+/// A bundle that is new or changed.
+struct Fresh {
+    path: String,
+    stamp: Stamp,
+    /// `Err` says why it is no session.
+    read: Result<SessionFile, String>,
+}
+
 pub struct Index {
     path: PathBuf,
     connection: Connection,
@@ -131,7 +142,7 @@ impl Index {
             return Err(rusqlite::Error::InvalidQuery);
         }
         let found = find(folder);
-        let mut known: BTreeMap<String, (i64, i64)> = BTreeMap::new();
+        let mut known: BTreeMap<String, Stamp> = BTreeMap::new();
         {
             let mut all = self.connection.prepare("SELECT path, size, modified FROM session")?;
             let mut rows = all.query([])?;
@@ -139,7 +150,7 @@ impl Index {
                 known.insert(row.get(0)?, (row.get(1)?, row.get(2)?));
             }
         }
-        let mut fresh: Vec<(String, (i64, i64), Result<SessionFile, String>)> = Vec::new();
+        let mut fresh: Vec<Fresh> = Vec::new();
         for file in &found.files {
             let bundle = file.parent().and_then(|b| b.strip_prefix(folder).ok()).unwrap_or(Path::new(""));
             let (name, is_text) = (bundle.to_string_lossy().into_owned(), bundle.to_str().is_some());
@@ -149,13 +160,13 @@ impl Index {
                     true => bundle::file_within(folder, bundle, "session.json").and_then(|path| read_session(&path)),
                     false => Err("its folder's name is not UTF-8".into()),
                 };
-                fresh.push((name, stamp, read));
+                fresh.push(Fresh { path: name, stamp, read });
             }
         }
         for (path, why) in found.left_out {
             let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
             if known.remove(&name) != Some((-1, 0)) {
-                fresh.push((name, (-1, 0), Err(why)));
+                fresh.push(Fresh { path: name, stamp: (-1, 0), read: Err(why) });
             }
         }
         if fresh.is_empty() && known.is_empty() {
@@ -166,7 +177,7 @@ impl Index {
         for gone in known.keys() {
             change.prepare("DELETE FROM session WHERE path = ?1")?.execute([gone])?;
         }
-        for (path, stamp, read) in fresh {
+        for Fresh { path, stamp, read } in fresh {
             match read {
                 Ok(session) => enter(&change, &path, stamp, &session, codes.as_ref())?,
                 Err(why) => {
@@ -312,8 +323,7 @@ fn remove(path: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// Size, and time of the last change in ns since 1970.
-fn stamp(file: &Path) -> (i64, i64) {
+fn stamp(file: &Path) -> Stamp {
     let Ok(meta) = fs::metadata(file) else { return (-1, -1) };
     let since = meta.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
     (meta.len() as i64, since.as_nanos() as i64)
@@ -322,7 +332,7 @@ fn stamp(file: &Path) -> (i64, i64) {
 fn enter(
     change: &Connection,
     path: &str,
-    stamp: (i64, i64),
+    stamp: Stamp,
     session: &SessionFile,
     codes: Option<&Codes>,
 ) -> rusqlite::Result<()> {

@@ -111,9 +111,12 @@ mod tests {
         }
     }
 
+    /// Of an item, by its place and measure, or of the whole grade.
+    type Judgement = (Option<(usize, &'static str)>, Option<Judged>);
+
     /// Judgements of item or grade, in their order.
-    fn told(judged: &[(Option<(usize, &str)>, Option<Judged>)]) -> Told {
-        let line = |(number, (item, examiner)): (usize, &(Option<(usize, &str)>, Option<Judged>))| Line {
+    fn told(judged: &[Judgement]) -> Told {
+        let line = |(number, (item, examiner)): (usize, &Judgement)| Line {
             doubtful: false,
             entry: Entry {
                 version: 1,
