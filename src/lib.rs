@@ -31,6 +31,7 @@ pub mod render;
 pub mod scene;
 pub mod report;
 pub mod handover;
+pub mod review;
 pub mod lesson;
 pub mod app;
 pub mod cli;

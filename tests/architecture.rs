@@ -101,7 +101,7 @@ fn the_lower_rooms_keep_their_promises() {
     // Aim: what cannot be seen from imports of our own modules: no clock, no printing, no serde, no randomness where a
     // tick is turned.
     // Drivers speak JSON to services and look at a monotonic clock, and so does the servo: both keep a beat.
-    let banned: [(&[&str], &[&str]); 5] = [
+    let banned: [(&[&str], &[&str]); 6] = [
         (
             &["tick", "frame", "mesh", "mailbox", "statistics", "volume", "anatomy", "touch", "sim", "score"],
             &["serde", "println!", "eprintln!", "HashMap", "std::fs"],
@@ -116,6 +116,8 @@ fn the_lower_rooms_keep_their_promises() {
             &["scenario", "session", "record", "report", "handover", "content", "lesson"],
             &["std::time", "SystemTime", "Instant", "println!", "HashMap"],
         ),
+        // Requests and responses are plain values, and say what time it is.
+        (&["review"], &["Instant", "SystemTime::now", "Timestamp::now", "println!", "HashMap"]),
         (
             &["statistics", "volume", "touch", "sim"],
             &[".sin()", ".cos()", ".exp()", ".ln()", ".powf(", ".acos()", ".tan()", "thread_rng"],
@@ -137,6 +139,35 @@ fn the_lower_rooms_keep_their_promises() {
                         wrong.push(format!("{}:{}: {module} has {word}", path.display(), number + 1));
                     }
                 }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_network_is_used_only_where_the_text_says() {
+    // Aim: whoever asks what this program says to a network, and who may speak to it, reads these files and no others. A socket
+    // that waits for connections stands in one place.
+    let speaks = [
+        "device/haply/service.rs",
+        "device/link.rs",
+        "device/stream.rs",
+        "cli/review.rs",
+        "cli/review/server.rs",
+        "cli/xapi/lrs.rs",
+    ];
+    let listens = ["cli/review.rs", "cli/review/server.rs"];
+    let words = ["TcpStream", "UdpSocket", "TcpListener", "tokio::", "hyper::", "ureq::"];
+    let mut wrong = Vec::new();
+    for path in sources(&root().join("src")) {
+        let text = fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        let is_in = |files: &[&str]| files.iter().any(|file| path.ends_with(file));
+        for word in words.iter().filter(|word| code.contains(**word)) {
+            let allowed = if *word == "TcpListener" { is_in(&listens) } else { is_in(&speaks) };
+            if !allowed {
+                wrong.push(format!("{}: {word}", path.display()));
             }
         }
     }

@@ -2,28 +2,15 @@
 //!
 //! Needs `TYPODONT_PLAYWRIGHT` (the folder of playwright-core) and `TYPODONT_CHROMIUM`, as `scripts/test` sets them.
 
+mod browser;
 mod bundle;
 mod folder;
 
+use browser::browser;
 use bundle::*;
 use folder::folder;
-use std::io::Write;
 use std::path::Path;
 use std::process::Command;
-
-/// What is needed from outside; without it the test says loudly that it did nothing.
-fn browser() -> Option<[String; 2]> {
-    let found = ["TYPODONT_PLAYWRIGHT", "TYPODONT_CHROMIUM"].map(std::env::var);
-    let [Ok(playwright), Ok(chromium)] = found else {
-        // Straight to the terminal: the test harness would keep what a passing test prints to itself.
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED: no browser opens our reports; set TYPODONT_PLAYWRIGHT and TYPODONT_CHROMIUM (see scripts/test)"
-        );
-        return None;
-    };
-    Some([playwright, chromium])
-}
 
 fn opens(bundle: &Path, pictures: &Path) {
     let Some([playwright, chromium]) = browser() else { return };

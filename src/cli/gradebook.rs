@@ -2,8 +2,11 @@
 
 use super::{Failure, cohort, say, write};
 use crate::handover::gradebook::{Students, System, Take, gradebook};
+use crate::handover::session_id;
+use crate::report::cohort::Cohort;
+use crate::review::{self, Log};
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -21,6 +24,9 @@ pub struct Arguments {
     /// The school's names of people: a CSV with the column participant, and those that the system knows people by
     #[arg(long, value_name = "FILE.csv")]
     students: Option<PathBuf>,
+    /// Take the examiner's grade where one stands (see `typodont review`)
+    #[arg(long)]
+    overrides: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -37,7 +43,10 @@ enum Taken {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let cohort = cohort::read(&arguments.folder)?;
+    let mut cohort = cohort::read(&arguments.folder)?;
+    if arguments.overrides {
+        take_overrides(&mut cohort, &arguments.folder)?;
+    }
     let students = arguments.students.as_ref().map(|path| -> Result<Students, Failure> {
         let source = crate::content::read_text(path)?;
         Students::read(&path.display().to_string(), &source.text).map_err(Failure::Wrong)
@@ -62,4 +71,24 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     write(&arguments.output, made.csv)?;
     say(format!("{}: {} students", arguments.output.display(), made.students))
+}
+
+/// Puts examiners' grades in place of the machine's, and says how many.
+fn take_overrides(cohort: &mut Cohort, folder: &Path) -> Result<(), Failure> {
+    let path = folder.join(review::OVERRIDES);
+    let unread = |e| Failure::wrong(format!("{}: unreadable-file: {e}", path.display()));
+    let told = Log::of(folder).told(None).map_err(unread)?;
+    for trouble in &told.troubles {
+        eprintln!("{}: {trouble}", path.display());
+    }
+    let mut count = 0;
+    for (_, session) in &mut cohort.sessions {
+        let id = session_id(session);
+        if let Some(grade) = &mut session.grade {
+            let (taken, overrides) = review::applied(grade, &id, &told);
+            (*grade, count) = (taken, count + usize::from(overrides > 0));
+        }
+    }
+    eprintln!("{}: {count} grades are an examiner's", path.display());
+    Ok(())
 }

@@ -17,6 +17,7 @@ mod live;
 mod parquet;
 mod path;
 mod preview;
+mod review;
 mod run;
 mod score;
 mod verify;
@@ -65,6 +66,8 @@ enum Command {
     Score(score::Arguments),
     /// Compare many bundles: a table, a page, maps of what was removed
     Cohort(cohort::Arguments),
+    /// Examiners list, compare and override sessions in a browser
+    Review(review::Arguments),
     /// Grades as a table that Moodle or Canvas imports
     Gradebook(gradebook::Arguments),
     /// Sessions as xAPI statements, spooled on disk and sent to a learning record store
@@ -163,6 +166,7 @@ pub fn main() -> ExitCode {
         Some(Command::Finish(arguments)) => finish::run(&arguments),
         Some(Command::Score(arguments)) => score::run(&arguments),
         Some(Command::Cohort(arguments)) => cohort::run(&arguments),
+        Some(Command::Review(arguments)) => review::run(&arguments),
         Some(Command::Gradebook(arguments)) => gradebook::run(&arguments),
         Some(Command::Xapi(arguments)) => xapi::run(&arguments),
         Some(Command::Parquet(arguments)) => parquet::run(&arguments),

@@ -90,6 +90,26 @@ impl Languages {
         (0..self.all.len()).map(|i| (self.all[i].0.clone(), self.say(i, said))).collect()
     }
 
+    /// These and more texts on top of them, by code: what a page of its own says beside what all say.
+    ///
+    /// `Err` for a text that is no file of texts by key.
+    pub fn with(&self, files: &BTreeMap<String, String>) -> Result<Languages, String> {
+        let mut all = self.all.clone();
+        for (code, texts) in Languages::read(files)?.all {
+            match all.iter_mut().find(|(known, _)| *known == code) {
+                Some((_, known)) => known.extend(texts),
+                None => all.push((code, texts)),
+            }
+        }
+        Ok(Languages { all })
+    }
+
+    /// Something in one language, as plain text; in English where there is none of that code.
+    pub fn in_one(&self, code: &str, said: &Said) -> String {
+        let place = self.all.iter().position(|(own, _)| own == code).unwrap_or(0);
+        self.say(place, said)
+    }
+
     /// Something in every language, ready for a page: each is marked with its code, and what all say alike stands once.
     pub fn html(&self, said: &Said) -> Value {
         Value::from_safe_string(self.marked(said, "span"))

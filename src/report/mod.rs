@@ -12,18 +12,20 @@ mod html;
 mod labelmap;
 mod language;
 mod pictures;
+pub mod said;
 mod session_file;
 mod session_page;
 mod voxels;
-mod words;
+pub mod words;
 
 pub use glb::{Part as SurfacePart, bytes as surfaces_glb};
 pub use html::Templates;
 pub use labelmap::tissues as tissue_map;
+pub use language::{Languages, Said};
 pub use pictures::{SEEN, preview_png, sections_png};
 pub use session_file::{
-    AnswerFile, DeviceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile, ScenarioRef, SessionFile,
-    StageFile,
+    AnswerFile, DeviceFile, EvidenceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile,
+    ScenarioRef, SessionFile, StageFile,
 };
 pub use words::{harmless, measure as measure_in_words};
 

@@ -41,6 +41,9 @@ pub struct SessionFile {
     pub operator: Option<String>,
     #[serde(default)]
     pub device: Option<DeviceFile>,
+    /// Number of the tooth that places are measured on, the first of several.
+    #[serde(default)]
+    pub tooth_fdi: Option<u8>,
     #[serde(default)]
     pub stages: Vec<StageFile>,
     pub metrics: BTreeMap<String, Option<f64>>,
@@ -208,6 +211,7 @@ impl SessionFile {
             ended_because: ended,
             operator: head.operator.clone(),
             device: Some(DeviceFile::from(&Spec::from(&head.device))),
+            tooth_fdi: scenario.scene.teeth.first().map(|tooth| tooth.fdi),
             stages: stages(recording, scored),
             metrics: metrics.collect(),
             evidence: evidence.collect(),

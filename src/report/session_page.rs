@@ -9,10 +9,10 @@ use super::feedback::{self, Feedback, Finding, Moment};
 use super::html::Templates;
 use super::language::{Languages, Said};
 use super::pictures::{Picture, Shows};
+use super::said;
 use super::voxels::{self, About};
 use super::words;
 use crate::record::Recording;
-use crate::scenario::Metric;
 use crate::score::{self, Scored, Verdict};
 use base64::Engine;
 use minijinja::value::Value;
@@ -175,8 +175,7 @@ pub fn render(
     session: &SessionFile,
     pictures: &[Picture],
 ) -> Result<String, String> {
-    let is_mirrored = scored.replay.workpiece.teeth.first().is_some_and(|tooth| tooth.distal().y < 0.0);
-    let in_all = Speaker { languages: templates.languages(), session, is_mirrored };
+    let in_all = Speaker { languages: templates.languages(), session };
     let grade = session.grade.as_ref();
     let figures =
         |shows: fn(&Shows) -> bool| pictures.iter().filter(|p| shows(&p.shows)).map(|p| in_all.figure(p)).collect();
@@ -313,8 +312,6 @@ fn data(
 struct Speaker<'a> {
     languages: &'a Languages,
     session: &'a SessionFile,
-    /// True where y of tooth space runs toward mesial.
-    is_mirrored: bool,
 }
 
 impl Speaker<'_> {
@@ -339,33 +336,17 @@ impl Speaker<'_> {
     }
 
     fn value(&self, metric: &str, value: Option<f64>) -> Value {
-        self.html(&valued(words::measure(metric, value)))
+        self.html(&said::value(metric, value))
     }
 
     fn formula(&self, metric: &str) -> Value {
-        let about = Metric::parse(metric).map(|m| m.about);
-        about.map_or(Value::from(""), |a| self.word(format!("formula.{}", a.name), a.formula))
+        self.html(&said::formula(metric))
     }
 
     /// Where and when a measure arose, in words.
     fn place(&self, metric: &str) -> Value {
-        let Some(evidence) = self.session.evidence.get(metric) else { return Value::from("") };
-        let part = |v: f64, positive: &str, negative: &str| {
-            let way = if v >= 0.0 { positive } else { negative };
-            Said::text(format!("way.{way}"), &[("mm", Said::plain(format!("{:.1}", v.abs())))])
-        };
-        let [x, y, z] = evidence.place_mm;
-        let distal = y * if self.is_mirrored { -1.0 } else { 1.0 };
-        let place = [
-            ("x", part(x, "buccal", "lingual")),
-            ("y", part(distal, "distal", "mesial")),
-            ("z", part(z, "up", "down")),
-        ];
-        let place = Said::text("place.at", &place);
-        self.html(&match evidence.at_s {
-            Some(at) => Said::text("place.when", &[("at", Said::plain(words::duration(at))), ("place", place)]),
-            None => place,
-        })
+        let tooth = self.session.tooth_fdi;
+        self.session.evidence.get(metric).map_or(Value::from(""), |e| self.html(&said::place(e, tooth)))
     }
 
     fn spot(&self, metric: &str) -> Option<Spot> {
@@ -391,20 +372,10 @@ impl Speaker<'_> {
     }
 
     fn fail(&self, fail: &super::HardFailFile) -> FailLine {
-        let said = |v: f64| match fail.metric.as_str() {
-            "pulp_exposed" => Said::word("limit.it_is", "it is"),
-            metric => valued(words::measure(metric, Some(v))),
-        };
-        let limit = match (fail.above, fail.below) {
-            (Some(limit), _) if fail.metric == "pulp_exposed" => said(limit),
-            (Some(limit), _) => Said::text("limit.more", &[("value", said(limit))]),
-            (_, Some(limit)) => Said::text("limit.less", &[("value", said(limit))]),
-            _ => Said::plain(""),
-        };
         FailLine {
             title: fail.title.clone(),
             formula: self.formula(&fail.metric),
-            limit: self.html(&limit),
+            limit: self.html(&said::limit(fail)),
             value: self.value(&fail.metric, fail.value),
             failed: fail.failed,
         }
@@ -414,7 +385,7 @@ impl Speaker<'_> {
         let line = |m: &score::Measure| {
             let name = m.metric.name();
             MeasureLine {
-                title: self.html(&titled(&m.metric)),
+                title: self.html(&said::measure(&m.metric)),
                 formula: self.formula(&name),
                 value: self.value(&name, m.value),
                 r#where: self.place(&name),
@@ -450,10 +421,7 @@ impl Speaker<'_> {
             title: result.title.clone(),
             began: words::duration(result.started_s),
             took: words::duration(result.ended_s - result.started_s),
-            ended_by: match result.ended_by.as_str() {
-                known @ ("time" | "answer" | "confirmation" | "cleared") => self.word(format!("ended.{known}"), known),
-                other => self.word("ended.broken_off", other),
-            },
+            ended_by: self.html(&said::ended_by(&result.ended_by)),
             guided: result.guided,
             led: result.led_s.map(words::duration),
             adjusted: (!result.adjusted.is_empty()).then(|| result.adjusted.join(", ")),
@@ -464,20 +432,10 @@ impl Speaker<'_> {
     }
 
     fn answer(&self, answer: &super::AnswerFile, stage_started: f64) -> AnswerLine {
-        let said = |value: &serde_json::Value| match value {
-            serde_json::Value::String(text) => Said::plain(text),
-            serde_json::Value::Bool(yes) => valued(words::yes_no(*yes).into()),
-            other => Said::plain(other.to_string()),
-        };
-        let judgement = match answer.right {
-            Some(true) => Some(Said::text("value.right", &[])),
-            Some(false) => Some(Said::text("answer.wrong", &[("truth", said(&answer.truth))])),
-            None => None,
-        };
         AnswerLine {
             text: answer.text.clone(),
-            value: self.html(&said(&answer.value)),
-            judgement: judgement.map(|said| self.html(&said)),
+            value: self.html(&said::answer(&answer.value)),
+            judgement: said::judgement(answer).map(|said| self.html(&said)),
             after: words::duration(answer.at_s - stage_started),
             level: answer.level,
         }
@@ -493,23 +451,6 @@ impl Speaker<'_> {
             advice: finding.advice.as_ref().map(|said| self.html(said)),
         };
         FeedbackLines { findings: feedback.findings.iter().map(line).collect(), kept: feedback.kept.clone() }
-    }
-}
-
-/// A value in words: "right" has a word in every language, "95.2 %" is the same in all.
-fn valued(text: String) -> Said {
-    Said::word(format!("value.{text}"), text)
-}
-
-fn titled(metric: &Metric) -> Said {
-    use crate::scenario::metric::Argument;
-    let title = Said::word(format!("measure.{}", metric.about.name), metric.about.title);
-    match &metric.argument {
-        None => title,
-        Some(Argument::Zone(zone)) => Said::text("measures.zone", &[("title", title), ("zone", Said::plain(zone))]),
-        Some(Argument::ToleranceMm(mm)) => {
-            Said::text("measures.within", &[("title", title), ("mm", Said::plain(mm.to_string()))])
-        }
     }
 }
 

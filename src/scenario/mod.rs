@@ -108,8 +108,13 @@ pub struct Tooth {
 impl Tooth {
     /// Which way is distal in tooth space: +y in the upper right and the lower left of the mouth, −y elsewhere.
     pub fn distal(&self) -> Vec3 {
-        Vec3::Y * anatomy::teeth::distal(self.fdi)
+        distal(self.fdi)
     }
+}
+
+/// Which way is distal in the tooth space of a tooth of this number: +y or −y.
+pub fn distal(fdi: u8) -> Vec3 {
+    Vec3::Y * anatomy::teeth::distal(fdi)
 }
 
 /// Where a tooth's shape comes from.

@@ -4,7 +4,7 @@
 //! each tooth and each lesion lies, and what stands around. The same inputs give the same voxels.
 
 use super::lesion::{Lesion, NoRoom, locate, put_in};
-use super::{Form, Layout, Scenario, Tooth};
+use super::{Form, Layout, Scenario, Tooth, distal};
 use crate::anatomy;
 use crate::content::TissueTable;
 use crate::frame::{Pose, Quat, Vec3};
@@ -40,7 +40,7 @@ pub struct ToothPlace {
 impl ToothPlace {
     /// Which way is distal in tooth space: +y in the upper right and the lower left of the mouth, −y elsewhere.
     pub fn distal(&self) -> Vec3 {
-        Vec3::Y * anatomy::teeth::distal(self.fdi)
+        distal(self.fdi)
     }
 }
 

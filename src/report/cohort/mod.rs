@@ -16,6 +16,7 @@ mod page;
 
 pub use progress::Progress;
 pub use questionnaire::{QuestionnaireSummary, wording};
+pub use reading::{Found, find, read_session};
 pub use removal::{Distance, Removal};
 pub use standard::{Rating, ratings};
 pub(super) use summary::in_words;

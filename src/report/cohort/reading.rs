@@ -12,7 +12,14 @@ const DEPTH_MAX: usize = 4;
 /// Every `session.json` below a folder, in order of exercise, participant, beginning and path.
 pub fn below(folder: &Path) -> Cohort {
     let mut cohort = Cohort::default();
-    look_into(&mut cohort, folder, 0);
+    let Found { files, left_out } = find(folder);
+    cohort.skipped = left_out;
+    for file in files {
+        match read_session(&file) {
+            Ok(session) => cohort.sessions.push((file.parent().unwrap_or(folder).to_path_buf(), session)),
+            Err(reason) => cohort.skipped.push((file, reason)),
+        }
+    }
     cohort.sessions.sort_by(|(pa, a), (pb, b)| {
         let key = |s: &SessionFile| (s.scenario.id.clone(), s.participant.clone(), s.started.clone());
         (key(a), pa).cmp(&(key(b), pb))
@@ -36,32 +43,47 @@ fn leave_out_copies(cohort: &mut Cohort) {
     });
 }
 
-fn look_into(cohort: &mut Cohort, folder: &Path, depth: usize) {
+/// What lies below a folder.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// Every `session.json`, in the order of paths.
+    pub files: Vec<PathBuf>,
+    /// Folders that could not be looked into, and why.
+    pub left_out: Vec<(PathBuf, String)>,
+}
+
+/// Looks for bundles, without opening any.
+pub fn find(folder: &Path) -> Found {
+    let mut found = Found::default();
+    look_into(&mut found, folder, 0);
+    found
+}
+
+fn look_into(found: &mut Found, folder: &Path, depth: usize) {
     let file = folder.join("session.json");
     if file.is_file() {
-        match read_session(&file) {
-            Ok(session) => cohort.sessions.push((folder.to_path_buf(), session)),
-            Err(reason) => cohort.skipped.push((file, reason)),
-        }
-        return;
+        return found.files.push(file);
     }
     if depth == DEPTH_MAX {
         let reason = "lies too deep to be looked into; name a folder nearer to it".into();
-        return cohort.skipped.push((folder.to_path_buf(), reason));
+        return found.left_out.push((folder.to_path_buf(), reason));
     }
     let entries = match fs::read_dir(folder) {
         Ok(entries) => entries,
-        Err(error) => return cohort.skipped.push((folder.to_path_buf(), error.to_string())),
+        Err(error) => return found.left_out.push((folder.to_path_buf(), error.to_string())),
     };
     let mut folders: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir()).collect();
     folders.sort();
     // What is still being written is not a session yet.
     for folder in folders.iter().filter(|f| f.extension().is_none_or(|e| e != "partial")) {
-        look_into(cohort, folder, depth + 1);
+        look_into(found, folder, depth + 1);
     }
 }
 
-fn read_session(file: &Path) -> Result<SessionFile, String> {
+/// Reads one of them.
+///
+/// `Err` says why it is none.
+pub fn read_session(file: &Path) -> Result<SessionFile, String> {
     let text = crate::content::read_text(file).map_err(|d| d.message)?;
     let session: SessionFile = serde_json::from_str(&text.text).map_err(|e| format!("not a session: {e}"))?;
     match session.version {
