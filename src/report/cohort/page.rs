@@ -1,11 +1,11 @@
 //! The cohort's page: what stands in it, in words, for the template `cohort.html`.
 
 use super::questionnaire::{QuestionnaireSummary, Statement};
+use super::reading::read_session;
 use super::standard::Standard;
 use super::summary::{ScenarioSummary, Spread, Summary, in_words};
 use super::{Cohort, POINTS, Removal, charts, value};
 use crate::frame::Vec3;
-use crate::record::{self, Recording};
 use crate::report::html::Templates;
 use crate::report::session_file::SessionFile;
 use crate::report::{pictures, words};
@@ -387,10 +387,10 @@ fn map(removal: &Removal, summary: &super::removal::RemovalSummary) -> MapPart {
     }
 }
 
-/// Which way is distal in a bundle's first tooth, as its recording says; where that is unreadable, as in the lower left.
+/// Which way is distal in a bundle's first tooth; where nobody says which that is, as in the lower left.
 fn distal(bundle: &Path) -> Vec3 {
-    let recording = Recording::read(&bundle.join(record::FILE_NAME)).ok();
-    recording.and_then(|r| r.scenario.scene.teeth.first().map(|tooth| tooth.distal())).unwrap_or(Vec3::Y)
+    let session = read_session(&bundle.join("session.json")).ok();
+    session.and_then(|session| session.tooth_fdi).map_or(Vec3::Y, crate::scenario::distal)
 }
 
 fn questionnaire(summary: &QuestionnaireSummary) -> QuestionnairePart {
