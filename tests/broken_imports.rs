@@ -148,6 +148,10 @@ fn headers_that_promise_too_much_are_refused_before_any_memory_is_taken() {
     let ply = b"ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n\
                 property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0123456789ab";
     let parse = |bytes: &[u8], ending| surfaces::parse(bytes, ending, |_| panic!("nothing else"));
+    let listed =
+        b"ply\nformat ascii 1.0\nelement vertex 1\nproperty list uchar float x\nproperty float y\nproperty float z\n\
+                   element face 1\nproperty list uchar int vertex_indices\nend_header\n0 1 1\n3 0 0 0\n";
+    check("a list for a number", &["its corners have no x, y and z"], || parse(listed, "ply"));
     check("huge ply", &["announces 4000000000 entries of \"vertex\", and has room for 1"], || parse(ply, "ply"));
     let stl = [&[0u8; 80][..], &u32::MAX.to_le_bytes(), &[0; 50]].concat();
     check("huge stl", &["announces 4294967295 triangles"], || parse(&stl, "stl"));

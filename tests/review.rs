@@ -257,9 +257,15 @@ fn strangers_are_refused() {
     // Aim: another site, another name, a path that leads out, a form without its value or a browser without its cookie get nothing
     // and write nothing. Method: each differs in one thing from what is answered.
     let folder = folder("review_strangers");
-    let bundle = enter(&folder, &graded("anna", [25.0, 38.5]));
+    let mut anna = graded("anna", [25.0, 38.5]);
+    let named = "92b2fa58028958317e408bd84ecfa70f5ee35b121991dbc232c49d166353708b";
+    anna["digests"] = json!({ "views/map-occlusal.png": named, "views/after-occlusal.png": named });
+    let bundle = enter(&folder, &anna);
     fs::create_dir_all(bundle.join("views")).unwrap();
     fs::write(bundle.join("views/map-occlusal.png"), "a picture").unwrap();
+    fs::write(bundle.join("views/after-occlusal.png"), "another picture").unwrap();
+    #[cfg(unix)]
+    std::os::unix::fs::symlink("../session.json", bundle.join("views/map-lingual.png")).unwrap();
     fs::write(folder.parent().unwrap().join("review-outside.png"), "outside").unwrap();
     #[cfg(unix)]
     std::os::unix::fs::symlink(
@@ -273,6 +279,9 @@ fn strangers_are_refused() {
     let (at, host, own) = (desk.at, desk.at.to_string(), format!("http://{}", desk.at));
     let cookie = ("cookie", browser.cookie.as_str());
     assert_eq!(browser.get(&format!("/session/{id}/view/map-occlusal.png")).body, b"a picture");
+    for changed in ["after-occlusal", "map-lingual"] {
+        assert_eq!(browser.get(&format!("/session/{id}/view/{changed}.png")).status, 404, "{changed}");
+    }
 
     // Nothing is shown without the cookie; the address opens once, and the terminal gets a new one.
     for path in ["/", &format!("/session/{id}"), "/sessions.csv", "/sessions.json", "/history", "/left-out"] {
@@ -657,6 +666,10 @@ fn the_folder_is_looked_at_again() {
     let mut changed: Value = serde_json::from_str(&fs::read_to_string(first.join("session.json")).unwrap()).unwrap();
     changed["grade"]["points"] = json!(12.25);
     fs::write(first.join("session.json"), changed.to_string()).unwrap();
+    // Of two results of one session one was changed: none is believed, until one is gone.
+    assert_eq!(browser.ids("/").len(), 0);
+    assert!(browser.get("/left-out").text().contains("it has another result than class-"));
+    fs::remove_dir_all(&copy).unwrap();
     assert!(browser.get("/").text().contains("12.25"));
     // A page that is not the one session.json names is not shown.
     changed["digests"] = json!({ "report.html": "00" });
@@ -722,4 +735,28 @@ fn two_thousand_bundles_are_listed() {
     let begun = Instant::now();
     let _desk = Desk::open(&folder, &[]);
     println!("a start with a warm index in {:.0} ms", begun.elapsed().as_secs_f64() * 1e3);
+}
+
+#[test]
+fn impossible_numbers_stop_nobody() {
+    // Aim: neither a bundle nor a line of the log can take the desk from the examiners. Method: a maximum below nothing, and a
+    // number without a next one.
+    let folder = folder("review_impossible");
+    enter(&folder.join("a"), &graded("anna", [25.0, 38.5]));
+    let mut wild = graded("berk", [25.0, 38.5]);
+    wild["grade"]["max_points"] = json!(-1);
+    enter(&folder.join("b"), &wild);
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    let id = browser.ids("/").remove(0);
+    assert_eq!(browser.ids("/").len(), 1);
+    assert!(browser.get("/left-out").text().contains("points that cannot be"));
+    assert_eq!(browser.judge(&id, "0", &[("points", "30"), ("reason", "r"), ("name", "n")]).status, 303);
+    let line = fs::read_to_string(log(&folder)).unwrap();
+    let far = line.replace("\"number\":1,", &format!("\"number\":{},", u64::MAX));
+    assert_ne!(far, line);
+    fs::write(log(&folder), line + &far).unwrap();
+    assert_eq!(browser.get("/").status, 200);
+    drop(desk);
+    assert_eq!(Desk::open(&folder, &[]).browser().get("/").status, 200);
 }

@@ -26,7 +26,7 @@ const MOMENTS: [&str; 3] = ["before", "after", "map"];
 /// Bytes of a file that is handed on; a session's page has up to 6 MB.
 const HANDED_MAX: u64 = 64 << 20;
 
-const REPORT: &str = "report.html";
+pub const REPORT: &str = "report.html";
 
 /// Whether a bundle has a picture of this stem: `map-occlusal`.
 pub fn is_picture(stem: &str) -> bool {
@@ -38,20 +38,21 @@ pub fn picture(stem: &str) -> String {
     format!("views/{stem}.png")
 }
 
-/// The path of a file of a bundle, if it is one and lies within the folder. `folder` is canonical.
+/// The path of a file of a bundle, if it is one and lies within it, and the bundle within the folder. `folder` is canonical.
 ///
-/// `Err` says what is wrong: a link that leads out of the folder is as good as no file.
+/// `Err` says what is wrong: a link that leads out of the bundle is as good as no file.
 pub fn file_within(folder: &Path, bundle: &Path, name: &str) -> Result<PathBuf, String> {
-    let path = folder.join(bundle).join(name);
-    let real = fs::canonicalize(&path).map_err(|e| format!("unreadable-file: {e}"))?;
-    match real.starts_with(folder) && real.is_file() {
+    let canonical = |path: &Path| fs::canonicalize(path).map_err(|e| format!("unreadable-file: {e}"));
+    let own = canonical(&folder.join(bundle))?;
+    let real = canonical(&own.join(name))?;
+    match own.starts_with(folder) && real.starts_with(&own) && real.is_file() {
         true => Ok(real),
-        false => Err("outside-folder: it is a link that leads out of the folder, or no file".into()),
+        false => Err("outside-folder: it is a link that leads out of the bundle, or no file".into()),
     }
 }
 
 /// A file's bytes, to be handed on.
-pub fn read(folder: &Path, bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
+fn read(folder: &Path, bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
     let file = File::open(file_within(folder, bundle, name)?).map_err(|e| format!("unreadable-file: {e}"))?;
     let mut bytes = Vec::new();
     file.take(HANDED_MAX + 1).read_to_end(&mut bytes).map_err(|e| format!("unreadable-file: {e}"))?;
@@ -61,16 +62,15 @@ pub fn read(folder: &Path, bundle: &Path, name: &str) -> Result<Vec<u8>, String>
     }
 }
 
-/// A bundle's own page, if it is the one that its `session.json` names.
+/// A file that `session.json` names by its digest, if it is the one that is named.
 ///
 /// `Err` says why it is not shown.
-pub fn report(folder: &Path, bundle: &Path, session: &SessionFile) -> Result<Vec<u8>, String> {
-    let bytes = read(folder, bundle, REPORT)?;
-    match session.digests.get(REPORT) {
-        Some(named) if *named != hex(&Sha256::digest(&bytes)) => Err(
-            "changed-file: report.html is not the one that session.json names; typodont verify says what else differs"
-                .into(),
-        ),
-        _ => Ok(bytes),
+pub fn read_named(folder: &Path, bundle: &Path, name: &str, session: &SessionFile) -> Result<Vec<u8>, String> {
+    let bytes = read(folder, bundle, name)?;
+    match session.digests.get(name) {
+        Some(named) if *named == hex(&Sha256::digest(&bytes)) => Ok(bytes),
+        _ => Err(format!(
+            "changed-file: {name} is not the one that session.json names; typodont verify says what else differs"
+        )),
     }
 }

@@ -304,7 +304,7 @@ impl Desk {
             Ok(case) => case,
             Err(response) => return *response,
         };
-        match bundle::report(&self.folder, &case.listed.path, &case.session) {
+        match bundle::read_named(&self.folder, &case.listed.path, bundle::REPORT, &case.session) {
             Ok(bytes) => Response::new(200, "text/html; charset=utf-8", POLICY, bytes),
             Err(why) => self.complain(visit, 409, &[Said::text("complaint.no_report", &[("why", Said::plain(why))])]),
         }
@@ -313,7 +313,9 @@ impl Desk {
     fn picture(&self, id: &str, stem: &str) -> Response {
         let listed = self.state().index.session(id);
         let bytes = match listed {
-            Ok(Some(listed)) => bundle::read(&self.folder, &listed.path, &bundle::picture(stem)),
+            Ok(Some(listed)) => bundle::file_within(&self.folder, &listed.path, "session.json")
+                .and_then(|path| read_session(&path))
+                .and_then(|s| bundle::read_named(&self.folder, &listed.path, &bundle::picture(stem), &s)),
             _ => Err(String::new()),
         };
         match bytes {
@@ -365,7 +367,9 @@ impl Desk {
         now: Timestamp,
         decide: impl FnOnce(&Told) -> Result<super::overrides::Draft, E>,
     ) -> Result<super::overrides::Entry, super::overrides::Unwritten<E>> {
-        self.state().log.append(&now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(), decide)
+        let mut state = self.state();
+        let known = state.index.known_head();
+        state.log.append(&now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(), known.as_ref(), decide)
     }
 
     /// A page within its frame.

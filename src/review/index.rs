@@ -4,6 +4,7 @@
 //! only.
 
 use super::bundle;
+use super::chance::hex;
 use super::codes::Codes;
 use super::overrides::{Head, Told, Trouble};
 use super::query::{Outcome, Query, Sort, folded};
@@ -13,6 +14,7 @@ use crate::report::cohort::{find, read_session};
 use crate::report::{GradeFile, SessionFile};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, Row, params, params_from_iter};
+use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,7 +23,7 @@ use std::time::{Duration, UNIX_EPOCH};
 pub const FILE_NAME: &str = "review.sqlite";
 
 /// Of the tables below. A cache of another version is made anew.
-const VERSION: i64 = 1;
+const VERSION: i64 = 2;
 
 /// For how long another program may hold the cache.
 const BUSY: Duration = Duration::from_secs(5);
@@ -30,7 +32,8 @@ const TABLES: &str = "
 CREATE TABLE session (
   path TEXT PRIMARY KEY, size INTEGER NOT NULL, modified INTEGER NOT NULL, problem TEXT,
   id TEXT, exercise TEXT, title TEXT, participant TEXT, code TEXT, folder TEXT, began TEXT, recording TEXT, searched TEXT, called TEXT,
-  grade TEXT, points REAL, max_points REAL, pass_points REAL, passed INTEGER, twin TEXT
+  grade TEXT, points REAL, max_points REAL, pass_points REAL, passed INTEGER, content TEXT,
+  twin TEXT, rival TEXT
 ) STRICT;
 CREATE INDEX by_id ON session (id, path);
 CREATE TABLE judged (id TEXT PRIMARY KEY, points REAL NOT NULL, passed INTEGER NOT NULL, overrides INTEGER NOT NULL) STRICT;
@@ -40,7 +43,7 @@ CREATE TABLE known (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 /// Sessions that can be listed, each with what examiners made of it.
 const LISTED: &str = "
 FROM session LEFT JOIN judged ON judged.id = session.id
-WHERE session.problem IS NULL AND session.twin IS NULL";
+WHERE session.problem IS NULL AND session.twin IS NULL AND session.rival IS NULL";
 
 const COLUMNS: &str = "session.id, session.path, session.exercise, session.title, session.participant, session.code,
   session.began, session.recording, judged.points, judged.passed, coalesce(judged.overrides, 0), session.grade";
@@ -114,6 +117,8 @@ impl Index {
                 }
             },
         };
+        // What another program may have written there meanwhile is not believed: every bundle is read once by every desk.
+        connection.execute("DELETE FROM session", []).map_err(|e| format!("{FILE_NAME}: unusable-cache: {e}"))?;
         Ok(Index { path, connection, codes, homeless, judged: None })
     }
 
@@ -186,10 +191,13 @@ impl Index {
                 }
             }
         }
-        // A copy beside its original is no second attempt.
+        // A copy beside its original is no second attempt; where they differ one of them was changed, and none is believed.
         change.execute(
-            "UPDATE session SET twin = (SELECT min(other.path) FROM session AS other
-             WHERE other.id = session.id AND other.problem IS NULL AND other.path < session.path)",
+            "UPDATE session SET
+             twin = (SELECT min(other.path) FROM session AS other
+               WHERE other.id = session.id AND other.content = session.content AND other.path < session.path),
+             rival = (SELECT min(other.path) FROM session AS other
+               WHERE other.id = session.id AND other.content <> session.content)",
             [],
         )?;
         change.commit()?;
@@ -208,7 +216,7 @@ impl Index {
         let change = self.connection.transaction()?;
         change.execute("DELETE FROM judged", [])?;
         for id in sessions {
-            let sql = "SELECT grade FROM session WHERE id = ?1 AND problem IS NULL AND twin IS NULL";
+            let sql = "SELECT grade FROM session WHERE id = ?1 AND problem IS NULL AND twin IS NULL AND rival IS NULL";
             let text: Option<Option<String>> = change.prepare(sql)?.query_row([id], |row| row.get(0)).optional()?;
             let Some(grade) = text.flatten().and_then(|text| serde_json::from_str::<GradeFile>(&text).ok()) else {
                 continue;
@@ -255,8 +263,10 @@ impl Index {
 
     /// Path and reason of what is no session, or one that is listed already.
     pub fn left_out(&self) -> rusqlite::Result<Vec<(String, String)>> {
-        let sql = "SELECT path, coalesce(problem, 'the same session as ' || twin) FROM session
-                   WHERE problem IS NOT NULL OR twin IS NOT NULL ORDER BY path";
+        let sql = "SELECT path, coalesce(problem,
+                     'it has another result than ' || rival || ', which is the same session: typodont verify says which holds',
+                     'the same session as ' || twin)
+                   FROM session WHERE problem IS NOT NULL OR twin IS NOT NULL OR rival IS NOT NULL ORDER BY path";
         let mut select = self.connection.prepare(sql)?;
         let rows = select.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
         rows.collect()
@@ -343,8 +353,8 @@ fn enter(
     let grade = session.grade.as_ref();
     let sql =
         "INSERT OR REPLACE INTO session (path, size, modified, id, exercise, title, participant, code, folder, began,
-        recording, searched, called, grade, points, max_points, pass_points, passed)
-        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18)";
+        recording, searched, called, grade, points, max_points, pass_points, passed, content)
+        VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16, ?17, ?18, ?19)";
     change.prepare(sql)?.execute(params![
         path,
         stamp.0,
@@ -364,6 +374,7 @@ fn enter(
         grade.map(|g| g.max_points),
         grade.map(|g| g.pass_points),
         grade.map(|g| g.passed),
+        hex(&Sha256::digest(session.text())),
     ])?;
     Ok(())
 }

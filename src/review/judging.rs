@@ -137,7 +137,7 @@ fn read(pairs: &[(String, String)], grade: &GradeFile, wrong: &mut Vec<Said>) ->
     let mut text = |name: &str, most: usize| {
         let text = value(pairs, name).replace("\r\n", "\n").trim().to_string();
         let letters = text.chars().count();
-        if letters == 0 {
+        if !text.chars().any(char::is_alphanumeric) {
             wrong.push(Said::text(format!("complaint.no_{name}"), &[]));
         } else if letters > most {
             let numbers = [("letters", number(letters)), ("most", number(most))];

@@ -9,10 +9,10 @@ use super::chance::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
-use std::fs::{File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 pub const FILE_NAME: &str = "overrides.jsonl";
 
@@ -177,7 +177,7 @@ impl Log {
 
     /// What it says now; `known` is how far it was known to go. A log that is not there says nothing.
     pub fn told(&mut self, known: Option<&Head>) -> io::Result<Told> {
-        let mut file = match File::open(&self.path) {
+        let mut file = match is_plain(&self.path).and_then(|()| File::open(&self.path)) {
             Ok(file) => file,
             Err(error) if error.kind() == ErrorKind::NotFound => return Ok(with_known(told(b""), b"", known)),
             Err(error) => return Err(error),
@@ -189,7 +189,7 @@ impl Log {
             _ => {}
         }
         // Not while a line is being written.
-        file.lock_shared()?;
+        in_time(|| file.try_lock_shared())?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         let now = with_known(told(&bytes), &bytes, known);
@@ -199,22 +199,31 @@ impl Log {
     }
 
     /// Appends a line, holding the log against every other program meanwhile. `decide` sees what stands there.
+    ///
+    /// Where lines are missing that were `known`, the new one is numbered after them: it is not mistaken for one of those.
     pub fn append<E>(
         &mut self,
         at: &str,
+        known: Option<&Head>,
         decide: impl FnOnce(&Told) -> Result<Draft, E>,
     ) -> Result<Entry, Unwritten<E>> {
         let failed = Unwritten::Failed;
         let is_new = !self.path.exists();
-        let mut file = OpenOptions::new().read(true).append(true).create(true).open(&self.path).map_err(failed)?;
-        file.lock().map_err(failed)?;
+        let mut options = OpenOptions::new();
+        options.read(true).append(true).create(true);
+        // Names and reasons are for whoever keeps the folder.
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let mut file = is_plain(&self.path).and_then(|()| options.open(&self.path)).map_err(failed)?;
+        in_time(|| file.try_lock()).map_err(failed)?;
         let mut bytes = Vec::new();
         file.rewind().and_then(|()| file.read_to_end(&mut bytes)).map_err(failed)?;
         let told = told(&bytes);
         let draft = decide(&told).map_err(Unwritten::Refused)?;
         let last = physical_lines(&bytes).last().map(digest);
         let previous = last.unwrap_or_else(|| NONE_BEFORE.into());
-        let entry = Entry { version: VERSION, number: told.next, previous, at: at.to_string(), draft };
+        let number = told.next.max(known.map_or(0, |known| known.lines.saturating_add(1)));
+        let entry = Entry { version: VERSION, number, previous, at: at.to_string(), draft };
         let text = serde_json::to_string(&entry).map_err(|e| failed(e.into()))?;
         // A torn line is ended first: what follows it stays readable.
         let begin = if bytes.is_empty() || bytes.ends_with(b"\n") { "" } else { "\n" };
@@ -230,6 +239,28 @@ impl Log {
         self.read = None;
         Ok(entry)
     }
+}
+
+/// `Err` for a link, a pipe or a folder in the log's place: what is written there would go elsewhere, or wait for ever.
+fn is_plain(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(meta) if !meta.is_file() => Err(io::Error::other("it is a link, or no plain file")),
+        _ => Ok(()),
+    }
+}
+
+/// Takes a lock that another program may hold for a line's length; who holds it longer must not stop the desk.
+fn in_time(lock: impl Fn() -> Result<(), TryLockError>) -> io::Result<()> {
+    const PAUSE: Duration = Duration::from_millis(10);
+    // Some five seconds.
+    for _ in 0..500 {
+        match lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::Error(error)) => return Err(error),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+        }
+    }
+    Err(io::Error::other("another program holds it"))
 }
 
 /// A new file's name must survive a power cut as well.
@@ -281,7 +312,9 @@ fn told(bytes: &[u8]) -> Told {
         };
         let number = entry.number;
         let mut doubtful = false;
-        if number < next {
+        // No log has so many lines: a number without a next one is nobody's.
+        let has_next = number < u64::MAX;
+        if number < next || !has_next {
             told.troubles.push(Trouble::Misplaced { line: number });
             doubtful = true;
         } else if number > next {
@@ -291,7 +324,7 @@ fn told(bytes: &[u8]) -> Told {
             doubtful = number == 1;
         }
         told.lines.push(Line { entry, doubtful });
-        if !doubtful || number >= next {
+        if has_next && (!doubtful || number >= next) {
             (next, unread) = (number + 1, 0);
         }
         before = own;
@@ -346,7 +379,6 @@ fn with_known(mut told: Told, bytes: &[u8], known: Option<&Head>) -> Told {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
 
     fn draft(item: Option<usize>, points: Option<f64>) -> Draft {
         let item = item.map(|index| ItemRef { index, metric: "dice".into(), title: "Overlap".into() });
@@ -362,7 +394,7 @@ mod tests {
     }
 
     fn written(folder: &Path, points: f64) -> Entry {
-        Log::of(folder).append("2026-11-22T09:00:00Z", |_| Ok::<_, ()>(draft(Some(0), Some(points)))).unwrap()
+        Log::of(folder).append("2026-11-22T09:00:00Z", None, |_| Ok::<_, ()>(draft(Some(0), Some(points)))).unwrap()
     }
 
     fn folder(name: &str) -> PathBuf {

@@ -51,7 +51,7 @@ pub fn standing<'a>(grade: &GradeFile, session: &str, told: &'a Told) -> Standin
     let mut points = grade.points;
     let mut passed = grade.passed;
     if !more.is_empty() {
-        points = tidy(grade.points + more.iter().sum::<f64>()).clamp(0.0, grade.max_points);
+        points = tidy(grade.points + more.iter().sum::<f64>()).min(grade.max_points).max(0.0);
         passed = grade.finished && grade.hard_fails.is_empty() && points >= grade.pass_points;
     }
     if let Some(judged) = whole.and_then(|entry| entry.draft.examiner) {

@@ -31,8 +31,9 @@ pub(super) enum NoRoom {
     NoGroove,
 }
 
-/// A groove may lie so far from where the author puts a decay, mm.
+/// A groove may lie so far from where the author puts a decay, mm, and so far from where chance leads: anywhere on the crown.
 const GROOVE_WITHIN: f32 = 2.0;
+const GROOVE_ANYWHERE: f32 = 8.0;
 
 /// The place of a surface where a decay comes in.
 #[derive(Clone, Copy, Debug)]
@@ -41,6 +42,8 @@ struct Site {
     /// Unit, from the surface's side toward the tooth's middle, and the surface's own two directions.
     inward: Vec3,
     axes: [Vec3; 2],
+    /// mm
+    groove_within: f32,
 }
 
 impl Site {
@@ -75,7 +78,9 @@ impl Site {
             DecayPlace::Offset([a, b]) => u * a + v * b,
         };
         let outside = middle + offset - inward * (half.max_element() + 2.0);
-        Site { surface: surface_below(volume, side, outside, inward), inward, axes: [u, v] }
+        let by_author = !matches!(decay.place, DecayPlace::Random | DecayPlace::RandomQuadrant);
+        let groove_within = if by_author { GROOVE_WITHIN } else { GROOVE_ANYWHERE };
+        Site { surface: surface_below(volume, side, outside, inward), inward, axes: [u, v], groove_within }
     }
 
     /// The way in, square to the surface.
@@ -85,7 +90,7 @@ impl Site {
     }
 
     fn groove(&self, volume: &Volume, side: Side, length: f32) -> Option<Groove> {
-        caries::nearest_groove(volume, self.surface, length, GROOVE_WITHIN, |point| side.holds(point))
+        caries::nearest_groove(volume, self.surface, length, self.groove_within, |point| side.holds(point))
     }
 }
 

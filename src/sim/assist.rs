@@ -76,10 +76,8 @@ impl Second {
 
     /// The first hand was let go: the lead comes in softly when it is back.
     pub(super) fn forget(&mut self) {
+        // What the second hand itself holds rests where it is: that hand was not lost.
         self.coupling.forget();
-        if let Some(attendant) = &mut self.attendant {
-            attendant.forget();
-        }
     }
 
     /// Datagrams that were refused on the way.

@@ -14,7 +14,7 @@ const TIP_RADIUS: f32 = 3.0;
 pub(super) struct Attendant {
     instrument: Instrument,
     proxy: Proxy,
-    /// It has been out of matter since it was let go.
+    /// It has been out of matter since it was lost.
     is_out: bool,
 }
 
@@ -40,7 +40,7 @@ impl Attendant {
         *world_from_tooth * self.proxy.tip()
     }
 
-    /// The hand was let go.
+    /// Its hand was lost.
     pub fn forget(&mut self) {
         self.is_out = false;
     }

@@ -102,14 +102,23 @@ pub struct Touch {
     pub normal: Vec3,
 }
 
-/// How far a hand may have gone into matter, mm, and how far it may have turned, rad, while it could not be trusted, to take up
-/// its working end where that was: a busy machine's hiccup is no reason to pass through the tooth. Its force comes back softly.
+/// How far a hand may have gone, mm, and turned, rad, while it could not be trusted, to take up its working end where that was:
+/// a busy machine's hiccup is no reason to pass through the tooth. Its force comes back softly.
 const SLIP: f32 = 2.0;
 const TWIST: f32 = 0.2;
 
-fn is_back(left: &Pose, held: &Pose) -> bool {
-    let is_near = left.position.distance(held.position) < SLIP;
-    is_near && left.orientation.angle_between(held.orientation) < TWIST
+/// A hand that could not be trusted any more, tooth space.
+#[derive(Clone, Copy, Debug)]
+struct Left {
+    hand: Pose,
+    tip: Vec3,
+}
+
+impl Left {
+    fn is_back(&self, held: &Pose) -> bool {
+        let is_near = self.hand.position.distance(held.position) < SLIP;
+        is_near && self.hand.orientation.angle_between(held.orientation) < TWIST
+    }
 }
 
 /// The state of one session's world.
@@ -129,10 +138,10 @@ pub struct Simulation {
     instrument: usize,
     bur_runs: bool,
     /// False until the working end has been out of matter once: whoever starts or changes instruments inside a tooth
-    /// feels nothing until then, instead of being thrown out.
+    /// feels nothing until then, instead of being thrown out. So does a hand that was let go and is not back where it was.
     is_out: bool,
-    /// Where the working end was when its hand could not be trusted any more, tooth space.
-    left_at: Option<Pose>,
+    /// Where hand and working end were when the hand could not be trusted any more.
+    left_at: Option<Left>,
     ramp: u32,
     /// Ticks since the hand was let go, up to `ramp`.
     eased: u32,
@@ -206,8 +215,7 @@ impl Simulation {
         self.tick = tick.next();
         let Some(pose) = self.gate.admit(&reading.pose) else {
             if self.is_out {
-                let orientation = (self.tooth_from_world * self.hand).orientation;
-                self.left_at = Some(Pose { position: self.proxy.tip(), orientation });
+                self.left_at = Some(Left { hand: self.tooth_from_world * self.hand, tip: self.proxy.tip() });
             }
             self.is_out = false;
             return self.let_go(tick);
@@ -219,11 +227,9 @@ impl Simulation {
         if !self.is_out {
             self.is_out = Proxy::is_free_at(&self.matter, instrument, &held);
             let step = self.let_go(tick);
-            if let Some(left) = self.left_at.take()
-                && !self.is_out
-                && is_back(&left, &held)
-            {
-                self.proxy.let_go(left.position);
+            // From there it follows the hand, which may be free by now, or on the other side of a wall.
+            if let Some(left) = self.left_at.take().filter(|left| left.is_back(&held)) {
+                self.proxy.let_go(left.tip);
                 self.is_out = true;
             }
             return step;
@@ -312,7 +318,7 @@ impl Simulation {
         }
     }
 
-    /// True while the hand is free because it was let go, and has not been out of matter since.
+    /// True while the hand is free because it was let go, and has neither been out of matter since nor taken hold again.
     pub fn has_let_go(&self) -> bool {
         !self.is_out
     }

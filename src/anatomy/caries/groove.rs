@@ -70,17 +70,20 @@ pub fn nearest_groove(
     Some(Groove { line: along(&bottoms, start, 0.5 * length) })
 }
 
-/// Those places that are no farther from the start than `most` by way of the others.
+/// Those places that are no farther from the start than `most` by way of the others (Dijkstra's way).
 fn along(places: &[Vec3], start: usize, most: f32) -> Vec<Vec3> {
     let mut way = vec![f32::INFINITY; places.len()];
     way[start] = 0.0;
-    let mut open = vec![start];
-    while let Some(at) = open.pop() {
-        for (next, place) in places.iter().enumerate() {
-            let step = (*place - places[at]).truncate().length();
-            if step <= GAP && way[at] + step < way[next] && way[at] + step <= most {
-                way[next] = way[at] + step;
-                open.push(next);
+    let mut open: Vec<usize> = (0..places.len()).collect();
+    while let Some(nearest) = (0..open.len()).min_by(|&a, &b| way[open[a]].total_cmp(&way[open[b]])) {
+        let at = open.swap_remove(nearest);
+        if way[at] > most {
+            break;
+        }
+        for &next in &open {
+            let step = (places[next] - places[at]).truncate().length();
+            if step <= GAP {
+                way[next] = way[next].min(way[at] + step);
             }
         }
     }

@@ -152,6 +152,28 @@ impl<'a> Near<'a> {
         [(end - begin) as f32 * step, to_pulp.min(DENTINE_MOST)]
     }
 
+    /// How thick the tooth is from a place of its surface inward, mm.
+    fn through(&self, from: Vec3, inward: Vec3) -> f32 {
+        let step = 0.5 * self.grid.spacing.min_element();
+        let is_matter =
+            |i: &u32| self.label_at(from + inward * (*i as f32 * step)).is_some_and(|label| label != Label::AIR);
+        // A place on the surface may lie half a voxel outside.
+        let begin = (0..6).find(is_matter).unwrap_or(0);
+        (begin..).find(|i| !is_matter(i)).unwrap_or(begin) as f32 * step
+    }
+
+    /// Which places each column lies near to as seen from above, x fastest.
+    fn columns_close_to(&self, places: impl Iterator<Item = Vec3> + Clone, reach: f32) -> Vec<Vec<usize>> {
+        let [nx, ny, _] = self.grid.dims;
+        let columns = (0..ny).flat_map(|y| (0..nx).map(move |x| [x, y, 0]));
+        let is_close = |column: Vec3, place: Vec3| (place - column).with_z(0.0).length() <= reach;
+        let close = |cell| {
+            let column = self.grid.centre(cell);
+            places.clone().enumerate().filter(|(_, place)| is_close(column, *place)).map(|(number, _)| number).collect()
+        };
+        columns.map(close).collect()
+    }
+
     /// The voxels for which `core` gives a value above 0.
     fn decayed(&self, core: impl Fn(usize, Vec3, Label) -> f32) -> Vec<Decayed> {
         let decayed = self.grid.cells().enumerate().filter_map(|(index, cell)| {
@@ -204,8 +226,9 @@ fn from_groove(
         let aside = (place.distance_squared(source.junction) - depth * depth).max(0.0).sqrt();
         1.0 - norm([aside / growth.spread, depth / (in_dentine * source.dentine_depth)])
     };
+    let close = near.columns_close_to(sources.iter().map(|source| source.bottom), growth.spread.max(base) + MOUTH);
     near.decayed(|index, place, label| {
-        let all = sources.iter();
+        let all = close[index % close.len()].iter().map(|&number| &sources[number]);
         match label {
             _ if label == tissues.enamel => all.map(|source| in_enamel_of(source, place)).fold(0.0, f32::max),
             _ if label == tissues.dentine && in_dentine > 0.0 => {
@@ -223,7 +246,9 @@ fn through_surface(near: &Near, growth: &Growth, tissues: &Tissues, enamel: &[f3
     let outside = near.distances(|label| label == Label::AIR);
     // On a root the dentine begins at the surface.
     let is_root = enamel_depth <= near.grid.spacing.min_element();
-    let most = enamel_depth + dentine_depth + growth.spread;
+    // The other side of the tooth has enamel and air of its own.
+    let into = if growth.reach.is_in_dentine() { dentine_depth + growth.spread } else { growth.spread };
+    let most = (enamel_depth + into).min(0.5 * near.through(at, inward));
     near.decayed(|index, place, label| {
         let away = place - at;
         if away.dot(inward) > most {

@@ -1,12 +1,10 @@
-//! A learning record store, spoken to by xAPI 1.0.3 (Part Three): one request, one answer.
+//! A learning record store, spoken to by xAPI 1.0.3 (Part Three) or 2.0.0 (IEEE 9274.1.1): one request, one answer.
 
 use base64::Engine;
 use serde_json::Value as Json;
 use std::time::Duration;
 use ureq::Agent;
 use ureq::tls::{Certificate, PemItem, RootCerts, TlsConfig, parse_pem};
-
-const VERSION: &str = "1.0.3";
 
 /// For one request with its answer: a slow store over a bad line. Longer is as good as gone.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -18,6 +16,25 @@ pub struct Lrs {
     agent: Agent,
     statements: String,
     authorization: String,
+    version: Version,
+}
+
+/// Of xAPI, as the store speaks it. What we send is right in both.
+#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
+pub enum Version {
+    #[value(name = "1.0.3")]
+    One,
+    #[value(name = "2.0.0")]
+    Two,
+}
+
+impl Version {
+    fn text(self) -> &'static str {
+        match self {
+            Version::One => "1.0.3",
+            Version::Two => "2.0.0",
+        }
+    }
 }
 
 /// What a store makes of statements.
@@ -39,7 +56,7 @@ impl Lrs {
     /// `endpoint` is the address that `statements` is appended to. `roots` are certificates in PEM to trust in place of the usual.
     ///
     /// `Err` for an address that would send the secret in the clear, or is none.
-    pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>) -> Result<Lrs, String> {
+    pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>, version: Version) -> Result<Lrs, String> {
         let url = url::Url::parse(endpoint).map_err(|e| format!("\"{endpoint}\" is no address: {e}"))?;
         if !url.username().is_empty() || url.password().is_some() || url.query().is_some() || url.fragment().is_some() {
             return Err("give it without a name, secret, query or fragment; the key and its secret have options".into());
@@ -83,6 +100,7 @@ impl Lrs {
             agent: config.into(),
             statements: format!("{}/statements", endpoint.trim_end_matches('/')),
             authorization: format!("Basic {login}"),
+            version,
         })
     }
 
@@ -92,7 +110,7 @@ impl Lrs {
         let request = self
             .agent
             .post(&self.statements)
-            .header("X-Experience-API-Version", VERSION)
+            .header("X-Experience-API-Version", self.version.text())
             .header("Authorization", &self.authorization)
             .header("Content-Type", "application/json");
         answer(request.send(body))
@@ -104,7 +122,7 @@ impl Lrs {
             .agent
             .get(&self.statements)
             .query("statementId", id)
-            .header("X-Experience-API-Version", VERSION)
+            .header("X-Experience-API-Version", self.version.text())
             .header("Authorization", &self.authorization);
         match request.call() {
             Ok(response) if response.status() == 404 => {

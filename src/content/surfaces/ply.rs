@@ -22,7 +22,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Triangle>, Unread> {
                 format!("it announces {} entries of \"{}\", and has room for {room}", element.count, element.name);
             return Err(wrong(what, AGAIN));
         }
-        let axes = ["x", "y", "z"].map(|axis| element.properties.iter().position(|p| p.name == axis));
+        let axes =
+            ["x", "y", "z"].map(|axis| element.properties.iter().position(|p| p.name == axis && p.list.is_none()));
         let corners = element.properties.iter().position(|p| p.list.is_some() && p.name.starts_with("vert"));
         match element.name.as_str() {
             "vertex" if axes.contains(&None) => return Err(wrong("its corners have no x, y and z", AGAIN)),

@@ -1,7 +1,7 @@
 //! Finds bundles and reads their results.
 
 use super::Cohort;
-use crate::report::session_file::{SessionFile, VERSION};
+use crate::report::session_file::{GradeFile, SessionFile, VERSION};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -86,9 +86,18 @@ fn look_into(found: &mut Found, folder: &Path, depth: usize) {
 pub fn read_session(file: &Path) -> Result<SessionFile, String> {
     let text = crate::content::read_text(file).map_err(|d| d.message)?;
     let session: SessionFile = serde_json::from_str(&text.text).map_err(|e| format!("not a session: {e}"))?;
+    if session.grade.as_ref().is_some_and(|grade| !is_possible(grade)) {
+        return Err("not a session: its grade has points that cannot be".into());
+    }
     match session.version {
         VERSION => Ok(session),
         version if version > VERSION => Err(format!("made by a newer program (version {version})")),
         version => Err(format!("not a session: version {version}")),
     }
+}
+
+/// Whether every maximum is one. Points beyond it are a matter for `verify`.
+fn is_possible(grade: &GradeFile) -> bool {
+    let most = grade.items.iter().map(|item| item.max_points).chain([grade.max_points]);
+    most.into_iter().all(|points| points.is_finite() && points >= 0.0)
 }
