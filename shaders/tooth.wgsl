@@ -21,7 +21,7 @@ struct Tooth {
 // Density and label (of 255).
 @group(1) @binding(1) var voxels: texture_3d<f32>;
 @group(1) @binding(2) var between: sampler;
-// Bricks to the nearest that may show something.
+// Bricks to the nearest that may show something, or EVEN.
 @group(1) @binding(3) var empty: texture_3d<u32>;
 // Mean density of cubes.
 @group(1) @binding(4) var hollow: texture_3d<f32>;
@@ -29,6 +29,8 @@ struct Tooth {
 @group(1) @binding(5) var transfer: texture_2d<f32>;
 
 const BRICK: f32 = 8.0;
+// A brick that shows the same wherever it is sampled.
+const EVEN: u32 = 0x80u;
 // Share of a voxel that surely leads across a border between bricks, however numbers are rounded.
 const NUDGE: f32 = 0.004;
 // Way outward to the place whose surroundings shade a surface, mm, and the share of light that it can cost.
@@ -69,19 +71,15 @@ fn brick_of(at: vec3f) -> vec3f {
     return clamp(floor(at / BRICK), vec3f(0.0), ceil(tooth.dims.xyz / BRICK) - 1.0);
 }
 
-// How density rises, per mm in world space: over a cube two voxels wide, so that stairs that carving along voxels leaves
-// do not catch the light.
+// How density rises, per mm in world space: between four corners of a cube two voxels wide, so that stairs that carving
+// along voxels leaves do not catch the light.
 fn slope(at: vec3f) -> vec3f {
-    let a = density(at + vec3f(-1.0, -1.0, -1.0));
-    let b = density(at + vec3f(1.0, -1.0, -1.0));
+    let a = density(at + vec3f(1.0, -1.0, -1.0));
+    let b = density(at + vec3f(-1.0, -1.0, 1.0));
     let c = density(at + vec3f(-1.0, 1.0, -1.0));
-    let d = density(at + vec3f(1.0, 1.0, -1.0));
-    let e = density(at + vec3f(-1.0, -1.0, 1.0));
-    let f = density(at + vec3f(1.0, -1.0, 1.0));
-    let g = density(at + vec3f(-1.0, 1.0, 1.0));
-    let h = density(at + vec3f(1.0, 1.0, 1.0));
-    let rise = vec3f(b + d + f + h - a - c - e - g, c + d + g + h - a - b - e - f, e + f + g + h - a - b - c - d);
-    let per_mm = rise * 0.125 / (tooth.spacing.xyz * tooth.spacing.xyz);
+    let d = density(at + vec3f(1.0, 1.0, 1.0));
+    let rise = vec3f(a - b - c + d, c + d - a - b, b + d - a - c);
+    let per_mm = rise * 0.25 / (tooth.spacing.xyz * tooth.spacing.xyz);
     return (tooth.world_from_voxel * vec4f(per_mm, 0.0)).xyz;
 }
 

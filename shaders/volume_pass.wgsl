@@ -35,23 +35,29 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
     while z < end {
         let at = start + along * z;
         let brick = brick_of(at);
-        let steps = f32(textureLoad(empty, vec3i(brick), 0).r);
-        let out = z + way_out(at, along, brick, steps);
+        let known = textureLoad(empty, vec3i(brick), 0).r;
+        let is_even = known == EVEN;
+        let steps = f32(select(known, 0u, is_even));
+        var out = z + way_out(at, along, brick, steps);
         if steps > 0.0 {
             number = max(ceil(out / pace), number + 1.0);
             z = number * pace;
             continue;
         }
-        while z < min(out, end) {
+        out = min(out, end);
+        // Where all samples are one, one is taken for all.
+        let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
+        while z < out {
             let found = entry(start + along * z);
             if found.a > 0.0 {
-                blended.colour += vec4f(found.rgb, 1.0) * (found.a * (1.0 - blended.colour.a));
+                let opacity = select(found.a, 1.0 - pow(1.0 - found.a, samples), is_even);
+                blended.colour += vec4f(found.rgb, 1.0) * (opacity * (1.0 - blended.colour.a));
                 blended.first = select(blended.first, z, blended.first < 0.0);
                 if blended.colour.a > OPAQUE {
                     return blended;
                 }
             }
-            number += 1.0;
+            number += samples;
             z = number * pace;
         }
     }

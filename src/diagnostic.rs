@@ -121,12 +121,22 @@ pub fn nearest<'a>(written: &str, known: impl IntoIterator<Item = &'a str>) -> O
         .map(|(_, word)| word)
 }
 
-/// "did you mean …? known: …", for a word that is not among the known ones.
+/// "did you mean …? known: …", for a word that is not among the known ones. Of many known words the nearest are named.
 pub fn did_you_mean<'a>(written: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
-    let listed = known.clone().into_iter().collect::<Vec<_>>().join(", ");
+    /// More than a reader looks through, and how many of those are named.
+    const MANY: usize = 20;
+    const NAMED: usize = 6;
+    let mut all: Vec<&str> = known.clone().into_iter().collect();
     match nearest(written, known) {
-        Some(word) => format!("did you mean \"{word}\"? known: {listed}"),
-        None => format!("known: {listed}"),
+        Some(word) if all.len() > MANY => {
+            let count = all.len();
+            let written = written.to_lowercase();
+            all.sort_by_key(|other| strsim::damerau_levenshtein(&written, &other.to_lowercase()));
+            let named: Vec<&str> = all.into_iter().filter(|other| *other != word).take(NAMED).collect();
+            format!("did you mean \"{word}\"? of {count} known the next are {}", named.join(", "))
+        }
+        Some(word) => format!("did you mean \"{word}\"? known: {}", all.join(", ")),
+        None => format!("known: {}", all.join(", ")),
     }
 }
 

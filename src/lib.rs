@@ -32,6 +32,8 @@ pub mod scene;
 pub mod report;
 pub mod handover;
 pub mod review;
+pub mod author;
+pub mod school;
 pub mod lesson;
 pub mod app;
 pub mod cli;

@@ -19,6 +19,14 @@ impl Mesh {
         self.triangles.is_empty()
     }
 
+    /// Takes another surface in.
+    pub fn join(&mut self, other: Mesh) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| first + i)));
+    }
+
     /// Enclosed volume in mm³, positive for a closed surface facing outward (divergence theorem).
     pub fn volume_mm3(&self) -> f64 {
         let at = |i: u32| self.positions[i as usize].as_dvec3();

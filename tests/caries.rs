@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
-use typodont::anatomy::caries::{self, Decayed, Entry, Growth, Reach};
-use typodont::anatomy::{Tissues, molar};
+use typodont::anatomy::caries::{self, Decayed, Entry, Growth, Patch, Reach};
+use typodont::anatomy::{Tissues, grid_of_spacing, grow, molar, teeth};
 use typodont::content::Library;
 use typodont::diagnostic::{Diagnostic, Source};
 use typodont::frame::Vec3;
@@ -90,7 +90,7 @@ fn a_lesion_through_a_smooth_surface_narrows_and_then_spreads() {
     let from = Vec3::new(0.0, high.y, 3.5);
     let step = (0..400).map(|i| from + inward * (i as f32 * 0.05));
     let at = step.into_iter().find(|&p| volume.density_at(p) >= 0.5).expect("the distal surface");
-    let entry = || Entry::Smooth { at, inward, axes: [Vec3::X, Vec3::Z], half: [1.5, 1.0] };
+    let entry = || Entry::Smooth(Patch { at, inward, axes: [Vec3::X, Vec3::Z], half: [1.5, 1.0] });
     let grown = |reach| caries::grow(&volume, &TISSUES, &Growth { entry: entry(), reach, spread: 1.4 });
     let decayed = grown(Reach::MiddleDentine);
     let outside = away_from(&volume, Label::AIR);
@@ -105,6 +105,31 @@ fn a_lesion_through_a_smooth_surface_narrows_and_then_spreads() {
     assert!(surface > 1.3 && inner < 0.85 * surface && below > 1.15 * inner, "{surface} {inner} {below}");
     assert!(is_one_piece(&volume, &decayed));
     assert_eq!(count(&volume, &grown(Reach::OuterEnamel), TISSUES.dentine), 0);
+}
+
+#[test]
+fn a_lesion_near_a_marginal_ridge_goes_to_the_dentine_and_not_along_the_enamel() {
+    // Aim: the way in that lies over the dentine is given up for the shortest. Method: at several heights of two molars no decayed
+    // voxel of enamel lies farther from where it came in than a lesion is wide and enamel thick, and all hang together.
+    for (fdi, heights) in [(36, [2.5, 4.5]), (37, [3.5, 4.5])] {
+        let form = &teeth::tooth(fdi).unwrap();
+        let volume = grow(form, grid_of_spacing(form, 0.15), &TISSUES);
+        let [_, high] = volume.grid().extent();
+        for height in heights {
+            let inward = Vec3::NEG_Y;
+            let from = Vec3::new(0.0, high.y, height);
+            let mut step = (0..400).map(|i| from + inward * (i as f32 * 0.05));
+            let at = step.find(|&p| volume.density_at(p) >= 0.5).expect("the distal surface");
+            let entry = Entry::Smooth(Patch { at, inward, axes: [Vec3::X, Vec3::Z], half: [1.5, 1.0] });
+            let decayed = caries::grow(&volume, &TISSUES, &Growth { entry, reach: Reach::MiddleDentine, spread: 0.9 });
+            let place = |d: &Decayed| volume.grid().centre(volume.grid().cell(d.index));
+            let in_enamel = decayed.iter().filter(|d| volume.tissue(d.index) == TISSUES.enamel);
+            let farthest = in_enamel.map(|d| place(d).distance(at)).fold(0.0, f32::max);
+            println!("{fdi} at {height} mm: enamel up to {farthest:.2} mm away, {} voxels", decayed.len());
+            assert!(farthest < 3.2 && is_one_piece(&volume, &decayed), "{fdi} at {height} mm: {farthest}");
+            assert!(count(&volume, &decayed, TISSUES.dentine) > 200, "{fdi} at {height} mm");
+        }
+    }
 }
 
 /// The grinding exercise with another tooth.
@@ -134,7 +159,11 @@ fn chance_stays_within_what_the_author_allows_and_the_seed_decides() {
         let made = Workpiece::make(&scenario, seed).unwrap();
         let again = Workpiece::make(&scenario, seed).unwrap();
         assert_eq!(made.volume.labels(), again.volume.labels(), "seed {seed}");
-        assert_eq!(made.lesions, Workpiece::of(&scenario, made.volume.clone(), seed).unwrap().lesions, "seed {seed}");
+        assert_eq!(
+            made.lesions,
+            Workpiece::of(&scenario, made.volume.clone(), None, seed).unwrap().lesions,
+            "seed {seed}"
+        );
         sizes.insert(made.volume.count(caries));
         let at = made.lesions[0].centre;
         places.insert([at.x, at.y].map(|mm| (mm * 5.0) as i32));

@@ -340,7 +340,7 @@ fn recorded(scenario: &File, to: &File) -> Vec<u8> {
     let workpiece = Arc::new(Workpiece::make(&scenario, 3).unwrap());
     let spec = Spec::phantom_omni();
     let head = HeadFile::of(&scenario, &spec, 3);
-    let mut recorder = Recorder::create(to, &head, &scenario, &workpiece.volume).unwrap();
+    let mut recorder = Recorder::create(to, &head, &scenario, &workpiece).unwrap();
     let mut session = Session::new(scenario.clone(), &workpiece);
     let mut sim = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
     let file = OperatorFile::read(&library, "careful").unwrap();

@@ -68,7 +68,7 @@ fn a_session_to_be_killed() {
     let workpiece = Arc::new(Workpiece::make(&scenario, 1).unwrap());
     let spec = Spec::phantom_omni();
     let head = HeadFile::of(&scenario, &spec, 1);
-    let recorder = Recorder::create(&folder.join("recording.mcap"), &head, &scenario, &workpiece.volume).unwrap();
+    let recorder = Recorder::create(&folder.join("recording.mcap"), &head, &scenario, &workpiece).unwrap();
     let progress = File::create(folder.join("progress")).unwrap();
     let mut session = Session::new(scenario.clone(), &workpiece);
     let mut simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));

@@ -155,7 +155,9 @@ fn exercise(mesh: Value) -> String {
     let shipped = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
     let mut scenario: Value = serde_json::from_str(&shipped).unwrap();
     scenario["scene"]["jaw"]["tooth"]["form"]["procedural"]["spacing_mm"] = json!(0.2);
-    scenario["scene"]["jaw"]["around"] = json!([mesh]);
+    let jaw = scenario["scene"]["jaw"].as_object_mut().unwrap();
+    jaw.remove("periodontium");
+    jaw.insert("around".into(), json!([mesh]));
     scenario["stages"][0]["time_limit_s"] = json!(4);
     scenario.as_object_mut().unwrap().remove("questionnaire");
     scenario.to_string()

@@ -94,6 +94,62 @@ fn excavating_a_fissure_tells_them_apart() {
     }
 }
 
+/// A shipped exercise with coarser voxels, so that a session of minutes takes seconds.
+fn coarse(name: &str) -> String {
+    let text = std::fs::read_to_string(format!("{}/scenarios/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    assert!(text.contains("\"spacing_mm\": 0.1"), "{name}");
+    let file = folder(&format!("coarse_{name}")).join(name);
+    std::fs::write(&file, text.replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.2")).unwrap();
+    file.to_str().unwrap().to_string()
+}
+
+/// One measure of one session each of some operators.
+fn played(name: &str, operators: &[&str]) -> impl Fn(&str, &str) -> Option<f64> {
+    let (scenario, out) = (coarse(name), folder(&format!("played_{name}")));
+    let sessions: Vec<(String, Value)> =
+        operators.iter().map(|o| (o.to_string(), session(&run(&scenario, o, &out, &[])))).collect();
+    move |operator, name| {
+        let (_, session) = sessions.iter().find(|(o, _)| o == operator).unwrap();
+        if name == "points" { session["grade"]["points"].as_f64() } else { metric(session, name) }
+    }
+}
+
+#[test]
+fn deep_decay_tells_them_apart() {
+    let mean = played("12-deep-caries.json", &["expert", "hasty"]);
+    grows(&mean, "dice", &["hasty", "expert"]);
+    grows(&mean, "points", &["hasty", "expert"]);
+    assert_eq!((mean("expert", "pulp_exposed"), mean("hasty", "pulp_exposed")), (Some(0.0), Some(1.0)));
+}
+
+#[test]
+fn scooping_soft_decay_tells_them_apart_and_leaves_sound_dentine() {
+    let mean = played("13-spoon.json", &["expert", "hasty"]);
+    grows(&mean, "zone_removed_pct(soft)", &["hasty", "expert"]);
+    grows(&mean, "points", &["hasty", "expert"]);
+    for operator in ["expert", "hasty"] {
+        assert_eq!(mean(operator, "zone_removed_pct(firm)"), Some(0.0), "{operator}");
+        assert_eq!(mean(operator, "healthy_per_decay_pct"), Some(0.0), "{operator}");
+    }
+}
+
+#[test]
+fn charting_tells_them_apart() {
+    // A chart takes minutes: one seed.
+    let mean = means_over("scenarios/15-charting.json", &SEEDS[..1]);
+    for better in ["careful", "expert"] {
+        assert_eq!(mean(better, "probing_within_1mm_pct"), Some(100.0), "{better}");
+        assert_eq!(mean(better, "calculus_found_pct"), Some(100.0), "{better}");
+        grows(&mean, "probing_force_max_n", &[better, "hasty"]);
+        grows(&mean, "probing_bias_mm", &[better, "hasty"]);
+        grows(&mean, "sites_read_pct", &["hasty", better]);
+        grows(&mean, "calculus_found_pct", &["timid", better]);
+        for worse in ["timid", "hasty"] {
+            grows(&mean, "points", &[worse, better]);
+        }
+    }
+}
+
 #[test]
 fn searching_tells_them_apart() {
     for (scenario, right, time) in [

@@ -2,27 +2,16 @@
 //!
 //! They lie in `$TYPODONT_DATA`, or in `../shared/data` beside the project; their licences keep them out of it.
 
+mod shared_data;
+
 use glam::DVec3;
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use shared_data::find;
+use std::path::Path;
 use typodont::anatomy::Tissues;
 use typodont::content::nrrd::segmentation::{self, Segmentation};
 use typodont::content::nrrd::{self, Encoding, Samples, Space};
 use typodont::content::scan;
 use typodont::volume::Label;
-
-/// The file's path; without the file the test says loudly that it did nothing.
-fn find(name: &str) -> Option<PathBuf> {
-    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    let folder = std::env::var_os("TYPODONT_DATA").map_or_else(beside, PathBuf::from);
-    let path = folder.join(name);
-    if !path.exists() {
-        // Straight to the terminal: the test harness would keep what a passing test prints to itself.
-        let _ = writeln!(std::io::stderr(), "SKIPPED: no {} — set TYPODONT_DATA", path.display());
-        return None;
-    }
-    Some(path)
-}
 
 #[test]
 fn the_ge_tooth_has_its_three_peaks() {

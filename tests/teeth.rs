@@ -300,6 +300,68 @@ fn the_program_writes_teeth_that_others_can_read() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("FDI numbers run"));
 }
 
+#[test]
+fn the_program_writes_a_jaw_with_a_part_for_each_tooth_and_the_gum() {
+    // Aim: both jaws for other programs, every tooth on its own side. Method: the parts' names, and where each tooth stands: in a
+    // glTF file x is x, in the lower jaw to the patient's left.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("arches");
+    let _ = std::fs::remove_dir_all(&folder);
+    for (name, quadrants) in [("upper", [1, 2]), ("lower", [3, 4])] {
+        let arguments = ["anatomy", "--arch", name, "--spacing-mm", "0.4", "-o"];
+        let wrote =
+            std::process::Command::new(env!("CARGO_BIN_EXE_typodont")).args(arguments).arg(&folder).output().unwrap();
+        assert!(wrote.status.success(), "{}", String::from_utf8_lossy(&wrote.stderr));
+        let (document, buffers, _) = gltf::import(folder.join(format!("{name}.glb"))).unwrap();
+        let mut named: Vec<(String, f32)> = Vec::new();
+        for node in document.nodes().filter(|n| n.mesh().is_some()) {
+            let primitive = node.mesh().unwrap().primitives().next().unwrap();
+            let places = primitive.reader(|b| Some(&buffers[b.index()])).read_positions().unwrap();
+            let xs: Vec<f32> = places.map(|p| p[0]).collect();
+            named.push((node.name().unwrap().to_string(), xs.iter().sum::<f32>() / xs.len() as f32));
+        }
+        let teeth: Vec<String> = quadrants.iter().flat_map(|q| (1..=7).map(move |n| format!("{q}{n}"))).collect();
+        let names: Vec<&str> = named.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, [vec!["gum"], teeth.iter().map(String::as_str).collect()].concat());
+        for (name, x) in &named[1..] {
+            assert_eq!(*x > 0.0, name.starts_with(['1', '3']), "{name} stands at {x}");
+        }
+    }
+}
+
+#[test]
+fn an_author_sets_arches_and_a_missing_neighbour_is_not_felt() {
+    // Aim: what is written of the jaws reaches what is felt and drawn. Method: one neighbour fewer, a wider arch's second molar
+    // farther out, and complaints for teeth that cannot be meant.
+    let jaw = |arch: &str| -> Result<(Workpiece, Mouth), String> {
+        let text = format!(
+            r#"{{ "id": "arch", "title": "Arch", "scene": {{ "jaw": {{ "tooth": {{ "id": "tooth", "fdi": 36, "form": {{ "procedural":
+            {{ "spacing_mm": 0.3 }} }} }}, "arch": {arch} }} }}, "instruments": ["explorer"], "stages": [ {{ "id": "look", "title":
+            "Look", "instruction": "Look.", "time_limit_s": 10 }} ] }}"#
+        );
+        let source = Source::new("arch.json", text);
+        let scenario = scenario::resolve(source, &Library::shipped(), Forms::Made)
+            .map_err(|found| found.iter().map(|d| d.to_string()).collect::<String>())?;
+        let workpiece = Workpiece::make(&scenario, 0).unwrap();
+        let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+        Ok((workpiece, mouth))
+    };
+    let reach = |mouth: &Mouth| mouth.one_jaw()[1].mesh.positions.iter().map(|p| p.x.abs()).fold(0.0, f32::max);
+    let (plain, average) = jaw("{}").unwrap();
+    let (gap, wide) = jaw(r#"{ "missing": [37], "lower": { "width_mm": 55 }, "angle_class": "II" }"#).unwrap();
+    assert_eq!(gap.around.len() + 1, plain.around.len());
+    assert!(reach(&wide) > reach(&average) + 1.5, "{} {}", reach(&wide), reach(&average));
+    let (_, turned) = jaw(r#"{ "rotated": [{ "fdi": 34, "degrees": 40 }] }"#).unwrap();
+    assert_ne!(turned.one_jaw()[1].mesh.positions, average.one_jaw()[1].mesh.positions);
+    for (arch, expected) in [
+        (r#"{ "missing": [36] }"#, "36 is the tooth that is worked on"),
+        (r#"{ "rotated": [{ "fdi": 19, "degrees": 10 }] }"#, "there is no tooth 19"),
+        (r#"{ "upper": { "width_mm": 90 } }"#, "width_mm"),
+    ] {
+        let complaint = jaw(arch).err().unwrap_or_default();
+        assert!(complaint.contains(expected), "{arch}: {complaint}");
+    }
+}
+
 /// OpenMandible's first lower left molar (doi 10.1016/j.dental.2021.01.009) as a label map, if it is there.
 fn open_mandible() -> Option<PathBuf> {
     let path = std::env::var_os("TYPODONT_OPENMANDIBLE").map(PathBuf::from);

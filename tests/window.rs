@@ -7,27 +7,27 @@
 mod bundle;
 mod folder;
 mod hearing;
+mod screen;
 
 use bundle::*;
 use folder::folder;
+use glam::DVec3;
 use hearing::Spectrum;
 use hearing::server::{Recorder, server};
+use screen::{Desk, Display, LOOK_EVERY, PATIENCE};
 use std::fs;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+use typodont::anatomy;
 use typodont::content::Library;
+use typodont::content::nrrd::{self, Encoding, Geometry, Samples, Space};
+use typodont::device::{Device, Gone, Link, Output, Reading, Spec};
 use typodont::diagnostic::Source;
 use typodont::frame::{Quat, Vec3};
 use typodont::render::Orbit;
 use typodont::scenario::{self, Forms, Workpiece};
-
-/// How long a state may take to come on a busy machine; a test that waits for longer has failed.
-const PATIENCE: Duration = Duration::from_secs(180);
-
-/// How often the diary is read.
-const LOOK_EVERY: Duration = Duration::from_millis(20);
+use typodont::sim::{Assist, AssistNews};
+use typodont::volume::Label;
 
 /// Pixels that a mouse goes at a stretch.
 const STRETCH: f32 = 120.0;
@@ -39,127 +39,18 @@ const MM_PER_STEP: f32 = 0.5;
 /// Distance at which a hand has arrived, mm: a step of the wheel and a little.
 const NEAR: f32 = 0.6;
 
-/// A virtual display of its own.
-struct Display {
-    server: Child,
-    name: String,
-}
-
-impl Display {
-    /// `None`, aloud, where it cannot be had.
-    fn open() -> Option<Display> {
-        let has = |program: &str| {
-            Command::new("which").arg(program).stdout(Stdio::null()).status().is_ok_and(|s| s.success())
-        };
-        if !has("Xvfb") || !has("xdotool") {
-            println!(
-                "SKIPPED: no Xvfb and xdotool here (Debian: xvfb xdotool mesa-vulkan-drivers): the window is not driven"
-            );
-            return None;
-        }
-        let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x800x24", "-nolisten", "tcp"])
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut number = String::new();
-        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
-        Some(Display { server, name: format!(":{}", number.trim()) })
-    }
-
-    fn xdotool(&self, arguments: &[&str]) -> bool {
-        let output = Command::new("xdotool").args(arguments).env("DISPLAY", &self.name).output().unwrap();
-        output.status.success()
-    }
-}
-
-impl Drop for Display {
-    fn drop(&mut self) {
-        let _ = self.server.kill();
-        let _ = self.server.wait();
-    }
-}
-
-/// The program at its desk, and the hands and eyes of whoever sits there.
-struct Desk {
-    program: Child,
-    diary: PathBuf,
-    complaints: PathBuf,
-    // Last: the program goes before its display.
-    display: Display,
-}
-
+/// What a hand does at the desk.
 impl Desk {
-    fn sit_down(display: Display, place: &Path, more: &[&str]) -> Desk {
-        Desk::sit_down_with(display, place, more, &[])
-    }
-
-    /// The same, with more in the environment.
-    fn sit_down_with(display: Display, place: &Path, more: &[&str], environment: &[(&str, String)]) -> Desk {
-        let (diary, home) = (place.join("diary"), place.join("home"));
-        let complaints = place.join("complaints");
-        fs::create_dir_all(&home).unwrap();
-        let program = Command::new(env!("CARGO_BIN_EXE_typodont"))
-            .args(more)
-            .current_dir(place)
-            .env("DISPLAY", &display.name)
-            .env("HOME", &home)
-            .env("XDG_CONFIG_HOME", home.join("config"))
-            .env("LANG", "en_GB.UTF-8")
-            .env("TYPODONT_DIARY", &diary)
-            .env_remove("WAYLAND_DISPLAY")
-            .env_remove("LC_ALL")
-            .envs(environment.iter().map(|(name, value)| (name, value)))
-            .stdout(Stdio::null())
-            .stderr(fs::File::create(&complaints).unwrap())
-            .spawn()
-            .unwrap();
-        let mut desk = Desk { program, diary, complaints, display };
-        desk.until("pictures", |_| true);
-        let begun = Instant::now();
-        while !desk.display.xdotool(&["search", "--onlyvisible", "--name", "Typodont", "windowfocus", "--sync"]) {
-            assert!(begun.elapsed() < PATIENCE, "the window does not take the keys");
-            std::thread::sleep(LOOK_EVERY);
-        }
-        desk.display.xdotool(&["mousemove", "640", "400"]);
-        desk
-    }
-
-    /// The newest line of a topic.
-    fn latest(&self, topic: &str) -> Option<String> {
-        let text = fs::read_to_string(&self.diary).unwrap_or_default();
-        // A line that is being written is not one yet.
-        let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
-        whole.lines().rev().find_map(|line| Some(line.strip_prefix(topic)?.strip_prefix(' ')?.to_string()))
-    }
-
-    /// Waits until a topic's newest line is as wanted.
-    fn until(&mut self, topic: &str, is_wanted: impl Fn(&str) -> bool) -> String {
-        let begun = Instant::now();
-        loop {
-            let latest = self.latest(topic);
-            if let Some(value) = latest.as_deref().filter(|value| is_wanted(value)) {
-                return value.to_string();
-            }
-            let complained = || fs::read_to_string(&self.complaints).unwrap_or_default();
-            assert!(self.program.try_wait().unwrap().is_none(), "the program ended: {}", complained());
-            assert!(begun.elapsed() < PATIENCE, "{topic} stays {latest:?}; {}", complained());
-            std::thread::sleep(LOOK_EVERY);
-        }
-    }
-
-    /// Presses a key until a topic is as wanted: a key that comes before the window listens is lost.
-    fn press(&mut self, key: &str, topic: &str, wanted: &str) {
-        assert!(self.display.xdotool(&["key", "--clearmodifiers", key]));
-        self.until(topic, |value| value == wanted);
-        println!("{key}: {topic} {wanted}");
-    }
-
     fn hand(&self) -> Vec3 {
         let line = self.latest("hand").unwrap_or_default();
         let numbers: Vec<f32> = line.split(' ').filter_map(|n| n.parse().ok()).collect();
         Vec3::from_slice(&numbers)
+    }
+
+    fn rate_everything(&mut self) {
+        for rated in 1..=25 {
+            self.press("4", "rated", &rated.to_string());
+        }
     }
 
     /// How the picture lies in the world.
@@ -218,24 +109,6 @@ impl Desk {
             last = hand;
         }
     }
-
-    /// Keeps a picture of the whole screen where somebody asked for pictures.
-    fn picture(&self, name: &str) {
-        if let Some(folder) = std::env::var_os("TYPODONT_TEST_PICTURES") {
-            // The diary is a picture or two ahead of the screen.
-            std::thread::sleep(Duration::from_secs(2));
-            let file = Path::new(&folder).join(format!("{name}.png"));
-            let _ =
-                Command::new("import").args(["-window", "root"]).arg(file).env("DISPLAY", &self.display.name).status();
-        }
-    }
-}
-
-impl Drop for Desk {
-    fn drop(&mut self) {
-        let _ = self.program.kill();
-        let _ = self.program.wait();
-    }
 }
 
 /// Where the decay of an exercise lies for a seed, world space, mm.
@@ -293,9 +166,7 @@ fn a_trainee_grinds_with_the_mouse_and_leaves_a_bundle_that_holds() {
     desk.picture("7-see-through");
     desk.press("ctrl+Return", "screen", "questionnaire");
 
-    for rated in 1..=25 {
-        desk.press("4", "rated", &rated.to_string());
-    }
+    desk.rate_everything();
     desk.picture("8-questionnaire");
     desk.press("ctrl+Return", "screen", "results");
     desk.picture("9-results");
@@ -375,6 +246,75 @@ fn the_servo_does_not_wait_for_the_picture() {
     let turned = count(desk.latest("ticks").unwrap()) - first;
     println!("{turned} ticks in about 15 pictures; late (p99, max, missed): {}", desk.latest("late").unwrap());
     assert!(turned > 10 * 100, "{turned} ticks in at least 10 pictures");
+}
+
+/// A CT of a tooth, as numbers alone: an upper premolar in 8 bits, with a little noise. Gives its voxels along each axis.
+fn scanned(path: &Path) -> [u32; 3] {
+    const SPACING: f32 = 0.25;
+    let tissues = anatomy::Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+    let form = anatomy::teeth::tooth(14).unwrap();
+    let tooth = anatomy::grow(&form, anatomy::grid_of_spacing(&form, SPACING), &tissues);
+    let bright = |voxel: usize| match tooth.tissue(voxel) {
+        Label(1) => 235.0,
+        Label(2) => 160.0,
+        _ => 70.0,
+    };
+    let sample = |voxel: usize| {
+        let share = tooth.densities()[voxel].unit();
+        let noise = (voxel.wrapping_mul(2_654_435_761) >> 16) % 9;
+        (70.0 + share * (bright(voxel) - 70.0)) as u8 + noise as u8
+    };
+    let samples = Samples::U8((0..tooth.grid().len()).map(sample).collect());
+    let steps = [DVec3::X, DVec3::Y, DVec3::Z];
+    let space = Space::LeftPosteriorSuperior;
+    let geometry = Geometry { dims: tooth.grid().dims, steps, origin: DVec3::ZERO, space };
+    let image = nrrd::Image { geometry, samples, keys: Vec::new() };
+    fs::write(path, nrrd::bytes(&image, Encoding::Gzip).unwrap()).unwrap();
+    tooth.grid().dims
+}
+
+/// An instructor's hand that rests far above.
+struct Resting(Spec);
+
+impl Device for Resting {
+    fn spec(&self) -> &Spec {
+        &self.0
+    }
+
+    fn exchange(&mut self, _: &Output) -> Result<Reading, Gone> {
+        Ok(Reading::at(Vec3::Y * 60.0))
+    }
+}
+
+#[test]
+fn a_scanned_tooth_is_worked_on_and_an_instructor_joins_from_another_machine() {
+    let Some(display) = Display::open() else { return };
+    let place = folder("scan_window");
+    let dims = scanned(&place.join("scan.nrrd"));
+    let exercise = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
+    let begun = ["run", exercise.to_str().unwrap(), "--seed", "1", "--begin", "--out", "bundles"];
+    let scan = ["--tooth", "scan.nrrd", "--tooth-spacing-mm", "0.25"];
+    let second = ["--second-at", "127.0.0.1:0", "--second-key", "a key of ours"];
+    let mut desk = Desk::sit_down(display, &place, &[&begun[..], &scan, &second].concat());
+    desk.until("tooth", |tooth| tooth == "drawn");
+    let address = desk.until("may_join", |_| true);
+    let link = Link::connect(&address, "a key of ours").unwrap();
+    let mut instructor = Assist::start(Box::new(Resting(Spec::phantom_omni())), link).unwrap();
+    let begun = Instant::now();
+    let joined = AssistNews::First { is_there: true };
+    while !std::iter::from_fn(|| instructor.next_news()).any(|news| news == joined) {
+        assert!(begun.elapsed() < PATIENCE, "nobody is at {address}");
+        std::thread::sleep(LOOK_EVERY);
+    }
+    desk.picture("scan");
+    desk.press("ctrl+Return", "screen", "questionnaire");
+    desk.rate_everything();
+    desk.press("ctrl+Return", "screen", "results");
+    let bundle = place.join(desk.latest("bundle").unwrap());
+    let began = nrrd::read(&bundle.join("initial.seg.nrrd")).unwrap();
+    assert_eq!(began.geometry.dims, dims, "the bundle is about the scan");
+    let output = typodont(&["verify", bundle.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", complained(&output));
 }
 
 #[test]

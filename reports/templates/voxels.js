@@ -11,7 +11,7 @@ const FULL = Uint8Array.from({ length: 32 }, (_, step) => Math.round(step * 255 
 /** A tick in ms later than any. */
 const NEVER = 0xffffffff;
 /** Numbers of the verdicts, as in performance.seg.nrrd. */
-const VERDICT = { outside: 0, keptSound: 1, rightlyRemoved: 2, withinLeeway: 3, overcut: 4, left: 5, vulnerableTouched: 6, kept: 7 };
+const VERDICT = { outside: 0, keptSound: 1, rightlyRemoved: 2, withinLeeway: 3, overcut: 4, left: 5, vulnerableTouched: 6, kept: 7, restored: 8, overfilled: 9 };
 
 /** The bytes behind a packed text: base64 of a zlib stream. */
 async function unpacked(text) {
@@ -260,6 +260,7 @@ class Palette {
   standing(label, verdict) {
     const isOpen = verdict === VERDICT.rightlyRemoved || verdict === VERDICT.outside;
     if (verdict === VERDICT.left || (isOpen && this.isDecay(label))) return this.verdict(VERDICT.left);
+    if (verdict === VERDICT.restored || verdict === VERDICT.overfilled) return this.verdict(verdict);
     const kept = this.verdict(verdict === VERDICT.kept ? VERDICT.kept : VERDICT.keptSound);
     return kept.map((c, i) => c + (this.tissue(label)[i] - c) * TOUCH);
   }

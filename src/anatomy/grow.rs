@@ -25,6 +25,10 @@ const BLOCK: usize = 8;
 /// molar are missed, more than 1.6 only costs time.
 const STEEPEST: f32 = 1.6;
 
+/// A cell whose corners are all so many bands outside the surface is empty: a distance counts for at most [`STEEPEST`] times what
+/// it is, and a little is left for rounding.
+const CLEAR: f32 = 1.01 * STEEPEST;
+
 /// The ground's tilt is taken over this far to each side, mm: what matters is the slope of a cusp, not of a groove.
 const TILT: f32 = 0.4;
 
@@ -168,6 +172,14 @@ struct Known {
     pulp: f32,
 }
 
+/// What is known of the nodes of a block, x fastest.
+#[derive(Default)]
+struct Told {
+    tooth: Vec<f32>,
+    dentine: Vec<f32>,
+    pulp: Vec<f32>,
+}
+
 impl Growing {
     fn on(grid: Grid, tissues: &Tissues) -> Growing {
         let band = BAND * grid.spacing.max_element();
@@ -194,12 +206,12 @@ impl Growing {
             let bz = number as usize;
             let level = |k: usize| shape.cut(self.nodes.height(bz * per_block + k));
             let levels: Vec<Slice> = (0..=per_block).map(level).collect();
-            let mut scratch = Vec::new();
+            let mut told = Told::default();
             for layer in layers {
                 for by in 0..ny.div_ceil(BLOCK) {
                     for bx in 0..nx.div_ceil(BLOCK) {
                         let block = Block { shape, levels: &levels, columns: &columns, at: [bx, by, bz] };
-                        self.fill_block(&block, layer, &mut scratch);
+                        self.fill_block(&block, layer, &mut told);
                     }
                 }
             }
@@ -208,7 +220,7 @@ impl Growing {
     }
 
     /// Leaves a block empty or fills it as a whole where its middle says so; else asks all its nodes.
-    fn fill_block(&self, block: &Block, layer: &mut Layer, known: &mut Vec<Known>) {
+    fn fill_block(&self, block: &Block, layer: &mut Layer, told: &mut Told) {
         let reach = self.reach;
         let middle = block.middle(&self.nodes);
         if middle.tooth > reach {
@@ -217,17 +229,46 @@ impl Growing {
         let far_from_pulp = middle.pulp.abs() > reach;
         if far_from_pulp && middle.tooth < -reach && middle.dentine.abs() > reach {
             let label = self.tissue(middle);
-            self.for_voxels(block.at, |index, _| {
+            self.for_voxels(block.at, [0; 3], BLOCK, |index, _| {
                 layer.density[index] = Density::FULL;
                 layer.label[index] = label;
             });
             return;
         }
-        block.ask(&self.nodes, far_from_pulp.then_some(middle.pulp), known);
-        self.for_voxels(block.at, |index, voxel| {
-            let (here, slope) = self.between(known, voxel);
-            layer.density[index] = ramp(here.tooth / slope, self.band);
-            layer.label[index] = self.tissue(here);
+        block.ask(&self.nodes, far_from_pulp.then_some(middle.pulp), told);
+        let cells = self.nodes.per_block();
+        for k in 0..cells {
+            for j in 0..cells {
+                for i in 0..cells {
+                    self.fill_cell(block.at, [i, j, k], told, layer);
+                }
+            }
+        }
+    }
+
+    /// Fills the voxels between eight nodes. Outside the surface they are air, whatever tissue is nearest.
+    fn fill_cell(&self, block: [usize; 3], cell: [usize; 3], told: &Told, layer: &mut Layer) {
+        let step = self.nodes.step;
+        let edge = self.nodes.per_block() + 1;
+        let first = (cell[2] * edge + cell[1]) * edge + cell[0];
+        let around = |nodes: &[f32]| -> [f32; 8] {
+            std::array::from_fn(|n| nodes[first + (n & 1) + (n >> 1 & 1) * edge + (n >> 2) * edge * edge])
+        };
+        let tooth = around(&told.tooth);
+        if tooth.iter().all(|&distance| distance > CLEAR * self.band) {
+            return;
+        }
+        let (dentine, pulp) = (around(&told.dentine), around(&told.pulp));
+        self.for_voxels(block, cell.map(|c| c * step), step, |index, voxel| {
+            let share = voxel.map(|v| (v as f32 + 0.5) / step as f32);
+            let slope = (rise(&tooth, share) / self.nodes.spacing).length().clamp(1.0 / STEEPEST, STEEPEST);
+            let here = value(&tooth, share);
+            let density = ramp(here / slope, self.band);
+            layer.density[index] = density;
+            if density.is_solid() {
+                let known = Known { tooth: here, dentine: value(&dentine, share), pulp: value(&pulp, share) };
+                layer.label[index] = self.tissue(known);
+            }
         });
     }
 
@@ -240,43 +281,37 @@ impl Growing {
         }
     }
 
-    /// The voxels of a block that lie in the grid: index within their layer, and steps from the block's first voxel.
-    fn for_voxels(&self, block: [usize; 3], mut each: impl FnMut(usize, [usize; 3])) {
+    /// The voxels of a cube in a block that lie in the grid: index within their layer, and steps from the cube's first voxel.
+    fn for_voxels(&self, block: [usize; 3], first: [usize; 3], edge: usize, mut each: impl FnMut(usize, [usize; 3])) {
         let [nx, ny, nz] = self.grid.dims.map(|n| n as usize);
-        let [x0, y0, z0] = block.map(|b| b * BLOCK);
-        for z in z0..(z0 + BLOCK).min(nz) {
-            for y in y0..(y0 + BLOCK).min(ny) {
-                for x in x0..(x0 + BLOCK).min(nx) {
-                    each(((z - z0) * ny + y) * nx + x, [x - x0, y - y0, z - z0]);
+        let [x0, y0] = [0, 1].map(|axis| block[axis] * BLOCK + first[axis]);
+        let (bottom, z0) = (block[2] * BLOCK, block[2] * BLOCK + first[2]);
+        for z in z0..(z0 + edge).min(nz) {
+            for y in y0..(y0 + edge).min(ny) {
+                for x in x0..(x0 + edge).min(nx) {
+                    each(((z - bottom) * ny + y) * nx + x, [x - x0, y - y0, z - z0]);
                 }
             }
         }
     }
-
-    /// What the nodes around a voxel's centre know of it, and how fast the tooth's distance rises there, mm per mm.
-    fn between(&self, known: &[Known], voxel: [usize; 3]) -> (Known, f32) {
-        let step = self.nodes.step;
-        let edge = self.nodes.per_block() + 1;
-        let [i, j, k] = voxel.map(|v| v / step);
-        let share = voxel.map(|v| ((v % step) as f32 + 0.5) / step as f32);
-        let first = (k * edge + j) * edge + i;
-        let corners: [Known; 8] =
-            std::array::from_fn(|n| known[first + (n & 1) + (n >> 1 & 1) * edge + (n >> 2) * edge * edge]);
-        let (tooth, rise) = value_and_rise(corners.map(|c| c.tooth), share);
-        let (dentine, _) = value_and_rise(corners.map(|c| c.dentine), share);
-        let (pulp, _) = value_and_rise(corners.map(|c| c.pulp), share);
-        let slope = (rise / self.nodes.spacing).length();
-        (Known { tooth, dentine, pulp }, slope.clamp(1.0 / STEEPEST, STEEPEST))
-    }
 }
 
-/// Trilinear value between eight corners, x fastest, and its rise across the cell along each axis.
-fn value_and_rise(corners: [f32; 8], [x, y, z]: [f32; 3]) -> (f32, Vec3) {
-    let [a, b, c, d] = [0, 2, 4, 6].map(|n| mix(corners[n], corners[n + 1], x));
-    let [da, db, dc, dd] = [0, 2, 4, 6].map(|n| corners[n + 1] - corners[n]);
-    let (low, high) = (mix(a, b, y), mix(c, d, y));
-    let along_x = mix(mix(da, db, y), mix(dc, dd, y), z);
-    (mix(low, high, z), Vec3::new(along_x, mix(b - a, d - c, z), high - low))
+/// Trilinear value between eight corners, x fastest.
+fn value(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> f32 {
+    let along_x = |n: usize| mix(corners[n], corners[n + 1], x);
+    mix(mix(along_x(0), along_x(2), y), mix(along_x(4), along_x(6), y), z)
+}
+
+/// How much [`value`] rises across the cell along each axis.
+fn rise(corners: &[f32; 8], [x, y, z]: [f32; 3]) -> Vec3 {
+    let along_x = |n: usize| mix(corners[n], corners[n + 1], x);
+    let step = |n: usize| corners[n + 1] - corners[n];
+    let [a, b, c, d] = [along_x(0), along_x(2), along_x(4), along_x(6)];
+    Vec3::new(
+        mix(mix(step(0), step(2), y), mix(step(4), step(6), y), z),
+        mix(b - a, d - c, z),
+        mix(c, d, y) - mix(a, b, y),
+    )
 }
 
 /// A block of nodes of one shape.
@@ -296,12 +331,19 @@ impl Block<'_> {
     }
 
     /// Asks every node, x fastest. A distance from the pulp that holds for the whole block saves asking for it.
-    fn ask(&self, nodes: &Nodes, pulp: Option<f32>, known: &mut Vec<Known>) {
+    fn ask(&self, nodes: &Nodes, pulp: Option<f32>, told: &mut Told) {
         let edge = nodes.per_block() + 1;
-        known.clear();
+        for known in [&mut told.tooth, &mut told.dentine, &mut told.pulp] {
+            known.clear();
+        }
         for k in 0..edge {
             for j in 0..edge {
-                known.extend((0..edge).map(|i| self.known(nodes, [i, j, k], pulp)));
+                for i in 0..edge {
+                    let known = self.known(nodes, [i, j, k], pulp);
+                    told.tooth.push(known.tooth);
+                    told.dentine.push(known.dentine);
+                    told.pulp.push(known.pulp);
+                }
             }
         }
     }

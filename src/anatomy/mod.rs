@@ -27,6 +27,8 @@ pub mod segment;
 pub mod shells;
 mod charted;
 pub mod caries;
+pub mod periodontium;
+pub mod girth;
 
 pub use charted::charted;
 pub use form::Form;

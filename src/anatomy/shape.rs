@@ -60,6 +60,11 @@ const DENTINE_EDGE: f32 = 1.1;
 const FOLLOWS: f32 = 0.6;
 
 impl Slice<'_> {
+    /// Signed distance to the crown's side or the trunk's, as if nothing ended it above, mm.
+    pub(super) fn side(&self, place: [f32; 2]) -> f32 {
+        self.body.side(place)
+    }
+
     /// Signed distance to the pulp, mm.
     pub(super) fn pulp(&self, place: [f32; 2]) -> f32 {
         self.pulp.distance(place)

@@ -8,13 +8,15 @@ use super::sound::Treatment;
 use crate::audio::Sounds;
 use crate::device::Device;
 use crate::device::mouse::Mouse;
-use crate::lesson::{Failed, Held, Lesson, Opening, Prepared};
+use crate::lesson::{Failed, Held, Lesson, Opening, Prepared, SecondHand, second};
 use crate::mailbox::{self, Newest, Receiver, Sender};
 use crate::report::Templates;
 use crate::scenario::{Scenario, Workpiece};
 use crate::session::{Heard, Input};
+use crate::sim::{AssistNews, Role};
 use crate::volume::Edit;
 use std::collections::{BTreeMap, VecDeque};
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -47,6 +49,9 @@ pub enum News {
     /// The matter is made; the servo is about to turn.
     Made(Arc<Workpiece>),
     Heard(Heard),
+    /// A machine with the key may join at this address.
+    MayJoin(SocketAddr),
+    Second(AssistNews),
     /// The device that came back is another one.
     OtherDevice,
     /// The session is over; its bundle is being made.
@@ -64,6 +69,10 @@ pub struct Order {
     pub templates: Templates,
     pub started: jiff::Timestamp,
     pub hand: Hand,
+    /// Another hand that may join, and as what.
+    pub second: Option<(second::From, Role)>,
+    /// SHA-256 of files that the exercise does not name, by name.
+    pub digests: BTreeMap<String, String>,
     /// Called when there is something to look at that was waited for.
     pub wake: Box<dyn Fn() + Send>,
 }
@@ -197,24 +206,27 @@ fn sit(mut seat: Seat, order: Order, mouse: Option<Box<dyn Device + Send>>) {
 }
 
 fn take_lesson(seat: &mut Seat, order: Order, mouse: Option<Box<dyn Device + Send>>) -> Result<PathBuf, Failed> {
-    let Order { scenario, seed, participant, out, templates, started, hand, wake } = order;
+    let Order { scenario, seed, participant, out, templates, started, hand, second, digests, wake } = order;
     let held = match hand {
         Hand::Mouse => None,
         Hand::Device(held) => Some(held),
     };
-    let (device, again) = match (held, mouse) {
-        (Some(held), _) => (held.device, Some((held.driver, held.argument))),
-        (None, Some(mouse)) => (mouse, None),
+    let (name, device, again) = match (held, mouse) {
+        (Some(held), _) => (held.name, held.device, Some((held.driver, held.argument))),
+        (None, Some(mouse)) => ("mouse".to_string(), mouse, None),
         (None, None) => return Err(Failed::NoDevice { name: "mouse".into(), why: "nothing is in the hand".into() }),
     };
-    let (out, digests) = (out.as_path(), BTreeMap::new());
-    let opening = Opening { scenario, seed, participant: &participant, out, digests, templates, started };
+    let second = second.map(|(from, role)| SecondHand::join(&from, role, (&name, device.spec()))).transpose()?;
+    if let Some(address) = second.as_ref().and_then(SecondHand::address) {
+        seat.news.send(News::MayJoin(address));
+    }
+    let opening = Opening { scenario, seed, participant: &participant, out: &out, digests, templates, started };
     let workpiece = opening.make()?;
     // It is drawn while its recording is opened.
     seat.news.send(News::Made(workpiece.clone()));
     wake();
     let prepared: Prepared = opening.prepare(workpiece, device.spec().clone(), None)?;
-    let (mut lesson, heard) = prepared.begin(device, None)?;
+    let (mut lesson, heard) = prepared.begin(device, second)?;
     seat.tell(heard);
     let mut looked = Instant::now();
     while !lesson.session().is_complete() {
@@ -247,6 +259,9 @@ impl Seat {
     fn follow(&mut self, lesson: &mut Lesson) -> Result<(), Failed> {
         let heard = lesson.listen()?;
         self.tell(heard);
+        while let Some(news) = lesson.next_of_second() {
+            self.news.send(News::Second(news));
+        }
         for edit in lesson.edits() {
             self.edits.waiting.push_back(*edit);
         }

@@ -1,11 +1,12 @@
 //! What screens ask for, as sentences, and which screens there are.
 
+use super::author::{Ask, Authoring};
 use super::results::Results;
 use super::settings::Settings;
 use super::sitting::{Sitting, Way};
 use super::transfer::Curves;
 use super::views::View;
-use crate::session::Answer;
+use crate::session::{Answer, Sign};
 use crate::touch::Coefficient;
 use crate::volume::Label;
 use eframe::egui;
@@ -24,8 +25,16 @@ pub enum Command {
     ToShelf,
     /// The lesson.
     Begin,
+    /// A new one, to be written.
+    NewExercise,
+    /// The chosen one, to be changed.
+    EditExercise,
+    /// At the author's screen.
+    Author(Ask),
     Take(usize),
     Answer(String, Answer),
+    /// Into the periodontal chart, where the instrument is.
+    Chart(Sign),
     Confirm,
     Pause(bool),
     /// Asks whether to give up, or takes that back.
@@ -82,6 +91,7 @@ pub enum Command {
 pub enum Screen {
     Shelf,
     Briefing,
+    Author(Box<Authoring>),
     Lesson(Box<Sitting>),
     Results(Box<Results>),
     /// Why there is no lesson or no bundle.

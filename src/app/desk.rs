@@ -1,22 +1,28 @@
 //! The desk: which screen is shown, and everything that happens when one of them asks for it.
 
+use super::author::{self, Ask, Authoring, Watch};
 use super::chair::{Hand, Order};
 use super::command::{Command, Screen};
 use super::diary::Diary;
 use super::language::{self, Words};
 use super::results::{Results, results_ui};
 use super::settings::{self, Settings, settings_ui};
-use super::shelf::{Shelf, shelf_ui};
+use super::shelf::{self, Shelf, shelf_ui};
 use super::sitting::{Sitting, Way};
+use super::told::OfSecond;
 use super::viewport::Viewport;
 use super::{Options, briefing, keys, look, practice, questionnaire, viewport};
 use crate::audio::{Output, Replacements};
-use crate::content::sounds;
+use crate::author::new_exercise;
+use crate::content::{Library, sounds};
 use crate::diagnostic::headlines;
 use crate::lesson;
+use crate::scenario::Scenario;
 use crate::session::Input;
 use eframe::egui::{self, ViewportCommand};
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 pub struct Desk {
@@ -27,6 +33,8 @@ pub struct Desk {
     shelf: Shelf,
     participant: String,
     screen: Screen,
+    /// The exercise that is tried, to come back to.
+    tried_from: Option<Box<Authoring>>,
     open: keys::Open,
     closing: Closing,
     /// A widget had the keys when the last picture was finished.
@@ -75,6 +83,9 @@ impl Desk {
         let mut screen = Screen::Shelf;
         if let Some(path) = &options.exercise {
             shelf.choose_file(path);
+            if let Some(scan) = &options.tooth {
+                shelf.replace_teeth(scan);
+            }
             if shelf.exercise().is_some_and(|e| e.read.is_ok()) {
                 screen = Screen::Briefing;
             }
@@ -88,6 +99,7 @@ impl Desk {
             languages,
             shelf,
             screen,
+            tried_from: None,
             open: keys::Open::default(),
             closing: Closing::No,
             had_focus: false,
@@ -99,14 +111,19 @@ impl Desk {
             viewport: None,
             pictures: 0,
         };
-        if begins {
-            desk.begin(ctx);
+        match (desk.options.author, desk.options.exercise.clone()) {
+            (Some(watch), Some(path)) => desk.open_author(&path, watch, ctx),
+            _ if begins => desk.begin(ctx),
+            _ => {}
         }
         desk
     }
 
     /// Takes over what happened since the last picture.
     fn follow(&mut self, ctx: &egui::Context) {
+        if let Screen::Author(authoring) = &mut self.screen {
+            authoring.follow(ctx.input(|input| input.time));
+        }
         let Screen::Lesson(sitting) = &mut self.screen else { return };
         let was_held = sitting.is_pointer_held;
         sitting.follow(self.settings.volume, ctx.input(|input| input.unstable_dt));
@@ -141,6 +158,12 @@ impl Desk {
                 self.shelf = Shelf::stock(&folder);
                 self.set(Settings { exercises: folder, ..self.settings.clone() }, ctx);
             }
+            Command::ToShelf if self.tried_from.is_some() => {
+                if let Some(mut authoring) = self.tried_from.take() {
+                    authoring.come_back();
+                    self.screen = Screen::Author(authoring);
+                }
+            }
             Command::ToShelf => {
                 if !matches!(self.screen, Screen::Briefing) {
                     // The next one at this desk is somebody else.
@@ -149,6 +172,15 @@ impl Desk {
                 self.screen = Screen::Shelf;
             }
             Command::Begin => self.begin(ctx),
+            Command::NewExercise => self.write_new(ctx),
+            Command::EditExercise => self.edit_chosen(ctx),
+            Command::Author(Ask::Try) => self.try_out(ctx),
+            Command::Author(Ask::Leave) => self.leave_author(),
+            Command::Author(ask) => {
+                if let Screen::Author(authoring) = &mut self.screen {
+                    authoring.carry_out(ask);
+                }
+            }
             Command::ShowReport => {
                 if let Screen::Results(results) = &self.screen
                     && let Some(page) = results.page()
@@ -160,11 +192,11 @@ impl Desk {
             Command::ShowSettings(is_open) => self.open_over(keys::Open { keys: false, settings: is_open }, ctx),
             Command::Close(is_closing) => self.close(is_closing, ctx),
             Command::Set(settings) => self.set(*settings, ctx),
-            in_lesson => {
-                if let Screen::Lesson(sitting) = &mut self.screen {
-                    carry_out_in(sitting, in_lesson, ctx);
-                }
-            }
+            other => match &mut self.screen {
+                Screen::Lesson(sitting) => carry_out_in(sitting, other, ctx),
+                Screen::Author(authoring) => carry_out_at_author(authoring, &other),
+                _ => {}
+            },
         }
     }
 
@@ -192,9 +224,71 @@ impl Desk {
         }
     }
 
+    /// The author's screen with a new exercise, in the person's language.
+    fn write_new(&mut self, ctx: &egui::Context) {
+        let words = &self.words;
+        let lines = ["author.new_cleared", "author.new_spared", "author.new_light"].map(|key| words.of(key));
+        let [title, stage, instruction] =
+            ["author.new_title", "author.new_stage", "author.new_instruction"].map(|key| words.of(key));
+        let text = new_exercise(title, stage, instruction, lines, words.of("author.new_fail"));
+        self.screen = Screen::Author(Box::new(Authoring::new(text, wake(ctx))));
+    }
+
+    /// The chosen exercise; of one that ships within the program a copy.
+    fn edit_chosen(&mut self, ctx: &egui::Context) {
+        let Some(exercise) = self.shelf.exercise() else { return };
+        match (exercise.path.clone(), shelf::shipped_text(&exercise.name)) {
+            (Some(path), _) => self.open_author(&path, Watch::Edit, ctx),
+            (None, Some(text)) => self.screen = Screen::Author(Box::new(Authoring::copy(text, wake(ctx)))),
+            (None, None) => {}
+        }
+    }
+
+    fn open_author(&mut self, path: &Path, watch: Watch, ctx: &egui::Context) {
+        self.screen = match Authoring::open(path, watch, wake(ctx)) {
+            Ok(authoring) => Screen::Author(Box::new(authoring)),
+            Err(complaint) => Screen::Failed(complaint.headline()),
+        };
+    }
+
+    /// Back to the shelf, where the exercise stands now. What is not saved is kept.
+    fn leave_author(&mut self) {
+        let Screen::Author(authoring) = &mut self.screen else { return };
+        authoring.keep();
+        let path = authoring.path.clone();
+        self.shelf = Shelf::stock(&self.settings.exercises);
+        if let Some(path) = path {
+            self.shelf.find_file(&path);
+        }
+        self.screen = Screen::Shelf;
+    }
+
+    /// A lesson of what is being written, to come back from. Its bundle replaces that of the try before.
+    fn try_out(&mut self, ctx: &egui::Context) {
+        let Screen::Author(authoring) = &mut self.screen else { return };
+        authoring.keep();
+        let scenario = match authoring.scenario() {
+            Ok(scenario) => scenario,
+            Err(_) => return authoring.carry_out(Ask::Check),
+        };
+        let library = authoring.library.clone();
+        let out = settings::folder().unwrap_or_else(std::env::temp_dir).join("tried");
+        let _ = std::fs::remove_dir_all(&out);
+        let left = std::mem::replace(&mut self.screen, Screen::Shelf);
+        if let Screen::Author(authoring) = left {
+            self.tried_from = Some(authoring);
+        }
+        self.begin_with(Arc::new(scenario), library, BTreeMap::new(), out, ctx);
+    }
+
     /// Answers whoever closes the window: not in the middle of a lesson, and not before its bundle is made.
     fn hear_close(&mut self, ctx: &egui::Context) {
         let is_in_lesson = matches!(self.screen, Screen::Lesson(_));
+        if ctx.input(|input| input.viewport().close_requested())
+            && let Screen::Author(authoring) = &mut self.screen
+        {
+            authoring.keep();
+        }
         if ctx.input(|input| input.viewport().close_requested()) && is_in_lesson {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             if self.closing == Closing::No {
@@ -213,6 +307,18 @@ impl Desk {
         if !lesson::is_code(&self.participant) {
             return;
         }
+        let (scenario, digests, out) = (scenario.clone(), exercise.digests.clone(), self.options.out.clone());
+        self.begin_with(scenario, library, digests, out, ctx);
+    }
+
+    fn begin_with(
+        &mut self,
+        scenario: Arc<Scenario>,
+        library: Library,
+        digests: BTreeMap<String, String>,
+        out: PathBuf,
+        ctx: &egui::Context,
+    ) {
         let hand = match self.options.device.as_deref().unwrap_or(&self.settings.device) {
             "mouse" => Hand::Mouse,
             device => match lesson::open(device) {
@@ -225,17 +331,16 @@ impl Desk {
         };
         let started = jiff::Timestamp::now();
         let order = Order {
-            scenario: scenario.clone(),
+            scenario,
             seed: self.options.seed.unwrap_or_else(|| lesson::seed_from(started)),
             participant: self.participant.clone(),
-            out: self.options.out.clone(),
+            out,
             templates: self.options.templates.clone(),
             started,
             hand,
-            wake: Box::new({
-                let ctx = ctx.clone();
-                move || ctx.request_repaint()
-            }),
+            second: self.options.second.clone(),
+            digests,
+            wake: wake(ctx),
         };
         self.diary.note("seed", order.seed);
         let output = Output { seed: order.seed, replacements: self.replacements.clone(), ..Output::default() };
@@ -265,9 +370,16 @@ impl Desk {
     }
 
     fn screen_ui(&mut self, ui: &mut egui::Ui, frame: &eframe::Frame, asked: &mut Vec<Command>) {
+        let is_tried = self.tried_from.is_some();
         let Desk { screen, shelf, words, settings, participant, viewport, .. } = self;
         match screen {
             Screen::Shelf => shelf_ui(ui, shelf, words, asked),
+            Screen::Author(authoring) => {
+                if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
+                    *viewport = Some(Viewport::new(state));
+                }
+                author::author_ui(ui, authoring, viewport.as_mut(), words, asked);
+            }
             Screen::Briefing => {
                 if let Some(Ok(scenario)) = shelf.exercise().map(|exercise| &exercise.read) {
                     briefing::briefing_ui(ui, scenario, participant, words, asked);
@@ -287,7 +399,7 @@ impl Desk {
                 }
                 practice::practice_ui(ui, sitting, settings, viewport.as_mut(), words, asked);
             }
-            Screen::Results(results) => results_ui(ui, results, words, asked),
+            Screen::Results(results) => results_ui(ui, results, is_tried, words, asked),
             Screen::Failed(why) => look::column(ui, |ui| {
                 ui.heading(words.of("desk.failed"));
                 ui.label(why.as_str());
@@ -327,7 +439,7 @@ impl Desk {
 
     /// A line per change for whoever cannot see the screen.
     fn note(&mut self) {
-        let Desk { diary, screen, shelf, open, closing, .. } = self;
+        let Desk { diary, screen, shelf, open, closing, pictures, .. } = self;
         diary.note(
             "over",
             if open.keys {
@@ -344,6 +456,10 @@ impl Desk {
             Screen::Shelf => {
                 diary.note("screen", "shelf");
                 diary.note("chosen", shelf.exercise().map_or("", |e| e.id()));
+            }
+            Screen::Author(authoring) => {
+                note_author(diary, authoring);
+                diary.note("turn", *pictures);
             }
             Screen::Briefing => diary.note("screen", "briefing"),
             Screen::Lesson(sitting) => note_lesson(diary, sitting),
@@ -369,6 +485,36 @@ fn page(ctx: &egui::Context, title: &str, contents: impl FnOnce(&mut egui::Ui)) 
     });
 }
 
+fn note_author(diary: &mut Diary, authoring: &Authoring) {
+    diary.note("part", format!("{:?}", authoring.part));
+    diary.note("file", authoring.path.as_ref().map_or(String::new(), |path| path.display().to_string()));
+    diary.note("unsaved", authoring.is_unsaved());
+    diary.note("complaints", authoring.complaints.len());
+    diary.note("checked", authoring.is_checked);
+    diary.note("teeth", authoring.view.generation);
+    diary.note("told", authoring.told.as_ref().map_or("", |(key, _)| key));
+    let chosen = authoring.chosen_decay().and_then(|at| Some(authoring.draft.at(&at)?.to_string()));
+    diary.note("decay", chosen.unwrap_or_default());
+    diary.note("screen", "author");
+}
+
+/// What wakes the window from another thread.
+fn wake(ctx: &egui::Context) -> Box<dyn Fn() + Send> {
+    let ctx = ctx.clone();
+    Box::new(move || ctx.request_repaint())
+}
+
+/// What moves the camera at the author's screen.
+fn carry_out_at_author(authoring: &mut Authoring, command: &Command) {
+    let orbit = authoring.view.orbit;
+    authoring.view.orbit = match *command {
+        Command::Turn { right, up } => orbit.turned(right, up),
+        Command::Nearer(factor) => orbit.zoomed(factor),
+        Command::Shift { right, up } => orbit.panned(right, up),
+        _ => orbit,
+    };
+}
+
 fn note_lesson(diary: &mut Diary, sitting: &Sitting) {
     if sitting.is_scoring {
         diary.note("screen", "scoring");
@@ -381,6 +527,9 @@ fn note_lesson(diary: &mut Diary, sitting: &Sitting) {
     }
     diary.note("pointer", if sitting.is_pointer_held { "held" } else { "free" });
     diary.note("paused", sitting.is_paused);
+    if let Some(OfSecond::MayJoin(address)) = sitting.second {
+        diary.note("may_join", address);
+    }
     diary.note("view", format!("{:.4} {:.4}", sitting.orbit.turn, sitting.orbit.tilt));
     if let Some(matter) = &sitting.matter {
         diary.note("open", matter.open);
@@ -407,6 +556,7 @@ fn carry_out_in(sitting: &mut Sitting, command: Command, ctx: &egui::Context) {
     match command {
         Command::Take(instrument) => sitting.say(Input::Take { instrument }),
         Command::Answer(question, value) => sitting.answer(question, value),
+        Command::Chart(sign) => sitting.note(sign),
         Command::Confirm => sitting.confirm(),
         Command::Pause(is_paused) => {
             sitting.pause(is_paused);
@@ -487,11 +637,14 @@ fn hold(ctx: &egui::Context, is_held: bool) {
 }
 
 impl eframe::App for Desk {
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
+
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         let mut asked = Vec::new();
         self.follow(&ctx);
-        ui.painter().rect_filled(ui.max_rect(), 0, ui.visuals().panel_fill);
         self.hear_close(&ctx);
         keys::asked(&ctx, &self.screen, self.open, self.had_focus, &mut asked);
         for complaint in &self.complaints {
@@ -507,12 +660,15 @@ impl eframe::App for Desk {
         self.pictures += 1;
         self.diary.note("pictures", self.pictures / 10);
         self.note();
+        author::note_marks(&ctx, &mut self.diary);
         if let Some(wait) = self.options.slow_picture {
             std::thread::sleep(wait);
         }
-        // While the matter is made the processors are for that.
-        let is_live = |sitting: &Sitting| !sitting.are_stages_over && sitting.matter.is_some();
-        let is_live = matches!(&self.screen, Screen::Lesson(sitting) if is_live(sitting));
-        ctx.request_repaint_after(if is_live { NEXT_PICTURE } else { NEXT_LOOK });
+        ctx.request_repaint_after(match &self.screen {
+            // While the matter is made the processors are for that; when it is, the lesson's thread asks for a picture.
+            Screen::Lesson(sitting) if sitting.matter.is_none() => look::WAITING_STEP,
+            Screen::Lesson(sitting) if !sitting.are_stages_over => NEXT_PICTURE,
+            _ => NEXT_LOOK,
+        });
     }
 }

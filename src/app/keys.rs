@@ -1,12 +1,14 @@
 //! What each key does, and the page that says so.
 
+use super::author::Ask;
 use super::command::{Command, Screen};
 use super::language::Words;
 use super::sitting::Sitting;
+use crate::session::Sign;
 use eframe::egui::{self, Event, Key, Modifiers};
 
 /// Keys and what they do, as the page lists them.
-const LISTED: [(&str, &str); 24] = [
+const LISTED: [(&str, &str); 30] = [
     ("F1", "keys.help"),
     ("F2", "keys.settings"),
     ("Tab", "keys.tab"),
@@ -16,6 +18,8 @@ const LISTED: [(&str, &str); 24] = [
     ("O", "keys.hold"),
     ("Ctrl Enter", "keys.done"),
     ("T", "keys.tool"),
+    ("D", "keys.depth"),
+    ("C", "keys.calculus"),
     ("P", "keys.pause"),
     ("V", "keys.view"),
     ("J M", "keys.mouth"),
@@ -31,6 +35,10 @@ const LISTED: [(&str, &str); 24] = [
     ("Ctrl drag", "keys.touchpad_nearer"),
     ("Shift drag", "keys.touchpad_shift"),
     ("R", "keys.report"),
+    ("Ctrl S", "keys.save"),
+    ("Ctrl Z, Ctrl Y", "keys.undo"),
+    ("F5", "keys.try"),
+    ("F8", "keys.check"),
 ];
 
 /// How far one press of a key opens the mouth, degrees.
@@ -91,6 +99,9 @@ pub fn asked(ctx: &egui::Context, screen: &Screen, is_open: Open, had_focus: boo
         }
         return;
     }
+    if let Screen::Author(authoring) = screen {
+        author(ctx, authoring.asking.is_some(), asked);
+    }
     let is_done = is_pressed(ctx, Modifiers::COMMAND, Key::Enter);
     if (had_focus || ctx.egui_wants_keyboard_input()) && !is_done {
         return;
@@ -106,6 +117,7 @@ pub fn asked(ctx: &egui::Context, screen: &Screen, is_open: Open, had_focus: boo
                 asked.push(Command::Open);
             }
         }
+        Screen::Author(authoring) if authoring.asking.is_none() => camera(ctx, asked),
         Screen::Briefing if pressed(Key::Enter) => asked.push(Command::Begin),
         Screen::Briefing if pressed(Key::Escape) => asked.push(Command::ToShelf),
         Screen::Lesson(sitting) if sitting.are_stages_over => questionnaire(ctx, sitting, is_done, asked),
@@ -114,7 +126,32 @@ pub fn asked(ctx: &egui::Context, screen: &Screen, is_open: Open, had_focus: boo
             asked.push(Command::ToShelf);
         }
         Screen::Results(_) if pressed(Key::R) => asked.push(Command::ShowReport),
-        Screen::Briefing | Screen::Results(_) | Screen::Failed(_) => {}
+        Screen::Author(_) | Screen::Briefing | Screen::Results(_) | Screen::Failed(_) => {}
+    }
+}
+
+/// At the author's screen, also while something is typed.
+fn author(ctx: &egui::Context, is_asking: bool, asked: &mut Vec<Command>) {
+    if is_asking {
+        if is_pressed(ctx, Modifiers::NONE, Key::Escape) {
+            asked.push(Command::Author(Ask::Where(false)));
+        }
+        return;
+    }
+    let redo = Modifiers::COMMAND | Modifiers::SHIFT;
+    let keys = [
+        (Modifiers::COMMAND, Key::S, Ask::Save),
+        // With Shift first: without it the same key takes back.
+        (redo, Key::Z, Ask::Redo),
+        (Modifiers::COMMAND, Key::Y, Ask::Redo),
+        (Modifiers::COMMAND, Key::Z, Ask::Undo),
+        (Modifiers::NONE, Key::F5, Ask::Try),
+        (Modifiers::NONE, Key::F8, Ask::Check),
+    ];
+    for (modifiers, key, ask) in keys {
+        if is_pressed(ctx, modifiers, key) {
+            asked.push(Command::Author(ask));
+        }
     }
 }
 
@@ -142,6 +179,13 @@ fn practice(ctx: &egui::Context, sitting: &Sitting, is_done: bool, asked: &mut V
         && let Some(instrument) = next_instrument(sitting)
     {
         asked.push(Command::Take(instrument));
+    }
+    let chart = sitting.stage().map(|stage| stage.chart).unwrap_or_default();
+    if chart.depths && pressed(Key::D) {
+        asked.push(Command::Chart(Sign::Depth));
+    }
+    if chart.calculus && pressed(Key::C) {
+        asked.push(Command::Chart(Sign::Calculus));
     }
     if pressed(Key::P) {
         asked.push(Command::Pause(!sitting.is_paused));

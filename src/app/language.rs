@@ -94,10 +94,11 @@ mod tests {
             SHIPPED.map(|(_, text)| texts(text).unwrap().into_keys().collect()).into_iter().collect();
         assert_eq!(all[0], all[1], "English and Turkish have the same keys");
         let used = Regex::new(r#""([a-z]+\.[a-z0-9_]+)""#).unwrap();
-        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app");
+        let app = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/app");
         let mut keys = BTreeSet::new();
-        for entry in fs::read_dir(folder).unwrap() {
-            let text = fs::read_to_string(entry.unwrap().path()).unwrap();
+        let files = [app.join("author"), app].into_iter().flat_map(|folder| fs::read_dir(folder).unwrap());
+        for path in files.map(|entry| entry.unwrap().path()).filter(|path| path.is_file()) {
+            let text = fs::read_to_string(path).unwrap();
             let code = text.split("#[cfg(test)]").next().unwrap();
             keys.extend(used.captures_iter(code).map(|c| c[1].to_string()).filter(|k| !k.ends_with(".json")));
         }

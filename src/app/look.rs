@@ -67,10 +67,12 @@ pub fn column(ui: &mut egui::Ui, contents: impl FnOnce(&mut egui::Ui)) {
     });
 }
 
+/// How soon [`waiting`] has something new to show.
+pub const WAITING_STEP: Duration = Duration::from_millis(333);
+
 /// A sign of life beside a text: a dot more every third of a second. A turning wheel would take, where there is no graphics
 /// processor, the very processor that is waited for.
 pub fn waiting(ui: &mut egui::Ui) {
-    const STEP: Duration = Duration::from_millis(333);
-    let steps = (ui.input(|input| input.time) / STEP.as_secs_f64()) as usize;
+    let steps = (ui.input(|input| input.time) / WAITING_STEP.as_secs_f64()) as usize;
     ui.label(".".repeat(1 + steps % 3));
 }

@@ -3,6 +3,7 @@
 //! Takes the pointer, the keys and what is chosen. Gives lessons on a thread of their own, and pictures of how they go.
 //! Never scores, never carves: every number that counts comes from below, and no session waits for the picture.
 
+mod author;
 mod briefing;
 mod chair;
 mod command;
@@ -16,6 +17,7 @@ mod pointer;
 mod practice;
 mod questionnaire;
 mod questions;
+mod chart;
 mod results;
 mod seen;
 mod settings;
@@ -27,7 +29,11 @@ mod transfer;
 mod viewport;
 mod views;
 
+pub use author::Watch;
+
+use crate::lesson::{Scan, second};
 use crate::report::Templates;
+use crate::sim::Role;
 use desk::Desk;
 use eframe::egui;
 use std::path::PathBuf;
@@ -37,8 +43,14 @@ use std::time::Duration;
 pub struct Options {
     /// The exercise to begin with; without one the shelf.
     pub exercise: Option<PathBuf>,
+    /// A scan to work on instead of that exercise's own teeth.
+    pub tooth: Option<Scan>,
+    /// Another hand that may join every lesson, and as what.
+    pub second: Option<(second::From, Role)>,
     /// Begins that exercise at once, without its instructions.
     pub begins: bool,
+    /// Opens that exercise at the author's screen instead, to be edited or only to be looked at while an editor changes it.
+    pub author: Option<Watch>,
     /// What is in the hand, as `--device` takes it; without it as the settings say.
     pub device: Option<String>,
     /// Decides what exercises leave to chance; without one the clock does.
@@ -58,7 +70,10 @@ impl Options {
         let (exercise, seed, slow_picture) = (None, None, None);
         Options {
             exercise,
+            tooth: None,
+            second: None,
             begins: false,
+            author: None,
             device: None,
             seed,
             participant: String::new(),
@@ -82,7 +97,8 @@ pub fn open(options: Options) -> Result<(), String> {
         .with_app_id("typodont")
         .with_inner_size(SIZE)
         .with_min_inner_size(SIZE_LEAST);
-    let native = eframe::NativeOptions { viewport, ..Default::default() };
+    // Where a processor draws, dithering is much of what a page costs, and pages are of few flat colours.
+    let native = eframe::NativeOptions { viewport, dithering: false, ..Default::default() };
     let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
         Ok(Box::new(Desk::new(context, options)))
     });

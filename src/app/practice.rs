@@ -6,7 +6,7 @@ use super::seen::Seen;
 use super::settings::Settings;
 use super::sitting::Sitting;
 use super::viewport::{Place, Viewport};
-use super::{look, menu, pointer, questions};
+use super::{chart, look, menu, pointer, questions};
 use crate::content::Role;
 use crate::frame::{Pose, Vec3};
 use crate::render::{Changes, Eye, Lamp, Lights, Scene, Solid, Tooth};
@@ -79,6 +79,9 @@ fn task_ui(ui: &mut egui::Ui, sitting: &mut Sitting, words: &Words, asked: &mut 
         ui.add(egui::ProgressBar::new(left / 100.0).fill(look::ACCENT).desired_height(10.0));
     }
     ui.add_space(8.0);
+    if let Some(second) = &sitting.second {
+        ui.label(words.with("practice.second", second.text(words)));
+    }
     if let Some(why) = &sitting.standstill {
         ui.colored_label(look::CARE, words.with("practice.standstill", why.text(words)));
     }
@@ -86,6 +89,7 @@ fn task_ui(ui: &mut egui::Ui, sitting: &mut Sitting, words: &Words, asked: &mut 
         ui.colored_label(look::CARE, words.of("practice.paused"));
     }
     questions::questions_ui(ui, stage, sitting, words, asked);
+    chart::chart_ui(ui, stage, sitting, words, asked);
     ui.add_space(12.0);
     if stage.ends.confirmed {
         // A row, so that the text stands in the button's middle.
@@ -155,7 +159,7 @@ fn force_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words) {
 
 /// What a trainee should stop doing.
 fn warning(sitting: &Sitting, seen: &Seen) -> Option<&'static str> {
-    let cuts = sitting.scenario.instruments.get(seen.instrument as usize).is_some_and(|i| i.cuts);
+    let cuts = sitting.scenario.instruments.get(seen.instrument as usize).is_some_and(|i| i.is_bur());
     let is_cutting = cuts && sitting.stage().is_some_and(|stage| stage.cutting);
     match seen.touch.and_then(|label| sitting.scenario.tissues.role(label)) {
         Some(Role::Soft) if is_cutting => Some("practice.warn_soft"),

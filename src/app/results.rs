@@ -46,7 +46,8 @@ fn picture(bundle: &Path, name: &str, ctx: &egui::Context) -> Option<egui::Textu
     Some(ctx.load_texture(name, pixels, egui::TextureOptions::LINEAR))
 }
 
-pub fn results_ui(ui: &mut egui::Ui, results: &Results, words: &Words, asked: &mut Vec<Command>) {
+/// `is_tried`: an author has tried their exercise, and goes back to it.
+pub fn results_ui(ui: &mut egui::Ui, results: &Results, is_tried: bool, words: &Words, asked: &mut Vec<Command>) {
     let side = egui::Frame::NONE.inner_margin(24);
     egui::Panel::right("maps").exact_size(380.0).resizable(false).frame(side).show(ui, |ui| {
         egui::ScrollArea::vertical().show(ui, |ui| maps_ui(ui, results, words));
@@ -73,7 +74,7 @@ pub fn results_ui(ui: &mut egui::Ui, results: &Results, words: &Words, asked: &m
             if ui.add(look::main_button(words.of("results.report"))).clicked() {
                 asked.push(Command::ShowReport);
             }
-            if ui.button(words.of("results.again")).clicked() {
+            if ui.button(words.of(if is_tried { "author.back" } else { "results.again" })).clicked() {
                 asked.push(Command::ToShelf);
             }
         });

@@ -1,14 +1,16 @@
 //! The shelf: every exercise there is to choose from.
 
+use super::author;
 use super::command::Command;
 use super::language::Words;
 use super::look;
 use crate::content::Library;
 use crate::diagnostic::{Source, headlines};
-use crate::lesson;
+use crate::lesson::{self, Scan};
 use crate::scenario::{self, Forms, Scenario};
 use eframe::egui;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Exercises that ship with the program, so that it has some wherever it is installed.
@@ -24,9 +26,13 @@ const SHIPPED: [(&str, &str); 5] = [
 pub struct Exercise {
     /// The file.
     pub name: String,
+    /// Where it is; none for one that ships within the program.
+    pub path: Option<PathBuf>,
     /// Where the files that it names are found.
     pub library: Library,
     pub read: Result<Arc<Scenario>, String>,
+    /// SHA-256 of files that the exercise does not name, by name.
+    pub digests: BTreeMap<String, String>,
 }
 
 impl Exercise {
@@ -56,8 +62,10 @@ impl Shelf {
             let read = scenario::resolve(Source::new(name, text), &library, Forms::Read);
             Exercise {
                 name: name.into(),
+                path: None,
                 library: library.clone(),
                 read: read.map(Arc::new).map_err(|found| headlines(&found)),
+                digests: BTreeMap::new(),
             }
         });
         let mut shelf = Shelf {
@@ -83,14 +91,44 @@ impl Shelf {
         self.is_sought = true;
     }
 
+    /// Puts a scan in the place of the chosen exercise's teeth.
+    pub fn replace_teeth(&mut self, scan: &Scan) {
+        let Some(exercise) = self.exercises.get_mut(self.chosen) else { return };
+        if let Ok(scenario) = &mut exercise.read {
+            match scan.replace_teeth(Arc::make_mut(scenario)) {
+                Ok(()) => drop(exercise.digests.insert("tooth".into(), scan.digest().into())),
+                Err(failed) => exercise.read = Err(failed.to_string()),
+            }
+        }
+    }
+
+    /// Chooses a file, which is put on the shelf where it is not there yet.
+    pub fn find_file(&mut self, path: &Path) {
+        match self.exercises.iter().position(|exercise| exercise.path.as_deref() == Some(path)) {
+            Some(place) => (self.chosen, self.is_sought) = (place, true),
+            None => self.choose_file(path),
+        }
+    }
+
     pub fn exercise(&self) -> Option<&Exercise> {
         self.exercises.get(self.chosen)
     }
 }
 
+/// The text of an exercise that ships within the program.
+pub fn shipped_text(name: &str) -> Option<&'static str> {
+    SHIPPED.iter().find(|(own, _)| *own == name).map(|(_, text)| *text)
+}
+
 fn from_file(path: &Path) -> Exercise {
     let read = lesson::read(path, Forms::Read).map(Arc::new).map_err(|found| headlines(&found));
-    Exercise { name: path.display().to_string(), library: lesson::library_for(path), read }
+    Exercise {
+        name: path.display().to_string(),
+        path: Some(path.to_path_buf()),
+        library: lesson::library_for(path),
+        read,
+        digests: BTreeMap::new(),
+    }
 }
 
 /// The list. Asks for one, or for another folder.
@@ -99,7 +137,7 @@ pub fn shelf_ui(ui: &mut egui::Ui, shelf: &mut Shelf, words: &Words, asked: &mut
         ui.heading(words.of("shelf.title"));
         ui.label(words.of("shelf.about"));
         ui.add_space(16.0);
-        let room = (ui.available_height() - 130.0).max(200.0);
+        let room = (ui.available_height() - 180.0).max(160.0);
         egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
             for (place, exercise) in shelf.exercises.iter().enumerate() {
                 let card = exercise_ui(ui, exercise, place, shelf.chosen == place, asked);
@@ -115,7 +153,15 @@ pub fn shelf_ui(ui: &mut egui::Ui, shelf: &mut Shelf, words: &Words, asked: &mut
             if ui.add_enabled(is_sound, look::main_button(words.of("shelf.open"))).clicked() {
                 asked.push(Command::Open);
             }
-            ui.add_space(24.0);
+            for (key, command) in [("shelf.edit", Command::EditExercise), ("shelf.new", Command::NewExercise)] {
+                let button = ui.button(words.of(key));
+                author::mark(ui, key, button.rect);
+                if button.clicked() {
+                    asked.push(command);
+                }
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
             let label = ui.label(words.of("shelf.folder")).id;
             let edit = egui::TextEdit::singleline(&mut shelf.folder).desired_width(260.0);
             let typed = ui.add(edit.hint_text(words.of("shelf.folder_hint"))).labelled_by(label);

@@ -3,7 +3,7 @@
 use super::chair::{Chair, News, Order, Said};
 use super::questions;
 use super::seen::Seen;
-use super::told::{self, Standstill};
+use super::told::{self, OfSecond, Standstill};
 use super::transfer::{Curves, Histogram};
 use crate::audio::{self, News as SoundNews, Output, Player};
 use crate::content::{Library, Role, TissueTable};
@@ -13,7 +13,7 @@ use crate::render::{Orbit, Palette, Shown, Solid, TransferFunction};
 use crate::scenario::{Layout, Scenario, Stage, Workpiece};
 use crate::scene::field::{self, Field, Ground};
 use crate::scene::{self, Mouth};
-use crate::session::{Answer, Effect, Heard, Input};
+use crate::session::{Answer, Effect, Heard, Input, Note, Sign};
 use crate::sim::Command as Tell;
 use crate::touch::{Coefficient, Materials};
 use crate::volume::{Label, Volume};
@@ -50,6 +50,8 @@ pub struct Sitting {
     pub refused: Option<&'static str>,
     /// Why time stands still, if it does by itself.
     pub standstill: Option<Standstill>,
+    /// What was last heard of a second hand.
+    pub second: Option<OfSecond>,
     pub is_paused: bool,
     /// The pointer is the hand.
     pub is_pointer_held: bool,
@@ -57,6 +59,8 @@ pub struct Sitting {
     pub orbit: Orbit,
     /// Where the instruments' pictures come from.
     library: Library,
+    /// What stands in the running stage's periodontal chart.
+    pub charted: Vec<Note>,
     /// What could not be drawn as the exercise asks.
     pub complaints: Vec<String>,
     pub shown: Way,
@@ -204,8 +208,10 @@ impl Sitting {
             answered: Vec::new(),
             drafts: BTreeMap::new(),
             said: BTreeMap::new(),
+            charted: Vec::new(),
             refused: None,
             standstill: None,
+            second: None,
             is_paused: false,
             is_pointer_held: false,
             is_giving_up: false,
@@ -303,6 +309,8 @@ impl Sitting {
             }
             News::Heard(Heard::Gone(gone)) => self.standstill = Some(Standstill::gone(gone)),
             News::Heard(Heard::Begun(_)) => {}
+            News::MayJoin(address) => self.second = Some(OfSecond::MayJoin(address)),
+            News::Second(news) => self.second = Some(OfSecond::of(news)),
             News::OtherDevice => self.standstill = Some(Standstill::other_device()),
             News::Scoring => self.is_scoring = true,
             News::Done(path) => self.end = Some(Ok(path)),
@@ -317,6 +325,7 @@ impl Sitting {
                 self.answered = vec![false; self.scenario.stages[*stage].ask.len()];
                 self.drafts.clear();
                 self.said.clear();
+                self.charted.clear();
                 self.refused = None;
                 self.felt = self.scenario.tissues.materials();
                 self.repaint_tissues();
@@ -328,6 +337,12 @@ impl Sitting {
                 if let Some(answered) = self.answered.get_mut(*question) {
                     *answered = true;
                 }
+                self.refused = None;
+            }
+            Effect::Charted { note, is_there, .. } => {
+                let is_like = |n: &Note| n.site == note.site && n.what.is_like(&note.what);
+                self.charted.retain(|n| !is_like(n));
+                self.charted.extend(is_there.then_some(*note));
                 self.refused = None;
             }
             Effect::StagesOver => {
@@ -415,6 +430,12 @@ impl Sitting {
         let Some(stage) = self.stage else { return };
         self.said.insert(question.clone(), value.clone());
         self.tell(Said::InStage(stage, Input::Answer { question, value }));
+    }
+
+    /// Notes something in the running stage's periodontal chart, where the instrument is.
+    pub fn note(&mut self, sign: Sign) {
+        let Some(stage) = self.stage else { return };
+        self.tell(Said::InStage(stage, Input::Chart(sign)));
     }
 
     /// Gives a coefficient another value, where the stage allows it.

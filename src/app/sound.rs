@@ -61,7 +61,7 @@ impl Treatment {
             CuttingLaw::Threshold => None,
         };
         let voice = |entry: &crate::content::InstrumentEntry| {
-            if !entry.cuts {
+            if !entry.is_bur() {
                 return Voice { tool: Tool::Hand, rpm: 0.0, surface_speed: 0.0 };
             }
             let usual = if entry.kind == Some(ToolKind::SteelBur) { LOW_SPEED_RPM } else { TURBINE_RPM };
@@ -183,8 +183,10 @@ mod tests {
             torque: Vec3::ZERO,
             hand: Vec3::ZERO,
             tip: Vec3::ZERO,
+            shaft: Vec3::Y,
             touch: touched.map(|(label, spring)| Touch { label, spring, normal: Vec3::Y }),
             cutting: touched.is_some(),
+            packing: false,
             removed: 0,
             lead: Vec3::ZERO,
             guidance: Vec3::ZERO,

@@ -3,6 +3,8 @@
 use super::language::Words;
 use crate::device::{Gone, State};
 use crate::session::Refusal;
+use crate::sim::AssistNews;
+use std::net::SocketAddr;
 
 /// Why something that was said is not taken: the key of its text.
 pub fn refusal(why: Refusal) -> &'static str {
@@ -20,6 +22,10 @@ pub fn refusal(why: Refusal) -> &'static str {
         Refusal::NoQuestionnaire => "refused.no_questionnaire",
         Refusal::NoStep => "refused.no_step",
         Refusal::NoStatement => "refused.no_statement",
+        Refusal::NoChart => "refused.no_chart",
+        Refusal::NotAtNeck => "refused.not_at_neck",
+        Refusal::NoProbe => "refused.no_probe",
+        Refusal::NotInSulcus => "refused.not_in_sulcus",
     }
 }
 
@@ -61,5 +67,37 @@ impl Standstill {
 
     pub fn text(&self, words: &Words) -> String {
         words.with(self.key, &self.detail)
+    }
+}
+
+/// What there is to say of a second hand.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OfSecond {
+    /// A machine that has the key is waited for.
+    MayJoin(SocketAddr),
+    Still(Standstill),
+    /// A key of the language's texts.
+    Plain(&'static str),
+}
+
+impl OfSecond {
+    pub fn of(news: AssistNews) -> OfSecond {
+        let ready = OfSecond::Plain("second.ready");
+        match news {
+            AssistNews::Device(state) => Standstill::of(state).map_or(ready, OfSecond::Still),
+            AssistNews::Gone(gone) => OfSecond::Still(Standstill::gone(gone)),
+            AssistNews::First { is_there: true } => ready,
+            AssistNews::First { is_there: false } => OfSecond::Plain("second.alone"),
+            AssistNews::Leading(true) => OfSecond::Plain("second.leads"),
+            AssistNews::Leading(false) => OfSecond::Plain("second.follows"),
+        }
+    }
+
+    pub fn text(&self, words: &Words) -> String {
+        match self {
+            OfSecond::MayJoin(address) => words.with("second.may_join", address),
+            OfSecond::Still(why) => words.with("second.still", why.text(words)),
+            OfSecond::Plain(key) => words.of(key).to_string(),
+        }
     }
 }

@@ -5,6 +5,7 @@ use crate::anatomy::{self, Tissues, caliper, teeth};
 use crate::content::{Library, TissueTable, obj};
 use crate::report::{SurfacePart, surfaces_glb, tissue_map};
 use crate::scenario;
+use crate::scene::{Jaw, JawAlone};
 use crate::volume::{Label, Volume, surface};
 use clap::Args;
 use serde::Serialize;
@@ -13,17 +14,26 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 pub struct Arguments {
     /// The teeth, by their numbers (ISO 3950): 11–18, 21–28, 31–38, 41–48
-    #[arg(long, value_name = "N", value_delimiter = ',', required_unless_present = "all", value_parser = number)]
+    #[arg(long, value_name = "N", value_delimiter = ',', required_unless_present_any = ["all", "arch"], value_parser = number)]
     fdi: Vec<u8>,
     /// All 32 permanent teeth
     #[arg(long, conflicts_with = "fdi")]
     all: bool,
+    /// One jaw in place of single teeth: JAW.glb, with a part for each of its 14 teeth and one for the gum
+    #[arg(long, value_name = "JAW", conflicts_with_all = ["fdi", "all"])]
+    arch: Option<ArchName>,
     /// Size of a voxel
     #[arg(long, value_name = "MM", default_value_t = 0.1, value_parser = spacing)]
     spacing_mm: f32,
     /// The folder: N.seg.nrrd, N.glb and N.obj for each tooth, and teeth.json
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum ArchName {
+    Upper,
+    Lower,
 }
 
 /// A row of `teeth.json`, measured on the voxels.
@@ -48,11 +58,14 @@ struct Row {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { fdi, all, spacing_mm, output } = arguments;
+    let Arguments { fdi, all, arch, spacing_mm, output } = arguments;
     let table = TissueTable::read(&Library::shipped())?;
     let tissues = scenario::anatomy_tissues(&table);
     std::fs::create_dir_all(output)
         .map_err(|e| Failure::wrong(format!("{}: unwritable-folder: {e}", output.display())))?;
+    if let Some(arch) = arch {
+        return save_arch(output, *arch, *spacing_mm, &table, &tissues);
+    }
     let numbers: Vec<u8> = if *all { teeth::numbers().collect() } else { fdi.clone() };
     let mut rows = Vec::new();
     for fdi in numbers {
@@ -70,6 +83,34 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     let text = serde_json::to_string_pretty(&rows).map_err(Failure::wrong)?;
     write(&output.join("teeth.json"), text + "\n")
+}
+
+/// A jaw as one glTF file: a part for each tooth, named by its number, and one for the gum.
+fn save_arch(
+    folder: &Path,
+    arch: ArchName,
+    spacing: f32,
+    table: &TissueTable,
+    tissues: &Tissues,
+) -> Result<(), Failure> {
+    let (jaw, name) = match arch {
+        ArchName::Upper => (Jaw::Upper, "upper"),
+        ArchName::Lower => (Jaw::Lower, "lower"),
+    };
+    let JawAlone { gum, gum_colours, teeth: standing } = JawAlone::of(jaw, table);
+    let enamel = table.by_label(tissues.enamel).map_or([0.95, 0.94, 0.9], |e| e.rgb());
+    let mut parts = vec![SurfacePart::coloured("gum", gum, &gum_colours)];
+    for (fdi, arch_from_tooth) in standing {
+        let form = teeth::tooth(fdi).ok_or_else(|| Failure::misuse(NO_SUCH))?;
+        let tooth = anatomy::grow(&form, anatomy::grid_of_spacing(&form, spacing), tissues);
+        let mut mesh = surface::extract(&tooth);
+        mesh.positions.iter_mut().for_each(|p| *p = arch_from_tooth * *p);
+        mesh.normals.iter_mut().for_each(|n| *n = arch_from_tooth.turn(*n));
+        parts.push(SurfacePart::plain(&fdi.to_string(), mesh, enamel));
+    }
+    let path = folder.join(format!("{name}.glb"));
+    write(&path, surfaces_glb(&parts).map_err(Failure::Wrong)?)?;
+    say(format!("{}: {} teeth and the gum", path.display(), parts.len() - 1))
 }
 
 /// The tooth as a label map, its tissues as one glTF file, its whole surface as OBJ.

@@ -39,13 +39,20 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         if is_interrupted.load(Ordering::Relaxed) {
             return Ok(());
         }
-        live::tell_second(&mut assist);
+        tell(&mut assist);
         match lines.try_recv() {
             Ok(line) if line.trim() == "end" => return Ok(()),
             // Without a terminal it stays until the device is gone or the program is stopped.
             Ok(_) | Err(TryRecvError::Disconnected | TryRecvError::Empty) => std::thread::sleep(LISTEN_EVERY),
         }
     }
-    live::tell_second(&mut assist);
+    tell(&mut assist);
     Err(Failure::Told)
+}
+
+/// Says what happened since last asked.
+fn tell(assist: &mut Assist) {
+    while let Some(news) = assist.next_news() {
+        live::tell_of_second(news);
+    }
 }

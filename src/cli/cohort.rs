@@ -1,5 +1,6 @@
 //! `typodont cohort`: many bundles, compared.
 
+use super::school::Source;
 use super::{Failure, say, write};
 use crate::report::cohort::{Cohort, Rating, ratings};
 use crate::report::harmless;
@@ -8,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth
-    folder: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// One line per session, one column per measure
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -34,12 +35,14 @@ pub struct Arguments {
 const TOLD_MAX: usize = 300;
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut cohort = read(&arguments.folder)?;
+    let Arguments { csv, html, json, maps, .. } = arguments;
+    let compares = csv.is_some() && !arguments.expert.is_empty();
+    let mut read = arguments.source.read(html.is_some() || json.is_some() || maps.is_some() || compares)?;
+    let mut cohort = std::mem::take(&mut read.cohort);
     cohort.experts = experts(&cohort, &arguments.expert)?;
     cohort.ratings =
         arguments.ratings.as_deref().map(|path| judgements(&cohort, path)).transpose()?.unwrap_or_default();
     let known = cohort.skipped.len();
-    let Arguments { csv, html, json, maps, .. } = arguments;
     if html.is_some() || json.is_some() || maps.is_some() || csv.is_some() && !cohort.experts.is_empty() {
         cohort.map_removals();
     }

@@ -1,17 +1,18 @@
 //! `typodont gradebook`: grades as a table that a school's system imports.
 
-use super::{Failure, cohort, say, write};
+use super::school::Source;
+use super::{Failure, say, write};
 use crate::handover::gradebook::{Students, System, Take, gradebook};
 use crate::handover::session_id;
 use crate::report::cohort::Cohort;
-use crate::review::{self, Log};
+use crate::review::{self, Told};
 use clap::{Args, ValueEnum};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth
-    folder: PathBuf,
+    #[command(flatten)]
+    source: Source,
     /// Whose gradebook
     #[arg(long = "for", value_name = "SYSTEM")]
     system: Systems,
@@ -43,9 +44,10 @@ enum Taken {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut cohort = cohort::read(&arguments.folder)?;
+    let mut read = arguments.source.read(false)?;
+    let mut cohort = std::mem::take(&mut read.cohort);
     if arguments.overrides {
-        take_overrides(&mut cohort, &arguments.folder)?;
+        take_overrides(&mut cohort, &read.judgements()?);
     }
     let students = arguments.students.as_ref().map(|path| -> Result<Students, Failure> {
         let source = crate::content::read_text(path)?;
@@ -67,28 +69,21 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     }
     if made.students == 0 {
         let what = "no-grades: nobody with a code has a grade here";
-        return Err(Failure::wrong(format!("{}: {what}", arguments.folder.display())));
+        return Err(Failure::wrong(format!("{}: {what}", read.name)));
     }
     write(&arguments.output, made.csv)?;
     say(format!("{}: {} students", arguments.output.display(), made.students))
 }
 
 /// Puts examiners' grades in place of the machine's, and says how many.
-fn take_overrides(cohort: &mut Cohort, folder: &Path) -> Result<(), Failure> {
-    let path = folder.join(review::OVERRIDES);
-    let unread = |e| Failure::wrong(format!("{}: unreadable-file: {e}", path.display()));
-    let told = Log::of(folder).told(None).map_err(unread)?;
-    for trouble in &told.troubles {
-        eprintln!("{}: {trouble}", path.display());
-    }
+fn take_overrides(cohort: &mut Cohort, told: &Told) {
     let mut count = 0;
     for (_, session) in &mut cohort.sessions {
         let id = session_id(session);
         if let Some(grade) = &mut session.grade {
-            let (taken, overrides) = review::applied(grade, &id, &told);
+            let (taken, overrides) = review::applied(grade, &id, told);
             (*grade, count) = (taken, count + usize::from(overrides > 0));
         }
     }
-    eprintln!("{}: {count} grades are an examiner's", path.display());
-    Ok(())
+    eprintln!("{count} grades are an examiner's");
 }

@@ -11,7 +11,7 @@ use crate::frame::Vec3;
 use crate::report::{sections_png, tissue_map};
 use crate::scenario;
 use crate::volume::{Label, Volume};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -72,8 +72,8 @@ pub struct Arguments {
     #[arg(long, value_name = "X,Y,Z", value_parser = sizes, requires = "type", requires = "spacing_mm")]
     size: Option<[u64; 3]>,
     /// Plain voxels: how each is written
-    #[arg(long, requires = "size")]
-    r#type: Option<NumberType>,
+    #[arg(long, requires = "size", value_parser = NUMBERS.map(|(name, _)| name))]
+    r#type: Option<String>,
     /// Plain voxels: the high byte comes first
     #[arg(long, requires = "size")]
     big_endian: bool,
@@ -95,32 +95,17 @@ centre lies in.
   typodont import map.nii.gz --labels enamel=1,dentine=2,pulp=3 -o tooth.seg.nrrd
   typodont import --tissue enamel=e.stl dentine=d.stl pulp=p.stl -o tooth.seg.nrrd";
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum NumberType {
-    Uint8,
-    Int8,
-    Uint16,
-    Int16,
-    Uint32,
-    Int32,
-    Float,
-    Double,
-}
-
-impl NumberType {
-    fn number(self) -> raw::Number {
-        match self {
-            NumberType::Uint8 => raw::Number::Uint8,
-            NumberType::Int8 => raw::Number::Int8,
-            NumberType::Uint16 => raw::Number::Uint16,
-            NumberType::Int16 => raw::Number::Int16,
-            NumberType::Uint32 => raw::Number::Uint32,
-            NumberType::Int32 => raw::Number::Int32,
-            NumberType::Float => raw::Number::Float,
-            NumberType::Double => raw::Number::Double,
-        }
-    }
-}
+/// What `--type` calls how a plain voxel is written.
+const NUMBERS: [(&str, raw::Number); 8] = [
+    ("uint8", raw::Number::Uint8),
+    ("int8", raw::Number::Int8),
+    ("uint16", raw::Number::Uint16),
+    ("int16", raw::Number::Int16),
+    ("uint32", raw::Number::Uint32),
+    ("int32", raw::Number::Int32),
+    ("float", raw::Number::Float),
+    ("double", raw::Number::Double),
+];
 
 fn numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
     let found: Option<Vec<f32>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
@@ -246,14 +231,14 @@ fn shaped(parts: &[shells::Part], arguments: &Arguments, table: &TissueTable) ->
 }
 
 fn from_scan(path: &Path, arguments: &Arguments, table: &TissueTable) -> Result<Shaped, Failure> {
-    let raw =
-        arguments.size.zip(arguments.r#type).zip(arguments.spacing_mm).map(|((size, number), spacing)| raw::Told {
-            size,
-            number: number.number(),
-            is_big_endian: arguments.big_endian,
-            skip: arguments.skip_bytes,
-            spacing: spacing.map(written),
-        });
+    let number = arguments.r#type.as_ref().and_then(|told| NUMBERS.iter().find(|(name, _)| name == told));
+    let raw = arguments.size.zip(number).zip(arguments.spacing_mm).map(|((size, (_, number)), spacing)| raw::Told {
+        size,
+        number: *number,
+        is_big_endian: arguments.big_endian,
+        skip: arguments.skip_bytes,
+        spacing: spacing.map(written),
+    });
     if path.is_dir() && arguments.spacing_mm.is_some() {
         let what = "DICOM slices say how far their pixels lie apart; give --resample for another distance";
         return Err(Failure::misuse(format!("{}: {what}", path.display())));

@@ -3,12 +3,11 @@
 //! Takes an open device and lines of text. Gives a recorded session. The window of the desktop program says the same things
 //! in pictures.
 
-use super::{Failure, say};
-use crate::device::Link;
-use crate::lesson::{self, Failed, Held, Lesson, Prepared, Recorded};
+use super::say;
+use crate::lesson::{Failed, Held, Lesson, Prepared, Recorded, SecondHand};
 use crate::scenario::{QuestionKind, Scenario};
-use crate::session::{Answer, Effect, Heard, Input, Live, Session};
-use crate::sim::{Assist, AssistNews, Command, Role, Second};
+use crate::session::{Answer, Effect, Heard, Input, Live, Noted, Session, Sign};
+use crate::sim::{AssistNews, Command};
 use std::fmt::Write;
 use std::io::BufRead;
 use std::sync::Arc;
@@ -22,47 +21,6 @@ pub struct Hands {
     pub second: Option<SecondHand>,
 }
 
-/// Another hand that joins the session.
-pub struct SecondHand {
-    end: Second,
-    /// Its own servo, if its device is plugged in here.
-    assist: Option<Assist>,
-}
-
-/// Where a second hand comes from.
-pub enum From<'a> {
-    /// Another device at this machine.
-    Device(&'a str),
-    /// Another machine that has the key; the address is ours.
-    Network { at: &'a str, key: &'a str },
-}
-
-/// Lets a second hand join.
-pub fn join(hands: &mut Hands, from: &From, role: Role) -> Result<(), Failure> {
-    let first = &hands.first;
-    let max_damping = first.device.spec().max_damping;
-    let (link, assist) = match from {
-        From::Device(name) if *name == first.name => {
-            return Err(Failure::misuse(format!(
-                "same-device: {name} is in the first hand; name another one, NAME:WHICH, for the second"
-            )));
-        }
-        From::Device(name) => {
-            let (ours, theirs) = Link::pair();
-            let assist = Assist::start(lesson::open(name)?.device, theirs).map_err(Failure::Wrong)?;
-            (ours, Some(assist))
-        }
-        From::Network { at, key } => {
-            let (link, address) = Link::listen(at, key)
-                .map_err(|e| Failure::Wrong(format!("{at}: cannot-listen: {e}; name an address of this machine")))?;
-            speak(format!("a second hand may join at {address}: typodont assist --device NAME --to {address} --key …"));
-            (link, None)
-        }
-    };
-    hands.second = Some(SecondHand { end: Second::new(link, max_damping, role), assist });
-    Ok(())
-}
-
 /// How often letters are fetched: a person at a terminal sees nothing faster.
 const LISTEN_EVERY: Duration = Duration::from_millis(4);
 
@@ -72,7 +30,9 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// Plays a prepared lesson to its end.
 pub fn play(prepared: Prepared, hands: Hands) -> Result<Recorded, Failed> {
     let Hands { first: Held { device, driver, argument, .. }, second } = hands;
-    let (second, mut assist) = second.map_or((None, None), |s| (Some(s.end), s.assist));
+    if let Some(address) = second.as_ref().and_then(SecondHand::address) {
+        speak(format!("a second hand may join at {address}: typodont assist --device NAME --to {address} --key …"));
+    }
     let lines = typed_lines();
     let is_interrupted = interruptions();
     let (mut lesson, heard) = prepared.begin(device, second)?;
@@ -83,8 +43,8 @@ pub fn play(prepared: Prepared, hands: Hands) -> Result<Recorded, Failed> {
         std::thread::sleep(LISTEN_EVERY);
         let heard = lesson.listen()?;
         tell(&heard, lesson.session());
-        if let Some(assist) = &mut assist {
-            tell_second(assist);
+        while let Some(news) = lesson.next_of_second() {
+            tell_of_second(news);
         }
         if lesson.live().is_waiting() && looked.elapsed() > LOOK_EVERY {
             looked = Instant::now();
@@ -161,6 +121,11 @@ fn tell(heard: &[Heard], session: &Session) {
             Heard::Effect(Effect::StagesOver) => speak(questionnaire_text(session.scenario())),
             Heard::Effect(Effect::Refused { why }) => speak(format!("not taken: {why}")),
             Heard::Effect(Effect::Answered { .. }) => speak("noted"),
+            Heard::Effect(Effect::Charted { note, is_there, .. }) => speak(match note.what {
+                Noted::Depth { read, .. } => format!("{}: {read} mm", note.site.code()),
+                Noted::Calculus if *is_there => format!("{}: calculus", note.site.code()),
+                Noted::Calculus => format!("{}: no calculus", note.site.code()),
+            }),
             Heard::Effect(Effect::Tell(Command::Take { instrument })) => {
                 speak(format!("in the hand: {}", session.scenario().instruments[*instrument].title));
             }
@@ -173,22 +138,17 @@ fn tell(heard: &[Heard], session: &Session) {
     }
 }
 
-/// Says what the second hand's servo told since last asked.
-pub fn tell_second(assist: &mut Assist) {
-    while let Some(news) = assist.next_news() {
-        speak(format!("second hand: {}", assist_text(news)));
-    }
-}
-
-fn assist_text(news: AssistNews) -> String {
-    match news {
+/// Says what happened to the second hand.
+pub fn tell_of_second(news: AssistNews) {
+    let text = match news {
         AssistNews::Device(state) => format!("the device is {state}"),
         AssistNews::Gone(gone) => format!("{gone}; it stays away until the session is begun anew"),
         AssistNews::First { is_there: true } => "the first hand is there; hold the button to lead it".to_string(),
         AssistNews::First { is_there: false } => "the first hand has fallen silent".to_string(),
         AssistNews::Leading(true) => "leads".to_string(),
         AssistNews::Leading(false) => "follows".to_string(),
-    }
+    };
+    speak(format!("second hand: {text}"));
 }
 
 /// What a stage asks for, and the words that answer.
@@ -212,6 +172,12 @@ fn stage_text(scenario: &Scenario, stage: usize) -> String {
             QuestionKind::Text => "a text".to_string(),
         };
         let _ = writeln!(text, "  answer {} …     {} ({answer})", question.id, question.text);
+    }
+    if stage.chart.depths {
+        let _ = writeln!(text, "  read              notes the depth where the probe is");
+    }
+    if stage.chart.calculus {
+        let _ = writeln!(text, "  calculus          notes calculus where the instrument is, or takes that back");
     }
     if stage.ends.confirmed {
         let _ = writeln!(text, "  done              ends this stage");
@@ -253,6 +219,8 @@ fn understood(line: &str, session: &Session, live: &Live) -> Said {
     let unknown = || Said::Show(format!("not understood: \"{line}\""));
     match (words.next(), words.next()) {
         (None, _) => Said::Nothing,
+        (Some("read"), None) => Said::Input(Input::Chart(Sign::Depth)),
+        (Some("calculus"), None) => Said::Input(Input::Chart(Sign::Calculus)),
         (Some("done"), None) => Said::Input(Input::Confirm),
         (Some("abort"), None) => Said::Input(Input::Abort),
         (Some("end"), None) => Said::End,

@@ -19,7 +19,9 @@ mod path;
 mod preview;
 mod review;
 mod run;
+mod school;
 mod score;
+mod trusted;
 mod verify;
 mod xapi;
 
@@ -74,6 +76,16 @@ enum Command {
     Xapi(xapi::Arguments),
     /// Sessions, measures and events as Parquet, for analysis
     Parquet(parquet::Arguments),
+    /// Records of many stations in one database: tables, classes, who may come in, erasing
+    School(school::Arguments),
+    /// Send finished bundles to the school; what is there already stays as it is
+    Sync(school::sync::Arguments),
+    /// Ask workers to score the school's sessions
+    Enqueue(school::enqueue::Arguments),
+    /// Score what was enqueued, until ended
+    Worker(school::worker::Arguments),
+    /// Score many bundles again without a database, a share on each machine
+    Rescore(school::rescore::Arguments),
     /// Grow permanent teeth: label maps, surfaces, a table of sizes
     Anatomy(anatomy::Arguments),
     /// Turn a scan into a labelled volume
@@ -110,7 +122,8 @@ impl From<Diagnostic> for Failure {
 impl From<Failed> for Failure {
     fn from(failed: Failed) -> Failure {
         match failed {
-            Failed::UnknownDevice { .. } => Failure::misuse(failed),
+            Failed::UnknownDevice { .. } | Failed::SameDevice { .. } => Failure::misuse(failed),
+            Failed::Unreadable(found) => found.into(),
             _ => Failure::wrong(failed),
         }
     }
@@ -170,6 +183,11 @@ pub fn main() -> ExitCode {
         Some(Command::Gradebook(arguments)) => gradebook::run(&arguments),
         Some(Command::Xapi(arguments)) => xapi::run(&arguments),
         Some(Command::Parquet(arguments)) => parquet::run(&arguments),
+        Some(Command::School(arguments)) => school::run(&arguments),
+        Some(Command::Sync(arguments)) => school::sync::run(&arguments),
+        Some(Command::Enqueue(arguments)) => school::enqueue::run(&arguments),
+        Some(Command::Worker(arguments)) => school::worker::run(&arguments),
+        Some(Command::Rescore(arguments)) => school::rescore::run(&arguments),
         Some(Command::Anatomy(arguments)) => anatomy::run(&arguments),
         Some(Command::Import(arguments)) => import::run(&arguments),
         Some(Command::Bench(arguments)) => bench::run(&arguments),

@@ -1,5 +1,6 @@
 //! `typodont parquet`: sessions, measures and events for analysis.
 
+use super::school::{self, Source};
 use super::{Failure, cohort, say, write};
 use crate::handover::tables;
 use clap::Args;
@@ -7,15 +8,19 @@ use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth
-    folder: PathBuf,
-    /// Folder for sessions.parquet, metrics.parquet and events.parquet
+    #[command(flatten)]
+    source: Source,
+    /// Folder for sessions.parquet, metrics.parquet and events.parquet. Of a database: a folder for each class and month in it, and
+    /// a store's URL will do as well
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { folder, output } = arguments;
+    let Arguments { source, output } = arguments;
+    let Some(folder) = source.folder.as_ref().filter(|_| source.at.database.is_none()) else {
+        return school::write_partitions(source, output);
+    };
     let cohort = cohort::read(folder)?;
     let unmade = |e: std::io::Error| Failure::wrong(format!("{}: unwritable-folder: {e}", output.display()));
     std::fs::create_dir_all(output).map_err(unmade)?;

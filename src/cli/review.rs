@@ -2,6 +2,7 @@
 
 mod server;
 
+use super::school::{self, At, Named};
 use super::{Failure, say, templates};
 use crate::report::harmless;
 use crate::review::{Desk, Lock, Look, Options, PASSWORD_MIN};
@@ -9,11 +10,20 @@ use clap::Args;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth; what examiners judge is written beside them
+    /// Folder that holds bundles, at any depth; what examiners judge is written beside them. With --database the bundles that you may
+    /// read are fetched into it first
     folder: PathBuf,
+    #[command(flatten)]
+    at: At,
+    #[command(flatten)]
+    store: Named,
+    /// Of a database: sessions of this class only
+    #[arg(long, value_name = "NAME")]
+    class: Option<String>,
     /// Port of the page; without it one that is free
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
@@ -31,12 +41,18 @@ pub struct Arguments {
     anonymous: bool,
 }
 
+/// Between two exchanges of judgements with a database.
+const EXCHANGE_EVERY: Duration = Duration::from_secs(5);
+
 const PASSWORD: &str = "TYPODONT_REVIEW_PASSWORD";
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Arguments { folder, port, listen, name, anonymous, .. } = arguments;
     if !folder.is_dir() {
         return Err(Failure::wrong(format!("{}: missing-folder: there is no such folder", folder.display())));
+    }
+    if arguments.at.database.is_some() {
+        exchange(arguments)?;
     }
     let password = password(arguments)?;
     if password.is_none() && !listen.is_loopback() {
@@ -72,6 +88,29 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         say(address(at, &token))?;
     }
     server::serve(listener, Arc::new(desk)).map_err(|e| Failure::wrong(format!("{at}: the server failed: {e}")))
+}
+
+/// Fetches bundles and judgements, and from then on carries judgements to and fro.
+fn exchange(arguments: &Arguments) -> Result<(), Failure> {
+    let Arguments { folder, at, store, class, .. } = arguments;
+    let (fetched, failed) = school::fetch::bundles(at, store, class.as_deref(), folder)?;
+    eprintln!("{fetched} bundles fetched, {failed} failed");
+    let mut line = at.line()?;
+    school::fetch::exchange(&mut line, folder)?;
+    let folder = folder.clone();
+    std::thread::spawn(move || {
+        let mut before = String::new();
+        loop {
+            std::thread::sleep(EXCHANGE_EVERY);
+            // What is judged while the database is away is entered when it is back; it is said once.
+            let now = school::fetch::exchange(&mut line, &folder).err().map_or_else(String::new, |e| e.lines());
+            if !now.is_empty() && now != before {
+                eprintln!("{}", harmless(&now, 300));
+            }
+            before = now;
+        }
+    });
+    Ok(())
 }
 
 /// What opens the door once.

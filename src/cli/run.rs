@@ -2,15 +2,14 @@
 
 use super::{Failure, SESSIONS, live, say};
 use crate::app;
-use crate::content::{self, Library, nrrd, scan};
+use crate::content::{self, Library};
 use crate::device::Spec;
-use crate::lesson::{self, Opening};
-use crate::scenario::{self, Form, Forms, Scenario, hex};
+use crate::lesson::{self, Failed, Opening, Scan, SecondHand, second};
+use crate::scenario::{Forms, Scenario};
 use crate::session::OperatorFile;
 use crate::sim::Role;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -138,12 +137,18 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let library = lesson::library_for(&arguments.scenario);
     let mut scenario = lesson::read(&arguments.scenario, Forms::Made)?;
     let mut digests = BTreeMap::new();
-    if let Some(path) = &arguments.tooth {
-        digests.insert("tooth".to_string(), replace_teeth(&mut scenario, path, arguments.tooth_spacing_mm)?);
+    if let Some(scan) = tooth(arguments)? {
+        scan.replace_teeth(&mut scenario)?;
+        digests.insert("tooth".to_string(), scan.digest().to_string());
     }
     let player = match is_scripted {
         true => Player::Script(Box::new(operator(&arguments.operator, &library)?)),
-        false => Player::Person(Box::new(hands(arguments)?)),
+        false => {
+            let first = lesson::open(&arguments.device)?;
+            let held = (first.name.as_str(), first.device.spec());
+            let second = second(arguments).map(|(from, role)| SecondHand::join(&from, role, held)).transpose()?;
+            Player::Person(Box::new(live::Hands { first, second }))
+        }
     };
     let run = Run {
         scenario: Arc::new(scenario),
@@ -158,14 +163,12 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
 
 /// The same exercise in the desktop program's window.
 fn window(arguments: &Arguments) -> Result<(), Failure> {
-    if arguments.tooth.is_some() || arguments.second.is_some() || arguments.second_at.is_some() {
-        return Err(Failure::misuse(
-            "window-only: --tooth and a second hand work without a window so far; add --headless, or --device NAME",
-        ));
-    }
     super::desktop(app::Options {
         exercise: Some(arguments.scenario.clone()),
+        tooth: tooth(arguments)?,
+        second: second(arguments),
         begins: arguments.begin,
+        author: None,
         device: (arguments.device == MOUSE).then(|| MOUSE.into()),
         seed: arguments.seed,
         participant: arguments.participant.clone(),
@@ -175,30 +178,19 @@ fn window(arguments: &Arguments) -> Result<(), Failure> {
     })
 }
 
-/// The device a person holds, and the second hand if one is to join.
-fn hands(arguments: &Arguments) -> Result<live::Hands, Failure> {
-    let mut hands = live::Hands { first: lesson::open(&arguments.device)?, second: None };
-    if let Some(name) = &arguments.second {
-        live::join(&mut hands, &live::From::Device(name), arguments.second_role.into())?;
-    }
-    if let Some((at, key)) = arguments.second_at.as_deref().zip(arguments.second_key.as_deref()) {
-        live::join(&mut hands, &live::From::Network { at, key }, arguments.second_role.into())?;
-    }
-    Ok(hands)
+/// Who is to join, and as what.
+fn second(arguments: &Arguments) -> Option<(second::From, Role)> {
+    let from = match (&arguments.second, arguments.second_at.clone().zip(arguments.second_key.clone())) {
+        (Some(name), _) => second::From::Device(name.clone()),
+        (None, Some((at, key))) => second::From::Network { at, key },
+        (None, None) => return None,
+    };
+    Some((from, arguments.second_role.into()))
 }
 
-/// Puts a scan in the place of every tooth; returns the scan's SHA-256.
-fn replace_teeth(scenario: &mut Scenario, path: &Path, spacing: Option<f32>) -> Result<String, Failure> {
-    let wrong = |what: String| Failure::Wrong(format!("{}: wrong-volume: {what}", path.display()));
-    let bytes = content::read_file(path)?;
-    let image = nrrd::read(path).map_err(|e| wrong(e.to_string()))?;
-    let tissues = scenario::anatomy_tissues(&scenario.tissues);
-    let volume = scan::segmented(&image, spacing.map(|mm| [mm; 3]), &tissues).map_err(|e| wrong(e.to_string()))?;
-    let volume = Arc::new(volume);
-    for tooth in &mut scenario.scene.teeth {
-        tooth.form = Form::Given(volume.clone());
-    }
-    Ok(hex(&Sha256::digest(&bytes)))
+/// The scan to work on.
+fn tooth(arguments: &Arguments) -> Result<Option<Scan>, Failed> {
+    arguments.tooth.as_ref().map(|path| Scan::read(path, arguments.tooth_spacing_mm)).transpose()
 }
 
 /// An operator by name, or from a file.

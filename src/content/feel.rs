@@ -65,6 +65,10 @@ struct ToolRow {
     #[serde(default = "one")]
     #[schemars(range(min = 0.1, max = 10.0))]
     hardness: f32,
+    /// Of the force from which the tissue is cut. A hand instrument cuts only tissues of which this is said.
+    #[serde(default)]
+    #[schemars(range(min = 0.1, max = 10.0))]
+    cut_force: Option<f32>,
     /// Where the values come from, and in what range they make sense.
     #[schemars(length(min = 1, max = 500))]
     #[allow(dead_code)]
@@ -122,12 +126,25 @@ impl FeelTable {
         };
         let FeelFile { by_tool, by_age } = json::read::<FeelFile>(source)?.value;
         let by_tool = by_tool.into_iter().map(|row| {
-            let ToolRow { tissue, kind, stiffness, damping, static_friction, dynamic_friction, hardness, .. } = row;
-            (tissue, kind, Factor { stiffness, damping, static_friction, dynamic_friction, hardness })
+            let ToolRow {
+                tissue,
+                kind,
+                stiffness,
+                damping,
+                static_friction,
+                dynamic_friction,
+                hardness,
+                cut_force,
+                ..
+            } = row;
+            // Of what is not said of a blade follows `factor`, below.
+            let cut_force = cut_force.unwrap_or(if kind.is_blade() { f32::INFINITY } else { 1.0 });
+            (tissue, kind, Factor { stiffness, damping, static_friction, dynamic_friction, hardness, cut_force })
         });
         let by_age = by_age.into_iter().map(|row| {
             let AgeRow { tissue, band, stiffness, damping, static_friction, dynamic_friction, hardness, .. } = row;
-            (tissue, band, Factor { stiffness, damping, static_friction, dynamic_friction, hardness })
+            let cut_force = 1.0;
+            (tissue, band, Factor { stiffness, damping, static_friction, dynamic_friction, hardness, cut_force })
         });
         Ok(Some(FeelTable { by_tool: by_tool.collect(), by_age: by_age.collect() }))
     }
@@ -135,8 +152,11 @@ impl FeelTable {
     /// What a tool and an age make of a tissue; `None` changes nothing.
     pub fn factor(&self, tissue: &str, kind: Option<ToolKind>, band: Option<AgeBand>) -> Factor {
         let tool = self.by_tool.iter().filter(|(t, k, _)| t == tissue && Some(*k) == kind).map(|(.., f)| *f);
+        let is_told = tool.clone().next().is_some();
+        let cut_force = if kind.is_some_and(ToolKind::is_blade) && !is_told { f32::INFINITY } else { 1.0 };
+        let untold = Factor { cut_force, ..Factor::ONE };
         let age = self.by_age.iter().filter(|(t, b, _)| t == tissue && Some(*b) == band).map(|(.., f)| *f);
-        tool.chain(age).fold(Factor::ONE, Factor::times)
+        tool.chain(age).fold(untold, Factor::times)
     }
 }
 

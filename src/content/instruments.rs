@@ -1,10 +1,11 @@
 //! The table of instruments.
 
 use super::Library;
+use super::hand_ends::{BladeEntry, CleoidEntry, PluggerEntry, SpoonEntry};
 use super::json;
 use crate::diagnostic::Diagnostic;
 use crate::frame::{Pose, Quat, Vec3};
-use crate::touch::{Body, EDGE, Instrument, Profile, Shank, WorkingEnd};
+use crate::touch::{Body, EDGE, Instrument, Packs, Profile, Shank, WorkingEnd};
 use crate::volume::{Grid, Label, Volume};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -22,7 +23,7 @@ pub struct InstrumentEntry {
     pub title: String,
     /// The part that touches.
     pub end: EndEntry,
-    /// True for a rotating bur.
+    /// Whether it takes matter away: a bur, or a blade such as a carver.
     pub cuts: bool,
     /// Of what kind it is: how tissues feel through it (`content/touch.json`); without it as the table of tissues says.
     #[serde(default)]
@@ -31,6 +32,9 @@ pub struct InstrumentEntry {
     #[serde(default)]
     #[schemars(range(min = 0.05, max = 10.0))]
     pub grit: Option<f32>,
+    /// What it does with a filling, for carriers, condensers and plastic instruments.
+    #[serde(default)]
+    pub packs: Option<PacksEntry>,
     /// ISO 6360 number: material, shank, shape, grit, greatest diameter in tenths of a millimetre.
     #[serde(default)]
     pub iso_6360: Option<String>,
@@ -53,6 +57,41 @@ pub enum ToolKind {
     SteelBur,
     CarbideBur,
     DiamondBur,
+    /// Cuts soft decay by hand.
+    SpoonExcavator,
+    /// Cuts what has not set, by hand: enamel stops it, and so it follows the tooth's contour.
+    Carver,
+    /// Lays down a filling.
+    Carrier,
+    /// Presses a filling together.
+    Condenser,
+    /// Lays down paste and presses it together.
+    PlasticInstrument,
+}
+
+impl ToolKind {
+    /// True for what cuts without turning; it cuts only tissues that `content/touch.json` names for it.
+    pub fn is_blade(self) -> bool {
+        matches!(self, ToolKind::SpoonExcavator | ToolKind::Carver)
+    }
+
+    /// True for what turns.
+    fn is_bur(self) -> bool {
+        matches!(self, ToolKind::SteelBur | ToolKind::CarbideBur | ToolKind::DiamondBur)
+    }
+}
+
+/// What an instrument does with the filling that a stage gives.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PacksEntry {
+    /// What it lays down while it is pressed, mm³/s: 0 (nothing) to 20.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 20.0))]
+    pub mm3_per_s: f32,
+    /// Whether it closes voids in what was laid.
+    #[serde(default)]
+    pub condenses: bool,
 }
 
 /// The shape of a working end.
@@ -72,9 +111,69 @@ pub enum EndEntry {
     InvertedCone(InvertedConeEntry),
     /// Slender at tip and neck, widest in the middle.
     Flame(FlameEntry),
+    /// A flat round face on a slender neck, of a condenser or a carrier.
+    Plugger(PluggerEntry),
+    /// A shallow bowl with an edge all round, tilted against its shaft: a spoon excavator, or the discoid end of a carver.
+    Spoon(SpoonEntry),
+    /// A blade that narrows to a rounded point: the cleoid end of a carver.
+    Cleoid(CleoidEntry),
+    /// A thin blade with rounded edges, of a plastic filling instrument.
+    Blade(BladeEntry),
     /// A mouth mirror; the middle of its face is where the hand's tip is.
     Mirror(MirrorEntry),
+    /// A periodontal probe: a slim rod with a round end and marks to read depths by.
+    Probe(ProbeEntry),
+    /// An explorer whose fine end is bent.
+    Bent(BentEntry),
 }
+
+/// A periodontal probe.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeEntry {
+    /// Of its end, mm: 0.3 to 0.7.
+    #[schemars(range(min = 0.3, max = 0.7))]
+    pub diameter_mm: f32,
+    /// True when the end is a ball that is wider than the rod behind it.
+    #[serde(default)]
+    pub ball: bool,
+    /// Lines across the rod, by their distance from the end, mm: 0.5 to 20, rising.
+    #[serde(default)]
+    #[schemars(length(max = 40))]
+    pub marks_mm: Vec<MarkEntry>,
+    /// Dark bands, from and to, mm: 0.5 to 20.
+    #[serde(default)]
+    #[schemars(length(max = 10))]
+    pub bands_mm: Vec<[MarkEntry; 2]>,
+}
+
+/// mm, 0.5 to 20.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct MarkEntry(#[schemars(range(min = 0.5, max = 20.0))] pub f32);
+
+impl ProbeEntry {
+    /// What is read off at a depth, whole mm: to the nearest, as between two marks one estimates; not beyond the last mark.
+    pub fn read(&self, depth: f32) -> u8 {
+        let marks = self.marks_mm.iter().map(|m| m.0).chain(self.bands_mm.iter().map(|[_, to]| to.0));
+        let last = marks.fold(0.0, f32::max);
+        depth.clamp(0.0, last).round() as u8
+    }
+}
+
+/// An explorer's end as a line through the middle of its wire.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BentEntry {
+    /// From the tip at [0, 0, 0] toward the handle, mm; z along the handle, which begins behind the last point.
+    #[schemars(length(min = 2, max = 40))]
+    pub wire_mm: Vec<[BendEntry; 3]>,
+}
+
+/// mm, -20 to 40.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct BendEntry(#[schemars(range(min = -20.0, max = 40.0))] pub f32);
 
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -212,14 +311,30 @@ pub enum TipEntry {
 const FLAME_TIP: f32 = 0.1;
 
 impl InstrumentEntry {
+    /// True for what takes matter away by turning.
+    pub fn is_bur(&self) -> bool {
+        self.cuts && !self.kind.is_some_and(ToolKind::is_blade)
+    }
+
     /// The instrument as touch knows it.
     pub fn make(&self) -> Instrument {
+        let made = self.shaped();
+        let made = if self.is_bur() { made } else { made.by_hand() };
+        match self.packs {
+            Some(PacksEntry { mm3_per_s: rate, condenses }) => made.packing(Packs { rate, condenses }),
+            None => made,
+        }
+    }
+
+    fn shaped(&self) -> Instrument {
         let bur = |profile: Profile, top: f32| {
             let [_, length] = profile.span();
             Instrument::shaped(Body::turned(profile, Some(Shank::friction_grip(top, length))), self.cuts)
         };
         match &self.end {
-            EndEntry::Point => Instrument::new(WorkingEnd::Point, self.cuts),
+            EndEntry::Point | EndEntry::Bent(_) => Instrument::new(WorkingEnd::Point, self.cuts),
+            // What is behind a probe's end slips between gum and tooth as it likes: a hand's tip without a direction could not lean it.
+            EndEntry::Probe(probe) => Instrument::new(WorkingEnd::Ball { radius: 0.5 * probe.diameter_mm }, self.cuts),
             EndEntry::Ball(ball) => Instrument::new(WorkingEnd::Ball { radius: 0.5 * ball.diameter_mm }, self.cuts),
             EndEntry::Pear(e) => {
                 let profile = Profile::round_ended(0.5 * e.diameter_mm, 0.5 * e.top_diameter_mm, e.length_mm);
@@ -231,6 +346,10 @@ impl InstrumentEntry {
                 bur(fissure(e.diameter_mm, e.top_diameter_mm, e.length_mm, TipEntry::Flat), e.top_diameter_mm)
             }
             EndEntry::Mirror(mirror) => Instrument::shaped(mirror.body(), self.cuts),
+            EndEntry::Plugger(e) => Instrument::shaped(e.body(), self.cuts),
+            EndEntry::Spoon(e) => Instrument::shaped(e.body(), self.cuts),
+            EndEntry::Cleoid(e) => Instrument::shaped(e.body(), self.cuts),
+            EndEntry::Blade(e) => Instrument::shaped(e.body(), self.cuts),
             EndEntry::Flame(e) => bur(Profile::flame(0.5 * e.diameter_mm, e.length_mm, FLAME_TIP), 2.0 * FLAME_TIP),
         }
     }
@@ -248,7 +367,22 @@ impl EndEntry {
     /// What is wrong with a shape whose lengths are each in range.
     fn contradiction(&self) -> Option<&'static str> {
         let (is_wrong, what) = match self {
-            EndEntry::Point | EndEntry::Ball(_) | EndEntry::Mirror(_) => return None,
+            EndEntry::Point | EndEntry::Ball(_) | EndEntry::Mirror(_) | EndEntry::Plugger(_) => return None,
+            EndEntry::Spoon(e) => (2.0 * e.thickness_mm > e.diameter_mm, "a spoon is at least twice as wide as thick"),
+            EndEntry::Cleoid(e) => (
+                e.point_mm >= e.width_mm || e.length_mm <= 0.5 * e.width_mm,
+                "a cleoid is narrower at its point than at its widest, and longer than half its width",
+            ),
+            EndEntry::Blade(e) => (e.thickness_mm >= e.width_mm, "a blade is wider than thick"),
+            EndEntry::Probe(probe) => (
+                probe.marks_mm.is_empty() && probe.bands_mm.is_empty()
+                    || probe.marks_mm.windows(2).any(|pair| pair[0].0 >= pair[1].0)
+                    || probe.bands_mm.iter().any(|[from, to]| from.0 >= to.0),
+                "a probe has marks or bands, each farther from its end than the one before",
+            ),
+            EndEntry::Bent(bent) => {
+                (bent.wire_mm[0].iter().any(|c| c.0 != 0.0), "a wire begins with its tip at [0, 0, 0]")
+            }
             EndEntry::Pear(e) => (
                 e.length_mm <= e.diameter_mm || e.top_diameter_mm >= e.diameter_mm,
                 "a pear is longer than it is wide, and wider at its tip than at its top",
@@ -290,22 +424,53 @@ impl InstrumentTable {
     pub const NAME: &str = "content/instruments.json";
 
     pub fn read(library: &Library) -> Result<InstrumentTable, Vec<Diagnostic>> {
-        let source = library.text(Self::NAME).map_err(|e| vec![e])?;
+        InstrumentTable { entries: Vec::new() }.and_of(library, Self::NAME)
+    }
+
+    /// The table with the instruments of a further file, such as a school's own.
+    pub fn and_of(self, library: &Library, name: &str) -> Result<InstrumentTable, Vec<Diagnostic>> {
+        let source = library.text(name).map_err(|e| vec![e])?;
         let read = json::read::<InstrumentFile>(source)?;
+        let known = self.entries;
         let entries = read.value.instruments;
         let mut found = Vec::new();
         for (index, entry) in entries.iter().enumerate() {
-            if entries[..index].iter().any(|e| e.id == entry.id) {
+            if known.iter().chain(&entries[..index]).any(|e| e.id == entry.id) {
                 let message = format!("there is already an instrument \"{}\"", entry.id);
                 found.push(read.places.complain(&format!("/instruments/{index}/id"), "duplicate-id", message, None));
             }
-            if entry.kind.is_some_and(|kind| (kind == ToolKind::SteelExplorer) == entry.cuts) {
+            if entry.kind.is_some_and(|kind| (kind.is_bur() || kind.is_blade()) != entry.cuts) {
                 let message = format!("\"{}\" does not cut as its kind does", entry.id);
-                let help = Some("an explorer never cuts, a bur always does".to_string());
+                let help = "burs, spoon excavators and carvers cut; explorers, carriers, condensers and plastic instruments do not";
+                let help = Some(help.to_string());
                 found.push(read.places.complain(&format!("/instruments/{index}/kind"), "wrong-kind", message, help));
             }
-            if matches!(entry.end, EndEntry::Point | EndEntry::Mirror(_)) && entry.cuts {
-                let message = format!("\"{}\" cuts with a point or a mirror", entry.id);
+            let is_packer =
+                |kind| matches!(kind, ToolKind::Carrier | ToolKind::Condenser | ToolKind::PlasticInstrument);
+            if entry.kind.is_some_and(is_packer) != entry.packs.is_some() {
+                let message = format!("\"{}\" does not pack as its kind does", entry.id);
+                let help = "carriers, condensers and plastic instruments have \"packs\", and nothing else has";
+                let place = format!("/instruments/{index}/packs");
+                found.push(read.places.complain(&place, "wrong-kind", message, Some(help.to_string())));
+            }
+            if entry.packs.is_some_and(|p| p.mm3_per_s == 0.0 && !p.condenses) {
+                let message = format!("\"{}\" neither lays nor condenses", entry.id);
+                let help = "give \"mm3_per_s\", or \"condenses\": true".to_string();
+                found.push(read.places.complain(
+                    &format!("/instruments/{index}/packs"),
+                    "idle-packs",
+                    message,
+                    Some(help),
+                ));
+            }
+            if entry.packs.is_some() && !matches!(entry.end, EndEntry::Plugger(_) | EndEntry::Blade(_)) {
+                let message = format!("\"{}\" has no face to press with", entry.id);
+                let help = "give its end as { \"plugger\": { \"diameter_mm\": … } } or as a blade".to_string();
+                found.push(read.places.complain(&format!("/instruments/{index}/end"), "no-face", message, Some(help)));
+            }
+            let is_blunt = matches!(entry.end, EndEntry::Mirror(_) | EndEntry::Probe(_));
+            if (is_blunt || matches!(entry.end, EndEntry::Point | EndEntry::Bent(_))) && entry.cuts {
+                let message = format!("\"{}\" cuts with a point, a probe or a mirror", entry.id);
                 let help = Some("a bur has a width: give its end as { \"ball\": { \"diameter_mm\": … } }".to_string());
                 found.push(read.places.complain(&format!("/instruments/{index}/cuts"), "cutting-point", message, help));
             }
@@ -317,7 +482,13 @@ impl InstrumentTable {
                 found.push(read.places.complain(&place, "impossible-shape", message, Some(what.to_string())));
             }
         }
+        let entries = known.into_iter().chain(entries).collect();
         if found.is_empty() { Ok(InstrumentTable { entries }) } else { Err(found) }
+    }
+
+    /// In the order of the table.
+    pub fn entries(&self) -> &[InstrumentEntry] {
+        &self.entries
     }
 
     pub fn ids(&self) -> impl Iterator<Item = &str> + Clone {

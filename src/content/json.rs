@@ -3,7 +3,7 @@
 //! Takes a text and a type. Gives the value and where each of its parts stands, or all that is wrong with it. The schema
 //! that the complaints come from is the one that is printed for editors: what it accepts is what is read.
 
-use super::syntax;
+use super::{pointer, syntax};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
 use jsonc_parser::ast::{ObjectPropName, Value};
 use jsonc_parser::common::{Range as AstRange, Ranged};
@@ -119,7 +119,7 @@ fn with_whole_numbers(value: Json) -> Json {
 }
 
 /// JSON as everyone else understands it: no comments, no trailing commas.
-fn strict() -> ParseOptions {
+pub(crate) fn strict() -> ParseOptions {
     ParseOptions {
         allow_comments: false,
         allow_loose_object_property_names: false,
@@ -220,7 +220,7 @@ impl<'s> Check<'s> {
             seen.push(name.clone());
             let length = path.len();
             path.push('/');
-            path.push_str(&name.replace('~', "~0").replace('/', "~1"));
+            path.push_str(&pointer::escaped(&name));
             match (known.and_then(|k| k.get(&name)), others) {
                 (Some(inner), _) => self.value(&property.value, inner, path),
                 (None, Some(Json::Object(_))) => self.value(&property.value, others.unwrap_or(&Json::Null), path),

@@ -108,7 +108,8 @@ pub fn read_text(path: &Path) -> Result<Arc<Source>, Diagnostic> {
     text_of(&path.display().to_string(), read_file(path)?)
 }
 
-fn text_of(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
+/// Bytes as text, without a byte order mark.
+pub fn text_of(name: &str, bytes: Vec<u8>) -> Result<Arc<Source>, Diagnostic> {
     match String::from_utf8(bytes) {
         Ok(text) => Ok(Source::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text))),
         Err(error) => {

@@ -3,6 +3,7 @@
 //! Takes bytes by name. Gives checked values, or every complaint there is. Never changes a file it reads.
 
 pub mod json;
+pub mod pointer;
 mod syntax;
 pub mod nrrd;
 pub mod imaging;
@@ -13,6 +14,7 @@ pub mod scan;
 mod library;
 mod coefficient;
 mod tissues;
+mod hand_ends;
 mod instruments;
 mod feel;
 pub mod measured;
@@ -20,6 +22,9 @@ pub mod sounds;
 
 pub use coefficient::CoefficientName;
 pub use feel::{AgeBand, FeelTable};
-pub use instruments::{EndEntry, InstrumentEntry, InstrumentTable, MirrorEntry, ToolKind};
-pub use library::{Library, read_file, read_text};
-pub use tissues::{Role, TissueEntry, TissueTable, parse_color};
+pub use hand_ends::{BladeEntry, CleoidEntry, PluggerEntry, SpoonEntry};
+pub use instruments::{
+    BentEntry, EndEntry, InstrumentEntry, InstrumentTable, MirrorEntry, PacksEntry, ProbeEntry, ToolKind,
+};
+pub use library::{Library, read_file, read_text, text_of};
+pub use tissues::{PackingEntry, Role, TissueEntry, TissueTable, parse_color};

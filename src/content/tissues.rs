@@ -3,7 +3,7 @@
 use super::Library;
 use super::json::{self, Places};
 use crate::diagnostic::Diagnostic;
-use crate::touch::{Material, Materials};
+use crate::touch::{Filling, Material, Materials};
 use crate::volume::Label;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,8 @@ pub enum Role {
     Neighbour,
     /// A filling.
     Material,
+    /// What has settled on a tooth: calculus.
+    Deposit,
 }
 
 /// One line of `content/tissues.json`.
@@ -65,11 +67,36 @@ pub struct TissueEntry {
     #[serde(default)]
     #[schemars(range(min = 0.1, max = 2000.0))]
     pub hardness_hv: Option<f32>,
+    /// How it is laid and condensed, for what fills cavities.
+    #[serde(default)]
+    pub packing: Option<PackingEntry>,
+}
+
+/// How a filling is laid and condensed.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PackingEntry {
+    /// Force from which it leaves its carrier and clings, N: 0.02 to 5.
+    #[schemars(range(min = 0.02, max = 5.0))]
+    pub least_force_n: f32,
+    /// Force from which what is laid keeps no voids, and from which a condenser closes them, N: 0.05 to 10, and more than
+    /// `least_force_n`.
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub condense_force_n: f32,
+    /// Share of its volume that voids take when it is laid with the least force, 0 to 0.25.
+    #[schemars(range(min = 0.0, max = 0.25))]
+    pub void_share: f32,
 }
 
 impl TissueEntry {
     pub fn label(&self) -> Label {
         Label(self.id)
+    }
+
+    /// How it is laid and condensed; `None` for what is not packed.
+    pub fn filling(&self) -> Option<Filling> {
+        let PackingEntry { least_force_n: least_force, condense_force_n: condense_force, void_share } = self.packing?;
+        Some(Filling { label: self.label(), least_force, condense_force, void_share })
     }
 
     /// Colour as red, green, blue in 0–1.
@@ -135,6 +162,10 @@ impl TissueTable {
             let message = format!("the number {} already belongs to \"{}\"", entry.id, other.name);
             complain("id", "duplicate-id", message, "give each tissue its own number".into());
         }
+        if entry.packing.is_some_and(|p| p.condense_force_n <= p.least_force_n) {
+            let message = format!("\"{}\" is condensed by no more than the force that lays it", entry.name);
+            complain("packing", "no-range", message, "give condense_force_n more than least_force_n".into());
+        }
         if self.entries.iter().any(|e| e.name == entry.name) {
             let message = format!("there is already a tissue named \"{}\"", entry.name);
             complain("name", "duplicate-id", message, "give each tissue its own name".into());
@@ -165,6 +196,11 @@ impl TissueTable {
     /// What a label means to the score; `None` for air and unknown labels.
     pub fn role(&self, label: Label) -> Option<Role> {
         self.by_label(label).map(|e| e.role)
+    }
+
+    /// What can be laid and condensed.
+    pub fn fillings(&self) -> Vec<Filling> {
+        self.entries.iter().filter_map(TissueEntry::filling).collect()
     }
 
     /// How each tissue feels.

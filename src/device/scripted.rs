@@ -22,6 +22,10 @@ pub enum Move {
     ///
     /// The hand leans beyond the path by as much as the force asks, within `lean` (least, most; mm); it starts at the least.
     Trace { path: Vec<Vec3>, along: Vec3, force: f32, speed: f32, lean: [f32; 2] },
+    /// Along a path in matter that gives way, until a force is met along it, then holds that for a while: a probe into a pocket.
+    ///
+    /// Ends where the path does if nothing is met.
+    Slide { path: Vec<Vec3>, force: f32, hold: f32, speed: f32 },
     /// Guides the tip that is seen on the screen along a path, leaning toward where it lags behind.
     ///
     /// The hand leans up to `lean` mm beyond the path and no harder than `force` N; where the tip does not follow it waits
@@ -201,6 +205,19 @@ impl Scripted {
                 }
                 (now.met && now.seconds >= *hold) || now.lean > *reach
             }
+            Move::Slide { path, force: wanted, hold, speed } => {
+                let (_, way) = point_and_way(path, now.lean.max(0.0));
+                let resistance = now.feel(force, way, self.hand.position(), *wanted);
+                let lack = wanted - resistance;
+                let step = if resistance > NOTICE { (lack * PRESS_GAIN).min(*speed) } else { *speed };
+                now.lean = (now.lean + step * dt).max(0.0);
+                let (on_path, at_end) = point_along(path, now.lean);
+                self.hand.goal = on_path;
+                if lack < 0.1 * wanted && !now.met {
+                    (now.met, now.seconds) = (true, 0.0);
+                }
+                (now.met && now.seconds >= *hold) || at_end
+            }
             Move::Trace { path, along, force: wanted, speed, lean: [least, most] } => {
                 let resistance = now.feel(force, *along, self.hand.position(), *wanted);
                 now.lean += (wanted - resistance) * PRESS_GAIN * dt;
@@ -256,6 +273,16 @@ impl Progress {
         self.felt.force = self.felt.force.max(resistance);
         resistance
     }
+}
+
+/// The point so far along a polyline, and the way on from there.
+fn point_and_way(path: &[Vec3], travelled: f32) -> (Vec3, Vec3) {
+    /// Over which way a polyline's direction is taken, mm: corners are no corners to a hand.
+    const OVER: f32 = 0.3;
+    let (here, _) = point_along(path, travelled);
+    let (ahead, _) = point_along(path, travelled + OVER);
+    let (behind, _) = point_along(path, (travelled - OVER).max(0.0));
+    (here, (ahead - behind).normalize_or(Vec3::NEG_Y))
 }
 
 /// The point `travelled` mm along a polyline, and whether that is its end.

@@ -108,7 +108,13 @@ pub fn gradebook(cohort: &Cohort, system: System, take: Take, students: Option<&
     let mut head = known.clone();
     let mut possible = vec![String::new(); known.len()];
     for exercise in &exercises {
-        let title = title(exercise, system);
+        let plain = |e: &SessionFile| title(e, system);
+        let is_alone = exercises.iter().filter(|e| plain(e) == plain(exercise)).count() == 1;
+        // Two columns of one name would be one assignment to a learning management system.
+        let title = match is_alone {
+            true => plain(exercise),
+            false => format!("{} · {}", plain(exercise), harmless(&exercise.scenario.id, TITLE_MAX)),
+        };
         head.push(title.clone());
         if system == System::Moodle {
             head.push(format!("{title} (feedback)"));

@@ -1,5 +1,6 @@
 //! Why a lesson has no bundle.
 
+use crate::diagnostic::Diagnostic;
 use crate::record::Unwritable;
 use crate::report::bundle::{Unfinished, Unmade};
 use crate::scenario::Unmakeable;
@@ -21,6 +22,14 @@ pub enum Failed {
     UnknownDevice { name: String, known: String },
     /// There is none to hold.
     NoDevice { name: String, why: String },
+    /// The second hand is to hold what the first does.
+    SameDevice { name: String },
+    /// Nobody can join at that address.
+    CannotListen { at: String, why: String },
+    /// A scan that is none, or no tooth.
+    WrongVolume { path: PathBuf, why: String },
+    /// A file that cannot be read.
+    Unreadable(Diagnostic),
     /// A folder that holds no exercise, or cannot be read.
     NoScenarios { folder: PathBuf, why: String },
 }
@@ -47,8 +56,22 @@ impl fmt::Display for Failed {
                 "unknown-device: no device is named \"{name}\"; known: scripted, {known} (see `typodont devices`)"
             ),
             Failed::NoDevice { name, why } => write!(f, "{name}: no-device: {why}"),
+            Failed::SameDevice { name } => {
+                write!(f, "same-device: {name} is in the first hand; name another one, NAME:WHICH, for the second")
+            }
+            Failed::CannotListen { at, why } => {
+                write!(f, "{at}: cannot-listen: {why}; name an address of this machine")
+            }
+            Failed::WrongVolume { path, why } => write!(f, "{}: wrong-volume: {why}", path.display()),
+            Failed::Unreadable(found) => f.write_str(&found.headline()),
             Failed::NoScenarios { folder, why } => write!(f, "{}: {why}", folder.display()),
         }
+    }
+}
+
+impl From<Diagnostic> for Failed {
+    fn from(found: Diagnostic) -> Failed {
+        Failed::Unreadable(found)
     }
 }
 

@@ -6,10 +6,14 @@
 mod failed;
 mod held;
 mod opening;
+mod scanned;
+pub mod second;
 
 pub use failed::Failed;
 pub use held::{Held, is_code, library_for, open, read, scenario_files, seed_from};
 pub use opening::{Opening, Prepared, Recorded};
+pub use scanned::Scan;
+pub use second::SecondHand;
 
 use crate::device::{Device, Reading, UPRIGHT};
 use crate::frame::Quat;
@@ -17,7 +21,7 @@ use crate::record::{EndFile, Recorder, ServoFile, Unwritable};
 use crate::report::Templates;
 use crate::report::bundle::Unfinished;
 use crate::session::{Broken, Effect, Heard, Input, Live, Observer, Session};
-use crate::sim::{Command, Second, Simulation, Step};
+use crate::sim::{Assist, AssistNews, Command, Simulation, Step};
 use crate::tick::Tick;
 use crate::volume::Edit;
 
@@ -25,6 +29,8 @@ use crate::volume::Edit;
 pub struct Lesson {
     session: Session,
     live: Live,
+    /// The second hand's servo, if that turns here.
+    assist: Option<Assist>,
     log: Log,
     unfinished: Unfinished,
     templates: Templates,
@@ -36,14 +42,15 @@ impl Lesson {
         prepared: Prepared,
         simulation: Simulation,
         device: Box<dyn Device + Send>,
-        second: Option<Second>,
+        second: Option<SecondHand>,
     ) -> Result<(Lesson, Vec<Heard>), Failed> {
         let Prepared { scenario, workpiece, recorder, unfinished, templates, .. } = prepared;
         let mut session = Session::new(scenario, &workpiece);
         let mut log = Log { recorder, edits: Vec::new(), held: UPRIGHT };
+        let (second, assist) = second.map_or((None, None), |hand| (Some(hand.end), hand.assist));
         let begun = Live::begin(&mut session, simulation, device, second, &mut log);
         let (live, heard) = begun.map_err(|broken| stopped(&unfinished, &broken))?;
-        Ok((Lesson { session, live, log, unfinished, templates }, heard))
+        Ok((Lesson { session, live, assist, log, unfinished, templates }, heard))
     }
 
     /// Hears everything the servo did since last asked; [`Lesson::edits`] are then those of that time.
@@ -51,6 +58,11 @@ impl Lesson {
         self.log.edits.clear();
         let heard = self.live.listen(&mut self.session, &mut self.log);
         heard.map_err(|broken| stopped(&self.unfinished, &broken))
+    }
+
+    /// What happened to a second hand whose device is plugged in here, in order.
+    pub fn next_of_second(&mut self) -> Option<AssistNews> {
+        self.assist.as_mut()?.next_news()
     }
 
     /// What the person says, as of the last tick that was heard.

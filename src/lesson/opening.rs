@@ -1,13 +1,13 @@
 //! From an exercise to a session that is about to begin, and from a recording to its bundle.
 
-use super::{Failed, Lesson};
+use super::{Failed, Lesson, SecondHand};
 use crate::device::{Device, Spec};
 use crate::record::{EndFile, HeadFile, Recorder, ServoFile};
 use crate::report::Templates;
 use crate::report::bundle::Unfinished;
 use crate::scenario::{Scenario, Workpiece, hex};
 use crate::session::{self, Heard, Operator, OperatorFile, Progress, Session};
-use crate::sim::{Second, Simulation};
+use crate::sim::Simulation;
 use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -66,7 +66,7 @@ impl Opening<'_> {
             ..HeadFile::of(&scenario, &spec, seed)
         };
         let unfinished = Unfinished::begin(out, &bundle_name(&head, started))?;
-        match Recorder::create(&unfinished.recording(), &head, &scenario, &workpiece.volume) {
+        match Recorder::create(&unfinished.recording(), &head, &scenario, &workpiece) {
             Ok(recorder) => Ok(Prepared { scenario, workpiece, recorder, unfinished, templates, spec, seed }),
             Err(error) => {
                 unfinished.abandon();
@@ -84,7 +84,11 @@ fn bundle_name(head: &HeadFile, started: Timestamp) -> String {
 
 impl Prepared {
     /// Begins with a device in a person's hand, in real time. Gives what is to be said first.
-    pub fn begin(self, device: Box<dyn Device + Send>, second: Option<Second>) -> Result<(Lesson, Vec<Heard>), Failed> {
+    pub fn begin(
+        self,
+        device: Box<dyn Device + Send>,
+        second: Option<SecondHand>,
+    ) -> Result<(Lesson, Vec<Heard>), Failed> {
         let simulation = self.simulation();
         Lesson::begin(self, simulation, device, second)
     }

@@ -4,7 +4,7 @@ use crate::content::CoefficientName;
 use crate::device::Spec;
 use crate::frame::Vec3;
 use crate::scenario::Scenario;
-use crate::session::{Answer, EndedBy, Input, Kept};
+use crate::session::{Answer, EndedBy, Input, Kept, Sign};
 use crate::sim::{Command, Simulation};
 use crate::tick::TICK_S;
 use crate::touch::Coefficient;
@@ -230,9 +230,17 @@ pub enum InputFile {
     AnswerYesNo { question: String, value: bool },
     AnswerNumber { question: String, value: f64 },
     Adjust { label: u8, coefficient: CoefficientName, value: f32 },
+    Chart { sign: SignFile },
     Confirm {},
     Rate { item: String, value: u8 },
     Abort {},
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SignFile {
+    Depth,
+    Calculus,
 }
 
 impl From<&Input> for InputFile {
@@ -248,6 +256,8 @@ impl From<&Input> for InputFile {
             Input::Adjust { label, coefficient, value } => {
                 InputFile::Adjust { label: label.0, coefficient: coefficient.into(), value }
             }
+            Input::Chart(Sign::Depth) => InputFile::Chart { sign: SignFile::Depth },
+            Input::Chart(Sign::Calculus) => InputFile::Chart { sign: SignFile::Calculus },
             Input::Confirm => InputFile::Confirm {},
             Input::Rate { item, value } => InputFile::Rate { item, value },
             Input::Abort => InputFile::Abort {},
@@ -266,6 +276,8 @@ impl From<InputFile> for Input {
             InputFile::Adjust { label, coefficient, value } => {
                 Input::Adjust { label: Label(label), coefficient: coefficient.into(), value }
             }
+            InputFile::Chart { sign: SignFile::Depth } => Input::Chart(Sign::Depth),
+            InputFile::Chart { sign: SignFile::Calculus } => Input::Chart(Sign::Calculus),
             InputFile::Confirm {} => Input::Confirm,
             InputFile::Rate { item, value } => Input::Rate { item, value },
             InputFile::Abort {} => Input::Abort,
@@ -295,6 +307,9 @@ pub enum CommandFile {
     Guide {
         guidance: Option<usize>,
     },
+    Fill {
+        label: Option<u8>,
+    },
 }
 
 impl From<&Command> for CommandFile {
@@ -309,6 +324,7 @@ impl From<&Command> for CommandFile {
             }
             Command::RunBur { running } => CommandFile::RunBur { running },
             Command::Guide { guidance } => CommandFile::Guide { guidance },
+            Command::Fill { label } => CommandFile::Fill { label: label.map(|l| l.0) },
         }
     }
 }
@@ -325,6 +341,7 @@ impl From<&CommandFile> for Command {
             }
             CommandFile::RunBur { running } => Command::RunBur { running },
             CommandFile::Guide { guidance } => Command::Guide { guidance },
+            CommandFile::Fill { label } => Command::Fill { label: label.map(Label) },
         }
     }
 }

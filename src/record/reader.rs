@@ -26,6 +26,8 @@ pub struct Recording {
     pub end: Option<EndFile>,
     pub scenario: Arc<Scenario>,
     pub initial: Arc<Volume>,
+    /// The tooth before its cavity was cut, where there is one.
+    pub original: Option<Arc<Volume>>,
     /// One per tick, from tick 0 on without a gap.
     pub ticks: Vec<Haptic>,
     /// Inputs in order, each before the step of its tick.
@@ -103,7 +105,8 @@ impl Recording {
 
     /// The workpiece the session started from.
     pub fn workpiece(&self) -> Result<Workpiece, String> {
-        Workpiece::of(&self.scenario, self.initial.clone(), self.head.seed).map_err(|e| e.to_string())
+        Workpiece::of(&self.scenario, self.initial.clone(), self.original.clone(), self.head.seed)
+            .map_err(|e| e.to_string())
     }
 
     /// The number of ticks.
@@ -200,6 +203,13 @@ impl Found {
         let density = files.remove(volume::DENSITY).ok_or(damaged("the volume at the start is missing"))?;
         let label = files.remove(volume::LABEL).ok_or(damaged("the labels at the start are missing"))?;
         let initial = volume::parse(&density, &label).map_err(|e| damaged(&e))?;
+        let original = match (files.remove(volume::ORIGINAL_DENSITY), files.remove(volume::ORIGINAL_LABEL)) {
+            (Some(density), Some(label)) => Some(volume::parse(&density, &label).map_err(|e| damaged(&e))?),
+            _ => None,
+        };
+        if original.as_ref().is_some_and(|original| original.grid() != initial.grid()) {
+            return Err(damaged("the tooth before its cavity was cut has another grid"));
+        }
         let mut library = Library::empty();
         for (file, bytes) in files {
             library.hold(file, bytes);
@@ -209,6 +219,9 @@ impl Found {
         if scenario.sha256 != head.scenario_sha256 {
             return Err(damaged("its scenario is not the one that its head names"));
         }
+        if scenario.has_cavity() != original.is_some() {
+            return Err(damaged("the tooth before its cavity was cut is missing"));
+        }
         if head.tick_s != TICK_S {
             return Err(damaged("its ticks are of another length"));
         }
@@ -217,6 +230,7 @@ impl Found {
             end,
             scenario: Arc::new(scenario),
             initial: Arc::new(initial),
+            original: original.map(Arc::new),
             ticks,
             inputs,
             commands,

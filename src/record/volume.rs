@@ -7,6 +7,10 @@ use crate::volume::{Density, Label, Volume};
 pub const DENSITY: &str = "initial.density.nrrd";
 pub const LABEL: &str = "initial.label.nrrd";
 
+/// The same of the tooth before its cavity was cut, where there is one.
+pub const ORIGINAL_DENSITY: &str = "original.density.nrrd";
+pub const ORIGINAL_LABEL: &str = "original.label.nrrd";
+
 /// Key under which the width of the density ramp is kept, mm.
 const BAND_KEY: &str = "typodont_band_mm";
 

@@ -6,11 +6,11 @@ use super::file::{
 use super::haptic::{self, Haptic, Layout};
 use super::{replay::Running, volume};
 use crate::device::Reading;
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, Workpiece};
 use crate::session::{Effect, Input, Observer, Session};
 use crate::sim::{Command, Step};
 use crate::tick::{TICK_S, Tick};
-use crate::volume::{Edit, Volume};
+use crate::volume::Edit;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
 use serde::Serialize;
@@ -52,9 +52,16 @@ pub struct Recorder {
 
 impl Recorder {
     /// Begins a recording: writes everything that is known before the first tick.
-    pub fn create(path: &Path, head: &HeadFile, scenario: &Scenario, initial: &Volume) -> Result<Recorder, Unwritable> {
+    pub fn create(
+        path: &Path,
+        head: &HeadFile,
+        scenario: &Scenario,
+        workpiece: &Workpiece,
+    ) -> Result<Recorder, Unwritable> {
         let failed = |why: String| Unwritable { path: path.to_path_buf(), why };
-        let (density, label) = volume::bytes(initial).map_err(|e| failed(e.to_string()))?;
+        let (density, label) = volume::bytes(&workpiece.volume).map_err(|e| failed(e.to_string()))?;
+        let original = workpiece.original.as_ref().map(|o| volume::bytes(o)).transpose();
+        let original = original.map_err(|e| failed(e.to_string()))?;
         let file = File::create(path).map_err(|e| failed(e.to_string()))?;
         // One thread and whole chunks in memory: the same session gives the same bytes, and a killed one whole chunks.
         let options = WriteOptions::new()
@@ -79,6 +86,10 @@ impl Recorder {
             }
             attach(volume::DENSITY, "application/x-nrrd", &density)?;
             attach(volume::LABEL, "application/x-nrrd", &label)?;
+            if let Some((density, label)) = &original {
+                attach(volume::ORIGINAL_DENSITY, "application/x-nrrd", density)?;
+                attach(volume::ORIGINAL_LABEL, "application/x-nrrd", label)?;
+            }
             let schema = writer.add_schema(haptic::SCHEMA_NAME, "ros2msg", haptic::SCHEMA.as_bytes())?;
             let none = BTreeMap::new();
             let haptic = writer.add_channel(schema, "/haptic", "cdr", &none)?;
@@ -149,7 +160,9 @@ impl Observer for Recorder {
             Effect::StagesOver => WhatFile::StagesOver {},
             Effect::Refused { why } => WhatFile::Refused { why: why.to_string() },
             // Commands are written as such; steps and answers follow from commands and inputs.
-            Effect::Tell(_) | Effect::StepStarted { .. } | Effect::Answered { .. } => return Ok(()),
+            Effect::Tell(_) | Effect::StepStarted { .. } | Effect::Answered { .. } | Effect::Charted { .. } => {
+                return Ok(());
+            }
         };
         self.write_event(tick, what)
     }

@@ -12,9 +12,13 @@ struct Content {
     most: u8,
     /// One bit per label modulo 64.
     labels: u64,
+    /// True when there is but one density and one label.
+    is_even: bool,
 }
 
 /// Steps (Chebyshev) from each brick to the nearest that may show something; 0 for those that may.
+///
+/// An entry may bear [`EVEN`]: all samples in that brick are one.
 ///
 /// After a change a brick's own entry and those it can have come nearer to are right at once. Where something vanished,
 /// distances stay as they were, too small, which costs a little time and never a pixel.
@@ -22,17 +26,20 @@ struct Content {
 pub struct Empty {
     dims: [u32; 3],
     content: Vec<Content>,
-    steps: Vec<u8>,
+    entries: Vec<u8>,
     shown: Shown,
 }
 
 /// The farthest distance told apart: 15 bricks are 120 voxels, a leap long enough.
 const FAR: u8 = 15;
 
+/// Marks a brick that shows something and, where matter is blended, the same wherever it is sampled. In step with `tooth.wgsl`.
+pub const EVEN: u8 = 0x80;
+
 impl Empty {
     pub fn of(volume: &Volume, shown: &Shown) -> Empty {
         let content: Vec<Content> = each(volume.bricks().len(), |brick| content(volume, brick));
-        let mut empty = Empty { dims: volume.bricks().dims(), content, steps: Vec::new(), shown: shown.clone() };
+        let mut empty = Empty { dims: volume.bricks().dims(), content, entries: Vec::new(), shown: shown.clone() };
         empty.measure();
         empty
     }
@@ -41,9 +48,9 @@ impl Empty {
         self.dims
     }
 
-    /// One entry per brick, x fastest.
-    pub fn steps(&self) -> &[u8] {
-        &self.steps
+    /// One entry per brick, x fastest: steps, or [`EVEN`].
+    pub fn entries(&self) -> &[u8] {
+        &self.entries
     }
 
     /// Shows the volume another way; `true` when that made any difference.
@@ -61,13 +68,18 @@ impl Empty {
         let mut differing = Vec::new();
         for brick in with_sharing(volume, changed) {
             self.content[brick] = content(volume, brick);
-            match (self.shows(brick), self.steps[brick]) {
-                (true, 1..) => self.announce(volume, brick, &mut differing),
-                (false, 0) => {
-                    self.steps[brick] = 1;
-                    differing.push(brick);
-                }
-                _ => {}
+            let shows = self.shows(brick);
+            if shows && steps(self.entries[brick]) > 0 {
+                self.announce(volume, brick, &mut differing);
+            }
+            let entry = match (shows, self.entries[brick]) {
+                (true, _) => self.mark(brick),
+                (false, 0 | EVEN) => 1,
+                (false, known) => known,
+            };
+            if self.entries[brick] != entry {
+                self.entries[brick] = entry;
+                differing.push(brick);
             }
         }
         differing.sort_unstable();
@@ -83,9 +95,22 @@ impl Empty {
             }
             _ => self.content.iter().map(is_solid).collect(),
         };
-        self.steps = shows.into_iter().map(|s| if s { 0 } else { FAR }).collect();
+        self.entries = shows.into_iter().map(|s| if s { 0 } else { FAR }).collect();
         for axis in 0..3 {
-            widen(&mut self.steps, self.dims, axis);
+            widen(&mut self.entries, self.dims, axis);
+        }
+        for brick in 0..self.entries.len() {
+            if self.entries[brick] == 0 {
+                self.entries[brick] = self.mark(brick);
+            }
+        }
+    }
+
+    /// The entry of a brick that shows something.
+    fn mark(&self, brick: usize) -> u8 {
+        match self.shown {
+            Shown::Volume(_) if self.content[brick].is_even => EVEN,
+            _ => 0,
         }
     }
 
@@ -106,14 +131,19 @@ impl Empty {
                 for x in span(0) {
                     let steps = [x, y, z].iter().zip(at).map(|(v, a)| v.abs_diff(a)).max().unwrap_or(0) as u8;
                     let index = volume.bricks().index([x, y, z]);
-                    if self.steps[index] > steps {
-                        self.steps[index] = steps;
+                    if self::steps(self.entries[index]) > steps {
+                        self.entries[index] = steps;
                         differing.push(index);
                     }
                 }
             }
         }
     }
+}
+
+/// Bricks to the nearest that may show something, by an entry.
+pub fn steps(entry: u8) -> u8 {
+    entry & !EVEN
 }
 
 fn is_solid(content: &Content) -> bool {
@@ -165,7 +195,10 @@ fn content(volume: &Volume, brick: usize) -> Content {
     let end: [u32; 3] = std::array::from_fn(|a| (corner[a] + BRICK + 1).min(grid.dims[a]));
     // Space beyond the grid is empty, and mixes with the first and the last voxels.
     let at_border = (0..3).any(|a| corner[a] == 0 || corner[a] + BRICK >= grid.dims[a]);
-    let mut found = Content { least: if at_border { 0 } else { u8::MAX }, most: 0, labels: u64::from(at_border) };
+    let mut found =
+        Content { least: if at_border { 0 } else { u8::MAX }, most: 0, labels: u64::from(at_border), is_even: false };
+    let of_first = volume.labels()[grid.index(corner)];
+    let mut is_one_label = !at_border || of_first == Label::AIR;
     for z in corner[2]..end[2] {
         for y in corner[1]..end[1] {
             let first = grid.index([corner[0], y, z]);
@@ -174,9 +207,12 @@ fn content(volume: &Volume, brick: usize) -> Content {
                 found.least = found.least.min(density.bits());
                 found.most = found.most.max(density.bits());
             }
-            found.labels |= volume.labels()[row].iter().fold(0, |all, l| all | 1u64 << (l.0 % 64));
+            let labels = &volume.labels()[row];
+            found.labels |= labels.iter().fold(0, |all, l| all | 1u64 << (l.0 % 64));
+            is_one_label &= labels.iter().all(|&label| label == of_first);
         }
     }
+    found.is_even = is_one_label && found.least == found.most;
     found
 }
 
@@ -223,12 +259,34 @@ mod tests {
         let volume = ball();
         let empty = Empty::of(&volume, &Shown::Iso);
         let at = |b: usize| volume.bricks().corner(b).map(|c| c / BRICK);
-        let solid: Vec<usize> = (0..empty.steps.len()).filter(|&b| empty.content[b].most > 127).collect();
-        for brick in 0..empty.steps.len() {
+        let solid: Vec<usize> = (0..empty.entries.len()).filter(|&b| empty.content[b].most > 127).collect();
+        for brick in 0..empty.entries.len() {
             let apart = |&o: &usize| (0..3).map(|a| at(brick)[a].abs_diff(at(o)[a])).max().unwrap();
             let nearest = solid.iter().map(apart).min().unwrap() as u8;
-            assert_eq!(empty.steps[brick], nearest.min(FAR), "brick {brick}");
+            assert_eq!(empty.entries[brick], nearest.min(FAR), "brick {brick}");
         }
+    }
+
+    #[test]
+    fn a_brick_is_even_where_every_sample_is_the_same() {
+        // Aim: one look stands for a brick. Method: ask for the marks of a ball of two tissues, then look at each voxel of the cells.
+        let mut volume = phantom::ball([96; 3], Vec3::splat(0.2), 8.0);
+        let middle = volume.grid().cell(volume.grid().len() / 2)[2];
+        let cells: Vec<u32> = volume.grid().cells().map(|[_, _, z]| z).collect();
+        volume.relabel(|index, label| if cells[index] < middle { Label(65) } else { label });
+        let all = super::super::transfer::table([1.0; 3], |d| d);
+        let empty = Empty::of(&volume, &Shown::Volume(Arc::new(TransferFunction::plain(all, 0.2, 0.0))));
+        let dims = volume.grid().dims;
+        for (brick, entry) in empty.entries.iter().enumerate() {
+            let corner = volume.bricks().corner(brick);
+            let voxel = |n: u32| {
+                let step = [n % 9, n / 9 % 9, n / 81];
+                volume.voxel(volume.grid().index(std::array::from_fn(|a| (corner[a] + step[a]).min(dims[a] - 1))))
+            };
+            let is_same = (0..729).all(|n| voxel(n) == voxel(0)) && voxel(0).density > crate::volume::Density::EMPTY;
+            assert_eq!(*entry == EVEN, is_same, "brick {brick}");
+        }
+        assert!(empty.entries.iter().filter(|e| **e == EVEN).count() > 10);
     }
 
     #[test]
@@ -246,7 +304,9 @@ mod tests {
             let changed = volume.take_dirty();
             let differing = empty.update(&volume, &changed);
             let anew = Empty::of(&volume, &shown);
-            assert!(empty.steps.iter().zip(&anew.steps).all(|(now, exact)| now <= exact));
+            assert!(empty.entries.iter().zip(&anew.entries).all(|(now, exact)| steps(*now) <= steps(*exact)));
+            let marked = |empty: &Empty| empty.entries.iter().map(|e| e & EVEN).collect::<Vec<_>>();
+            assert_eq!(marked(&empty), marked(&anew));
             assert!(empty.content == anew.content);
             assert!(differing.len() < 60, "{} entries for a few bricks", differing.len());
         }

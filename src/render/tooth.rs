@@ -130,7 +130,7 @@ impl ToothTextures {
             group,
         };
         resources::write_box(queue, &made.voxels, [0; 3], dims, &interleaved(volume, [0; 3], dims));
-        resources::write_box(queue, &made.empty, [0; 3], made.empty_map.dims(), made.empty_map.steps());
+        resources::write_box(queue, &made.empty, [0; 3], made.empty_map.dims(), made.empty_map.entries());
         resources::write_box(queue, &made.hollow, [0; 3], made.hollow_map.dims(), made.hollow_map.mean());
         made
     }
@@ -153,11 +153,11 @@ impl ToothTextures {
         }
         let differing = self.empty_map.update(tooth.volume, changed);
         if self.empty_map.show(&tooth.shown) {
-            resources::write_box(queue, &self.empty, [0; 3], self.empty_map.dims(), self.empty_map.steps());
+            resources::write_box(queue, &self.empty, [0; 3], self.empty_map.dims(), self.empty_map.entries());
         } else {
             for brick in differing {
                 let place = tooth.volume.bricks().corner(brick).map(|c| c / BRICK);
-                resources::write_box(queue, &self.empty, place, [1; 3], &self.empty_map.steps()[brick..=brick]);
+                resources::write_box(queue, &self.empty, place, [1; 3], &self.empty_map.entries()[brick..=brick]);
             }
         }
         for cube in self.hollow_map.update(tooth.volume, changed) {

@@ -44,18 +44,23 @@ struct Curve<'a> {
 
 /// The curves of a session, with its stages and marks; empty for a session without a tick.
 ///
+/// Without decay there is none to clear.
+///
 /// `data-seconds`, `data-left` and `data-right` say which second stands where, for the page's script.
-pub fn svg(trace: &Trace, stages: &[Span], marks: &[Mark], languages: &Languages) -> String {
+pub fn svg(trace: &Trace, has_decay: bool, stages: &[Span], marks: &[Mark], languages: &Languages) -> String {
     let Some(last) = trace.samples.last() else { return String::new() };
     let seconds = last.at.seconds();
     let value = |f: fn(&crate::score::Sample) -> f32| trace.samples.iter().map(|s| f64::from(f(s))).collect::<Vec<_>>();
     let highest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let (force, speed) = (value(|s| s.force), value(|s| if s.touched { s.speed } else { 0.0 }));
-    let curves = [
+    let mut curves = vec![
         Curve { key: "curve.force", unit: "N", full: nice(highest(&force)), values: force, color: "#b04a00" },
         Curve { key: "curve.speed", unit: "mm/s", full: nice(highest(&speed)), values: speed, color: "#0b6ea8" },
-        Curve { key: "curve.cleared", unit: "%", full: 100.0, values: value(|s| s.cleared), color: "#22794f" },
     ];
+    if has_decay {
+        let values = value(|s| s.cleared);
+        curves.push(Curve { key: "curve.cleared", unit: "%", full: 100.0, values, color: "#22794f" });
+    }
     let height = TOP + curves.len() as f64 * (BAND_HEIGHT + BAND_GAP) + 14.0;
     let x = |s: f64| LEFT + (WIDTH - LEFT - RIGHT) * s / seconds.max(1e-9);
     let mut svg = format!(

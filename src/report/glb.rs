@@ -16,6 +16,12 @@ pub struct Part {
 }
 
 impl Part {
+    /// A surface with a colour at each corner, given as screens take it.
+    pub fn coloured(name: &str, mesh: Mesh, rgb: &[[f32; 3]]) -> Part {
+        let colors = rgb.iter().map(|c| linear(*c)).collect();
+        Part { name: name.into(), mesh, colors }
+    }
+
     /// A surface of one colour, given as screens take it.
     pub fn plain(name: &str, mesh: Mesh, rgb: [f32; 3]) -> Part {
         let colors = vec![linear(rgb); mesh.positions.len()];

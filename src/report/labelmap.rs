@@ -22,7 +22,7 @@ pub fn tissues(volume: &Volume, table: &TissueTable) -> Result<Vec<u8>, String> 
 /// The verdicts as `.seg.nrrd`.
 pub fn performance(grid: &Grid, verdicts: &[Verdict]) -> Result<Vec<u8>, String> {
     let labels = verdicts.iter().map(|v| *v as u8).collect();
-    let segments = Verdict::SEEN.iter().map(|v| Segment {
+    let segments = Verdict::SEEN.iter().chain(&Verdict::OF_FILLINGS).map(|v| Segment {
         id: v.id().into(),
         name: v.title().into(),
         label_value: *v as u8,

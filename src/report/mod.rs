@@ -25,7 +25,7 @@ pub use language::{Languages, Said};
 pub use pictures::{SEEN, preview_png, sections_png};
 pub use session_file::{
     AnswerFile, DeviceFile, EvidenceFile, GradeFile, HardFailFile, ItemFile, QuestionnaireFile, RatingFile,
-    ScenarioRef, SessionFile, StageFile,
+    ScenarioRef, SessionFile, SiteFile, StageFile,
 };
 pub use words::{harmless, measure as measure_in_words};
 

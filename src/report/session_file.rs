@@ -4,7 +4,7 @@ use crate::content::CoefficientName;
 use crate::device::Spec;
 use crate::record::{Recording, ServoFile, SpecFile, ended_by_name};
 use crate::scenario::{Limit, QuestionKind, Questionnaire};
-use crate::score::{Grade, SCORER_VERSION, Scored};
+use crate::score::{Grade, SCORER_VERSION, Scored, SiteResult};
 use crate::session::{Answer, Given};
 use crate::tick::Tick;
 use serde::{Deserialize, Serialize};
@@ -46,6 +46,9 @@ pub struct SessionFile {
     pub tooth_fdi: Option<u8>,
     #[serde(default)]
     pub stages: Vec<StageFile>,
+    /// The periodontal chart; left out where none was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub chart: Vec<SiteFile>,
     pub metrics: BTreeMap<String, Option<f64>>,
     /// Where and when some of the metrics arose.
     #[serde(default)]
@@ -93,6 +96,26 @@ pub struct StageFile {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub adjusted: Vec<String>,
     pub answers: Vec<AnswerFile>,
+}
+
+/// One site of a periodontal chart.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SiteFile {
+    /// MB, B, DB, ML, L or DL.
+    pub site: String,
+    /// As read off the probe; null where it was not.
+    pub read_mm: Option<u8>,
+    pub true_mm: f64,
+    /// How far the gum's margin has gone back below the neckline; negative where it covers enamel.
+    pub recession_mm: f64,
+    /// How hard the probe was pressed then.
+    pub force_n: Option<f64>,
+    pub at_s: Option<f64>,
+    /// Whether calculus was marked; null where it was not asked for.
+    #[serde(default)]
+    pub calculus_marked: Option<bool>,
+    #[serde(default)]
+    pub calculus: bool,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -213,6 +236,7 @@ impl SessionFile {
             device: Some(DeviceFile::from(&Spec::from(&head.device))),
             tooth_fdi: scenario.scene.teeth.first().map(|tooth| tooth.fdi),
             stages: stages(recording, scored),
+            chart: scored.chart.iter().flatten().map(site).collect(),
             metrics: metrics.collect(),
             evidence: evidence.collect(),
             grade: scored.grade.as_ref().map(grade),
@@ -233,6 +257,24 @@ impl SessionFile {
     pub fn metric(&self, name: &str) -> Option<f64> {
         self.metrics.get(name).copied().flatten()
     }
+}
+
+fn site(result: &SiteResult) -> SiteFile {
+    SiteFile {
+        site: result.site.code().to_string(),
+        read_mm: result.reading.map(|r| r.read),
+        true_mm: hundredths(result.true_depth),
+        recession_mm: hundredths(result.recession),
+        force_n: result.reading.map(|r| hundredths(f64::from(r.force))),
+        at_s: result.reading.map(|r| r.at.seconds()),
+        calculus_marked: result.calculus_marked,
+        calculus: result.has_calculus,
+    }
+}
+
+/// A length or a force as finely as anybody means it.
+fn hundredths(value: f64) -> f64 {
+    (value * 100.0).round() / 100.0
 }
 
 fn yes() -> bool {

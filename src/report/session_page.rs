@@ -13,6 +13,7 @@ use super::said;
 use super::voxels::{self, About};
 use super::words;
 use crate::record::Recording;
+use crate::scenario::{Metric, Rubric, Scenario};
 use crate::score::{self, Scored, Verdict};
 use base64::Engine;
 use minijinja::value::Value;
@@ -37,7 +38,14 @@ struct SessionPage<'a> {
     slices: Vec<Figure>,
     plain: Vec<Figure>,
     curves: Value,
+    /// A flag on the curves stands for each moment that cost points.
+    has_flags: bool,
+    /// Key of what is said of the maps.
+    maps_about: &'static str,
+    is_filling: bool,
     stages: Vec<StageLine>,
+    /// The periodontal chart, cheek's side and tongue's.
+    chart: Vec<SiteLine>,
     measures: Vec<MeasureLine>,
     questionnaire: Option<QuestionnaireLines>,
     feedback: FeedbackLines,
@@ -159,6 +167,21 @@ struct StageLine {
 }
 
 #[derive(Serialize)]
+struct SiteLine {
+    site: String,
+    title: Value,
+    read: String,
+    truth: String,
+    difference: String,
+    /// Within a millimetre.
+    is_right: bool,
+    force: String,
+    /// What was said of calculus, and whether that is so; none where it was not asked for.
+    calculus: Option<Value>,
+    is_calculus_right: bool,
+}
+
+#[derive(Serialize)]
 struct AnswerLine {
     text: String,
     value: Value,
@@ -183,7 +206,7 @@ pub fn render(
     let feedback = feedback::of(session, &lapses, templates.rules(), &recording.scenario.tissues);
     let script = templates.script();
     let packed = voxels::pack(scored);
-    let data = data(templates, recording, session, &feedback, packed.as_ref().map(|v| &v.about));
+    let data = data(templates, recording, scored, session, &feedback, packed.as_ref().map(|v| &v.about));
     let page = SessionPage {
         session,
         summary: &recording.scenario.summary,
@@ -199,8 +222,16 @@ pub fn render(
         slices: figures(|s| *s == Shows::MapSlice),
         plain: figures(|s| !matches!(s, Shows::Map | Shows::MapSlice)),
         curves: Value::from_safe_string(drawn(scored, session, &feedback, templates.languages())),
+        has_flags: feedback.moments.iter().any(|moment| moment.at.is_some()),
+        maps_about: match (&scored.restoration, recording.scenario.stages.iter().any(|stage| stage.cutting)) {
+            (Some(_), _) => "maps.filling",
+            (None, true) => "maps.about",
+            (None, false) => "maps.whole",
+        },
+        is_filling: scored.restoration.is_some(),
         stages: in_all.stages(recording),
-        measures: in_all.measures(scored),
+        chart: session.chart.iter().map(|site| in_all.site(site)).collect(),
+        measures: in_all.measures(&recording.scenario, scored),
         questionnaire: questionnaire_lines(recording, session),
         feedback: in_all.feedback(&feedback),
         languages: languages(templates),
@@ -234,7 +265,8 @@ fn drawn(scored: &Scored, session: &SessionFile, feedback: &Feedback, languages:
         session.stages.iter().map(|s| curves::Span { title: &s.title, from: s.started_s, to: s.ended_s }).collect();
     let mark = |m: &Moment| Some(Mark { number: m.number, at: m.at?, span: m.span });
     let marks: Vec<Mark> = feedback.moments.iter().filter_map(mark).collect();
-    curves::svg(&scored.trace, &spans, &marks, languages)
+    let has_decay = !scored.replay.workpiece.lesions.is_empty();
+    curves::svg(&scored.trace, has_decay, &spans, &marks, languages)
 }
 
 /// What the page's script works with.
@@ -275,6 +307,7 @@ struct MomentData {
 fn data(
     templates: &Templates,
     recording: &Recording,
+    scored: &Scored,
     session: &SessionFile,
     feedback: &Feedback,
     voxels: Option<&About>,
@@ -299,13 +332,19 @@ fn data(
         seconds: session.servo.ticks as f64 * crate::tick::TICK_S,
         voxels,
         tissues: recording.scenario.tissues.entries().iter().map(tissue).collect(),
-        verdicts: Verdict::SEEN.iter().map(verdict).collect(),
+        verdicts: seen(scored).map(verdict).collect(),
         tools: recording.scenario.instruments.iter().map(|i| i.title.as_str()).collect(),
         moments: feedback.moments.iter().map(moment).collect(),
         words: languages.beginning("script."),
     };
     // Numbers are finite and keys are texts: writing cannot fail.
     serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c")
+}
+
+/// The verdicts that a session's maps may show.
+fn seen(scored: &Scored) -> impl Iterator<Item = &'static Verdict> + use<> {
+    let of_fillings: &[Verdict] = if scored.restoration.is_some() { &Verdict::OF_FILLINGS } else { &[] };
+    Verdict::SEEN.iter().chain(of_fillings)
 }
 
 /// Says in all languages what a session's numbers mean.
@@ -381,7 +420,11 @@ impl Speaker<'_> {
         }
     }
 
-    fn measures(&self, scored: &Scored) -> Vec<MeasureLine> {
+    /// Those that say something, and whatever the rubric asks for.
+    fn measures(&self, scenario: &Scenario, scored: &Scored) -> Vec<MeasureLine> {
+        let has_target = scenario.has_target();
+        let asked: Vec<&Metric> = scenario.rubric.iter().flat_map(Rubric::metrics).collect();
+        let is_told = |m: &&score::Measure| has_target || !m.metric.about.is_of_target() || asked.contains(&&m.metric);
         let line = |m: &score::Measure| {
             let name = m.metric.name();
             MeasureLine {
@@ -393,7 +436,7 @@ impl Speaker<'_> {
                 name,
             }
         };
-        scored.measures.all.iter().map(line).collect()
+        scored.measures.all.iter().filter(is_told).map(line).collect()
     }
 
     /// The signs are a second cue beside the colours.
@@ -412,7 +455,7 @@ impl Speaker<'_> {
                 amount: format!("{} mm³", words::number(count as f64 * voxel)),
             }
         };
-        Verdict::SEEN.iter().filter(|v| scored.verdicts.contains(v)).map(entry).collect()
+        seen(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
     }
 
     fn stages(&self, recording: &Recording) -> Vec<StageLine> {
@@ -429,6 +472,31 @@ impl Speaker<'_> {
             answers: result.answers.iter().map(|a| self.answer(a, result.started_s)).collect(),
         };
         stages.map(line).collect()
+    }
+
+    fn site(&self, site: &super::SiteFile) -> SiteLine {
+        let off = site.read_mm.map(|read| f64::from(read) - site.true_mm);
+        let none = || "–".to_string();
+        let calculus = site.calculus_marked.map(|marked| {
+            let key = match (marked, site.calculus) {
+                (true, true) => "chart.found",
+                (true, false) => "chart.false_alarm",
+                (false, true) => "chart.missed",
+                (false, false) => "chart.none",
+            };
+            self.html(&Said::text(key, &[]))
+        });
+        SiteLine {
+            title: self.html(&Said::text(format!("chart.site_{}", site.site.to_lowercase()), &[])),
+            site: site.site.clone(),
+            read: site.read_mm.map_or_else(none, |mm| mm.to_string()),
+            truth: format!("{:.1}", site.true_mm),
+            difference: off.map_or_else(none, |mm| format!("{mm:+.1}")),
+            is_right: off.is_some_and(|mm| mm.abs() <= 1.0),
+            force: site.force_n.map_or_else(none, |force| format!("{force:.2}")),
+            is_calculus_right: site.calculus_marked == Some(site.calculus),
+            calculus,
+        }
     }
 
     fn answer(&self, answer: &super::AnswerFile, stage_started: f64) -> AnswerLine {
@@ -578,11 +646,16 @@ mod tests {
         for key in keys {
             assert!(english.contains_key(&key), "en.json lacks {key}");
         }
-        for about in crate::scenario::metric::PLAIN.iter().chain(crate::scenario::metric::WITH_ARGUMENT) {
+        for about in crate::scenario::metric::every() {
             for kind in ["measure", "formula"] {
                 assert!(turkish.contains_key(&format!("{kind}.{}", about.name)), "tr.json lacks {kind}.{}", about.name);
             }
         }
-        assert!(Verdict::SEEN.iter().all(|v| turkish.contains_key(&format!("verdict.{}", v.id()))));
+        assert!(
+            Verdict::SEEN
+                .iter()
+                .chain(&Verdict::OF_FILLINGS)
+                .all(|v| turkish.contains_key(&format!("verdict.{}", v.id())))
+        );
     }
 }

@@ -66,7 +66,9 @@ pub fn pack(scored: &Scored) -> Option<Voxels> {
 }
 
 fn pack_every(scored: &Scored, stride: u32) -> Option<Voxels> {
-    let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
+    let after = &scored.replay.volume;
+    let begun = begun_with_filling(scored);
+    let before = begun.as_ref().unwrap_or(&scored.replay.workpiece.volume);
     let all = Selection::of(before, stride)?;
     let changed = all.part_where(|v| before.densities()[v] != after.densities()[v]);
     let step = |volume: &Volume, voxel: usize| volume.densities()[voxel].bits() >> STEP_BITS;
@@ -92,7 +94,7 @@ fn pack_every(scored: &Scored, stride: u32) -> Option<Voxels> {
         dims,
         spacing_mm: (all.whole.spacing * stride as f32).to_array(),
         origin_mm: all.whole.centre(first).to_array(),
-        is_mirrored: scored.replay.workpiece.teeth.first().is_some_and(|tooth| tooth.distal().y < 0.0),
+        is_mirrored: scored.replay.workpiece.distal().y < 0.0,
         first,
         stride,
         changed_low: std::array::from_fn(|a| (changed.first[a] - first[a]) / stride),
@@ -101,6 +103,17 @@ fn pack_every(scored: &Scored, stride: u32) -> Option<Voxels> {
         held,
     };
     Some(Voxels { about, packed: packed(parts.iter().map(|(_, bytes)| bytes.as_slice())) })
+}
+
+/// What a page of a filling begins with: all that stays is there from the beginning, since a page only knows how matter goes.
+fn begun_with_filling(scored: &Scored) -> Option<Volume> {
+    scored.restoration.as_ref()?;
+    let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
+    let mut begun = Volume::clone(before);
+    for voxel in (0..after.grid().len()).filter(|&v| after.densities()[v] > before.densities()[v]) {
+        begun.set(voxel, after.voxel(voxel));
+    }
+    Some(begun)
 }
 
 fn has_fallen(scored: &Scored, voxel: usize) -> bool {

@@ -1,7 +1,8 @@
 //! A bundle's files: these, by these names, and nothing that lies elsewhere.
 
-use super::chance::hex;
 use crate::report::SessionFile;
+use crate::report::cohort::read_session;
+use crate::scenario::hex;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::Read;
@@ -49,6 +50,11 @@ pub fn file_within(folder: &Path, bundle: &Path, name: &str) -> Result<PathBuf, 
         true => Ok(real),
         false => Err("outside-folder: it is a link that leads out of the bundle, or no file".into()),
     }
+}
+
+/// What a bundle's `session.json` says now.
+pub fn session(folder: &Path, bundle: &Path) -> Result<SessionFile, String> {
+    file_within(folder, bundle, "session.json").and_then(|path| read_session(&path))
 }
 
 /// A file's bytes, to be handed on.

@@ -4,6 +4,7 @@
 //! person, not even by trying every name.
 
 use super::chance;
+use crate::scenario::hex;
 use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -57,7 +58,7 @@ impl Codes {
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
         let mut file = options.open(&partial).map_err(unwritable)?;
-        file.write_all(format!("{}\n", chance::hex(&chance::bytes()?)).as_bytes()).map_err(unwritable)?;
+        file.write_all(format!("{}\n", hex(&chance::bytes()?)).as_bytes()).map_err(unwritable)?;
         file.sync_all().map_err(unwritable)?;
         let linked = fs::hard_link(&partial, &path);
         // A disk without hard links has no second program in practice.
@@ -86,7 +87,7 @@ impl Codes {
 
     /// Tells this secret from another, and nothing else.
     pub fn fingerprint(&self) -> String {
-        chance::hex(&chance::mark(&self.secret, b"fingerprint")[..8])
+        hex(&chance::mark(&self.secret, b"fingerprint")[..8])
     }
 }
 

@@ -10,7 +10,6 @@ use super::origin::{Foreign, Names};
 use super::overrides::{Log, Told, Trouble};
 use super::route::Route;
 use super::{compare, export, history, judging, list, sitting};
-use crate::report::cohort::read_session;
 use crate::report::{Said, SessionFile, harmless};
 use jiff::Timestamp;
 use serde::Serialize;
@@ -313,9 +312,8 @@ impl Desk {
     fn picture(&self, id: &str, stem: &str) -> Response {
         let listed = self.state().index.session(id);
         let bytes = match listed {
-            Ok(Some(listed)) => bundle::file_within(&self.folder, &listed.path, "session.json")
-                .and_then(|path| read_session(&path))
-                .and_then(|s| bundle::read_named(&self.folder, &listed.path, &bundle::picture(stem), &s)),
+            Ok(Some(listed)) => bundle::session(&self.folder, &listed.path)
+                .and_then(|session| bundle::read_named(&self.folder, &listed.path, &bundle::picture(stem), &session)),
             _ => Err(String::new()),
         };
         match bytes {
@@ -344,8 +342,7 @@ impl Desk {
         drop(state);
         let missing = || Box::new(self.complain(visit, 404, &[Said::text("complaint.no_session", &[])]));
         let listed = listed.ok().flatten().ok_or_else(missing)?;
-        let file = bundle::file_within(&self.folder, &listed.path, "session.json").and_then(|path| read_session(&path));
-        match file {
+        match bundle::session(&self.folder, &listed.path) {
             Ok(session) if crate::handover::session_id(&session) == id => Ok(Case { told, listed, session }),
             _ => Err(missing()),
         }

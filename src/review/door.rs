@@ -5,6 +5,7 @@
 //! own pages only.
 
 use super::chance;
+use crate::scenario::hex;
 use std::collections::BTreeMap;
 use std::net::IpAddr;
 
@@ -109,7 +110,7 @@ impl Door {
     }
 
     fn renew(&mut self) -> Result<String, String> {
-        let token = chance::hex(&chance::bytes()?);
+        let token = hex(&chance::bytes()?);
         self.fresh = chance::mark(&self.key, token.as_bytes());
         Ok(token)
     }
@@ -157,8 +158,8 @@ impl Door {
     }
 
     fn let_in(&mut self, now: i64) -> Result<String, String> {
-        let cookie = chance::hex(&chance::bytes()?);
-        let form = chance::hex(&chance::bytes()?);
+        let cookie = hex(&chance::bytes()?);
+        let form = hex(&chance::bytes()?);
         self.guests.retain(|_, guest| now - guest.seen < STAYS);
         if self.guests.len() >= GUESTS_MAX
             && let Some(quietest) = self.guests.iter().min_by_key(|(_, g)| g.seen).map(|(mark, _)| *mark)

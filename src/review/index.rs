@@ -4,14 +4,14 @@
 //! only.
 
 use super::bundle;
-use super::chance::hex;
 use super::codes::Codes;
 use super::overrides::{Head, Told, Trouble};
 use super::query::{Outcome, Query, Sort, folded};
 use super::standing::standing;
 use crate::handover::session_id;
-use crate::report::cohort::{find, read_session};
+use crate::report::cohort::find;
 use crate::report::{GradeFile, SessionFile};
+use crate::scenario::hex;
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, Row, params, params_from_iter};
 use sha2::{Digest, Sha256};
@@ -117,8 +117,6 @@ impl Index {
                 }
             },
         };
-        // What another program may have written there meanwhile is not believed: every bundle is read once by every desk.
-        connection.execute("DELETE FROM session", []).map_err(|e| format!("{FILE_NAME}: unusable-cache: {e}"))?;
         Ok(Index { path, connection, codes, homeless, judged: None })
     }
 
@@ -162,7 +160,7 @@ impl Index {
             let stamp = stamp(file);
             if known.remove(&name) != Some(stamp) {
                 let read = match is_text {
-                    true => bundle::file_within(folder, bundle, "session.json").and_then(|path| read_session(&path)),
+                    true => bundle::session(folder, bundle),
                     false => Err("its folder's name is not UTF-8".into()),
                 };
                 fresh.push(Fresh { path: name, stamp, read });
@@ -308,18 +306,15 @@ fn tables(mut connection: Connection, secret: &str) -> rusqlite::Result<Connecti
         change.pragma_update(None, "user_version", VERSION)?;
         change.execute("INSERT INTO known (name, value) VALUES ('secret', ?1)", [secret])?;
     }
-    let own: String = change.query_row("SELECT value FROM known WHERE name = 'secret'", [], |row| row.get(0))?;
-    change.commit()?;
-    match (version, own == secret) {
-        (0 | VERSION, true) => Ok(connection),
-        (0 | VERSION, false) => {
-            // Codes under another secret: every bundle is read again.
-            connection.execute("DELETE FROM session", [])?;
-            connection.execute("UPDATE known SET value = ?1 WHERE name = 'secret'", [secret])?;
-            Ok(connection)
-        }
-        _ => Err(rusqlite::Error::InvalidQuery),
+    if !matches!(version, 0 | VERSION) {
+        return Err(rusqlite::Error::InvalidQuery);
     }
+    // What another program may have written there meanwhile is not believed, and codes may be of another secret: every desk
+    // reads every bundle once.
+    change.execute("DELETE FROM session", [])?;
+    change.execute("UPDATE known SET value = ?1 WHERE name = 'secret'", [secret])?;
+    change.commit()?;
+    Ok(connection)
 }
 
 /// Takes the cache away, with the journal of a change that was never finished: the next cache would be mended by it.

@@ -28,7 +28,7 @@ pub use desk::{Desk, Options};
 pub use door::{Lock, PASSWORD_MIN};
 pub use exchange::{BODY_MAX, Request, Response};
 pub use look::Look;
-pub use overrides::{Entry, FILE_NAME as OVERRIDES, Judged, Log, Told, Trouble};
+pub use overrides::{Entry, FILE_NAME as OVERRIDES, Judged, Log, Told, Trouble, Unwritten};
 pub use standing::{Standing, applied};
 
 /// What an address asks for, as it may stand in a log; no part of the address itself.

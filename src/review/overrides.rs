@@ -5,7 +5,7 @@
 //! all of it from some line on makes a log that agrees with itself. Who must be safe from that writes down the last line's digest,
 //! which every page and every export shows.
 
-use super::chance::hex;
+use crate::scenario::hex;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
@@ -272,6 +272,13 @@ fn sync_folder(path: &Path) {
 }
 
 impl Told {
+    /// Judgements that come from elsewhere than a log, in the order in which they were made: whoever keeps them vouches for them.
+    pub fn of(entries: Vec<Entry>) -> Told {
+        let next = entries.len() as u64 + 1;
+        let lines = entries.into_iter().map(|entry| Line { entry, doubtful: false }).collect();
+        Told { lines, next, ..Told::default() }
+    }
+
     /// What stands: of each session and item the last judgement that counts.
     pub fn counting(&self) -> impl Iterator<Item = &Entry> {
         self.lines.iter().filter(|line| !line.doubtful).map(|line| &line.entry)

@@ -3,6 +3,11 @@
 //! Every key, unit and range here is the contract with authors: the JSON Schema for editors and the reader's complaints
 //! both come from these types. What the keys mean together is decided in [`super::resolve`].
 
+pub use super::arch_file::*;
+pub use super::cavity_file::*;
+pub use super::decay_file::*;
+pub use super::gum_file::*;
+
 use crate::content::TissueEntry;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,6 +32,11 @@ pub struct ScenarioFile {
     pub summary: String,
     /// What there is to see and touch.
     pub scene: SceneFile,
+    /// Instruments of the school's own, besides those of `content/instruments.json`: a file with the same keys, relative to
+    /// the scenario's folder.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 500), regex(pattern = r"\.json$"))]
+    pub instrument_file: Option<String>,
     /// Changes to tissues of the table in `content/tissues.json`, by name.
     #[serde(default)]
     pub tissues: BTreeMap<String, TissueChange>,
@@ -112,6 +122,12 @@ pub struct JawFile {
     #[serde(default)]
     #[schemars(length(max = 20))]
     pub around: Option<Vec<ObstacleFile>>,
+    /// Gum round the tooth with a sulcus or pockets that a probe finds. Without it a plain gum that has none.
+    #[serde(default)]
+    pub periodontium: Option<PeriodontiumFile>,
+    /// How the teeth of both jaws stand.
+    #[serde(default)]
+    pub arch: ArchFile,
 }
 
 /// Something that can be touched but is never carved.
@@ -163,10 +179,21 @@ pub struct ToothFile {
     #[serde(default)]
     #[schemars(length(max = 20))]
     pub decay: Vec<DecayFile>,
+    /// A cavity that is prepared already, to be filled.
+    #[serde(default)]
+    pub cavity: Option<CavityFile>,
     /// Colour without softness: what looks like decay and is sound. Written as decay is; its tissue must be a sound one.
     #[serde(default)]
     #[schemars(length(max = 20))]
     pub stains: Vec<StainFile>,
+    /// Hard deposits on root and neck; the tooth must stand in a jaw with "periodontium".
+    #[serde(default)]
+    #[schemars(length(max = 20))]
+    pub calculus: Vec<CalculusFile>,
+    /// Fillings that the tooth has had for long.
+    #[serde(default)]
+    #[schemars(length(max = 10))]
+    pub old_fillings: Vec<FillingFile>,
 }
 
 /// Where a tooth's shape comes from.
@@ -223,201 +250,6 @@ pub struct LabelsFile {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct SpacingFile(#[schemars(range(min = 0.01, max = 2.0))] pub f32);
-
-/// One decayed place.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DecayFile {
-    /// Name by which questions refer to the decay: small letters, digits, hyphens, underscores.
-    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
-    pub id: String,
-    /// Tissue of which the decay is made.
-    #[serde(default = "caries")]
-    pub tissue: String,
-    /// Shape of the decay; only its part within the tooth's hard tissue counts.
-    pub shape: DecayShapeFile,
-    /// Surface on which the decay lies.
-    #[serde(default)]
-    pub surface: SurfaceFile,
-    /// Where on that surface.
-    #[serde(default)]
-    pub at: DecayPlaceFile,
-    /// How deep a sphere's or ellipsoid's centre lies under the surface, mm: -3 (above it) to 8.
-    #[serde(default)]
-    #[schemars(range(min = -3.0, max = 8.0))]
-    pub depth_mm: f32,
-    /// What lies around the core of a fissure or smooth lesion: firmer decay, say. Without it all of it is of one tissue.
-    #[serde(default)]
-    pub rim: Option<RimFile>,
-}
-
-/// One stained place.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StainFile {
-    /// Name of the place: small letters, digits, hyphens, underscores.
-    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
-    pub id: String,
-    /// Tissue of which the stain is made.
-    #[serde(default = "stain")]
-    pub tissue: String,
-    /// Shape of the stain; only its part within the tooth's sound tissue counts.
-    pub shape: DecayShapeFile,
-    /// Surface on which the stain lies.
-    #[serde(default)]
-    pub surface: SurfaceFile,
-    /// Where on that surface.
-    #[serde(default)]
-    pub at: DecayPlaceFile,
-    /// How deep a sphere's or ellipsoid's centre lies under the surface, mm: -3 (above it) to 8.
-    #[serde(default)]
-    #[schemars(range(min = -3.0, max = 8.0))]
-    pub depth_mm: f32,
-}
-
-fn stain() -> String {
-    "stain".into()
-}
-
-/// The outer part of a lesion.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RimFile {
-    /// Tissue of which the rim is made.
-    pub tissue: String,
-    /// How far it reaches from the lesion's border toward its core, as a share of that way: 0.05 to 0.95.
-    #[serde(default = "half")]
-    #[schemars(range(min = 0.05, max = 0.95))]
-    pub share: f32,
-}
-
-fn half() -> f32 {
-    0.5
-}
-
-fn caries() -> String {
-    "caries".into()
-}
-
-/// Shape of a decay.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum DecayShapeFile {
-    Sphere(SphereFile),
-    Ellipsoid(EllipsoidFile),
-    /// Follows the groove of the chewing surface that is nearest to the place, and spreads under the enamel.
-    Fissure(FissureFile),
-    /// Comes in through a smooth surface, narrows in the enamel and spreads under it; on a root it begins in the dentine.
-    Smooth(SmoothFile),
-}
-
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct FissureFile {
-    /// How deep it has come; of several one is drawn by the session's seed.
-    #[schemars(length(min = 1, max = 5))]
-    pub reaches: Vec<ReachFile>,
-    /// How long it is, by way of the groove, mm: 0.5 to 15.
-    #[schemars(range(min = 0.5, max = 15.0))]
-    pub length_mm: f32,
-    /// How far it has spread to each side along the border of enamel and dentine, mm: 0.2 to 4.
-    #[serde(default = "one_mm")]
-    #[schemars(range(min = 0.2, max = 4.0))]
-    pub spread_mm: f32,
-}
-
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SmoothFile {
-    /// How deep it has come; of several one is drawn by the session's seed.
-    #[schemars(length(min = 1, max = 5))]
-    pub reaches: Vec<ReachFile>,
-    /// Width on the surface, along the first of the surface's two directions as `offset_mm` has them, mm: 0.4 to 10.
-    #[schemars(range(min = 0.4, max = 10.0))]
-    pub width_mm: f32,
-    /// Height on the surface, mm: 0.4 to 10.
-    #[schemars(range(min = 0.4, max = 10.0))]
-    pub height_mm: f32,
-    /// How far it has spread to each side along the border of enamel and dentine, mm: 0.2 to 4.
-    #[serde(default = "one_mm")]
-    #[schemars(range(min = 0.2, max = 4.0))]
-    pub spread_mm: f32,
-}
-
-fn one_mm() -> f32 {
-    1.0
-}
-
-/// How deep a lesion has come, in the thirds in which radiographs are read (ICCMS 2014).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum ReachFile {
-    /// RA1: the outer half of the enamel.
-    OuterEnamel,
-    /// RA2: the inner half of the enamel.
-    InnerEnamel,
-    /// RA3: the outer third of the dentine.
-    OuterDentine,
-    /// RB4: the middle third of the dentine.
-    MiddleDentine,
-    /// RC5: the inner third of the dentine, short of the pulp.
-    InnerDentine,
-}
-
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SphereFile {
-    /// mm, 0.2 to 6.
-    #[schemars(range(min = 0.2, max = 6.0))]
-    pub radius_mm: f32,
-}
-
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct EllipsoidFile {
-    /// Half axes: buccolingual, mesiodistal, occlusoapical.
-    pub radii_mm: [RadiusFile; 3],
-}
-
-/// Half an axis, mm: 0.2 to 6.
-#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct RadiusFile(#[schemars(range(min = 0.2, max = 6.0))] pub f32);
-
-/// Surface of a tooth: mesial, occlusal, distal, buccal or lingual.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
-pub enum SurfaceFile {
-    M,
-    #[default]
-    O,
-    D,
-    B,
-    L,
-}
-
-/// Where on a surface a decay lies.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum DecayPlaceFile {
-    /// In the middle of the surface.
-    #[default]
-    Centre,
-    /// In one of the four quadrants of the occlusal surface, drawn by the session's seed.
-    RandomQuadrant,
-    /// Anywhere on the surface, drawn by the session's seed.
-    Random,
-    /// In a quadrant of the occlusal surface, counted as the trainee sees it from above: 1 upper left, 2 upper right,
-    /// 3 lower left, 4 lower right.
-    Quadrant(#[schemars(range(min = 1, max = 4))] u8),
-    /// At a distance from the middle of the surface: on the occlusal one buccal and distal, on the buccal and lingual ones
-    /// distal and occlusal, on the mesial and distal ones buccal and occlusal; mm.
-    OffsetMm([OffsetFile; 2]),
-}
-
-/// mm, -8 to 8.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(transparent)]
-pub struct OffsetFile(#[schemars(range(min = -8.0, max = 8.0))] pub f32);
 
 /// New values for a tissue of the table; what is left out stays.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
@@ -711,9 +543,13 @@ pub struct StageFile {
     #[serde(default)]
     #[schemars(length(min = 1, max = 50))]
     pub instruments: Option<Vec<String>>,
-    /// Whether burs run.
+    /// Whether burs run, and whether blades such as spoon excavators and carvers cut.
     #[serde(default)]
     pub cutting: bool,
+    /// The filling that carriers and plastic instruments lay in this stage: a tissue with "packing", such as
+    /// "fresh_amalgam" or "fresh_composite".
+    #[serde(default)]
+    pub filling: Option<String>,
     /// Whether decay is shown in its colour.
     #[serde(default)]
     pub show_decay: bool,
@@ -727,6 +563,11 @@ pub struct StageFile {
     /// What leads the trainee's hand during the stage.
     #[serde(default)]
     pub guidance: Option<GuidanceFile>,
+    /// What the trainee notes in the tooth's periodontal chart: the site is the one where the instrument is. The tooth must stand in
+    /// a jaw with "periodontium".
+    #[serde(default)]
+    #[schemars(length(max = 2))]
+    pub chart: Vec<ChartFile>,
     /// What the trainee is asked; can be answered at any time during the stage.
     #[serde(default)]
     #[schemars(length(max = 20))]

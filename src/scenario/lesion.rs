@@ -3,7 +3,7 @@
 use super::file::SurfaceFile;
 use super::workpiece::{Side, ToothPlace, Workpiece, anatomy_tissues};
 use super::{Decay, DecayPlace, DecayShape, Grown, GrownEntry};
-use crate::anatomy::caries::{self, Entry, Groove, Growth};
+use crate::anatomy::caries::{self, Entry, Groove, Growth, Patch};
 use crate::content::{Role, TissueTable};
 use crate::frame::Vec3;
 use crate::volume::{ISO, Label, Volume};
@@ -94,6 +94,13 @@ impl Site {
     }
 }
 
+/// The occlusal surface where a place says; the seed decides what is left to chance.
+pub(super) fn surface_over(at: DecayPlace, place: &ToothPlace, volume: &Volume, seed: u64) -> Vec3 {
+    let shape = DecayShape::Ellipsoid { radii: [1.0; 3], depth: 0.0 };
+    let patch = Decay { id: "cavity".into(), label: Label::AIR, shape, surface: SurfaceFile::O, place: at };
+    Site::of(&patch, place, volume, Side::All, seed).surface
+}
+
 /// Where a decay lies, in a volume that may hold it already.
 pub(super) fn locate(
     decay: &Decay,
@@ -169,7 +176,7 @@ fn put_grown(
             let [u, v] = site.axes;
             let v = v.reject_from_normalized(inward).normalize_or(v);
             let u = v.cross(inward) * u.dot(v.cross(inward)).signum();
-            Entry::Smooth { at: site.surface, inward, axes: [u, v], half }
+            Entry::Smooth(Patch { at: site.surface, inward, axes: [u, v], half })
         }
     };
     let drawn = draw(seed, &format!("{}/reach", decay.id)) % grown.reaches.len() as u64;

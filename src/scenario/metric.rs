@@ -39,6 +39,29 @@ pub enum Argument {
     ToleranceMm(f32),
 }
 
+/// Measures that say nothing where there was nothing to remove: their rules for empty sets would read as praise.
+const OF_TARGET: [&str; 13] = [
+    "decay_cleared_pct",
+    "healthy_per_decay_pct",
+    "efficiency_pct_s",
+    "dice",
+    "jaccard",
+    "precision",
+    "recall",
+    "hausdorff_mm",
+    "hausdorff95_mm",
+    "overcut_depth_max_mm",
+    "undercut_depth_max_mm",
+    "surface_within_tol",
+    "time_to_clear_s",
+];
+
+impl About {
+    pub fn is_of_target(&self) -> bool {
+        OF_TARGET.contains(&self.name)
+    }
+}
+
 use Better::{Higher, Lower, Neither};
 
 const fn about(
@@ -66,7 +89,7 @@ pub const PLAIN: &[About] = &[
         "Time of the cutting stage",
         "s",
         Lower,
-        "end − start of the last stage in which burs run",
+        "end − start of the last stage in which tooth or filling is cut",
     ),
     about(
         "detect_tooth",
@@ -127,7 +150,13 @@ pub const PLAIN: &[About] = &[
         Lower,
         "symmetric, between the borders of R and T; none if either is empty",
     ),
-    about("hausdorff95_mm", "Distance between outlines, 95 %", "mm", Lower, "95th percentile of the same distances"),
+    about(
+        "hausdorff95_mm",
+        "Distance between outlines, 95 %",
+        "mm",
+        Lower,
+        "95th percentile of the distances of which hausdorff_mm is the greatest",
+    ),
     about(
         "overcut_depth_max_mm",
         "Deepest cut into sound tissue",
@@ -232,6 +261,103 @@ pub const PLAIN: &[About] = &[
     about("session_time_s", "Length of the session", "s", Neither, "all stages together"),
 ];
 
+/// Measures of fillings, for exercises that begin with a prepared cavity. C the cavity, S the surface at the end, O the tooth's
+/// original contour.
+pub const OF_FILLINGS: &[About] = &[
+    about("filled_pct", "Cavity filled", "%", Higher, "100·|filled∩C| / |C|"),
+    about(
+        "contour_mean_mm",
+        "Mean distance from the original contour",
+        "mm",
+        Lower,
+        "mean distance of S from O, along O's normals, over the cavity's mouth and wherever material lies on the tooth",
+    ),
+    about(
+        "contour_p95_mm",
+        "Distance from the original contour, 95 %",
+        "mm",
+        Lower,
+        "95th percentile of the distances of S from O that contour_mean_mm is the mean of",
+    ),
+    about(
+        "contour_max_mm",
+        "Greatest distance from the original contour",
+        "mm",
+        Lower,
+        "greatest of the distances of S from O that contour_mean_mm is the mean of",
+    ),
+    about(
+        "overhang_max_mm",
+        "Highest overhang",
+        "mm",
+        Lower,
+        "greatest distance by which S lies outside O; nowhere: 0",
+    ),
+    about("deficit_max_mm", "Deepest deficit", "mm", Lower, "greatest distance by which S lies inside O; nowhere: 0"),
+    about(
+        "overhang_mm3",
+        "Material outside the original contour",
+        "mm³",
+        Lower,
+        "volume laid outside O, from densities",
+    ),
+    about("void_mm3", "Voids in the filling", "mm³", Lower, "volume of air in C that matter encloses on all sides"),
+];
+
+/// Measures of a periodontal chart, computed where a stage asks for one. Sites are the six of the tooth.
+pub const CHARTING: &[About] = &[
+    about("sites_read_pct", "Sites probed", "%", Higher, "100·sites with a reading / 6"),
+    about(
+        "probing_within_1mm_pct",
+        "Readings within 1 mm",
+        "%",
+        Higher,
+        "100·sites with |reading − true depth| ≤ 1 mm / 6; a site without a reading is not within",
+    ),
+    about(
+        "probing_error_mm",
+        "Mean error of the readings",
+        "mm",
+        Lower,
+        "mean of |reading − true depth| over the sites with a reading; none without any",
+    ),
+    about(
+        "probing_bias_mm",
+        "Readings too deep or too shallow",
+        "mm",
+        Neither,
+        "mean of reading − true depth over the sites with a reading: positive is too deep; none without any",
+    ),
+    about(
+        "probing_force_max_n",
+        "Greatest probing force",
+        "N",
+        Lower,
+        "greatest force at the moment of a reading; none without any",
+    ),
+    about(
+        "probing_force_high",
+        "Readings with too much force",
+        "",
+        Lower,
+        "readings at which the probe was pressed with more than 0.35 N (0.25 N is taught)",
+    ),
+    about(
+        "calculus_found_pct",
+        "Calculus found",
+        "%",
+        Higher,
+        "100·sites with calculus that were marked / sites with calculus; none without calculus or if not asked",
+    ),
+    about(
+        "calculus_false_alarms",
+        "Calculus marked where there is none",
+        "",
+        Lower,
+        "sites that were marked and have none; none if not asked",
+    ),
+];
+
 /// Measures with an argument in brackets.
 pub const WITH_ARGUMENT: &[About] = &[
     about("zone_removed_pct", "Zone removed", "%", Neither, "100·|R∩Z| / |Z|; empty zone: none"),
@@ -263,7 +389,7 @@ impl Metric {
             },
             None => (written, None),
         };
-        if let Some(about) = PLAIN.iter().find(|a| a.name == name) {
+        if let Some(about) = without_argument().find(|a| a.name == name) {
             return match inner {
                 None => Ok(Metric { about, argument: None }),
                 Some(_) => Err(Unknown::Argument("this measure takes nothing in brackets")),
@@ -305,9 +431,19 @@ impl fmt::Display for Metric {
     }
 }
 
+/// Every measure that takes nothing in brackets, in the order of reports.
+pub fn without_argument() -> impl Iterator<Item = &'static About> + Clone {
+    PLAIN.iter().chain(OF_FILLINGS).chain(CHARTING)
+}
+
+/// Every measure.
+pub fn every() -> impl Iterator<Item = &'static About> + Clone {
+    without_argument().chain(WITH_ARGUMENT)
+}
+
 /// Every name that can be written, for complaints.
 pub fn names() -> impl Iterator<Item = &'static str> + Clone {
-    PLAIN.iter().chain(WITH_ARGUMENT).map(|a| a.name)
+    every().map(|a| a.name)
 }
 
 #[cfg(test)]
@@ -319,7 +455,7 @@ mod tests {
         for name in ["dice", "zone_removed_pct(target)", "surface_within_tol(0.3)"] {
             assert_eq!(Metric::parse(name).map(|m| m.name()), Ok(name.to_string()));
         }
-        for about in PLAIN {
+        for about in without_argument() {
             assert!(Metric::parse(about.name).is_ok(), "{}", about.name);
         }
     }

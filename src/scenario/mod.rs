@@ -3,6 +3,12 @@
 //! Takes a scenario's text and the files it names. Gives a complete, valid [`Scenario`], or every complaint there is; and
 //! the [`Workpiece`] a session starts from. Never runs anything.
 
+mod arch_file;
+mod cavity;
+mod cavity_file;
+mod decay_file;
+mod gum_file;
+mod deposit;
 pub mod file;
 mod lesion;
 pub mod metric;
@@ -11,6 +17,8 @@ mod resolve;
 mod schema;
 mod workpiece;
 
+pub use crate::anatomy::periodontium::{Periodontium, Pockets, Site};
+pub use cavity::{Cavity, Proximal};
 pub use lesion::Lesion;
 pub use metric::Metric;
 pub use questionnaire::{Category, Item, Questionnaire};
@@ -23,7 +31,7 @@ use crate::content::{InstrumentEntry, TissueTable};
 use crate::frame::Vec3;
 use crate::touch::{Carving, Factors, Guidance, Shape, Vibration};
 use crate::volume::{Label, Volume};
-use file::{SurfaceFile, ZoneRole};
+use file::{AngleClassFile, SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -81,6 +89,28 @@ pub struct Scene {
     pub teeth: Vec<Tooth>,
     /// What stands around a tooth in its jaw, tooth space; `None` for plain shapes of average size.
     pub around: Option<Vec<Shape>>,
+    /// Gum with pockets, only in a jaw.
+    pub pockets: Option<Pockets>,
+    pub arch: Arch,
+}
+
+/// How the teeth of both jaws stand; mm.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Arch {
+    pub upper: ArchForm,
+    pub lower: ArchForm,
+    pub angle_class: AngleClassFile,
+    /// Numbers of teeth that are not there.
+    pub missing: Vec<u8>,
+    /// Numbers of teeth that are turned, and by how much, degrees.
+    pub rotated: Vec<(u8, f32)>,
+}
+
+/// Of one jaw; `None` for the average.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ArchForm {
+    pub width: Option<f32>,
+    pub depth: Option<f32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,13 +133,34 @@ pub struct Tooth {
     pub decay: Vec<Decay>,
     /// Colour without softness.
     pub stains: Vec<Decay>,
+    /// Cut out before the session begins.
+    pub cavity: Option<Cavity>,
+    pub calculus: Vec<Calculus>,
+    pub fillings: Vec<Filling>,
 }
 
-impl Tooth {
-    /// Which way is distal in tooth space: +y in the upper right and the lower left of the mouth, −y elsewhere.
-    pub fn distal(&self) -> Vec3 {
-        distal(self.fdi)
-    }
+/// A hard deposit on a root; mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calculus {
+    pub id: String,
+    pub label: Label,
+    pub site: Site,
+    /// Of its middle below the gum's margin.
+    pub below_margin: f32,
+    pub thickness: f32,
+    pub width: f32,
+    pub height: f32,
+}
+
+/// A filling from long ago, in the chewing surface; mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Filling {
+    pub id: String,
+    pub label: Label,
+    /// Of its middle from the crown's: buccal and distal.
+    pub offset: [f32; 2],
+    pub size: [f32; 2],
+    pub depth: f32,
 }
 
 /// Which way is distal in the tooth space of a tooth of this number: +y or −y.
@@ -216,6 +267,21 @@ impl Region {
         }
     }
 
+    /// True for a point within a region of a given shape, tooth space, mm; false where matter decides.
+    pub fn holds(&self, point_in_tooth: Vec3) -> bool {
+        let p = point_in_tooth;
+        match self {
+            Region::Sphere { centre, radius } => p.distance_squared(Vec3::from(*centre)) <= radius * radius,
+            Region::Box { min, max } => p.cmpge(Vec3::from(*min)).all() && p.cmple(Vec3::from(*max)).all(),
+            Region::Cylinder { from, to, radius } => {
+                let (from, axis) = (Vec3::from(*from), Vec3::from(*to) - Vec3::from(*from));
+                let along = (p - from).dot(axis) / axis.length_squared();
+                (0.0..=1.0).contains(&along) && (p - from - axis * along).length_squared() <= radius * radius
+            }
+            Region::Tissue(_) | Region::Around { .. } | Region::Mask(_) => false,
+        }
+    }
+
     /// The size of the label map that marks the region, if one does.
     pub fn map_dims(&self) -> Option<[u32; 3]> {
         if let Region::Mask(mask) = self { Some(mask.dims) } else { None }
@@ -240,12 +306,15 @@ pub struct Stage {
     /// Indices into [`Scenario::instruments`]; never empty.
     pub instruments: Vec<usize>,
     pub cutting: bool,
+    /// What carriers lay.
+    pub filling: Option<Label>,
     pub show_decay: bool,
     /// The trainee may change the tissues' coefficients.
     pub is_adjustable: bool,
     pub steps: Option<StiffnessSteps>,
     /// Index into [`Scenario::guidances`].
     pub guidance: Option<usize>,
+    pub chart: Charted,
     pub ask: Vec<Question>,
     pub ends: Ends,
 }
@@ -257,6 +326,13 @@ pub struct StiffnessSteps {
     pub coefficients: Vec<f32>,
     /// s
     pub step_time: f64,
+}
+
+/// What is noted in the periodontal chart during a stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Charted {
+    pub depths: bool,
+    pub calculus: bool,
 }
 
 /// What ends a stage besides its time limit.
@@ -316,6 +392,13 @@ pub struct Rubric {
     pub hard_fails: Vec<HardFail>,
 }
 
+impl Rubric {
+    /// Every measure that is asked for, those of hard fails last.
+    pub fn metrics(&self) -> impl Iterator<Item = &Metric> {
+        self.items.iter().map(|item| &item.metric).chain(self.hard_fails.iter().map(|fail| &fail.metric))
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct RubricItem {
     pub title: String,
@@ -356,6 +439,22 @@ impl Scenario {
     /// The last stage in which burs run.
     pub fn cutting_stage(&self) -> Option<usize> {
         self.stages.iter().rposition(|s| s.cutting)
+    }
+
+    /// Something is to be removed: decay, or what lies in a target zone.
+    pub fn has_target(&self) -> bool {
+        let has_zone = self.zones.iter().any(|zone| zone.role == ZoneRole::Target);
+        has_zone || self.scene.teeth.iter().any(|tooth| !tooth.decay.is_empty())
+    }
+
+    /// True where a tooth begins with a prepared cavity: a filling can be held against its contour.
+    pub fn has_cavity(&self) -> bool {
+        self.scene.teeth.iter().any(|tooth| tooth.cavity.is_some())
+    }
+
+    /// True where a prepared cavity is to be filled.
+    pub fn has_filling(&self) -> bool {
+        self.has_cavity() && self.stages.iter().any(|stage| stage.filling.is_some())
     }
 
     /// Every decay with the index of its tooth.

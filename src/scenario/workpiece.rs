@@ -3,13 +3,16 @@
 //! Takes a scenario and a seed, or a scenario and the volume of an earlier session. Gives the volume with its decay, where
 //! each tooth and each lesion lies, and what stands around. The same inputs give the same voxels.
 
+use super::cavity::Uncuttable;
+use super::deposit::{put_calculus, put_filling};
 use super::lesion::{Lesion, NoRoom, locate, put_in};
-use super::{Form, Layout, Scenario, Tooth, distal};
+use super::{Arch, Form, Layout, Scenario, Tooth, distal};
 use crate::anatomy;
+use crate::anatomy::periodontium::{Periodontium, Pockets, Standing};
 use crate::content::TissueTable;
 use crate::frame::{Pose, Quat, Vec3};
-use crate::touch::{self, Shape};
-use crate::volume::{Grid, Label, Volume};
+use crate::touch::{self, Field, Obstacle, Shape, Yield};
+use crate::volume::{Grid, Label, Volume, surface};
 use std::fmt;
 use std::sync::Arc;
 
@@ -17,10 +20,16 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Workpiece {
     pub volume: Arc<Volume>,
+    /// The same before its cavities were cut; `None` where none was. The original contour, with a tooth's decay in it.
+    pub original: Option<Arc<Volume>>,
     pub teeth: Vec<ToothPlace>,
     pub lesions: Vec<Lesion>,
     /// Gum and neighbours.
     pub around: Vec<Shape>,
+    /// Gum with a sulcus, where there is one.
+    pub periodontium: Option<Arc<Periodontium>>,
+    /// How the teeth around it stand.
+    pub arch: Arch,
     pub world_from_tooth: Pose,
 }
 
@@ -53,6 +62,16 @@ pub enum Unmakeable {
     NoGroove { tooth: usize, decay: usize },
     /// A stain holds no sound tissue, or finds no groove to follow: tooth and stain by index.
     StainOutside { tooth: usize, stain: usize },
+    /// A cavity meets no tissue: tooth by index.
+    CavityOutside { tooth: usize },
+    /// A cavity opens the pulp: tooth by index.
+    CavityInPulp { tooth: usize },
+    /// Calculus finds no root at its place: tooth and deposit by index.
+    NoRoot { tooth: usize, calculus: usize },
+    /// An old filling holds no hard tissue: tooth and filling by index.
+    FillingOutside { tooth: usize, filling: usize },
+    /// A pocket reaches below the root: by how much the deepest does, tenths of a millimetre.
+    PocketTooDeep { tenths: u32 },
     /// Two teeth of a pair have different voxel sizes.
     UnequalSpacing,
     /// A tooth has no enamel, so its crown cannot be told.
@@ -75,6 +94,13 @@ impl fmt::Display for Unmakeable {
                 f.write_str("there is no groove in the chewing surface near the decay's place")
             }
             Unmakeable::StainOutside { .. } => f.write_str("the stain finds no place in the tooth's sound tissue"),
+            Unmakeable::CavityOutside { .. } => f.write_str("the cavity lies outside the tooth"),
+            Unmakeable::CavityInPulp { .. } => f.write_str("the cavity opens the pulp"),
+            Unmakeable::NoRoot { .. } => f.write_str("the calculus finds no tooth at its place"),
+            Unmakeable::FillingOutside { .. } => f.write_str("the old filling lies outside the crown's hard tissue"),
+            Unmakeable::PocketTooDeep { tenths } => {
+                write!(f, "the deepest pocket ends {:.1} mm below the root's end", f64::from(*tenths) / 10.0)
+            }
             Unmakeable::UnequalSpacing => f.write_str("the two teeth have different voxel sizes"),
             Unmakeable::NoEnamel { .. } => f.write_str("the tooth has no enamel, so its crown cannot be told"),
             Unmakeable::ZoneSize { map, workpiece, .. } => write!(
@@ -95,7 +121,9 @@ const VOXELS_MAX: u64 = 130_000_000;
 impl Workpiece {
     /// Makes the matter of a scenario; the seed decides what the scenario leaves to chance.
     pub fn make(scenario: &Scenario, seed: u64) -> Result<Workpiece, Unmakeable> {
-        let mut parts = Vec::new();
+        // As they were before their cavities were cut; nobody asks for those of teeth without any.
+        let (mut parts, mut wholes) = (Vec::new(), Vec::new());
+        let has_cavity = scenario.has_cavity();
         for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
             let mut volume = form_of(tooth, &scenario.tissues)?;
             let place = place_of(tooth, &volume, &scenario.tissues).ok_or(Unmakeable::NoEnamel { tooth: index })?;
@@ -109,12 +137,38 @@ impl Workpiece {
                 volume = put_in(volume, patch, &place, &scenario.tissues, seed)
                     .map_err(|_| Unmakeable::StainOutside { tooth: index, stain })?;
             }
+            for (filling, written) in tooth.fillings.iter().enumerate() {
+                volume = put_filling(volume, written, &place, &scenario.tissues)
+                    .ok_or(Unmakeable::FillingOutside { tooth: index, filling })?;
+            }
+            if let Some(pockets) = scenario.scene.pockets.filter(|_| !tooth.calculus.is_empty()) {
+                let gum = periodontium(&volume, &place, pockets, &scenario.tissues);
+                for (calculus, deposit) in tooth.calculus.iter().enumerate() {
+                    volume =
+                        put_calculus(&volume, &gum, deposit).ok_or(Unmakeable::NoRoot { tooth: index, calculus })?;
+                }
+            }
+            if has_cavity {
+                wholes.push(volume.clone());
+            }
+            if let Some(cavity) = &tooth.cavity {
+                volume = cavity.cut(volume, &place, &scenario.tissues, seed).map_err(|reason| match reason {
+                    Uncuttable::Outside => Unmakeable::CavityOutside { tooth: index },
+                    Uncuttable::Pulp => Unmakeable::CavityInPulp { tooth: index },
+                })?;
+            }
             parts.push(volume);
         }
-        let volume = match scenario.scene.layout {
-            Layout::Pair { gap } => side_by_side(&parts, gap)?,
-            Layout::Single | Layout::Jaw => parts.swap_remove(0),
+        let together = |mut parts: Vec<Volume>| match scenario.scene.layout {
+            Layout::Pair { gap } => side_by_side(&parts, gap),
+            Layout::Single | Layout::Jaw => Ok(parts.swap_remove(0)),
         };
+        let original = if has_cavity { Some(Arc::new(together(wholes)?)) } else { None };
+        let volume = together(parts)?;
+        // A proximal box may take a pair's outermost place: teeth side by side then no longer lie where they lay.
+        if original.as_ref().is_some_and(|original| original.grid() != volume.grid()) {
+            return Err(Unmakeable::UnequalSpacing);
+        }
         if volume.grid().len() as u64 > VOXELS_MAX {
             return Err(Unmakeable::TooLarge { voxels: volume.grid().len() as u64 });
         }
@@ -123,29 +177,51 @@ impl Workpiece {
                 return Err(Unmakeable::ZoneSize { zone, map, workpiece: volume.grid().dims });
             }
         }
-        Workpiece::of(scenario, Arc::new(volume), seed)
+        Workpiece::of(scenario, Arc::new(volume), original, seed)
     }
 
-    /// The workpiece of a session whose first volume is known: from a recording.
-    pub fn of(scenario: &Scenario, volume: Arc<Volume>, seed: u64) -> Result<Workpiece, Unmakeable> {
+    /// The workpiece of a session whose first volume is known, and its original where it has cavities: from a recording.
+    pub fn of(
+        scenario: &Scenario,
+        volume: Arc<Volume>,
+        original: Option<Arc<Volume>>,
+        seed: u64,
+    ) -> Result<Workpiece, Unmakeable> {
+        let whole = original.as_ref().unwrap_or(&volume);
         let mut teeth = Vec::new();
         let mut lesions = Vec::new();
         for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
             let side = Side::of(scenario.scene.layout, index);
-            let place = place_within(tooth, &volume, &scenario.tissues, side);
+            let place = place_within(tooth, whole, &scenario.tissues, side);
             let place = place.ok_or(Unmakeable::NoEnamel { tooth: index })?;
-            lesions.extend(tooth.decay.iter().map(|decay| locate(decay, index, &place, &volume, side, seed)));
+            lesions.extend(tooth.decay.iter().map(|decay| locate(decay, index, &place, whole, side, seed)));
             teeth.push(place);
+        }
+        let gum = scenario.scene.pockets.map(|pockets| periodontium(&volume, &teeth[0], pockets, &scenario.tissues));
+        if let Some(gum) = &gum {
+            let beyond = teeth[0].low.z - gum.deepest();
+            if beyond > 0.0 {
+                return Err(Unmakeable::PocketTooDeep { tenths: (10.0 * beyond).ceil() as u32 });
+            }
         }
         let around = match (scenario.scene.layout, &scenario.scene.around) {
             (Layout::Jaw, Some(meshes)) => meshes.clone(),
-            (Layout::Jaw, None) => surroundings(&teeth[0], &scenario.tissues),
+            (Layout::Jaw, None) => {
+                surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch.missing, &scenario.tissues)
+            }
             (Layout::Single | Layout::Pair { .. }, _) => Vec::new(),
         };
         let low = teeth.iter().map(|t| t.crown_low).reduce(Vec3::min).unwrap_or_default();
         let high = teeth.iter().map(|t| t.crown_high).reduce(Vec3::max).unwrap_or_default();
         let world_from_tooth = world_above(Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z));
-        Ok(Workpiece { volume, teeth, lesions, around, world_from_tooth })
+        let periodontium = gum.map(Arc::new);
+        let arch = scenario.scene.arch.clone();
+        Ok(Workpiece { volume, original, teeth, lesions, around, periodontium, arch, world_from_tooth })
+    }
+
+    /// Which way is distal in the first tooth, tooth space.
+    pub fn distal(&self) -> Vec3 {
+        self.teeth.first().map_or(Vec3::Y, ToothPlace::distal)
     }
 
     /// The quadrant (1–4, as seen from above) of a point of tooth space on a tooth.
@@ -223,14 +299,24 @@ fn place_within(tooth: &Tooth, volume: &Volume, tissues: &TissueTable, side: Sid
     let grid = volume.grid();
     let mut whole = Bounds::EMPTY;
     let mut crown = Bounds::EMPTY;
-    for (index, label) in volume.tissues().enumerate().filter(|(_, l)| *l != Label::AIR) {
-        let point = grid.centre(grid.cell(index));
-        if side.holds(point) {
-            whole.add(point);
-            if label == enamel {
-                crown.add(point);
-            }
+    let [nx, ny, nz] = grid.dims;
+    for [y, z] in (0..nz).flat_map(|z| (0..ny).map(move |y| [y, z])) {
+        let centre = |x: u32| grid.centre([x, y, z]);
+        if !side.holds(centre(0)) {
+            continue;
         }
+        // Of a row the ends are enough: what a tooth measures is where it begins and ends.
+        let first = grid.index([0, y, z]);
+        let tissue = |x: u32| volume.tissue(first + x as usize);
+        let ends = |bounds: &mut Bounds, is_meant: &dyn Fn(Label) -> bool| {
+            if let Some(low) = (0..nx).find(|&x| is_meant(tissue(x))) {
+                let high = (low..nx).rfind(|&x| is_meant(tissue(x))).unwrap_or(low);
+                bounds.add(centre(low));
+                bounds.add(centre(high));
+            }
+        };
+        ends(&mut whole, &|label| label != Label::AIR);
+        ends(&mut crown, &|label| label == enamel);
     }
     let Bounds { low, high } = whole;
     let (crown_low, crown_high) = (crown.low, crown.high);
@@ -299,10 +385,16 @@ fn tight_extent(volume: &Volume) -> [Vec3; 2] {
     }
 }
 
+/// Distance between neighbouring crowns, mm: in contact, but for what a bur's run-out needs.
+const CONTACT_GAP: f32 = 0.05;
+
 /// Gum and two neighbours around a tooth, as plain shapes of average size.
-fn surroundings(tooth: &ToothPlace, tissues: &TissueTable) -> Vec<Shape> {
-    /// Distance between neighbouring crowns, mm: in contact, but for what a bur's run-out needs.
-    const CONTACT_GAP: f32 = 0.05;
+fn surroundings(
+    tooth: &ToothPlace,
+    periodontium: Option<&Periodontium>,
+    missing: &[u8],
+    tissues: &TissueTable,
+) -> Vec<Shape> {
     /// Rounding of a crown, mm.
     const ROUNDING: f32 = 1.8;
     let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
@@ -311,6 +403,9 @@ fn surroundings(tooth: &ToothPlace, tissues: &TissueTable) -> Vec<Shape> {
     // Across the arch and along it, mm.
     let own = sizes(tooth.fdi).map_or([10.5, 11.0], |s| [s.buccolingual[0], s.mesiodistal[0]]);
     let neighbour = |fdi: u8, toward: Vec3| {
+        if periodontium.is_some() {
+            return neighbour_as_grown(fdi, toward, tooth, label("neighbour"));
+        }
         let sizes = sizes(fdi)?;
         let half = Vec3::new(0.5 * sizes.buccolingual[0], 0.5 * sizes.mesiodistal[0], 4.5);
         let side = match toward.y < 0.0 {
@@ -323,7 +418,7 @@ fn surroundings(tooth: &ToothPlace, tissues: &TissueTable) -> Vec<Shape> {
             form: touch::Form::RoundBox { half, rounding: ROUNDING.min(0.6 * half.min_element()) },
         })
     };
-    let [mesial, distal] = beside(tooth.fdi);
+    let [mesial, distal] = beside(tooth.fdi).map(|fdi| fdi.filter(|fdi| !missing.contains(fdi)));
     let gum_half = Vec3::new(0.5 * own[0] + 1.25, 22.0, 8.0);
     let gum = Shape {
         label: label("gingiva"),
@@ -332,7 +427,84 @@ fn surroundings(tooth: &ToothPlace, tissues: &TissueTable) -> Vec<Shape> {
     };
     let mesial = mesial.and_then(|fdi| neighbour(fdi, -tooth.distal()));
     let distal = distal.and_then(|fdi| neighbour(fdi, tooth.distal()));
-    mesial.into_iter().chain(distal).chain([gum]).collect()
+    let gum = match periodontium {
+        Some(periodontium) => gum_with_pockets(tooth, periodontium, gum, label("attachment")),
+        None => vec![gum],
+    };
+    mesial.into_iter().chain(distal).chain(gum).collect()
+}
+
+/// A neighbour with the form of its kind: a probe beside it goes where there is room.
+fn neighbour_as_grown(fdi: u8, toward: Vec3, tooth: &ToothPlace, label: Label) -> Option<Shape> {
+    /// Voxels, mm: what is only met from the side needs no fissures.
+    const SPACING: f32 = 0.3;
+    /// Of its root so much is kept below the neck, mm: deeper no probe goes.
+    const ROOT: f32 = 7.0;
+    let form = anatomy::teeth::tooth(fdi)?;
+    let whole = anatomy::grid_of_spacing(&form, SPACING);
+    let cut = (((-ROOT - whole.origin.z) / SPACING).max(0.0) as u32).min(whole.dims[2] - 2);
+    let [nx, ny, nz] = whole.dims;
+    let origin = whole.origin + Vec3::Z * (cut as f32 * SPACING);
+    let grid = Grid { dims: [nx, ny, nz - cut], origin, ..whole };
+    let labels = anatomy::Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+    let mesh = surface::extract(&anatomy::grow(&form, grid, &labels));
+    let extent = mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
+    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let along = match toward.y < 0.0 {
+        true => tooth.crown_low.y - CONTACT_GAP - extent[1].y,
+        false => tooth.crown_high.y + CONTACT_GAP - extent[0].y,
+    };
+    let place = Vec3::new(middle.x, along, tooth.crown_high.z - 0.3 - extent[1].z);
+    let form = touch::Form::Mesh(Arc::new(Obstacle::new(&mesh)?));
+    Some(Shape { label, tooth_from_shape: Pose::at(place), form })
+}
+
+/// Gum as [`Periodontium`] has it next to the tooth, plain beyond, and what closes the sulcus below.
+fn gum_with_pockets(tooth: &ToothPlace, periodontium: &Periodontium, plain: Shape, attachment: Label) -> Vec<Shape> {
+    /// How far the gum next to the tooth reaches beyond its crown along the arch, and across it, mm.
+    const ALONG: f32 = 2.5;
+    const ACROSS: f32 = 2.0;
+    /// Between samples, mm: a margin is rounded by half a millimetre.
+    const SPACING: f32 = 0.2;
+    let (low, high) = (tooth.crown_low, tooth.crown_high);
+    let beside = Vec3::new(ACROSS, ALONG, 0.0);
+    let (from, to) = ((low - beside).with_z(periodontium.deepest() - 2.5), (high + beside).with_z(low.z + GUM_HIGH));
+    let grid = Grid::covering(from, to, Vec3::splat(SPACING), 1);
+    let field = |yields: Yield, at: &dyn Fn(Vec3) -> f32| touch::Form::Field(Arc::new(Field::of(grid, yields, at)));
+    let near = Shape {
+        label: plain.label,
+        tooth_from_shape: Pose::IDENTITY,
+        form: field(Yield::default(), &|p| periodontium.gum(p)),
+    };
+    let floor = Shape {
+        label: attachment,
+        tooth_from_shape: Pose::IDENTITY,
+        form: field(ATTACHMENT_YIELDS, &|p| periodontium.attachment(p)),
+    };
+    let touch::Form::RoundBox { half, rounding } = plain.form else { return vec![near, floor] };
+    let beyond = |toward: f32| {
+        let edge = if toward < 0.0 { low.y - ALONG } else { high.y + ALONG };
+        let far = plain.tooth_from_shape.position.y + toward * half.y;
+        let half = Vec3::new(half.x, 0.5 * (far - edge).abs(), half.z);
+        let position = plain.tooth_from_shape.position.with_y(0.5 * (far + edge));
+        let form = touch::Form::RoundBox { half, rounding: rounding.min(0.9 * half.y) };
+        Shape { label: plain.label, tooth_from_shape: Pose::at(position), form }
+    };
+    vec![near, floor, beyond(-1.0), beyond(1.0)]
+}
+
+/// No gum reaches higher over the lowest enamel, mm.
+const GUM_HIGH: f32 = 6.0;
+
+/// The floor of a sulcus holds 0.25 N, the force that probing is taught with; more of it sinks a probe in: in studies with graded
+/// forces readings grow by half a millimetre to a millimetre from 0.25 to 0.75 N (U. van der Velden, *Probing force and the
+/// relationship of the probe tip to the periodontal tissues*, 1979, and others since). 0.7 to 2 mm/N is plausible.
+const ATTACHMENT_YIELDS: Yield = Yield { from: 0.25, per_newton: 1.4, most: 2.5 };
+
+fn periodontium(volume: &Volume, place: &ToothPlace, pockets: Pockets, tissues: &TissueTable) -> Periodontium {
+    let enamel = anatomy_tissues(tissues).enamel;
+    let standing = Standing { volume, enamel, crown: [place.crown_low, place.crown_high], distal: place.distal().y };
+    Periodontium::around(&standing, pockets)
 }
 
 fn sizes(fdi: u8) -> Option<anatomy::form::Sizes> {

@@ -1,10 +1,10 @@
 //! What the hand holds, drawn.
 
-use crate::content::{EndEntry, InstrumentEntry, Library, MirrorEntry, picture_mesh};
+use crate::content::{BentEntry, EndEntry, InstrumentEntry, Library, MirrorEntry, ProbeEntry, picture_mesh};
 use crate::diagnostic::Diagnostic;
 use crate::frame::{Pose, Vec3};
 use crate::mesh::Mesh;
-use crate::render::{Finish, Mirror, Solid};
+use crate::render::{Finish, Mirror, Rgb, Solid};
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -23,7 +23,105 @@ pub fn instrument(entry: &InstrumentEntry, library: &Library) -> (Solid, Option<
 
 /// An instrument by the outline of its end, about its own tip, +z along the shaft toward the hand.
 pub fn outlined(entry: &InstrumentEntry) -> Solid {
-    Solid::plain(Arc::new(drawing(&entry.end)), Pose::IDENTITY, STEEL)
+    match &entry.end {
+        EndEntry::Probe(probe) => probe_solid(probe),
+        end => Solid::plain(Arc::new(drawing(end)), Pose::IDENTITY, STEEL),
+    }
+}
+
+/// A periodontal probe with its marks and bands, so that a depth can be read; the middle of its end at the origin.
+fn probe_solid(probe: &ProbeEntry) -> Solid {
+    /// A line is so broad, mm, and paint so dark.
+    const LINE: f32 = 0.12;
+    const PAINT: Rgb = [0.10; 3];
+    /// From its end a probe is slim for so long, mm.
+    const SLIM: f32 = 16.0;
+    let end = 0.5 * probe.diameter_mm;
+    let neck = if probe.ball { 0.6 * end } else { 0.9 * end };
+    let thick = |height: f32| neck + (0.42 - neck).max(0.0) * (height / SLIM).clamp(0.0, 1.0);
+    let lines = probe.marks_mm.iter().map(|m| [m.0 - 0.5 * LINE, m.0 + 0.5 * LINE]);
+    let dark: Vec<[f32; 2]> = lines.chain(probe.bands_mm.iter().map(|b| b.map(|m| m.0))).collect();
+    let mut heights: Vec<f32> = dark.iter().flatten().copied().chain([SLIM]).filter(|h| *h <= SLIM).collect();
+    heights.sort_by(f32::total_cmp);
+    heights.dedup();
+    // Heights count from the end's lowest place, which lies its radius below the origin.
+    let rod = heights.iter().map(|h| [thick(*h), h - end]);
+    let tip = arc(end, -1.0, if probe.ball { 0.8 } else { 0.0 });
+    let behind = [[0.9, SLIM + 5.0], [1.1, SLIM + 9.0], [3.0, SLIM + 14.0], [3.0, SLIM + 110.0], [0.0, SLIM + 111.0]];
+    let outline: Vec<[f32; 2]> = tip.into_iter().chain(rod).chain(behind).collect();
+    let is_dark = |pair: &[[f32; 2]]| {
+        let middle = 0.5 * (pair[0][1] + pair[1][1]) + end;
+        dark.iter().any(|[from, to]| (*from..=*to).contains(&middle))
+    };
+    let tint = |pair: &[[f32; 2]]| [if is_dark(pair) { PAINT } else { [1.0; 3] }; 2 * (SIDES + 1)];
+    let tints = outline.windows(2).flat_map(tint).collect();
+    Solid { tints: Arc::new(tints), ..Solid::plain(Arc::new(turned(&outline)), Pose::IDENTITY, STEEL) }
+}
+
+/// An explorer's bent wire with its handle.
+fn bent(wire: &BentEntry) -> Mesh {
+    /// Radius at the tip, of the shank and over which way it grows, mm.
+    const FINE: f32 = 0.07;
+    const SHANK: f32 = 0.75;
+    const GROWS: f32 = 16.0;
+    /// Between two rings, mm.
+    const STEP: f32 = 0.4;
+    let corners: Vec<Vec3> = wire.wire_mm.iter().map(|p| Vec3::from(p.map(|c| c.0))).collect();
+    let line = rounded(&corners, STEP);
+    let mut way = 0.0;
+    let mut rings = Vec::new();
+    for (i, at) in line.iter().enumerate() {
+        let (before, after) = (line[i.saturating_sub(1)], line[(i + 1).min(line.len() - 1)]);
+        way += before.distance(*at);
+        let radius = FINE + (SHANK - FINE) * (way / GROWS).clamp(0.0, 1.0);
+        rings.push((*at, (after - before).normalize_or(Vec3::Z), radius));
+    }
+    let mut mesh = tube(&rings);
+    let end = *line.last().unwrap_or(&Vec3::ZERO);
+    let handle = [[0.0, -0.2], [SHANK, 0.0], [2.8, 5.0], [2.8, 95.0], [0.0, 97.0]];
+    let handle = placed(turned(&handle), Pose::at(end));
+    mesh.join(handle);
+    mesh
+}
+
+/// A line through corners with its bends rounded (Catmull and Rom's spline), in steps.
+fn rounded(corners: &[Vec3], step: f32) -> Vec<Vec3> {
+    let at = |i: isize| corners[i.clamp(0, corners.len() as isize - 1) as usize];
+    let mut line = Vec::new();
+    for i in 0..corners.len() as isize - 1 {
+        let [a, b, c, d] = [at(i - 1), at(i), at(i + 1), at(i + 2)];
+        let steps = (b.distance(c) / step).ceil().max(1.0) as usize;
+        line.extend((0..steps).map(|s| {
+            let t = s as f32 / steps as f32;
+            let slope = (c - a) * t + (a * 2.0 - b * 5.0 + c * 4.0 - d) * (t * t);
+            b + (slope + (b * 3.0 - a - c * 3.0 + d) * (t * t * t)) * 0.5
+        }));
+    }
+    line.extend(corners.last());
+    line
+}
+
+/// A tube along rings: middle, way, radius.
+fn tube(rings: &[(Vec3, Vec3, f32)]) -> Mesh {
+    let mut mesh = Mesh::default();
+    for (at, way, radius) in rings {
+        let side = way.cross(Vec3::Y).normalize_or(Vec3::X);
+        let up = way.cross(side);
+        for i in 0..=SIDES {
+            let angle = TAU * i as f32 / SIDES as f32;
+            let out = side * libm::cosf(angle) + up * libm::sinf(angle);
+            mesh.positions.push(*at + out * *radius);
+            mesh.normals.push(out);
+        }
+    }
+    let round = SIDES as u32 + 1;
+    for ring in 0..rings.len().saturating_sub(1) as u32 {
+        for i in 0..SIDES as u32 {
+            let (a, b) = (ring * round + i, (ring + 1) * round + i);
+            mesh.triangles.extend([[a, a + 1, b], [a + 1, b + 1, b]]);
+        }
+    }
+    mesh
 }
 
 /// The reflecting face of a mouth mirror held in a place; `None` for every other instrument.
@@ -46,11 +144,16 @@ fn mirror_body(mirror: &MirrorEntry) -> Mesh {
         [[0.0, -0.6], [1.0, -0.4], [1.1, 12.0], [1.1, 32.0], [2.8, 38.0], [2.8, 115.0], [2.0, 117.0], [0.0, 117.0]];
     let mut mesh = placed(turned(&[&head[..], &glass].concat()), mirror.handle_from_face());
     let shaft = placed(turned(&shaft), Pose::at(mirror.foot()));
-    let first = mesh.positions.len() as u32;
-    mesh.positions.extend(shaft.positions);
-    mesh.normals.extend(shaft.normals);
-    mesh.triangles.extend(shaft.triangles.iter().map(|t| t.map(|i| first + i)));
+    mesh.join(shaft);
     mesh
+}
+
+/// An end with the neck, shaft and handle of a hand instrument behind it.
+fn hand_instrument(mut end: Mesh, neck: f32, top: f32) -> Mesh {
+    let handle = [[0.0, top], [neck, top], [1.2, top + 9.0], [1.2, top + 28.0], [3.2, top + 34.0], [3.2, top + 120.0]];
+    let behind = turned(&[&handle[..], &[[0.0, top + 122.0]]].concat());
+    end.join(behind);
+    end
 }
 
 fn placed(mut mesh: Mesh, pose: Pose) -> Mesh {
@@ -64,6 +167,9 @@ pub(super) fn head_height(end: &EndEntry) -> f32 {
     bur(end).last().map_or(0.0, |[_, top]| top + NECK)
 }
 
+/// Corners of what is round.
+const SIDES: usize = 32;
+
 /// From the top of a bur to the handpiece's head, mm.
 const NECK: f32 = 9.5;
 
@@ -75,6 +181,18 @@ fn drawing(end: &EndEntry) -> Mesh {
             return turned(&[&needle[..], &[[2.6, 20.0], [2.6, 90.0], [0.0, 90.0]]].concat());
         }
         EndEntry::Mirror(mirror) => return mirror_body(mirror),
+        EndEntry::Plugger(e) => {
+            let radius = 0.5 * e.diameter_mm;
+            return hand_instrument(turned(&[[0.0, 0.0], [radius, 0.0], [0.9 * radius, 2.0]]), 0.8 * radius, 2.0);
+        }
+        EndEntry::Cleoid(e) => {
+            let (point, wide) = (0.5 * e.point_mm, 0.5 * e.width_mm);
+            let cone = [lifted(arc(point, -1.0, 0.0), point), vec![[wide, e.length_mm]]].concat();
+            return hand_instrument(turned(&cone), 0.4, e.length_mm);
+        }
+        EndEntry::Spoon(e) => return hand_instrument(e.drawing(), 0.4, 0.3 * e.diameter_mm),
+        EndEntry::Blade(e) => return hand_instrument(e.drawing(), 0.45, 0.5 * e.thickness_mm),
+        EndEntry::Bent(wire) => return bent(wire),
         _ => {}
     }
     let tip = bur(end);
@@ -88,7 +206,14 @@ fn drawing(end: &EndEntry) -> Mesh {
 /// A bur's outline: radius and height, from the tip upward, mm. None for what does not turn.
 fn bur(end: &EndEntry) -> Vec<[f32; 2]> {
     match end {
-        EndEntry::Point | EndEntry::Mirror(_) => Vec::new(),
+        EndEntry::Point
+        | EndEntry::Mirror(_)
+        | EndEntry::Probe(_)
+        | EndEntry::Bent(_)
+        | EndEntry::Plugger(_)
+        | EndEntry::Spoon(_)
+        | EndEntry::Cleoid(_)
+        | EndEntry::Blade(_) => Vec::new(),
         EndEntry::Ball(e) => arc(0.5 * e.diameter_mm, -1.0, 0.8),
         EndEntry::Pear(e) => {
             let radius = 0.5 * e.diameter_mm;
@@ -124,7 +249,6 @@ fn straight(low: f32, high: f32, length: f32) -> Vec<[f32; 2]> {
 
 /// An outline turned about z; each stretch has its own normals, so that edges stay edges.
 pub(super) fn turned(outline: &[[f32; 2]]) -> Mesh {
-    const SIDES: usize = 32;
     let mut mesh = Mesh::default();
     for pair in outline.windows(2) {
         let [[r0, z0], [r1, z1]] = [pair[0], pair[1]];

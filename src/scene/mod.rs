@@ -13,6 +13,6 @@ mod views;
 
 pub use around::around;
 pub use instrument::{instrument, mirror, outlined};
-pub use jaw::{Mouth, OPEN};
+pub use jaw::{Jaw, JawAlone, Mouth, OPEN};
 pub use palette::palette;
 pub use views::{ToothSide, tooth_view, work_view};

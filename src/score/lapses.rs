@@ -198,7 +198,7 @@ impl Offsets {
             let (distances, nearest) = distance::to_nearest(&crop.grid, |i| is_in(crop.whole_index(i)));
             (crop, distances, nearest)
         });
-        Offsets { near, distal: scored.replay.workpiece.teeth.first().map_or(Vec3::Y, |tooth| tooth.distal()) }
+        Offsets { near, distal: scored.replay.workpiece.distal() }
     }
 
     /// `None` with an empty set, or far from all that was asked about.
@@ -285,7 +285,7 @@ fn touched(recording: &Recording, scored: &Scored) -> Vec<Lapse> {
     let stages = scenario.stages.iter().zip(&scored.replay.outcome.stages).filter(|(stage, _)| stage.cutting);
     let running: Vec<[Tick; 2]> = stages.map(|(_, result)| [result.started, result.ended]).collect();
     let is_running = |h: &crate::record::Haptic| {
-        scenario.instruments.get(usize::from(h.instrument)).is_some_and(|i| i.cuts)
+        scenario.instruments.get(usize::from(h.instrument)).is_some_and(|i| i.is_bur())
             && running.iter().any(|[from, to]| (*from..*to).contains(&h.tick))
     };
     let lift = (LIFT_S / TICK_S) as u64;

@@ -1,11 +1,13 @@
 //! Every measure of a session, with its evidence.
 
+use super::charting::{self, SiteResult};
 use super::process::{Moment, Seen};
+use super::restoration::Restoration;
 use super::shape::{Deepest, Shape};
 use crate::frame::Vec3;
 use crate::record::{Recording, Replay};
-use crate::scenario::metric::{About, Argument, PLAIN};
-use crate::scenario::{Metric, QuestionKind};
+use crate::scenario::metric::{About, Argument, CHARTING, OF_FILLINGS, PLAIN};
+use crate::scenario::{Metric, QuestionKind, Rubric};
 use crate::session::{Given, StageResult};
 use crate::tick::{TICK_S, Tick};
 
@@ -70,17 +72,24 @@ impl From<Option<Moment>> for Found {
 }
 
 /// Computes every measure of the table, and those with an argument that the scenario asks for.
-pub fn all(recording: &Recording, replay: &Replay, seen: &Seen, shape: &Shape) -> Measures {
+pub fn all(
+    recording: &Recording,
+    replay: &Replay,
+    seen: &Seen,
+    shape: &Shape,
+    restoration: Option<&Restoration>,
+    chart: Option<&[SiteResult]>,
+) -> Measures {
     let scenario = &recording.scenario;
-    let source = Source { recording, replay, seen, shape, outlines: shape.outline_distances() };
-    let mut metrics: Vec<Metric> = PLAIN.iter().map(Metric::plain).collect();
+    let source = Source { recording, replay, seen, shape, restoration, chart, outlines: shape.outline_distances() };
+    // Sessions without a cavity have no filling to measure, and those without a chart none to compare.
+    let of_fillings = if restoration.is_some() { OF_FILLINGS } else { &[] };
+    let charting = if chart.is_some() { CHARTING } else { &[] };
+    let mut metrics: Vec<Metric> = PLAIN.iter().chain(of_fillings).chain(charting).map(Metric::plain).collect();
     let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
     let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
     metrics.extend(zones.chain([tolerance]).flatten());
-    let asked = scenario
-        .rubric
-        .iter()
-        .flat_map(|r| r.items.iter().map(|i| &i.metric).chain(r.hard_fails.iter().map(|f| &f.metric)));
+    let asked = scenario.rubric.iter().flat_map(Rubric::metrics);
     for metric in asked {
         if !metrics.contains(metric) {
             metrics.push(metric.clone());
@@ -98,6 +107,8 @@ struct Source<'a> {
     replay: &'a Replay,
     seen: &'a Seen,
     shape: &'a Shape,
+    restoration: Option<&'a Restoration>,
+    chart: Option<&'a [SiteResult]>,
     /// Distances between the borders of R and T, ascending.
     outlines: Option<Vec<f32>>,
 }
@@ -167,7 +178,10 @@ impl Source<'_> {
                 }
                 _ => Found::default(),
             },
-            _ => Found::default(),
+            name if OF_FILLINGS.iter().any(|about| about.name == name) => {
+                self.restoration.map_or(Found::default(), |r| of_filling(r, name))
+            }
+            charting => self.chart.and_then(|chart| charting::measure(charting, chart)).into(),
         }
     }
 
@@ -240,6 +254,34 @@ impl Source<'_> {
     fn evidence_at(&self, voxel: usize) -> Evidence {
         let grid = &self.shape.grid;
         Evidence { at: self.seen.falls.at(voxel), place: grid.centre(grid.cell(voxel)) }
+    }
+}
+
+/// A measure of a filling. Of distances the place is told, not the moment: many strokes make a surface.
+fn of_filling(restoration: &Restoration, name: &str) -> Found {
+    let at = |value: f64, place: Vec3| Found { value: Some(value), evidence: Some(Evidence { at: None, place }) };
+    match name {
+        "filled_pct" if restoration.cavity > 0 => {
+            (100.0 * restoration.filled as f64 / restoration.cavity as f64).into()
+        }
+        "contour_mean_mm" => restoration.mean().into(),
+        "contour_p95_mm" => restoration.percentile(0.95).into(),
+        "contour_max_mm" => {
+            let farthest = [restoration.highest(), restoration.lowest()];
+            let farthest = farthest.into_iter().flatten().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+            farthest.map_or(Found::default(), |(mm, place)| at(f64::from(mm.abs()), place))
+        }
+        "overhang_max_mm" => restoration.highest().map_or(Found::default(), |(mm, place)| match mm > 0.0 {
+            true => at(f64::from(mm), place),
+            false => 0.0.into(),
+        }),
+        "deficit_max_mm" => restoration.lowest().map_or(Found::default(), |(mm, place)| match mm < 0.0 {
+            true => at(f64::from(-mm), place),
+            false => 0.0.into(),
+        }),
+        "overhang_mm3" => restoration.overhang_mm3.into(),
+        "void_mm3" => restoration.void_mm3.into(),
+        _ => Found::default(),
     }
 }
 

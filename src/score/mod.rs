@@ -4,22 +4,26 @@
 //! sees a device, a clock or a screen: the same recording gives the same score to the last bit.
 
 mod bits;
+mod charting;
 mod crop;
 mod falls;
 mod grade;
 mod lapses;
 mod measures;
 mod process;
+mod restoration;
 mod shape;
 mod verdict;
 mod zones;
 
+pub use charting::{Reading, SiteResult};
 pub(crate) use crop::Crop;
 pub use falls::{Fall, Falls};
 pub use grade::{Grade, HardFailResult, ItemResult};
 pub use lapses::{Lapse, Mistake, Way, lapses};
 pub use measures::{Evidence, Measure, Measures};
 pub use process::{Sample, Trace};
+pub use restoration::Restoration;
 pub use verdict::Verdict;
 
 use crate::record::{self, Recording, Replay, Watch};
@@ -39,6 +43,10 @@ pub struct Scored {
     /// Force, speed and the like over time, thinned for drawing.
     pub trace: Trace,
     pub grade: Option<Grade>,
+    /// The filling of a prepared cavity, where the exercise begins with one.
+    pub restoration: Option<Restoration>,
+    /// The periodontal chart against the truth, where a stage asks for one.
+    pub chart: Option<Vec<SiteResult>>,
     /// Ticks in which another person's hand led the trainee's, by stage of the scenario.
     pub led_ticks: Vec<u64>,
 }
@@ -70,10 +78,13 @@ pub fn judge(recording: &Recording, watched: Watched) -> Scored {
     let Watched { replay, seen } = watched;
     let scenario = &recording.scenario;
     let shape = shape::Shape::of(scenario, &replay);
-    let verdicts = verdict::of(scenario, &replay, &shape);
-    let measures = measures::all(recording, &replay, &seen, &shape);
+    let filled = scenario.has_filling().then(|| Restoration::of(&replay.workpiece, &replay.volume));
+    let restoration = filled.flatten();
+    let verdicts = verdict::of(scenario, &replay, &shape, restoration.as_ref());
+    let chart = charting::chart(recording, &replay);
+    let measures = measures::all(recording, &replay, &seen, &shape, restoration.as_ref(), chart.as_deref());
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
     let process::Seen { falls, trace, led_ticks, .. } = seen;
-    Scored { replay, measures, verdicts, falls, trace, grade, led_ticks }
+    Scored { replay, measures, verdicts, falls, trace, grade, restoration, chart, led_ticks }
 }

@@ -99,7 +99,7 @@ impl Trace {
 pub struct Watcher {
     tooth_from_world: Pose,
     roles: [Option<Role>; 256],
-    cuts: Vec<bool>,
+    turns: Vec<bool>,
     danger: Danger,
     seen: Seen,
     last_place: Option<Vec3>,
@@ -119,7 +119,7 @@ impl Watcher {
         Watcher {
             tooth_from_world: workpiece.world_from_tooth.inverse(),
             roles,
-            cuts: scenario.instruments.iter().map(|i| i.cuts).collect(),
+            turns: scenario.instruments.iter().map(|i| i.is_bur()).collect(),
             danger: Danger::around(scenario, &workpiece.volume, scenario.measures.near),
             seen: Seen {
                 ticks: 0,
@@ -171,7 +171,7 @@ impl Watcher {
             }
             self.now.force = self.now.force.max(pressed.length());
             self.now.touched = true;
-            let is_running = self.cuts[step.instrument] && session.stage().is_some_and(|(_, s)| s.cutting);
+            let is_running = self.turns[step.instrument] && session.stage().is_some_and(|(_, s)| s.cutting);
             match self.roles[usize::from(touch.label.0)] {
                 Some(Role::Soft) if is_running => self.seen.soft_ticks += 1,
                 Some(Role::Neighbour) if is_running => self.seen.neighbour_ticks += 1,

@@ -1,6 +1,7 @@
 //! A verdict on every voxel.
 
 use super::crop::Crop;
+use super::restoration::Restoration;
 use super::shape::Shape;
 use crate::record::Replay;
 use crate::scenario::Scenario;
@@ -27,6 +28,14 @@ pub enum Verdict {
     VulnerableTouched = 6,
     /// Everything else that is still there.
     Kept = 7,
+    /// A filling, within the tooth's original contour.
+    Restored = 8,
+    /// A filling, outside that contour.
+    Overfilled = 9,
+    /// Part of the cavity that was to be filled and is open.
+    Underfilled = 10,
+    /// Part of the cavity that a filling encloses and does not fill.
+    Void = 11,
 }
 
 impl Verdict {
@@ -41,6 +50,9 @@ impl Verdict {
         Verdict::Kept,
     ];
 
+    /// What is seen besides where a cavity was to be filled.
+    pub const OF_FILLINGS: [Verdict; 4] = [Verdict::Restored, Verdict::Overfilled, Verdict::Underfilled, Verdict::Void];
+
     pub fn id(self) -> &'static str {
         match self {
             Verdict::Outside => "outside",
@@ -51,6 +63,10 @@ impl Verdict {
             Verdict::Left => "left",
             Verdict::VulnerableTouched => "vulnerable_touched",
             Verdict::Kept => "kept",
+            Verdict::Restored => "restored",
+            Verdict::Overfilled => "overfilled",
+            Verdict::Underfilled => "underfilled",
+            Verdict::Void => "void",
         }
     }
 
@@ -64,6 +80,10 @@ impl Verdict {
             Verdict::Left => "Left behind",
             Verdict::VulnerableTouched => "Vulnerable, touched",
             Verdict::Kept => "Other, kept",
+            Verdict::Restored => "Filled to the contour",
+            Verdict::Overfilled => "Overfilled",
+            Verdict::Underfilled => "Underfilled",
+            Verdict::Void => "Void in the filling",
         }
     }
 
@@ -78,6 +98,10 @@ impl Verdict {
             Verdict::Left => "L",
             Verdict::VulnerableTouched => "!",
             Verdict::Kept => "·",
+            Verdict::Restored => "✓",
+            Verdict::Overfilled => "+",
+            Verdict::Underfilled => "−",
+            Verdict::Void => "○",
         }
     }
 
@@ -93,13 +117,17 @@ impl Verdict {
             Verdict::Left => [94, 60, 40],
             Verdict::VulnerableTouched => [170, 20, 110],
             Verdict::Kept => [190, 190, 190],
+            Verdict::Restored => [86, 180, 233],
+            Verdict::Overfilled => [213, 94, 0],
+            Verdict::Underfilled => [94, 60, 40],
+            Verdict::Void => [170, 20, 110],
         };
         [r, g, b].map(|c: u8| f32::from(c) / 255.0)
     }
 }
 
 /// One verdict per voxel of the workpiece.
-pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
+pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape, restoration: Option<&Restoration>) -> Vec<Verdict> {
     let initial = &replay.workpiece.volume;
     let is_harmless = harmless(scenario, shape);
     let is_forbidden = |voxel: usize| {
@@ -113,7 +141,7 @@ pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
     };
     let verdict = |voxel: usize| {
         if initial.tissue(voxel) == Label::AIR {
-            return Verdict::Outside;
+            return restoration.map_or(Verdict::Outside, |r| of_air(replay, r, voxel));
         }
         let sets = shape.sets[voxel];
         match (sets.removed(), sets.wanted()) {
@@ -129,6 +157,18 @@ pub fn of(scenario: &Scenario, replay: &Replay, shape: &Shape) -> Vec<Verdict> {
         }
     };
     (0..initial.grid().len()).map(verdict).collect()
+}
+
+/// What came of a place that was air at the start.
+fn of_air(replay: &Replay, restoration: &Restoration, voxel: usize) -> Verdict {
+    let was_tooth = replay.workpiece.is_in_cavity(voxel);
+    match (was_tooth, replay.volume.tissue(voxel) != Label::AIR) {
+        (true, true) => Verdict::Restored,
+        (false, true) => Verdict::Overfilled,
+        (true, false) if restoration.voids.contains(voxel) => Verdict::Void,
+        (true, false) => Verdict::Underfilled,
+        (false, false) => Verdict::Outside,
+    }
 }
 
 /// Where removing sound tissue does no harm: in leeway zones, and within the leeway of what was to be removed.

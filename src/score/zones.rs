@@ -12,17 +12,8 @@ pub fn mask(zone: &Zone, initial: &Volume) -> Bits {
     match &zone.region {
         Region::Tissue(label) => initial.tissues().map(|l| l == *label).collect(),
         Region::Around { label, within } => around(initial, *label, *within),
-        Region::Sphere { centre, radius } => {
-            let centre = Vec3::from(*centre);
-            matter_where(initial, |p| p.distance_squared(centre) <= radius * radius)
-        }
-        Region::Box { min, max } => {
-            let (min, max) = (Vec3::from(*min), Vec3::from(*max));
-            matter_where(initial, |p| p.cmpge(min).all() && p.cmple(max).all())
-        }
-        Region::Cylinder { from, to, radius } => {
-            let (from, to) = (Vec3::from(*from), Vec3::from(*to));
-            matter_where(initial, |p| is_in_cylinder(p, from, to, *radius))
+        region @ (Region::Sphere { .. } | Region::Box { .. } | Region::Cylinder { .. }) => {
+            matter_where(initial, |p| region.holds(p))
         }
         // A map of another size belongs to another tooth: it marks nothing here.
         Region::Mask(mask) if mask.dims == grid.dims => {
@@ -49,10 +40,4 @@ fn around(initial: &Volume, label: Label, within: f32) -> Bits {
     let distance = distance::to_set(&crop.grid, |i| is_label(crop.whole_index(i)));
     let is_near = |voxel: usize| crop.index_of(voxel).is_some_and(|i| distance[i] <= within);
     initial.tissues().enumerate().map(|(i, l)| l != Label::AIR && l != label && is_near(i)).collect()
-}
-
-fn is_in_cylinder(point: Vec3, from: Vec3, to: Vec3, radius: f32) -> bool {
-    let axis = to - from;
-    let along = (point - from).dot(axis) / axis.length_squared();
-    (0.0..=1.0).contains(&along) && (point - from - axis * along).length_squared() <= radius * radius
 }

@@ -10,6 +10,8 @@ use crate::volume::{Grid, Label, Volume, distance};
 #[derive(Clone, Copy, Debug)]
 pub struct Excavation {
     pub radius: f32,
+    /// How far its lowest place lies below the device's tip: a ball's radius, 0 for what ends there.
+    pub below: f32,
     /// Between neighbouring tracks.
     pub pitch: f32,
     /// How far the cut reaches beyond the decay's border; negative: how far it stays inside.
@@ -34,7 +36,7 @@ impl Excavation {
         // Decay narrower than the bur is cut along its middle.
         let least = (self.radius - self.margin).min(0.8 * widest);
         let tracks = self.tracks(grid, |index| columns[index].filter(|_| inside[index] >= least));
-        let floor_of = |column: &Column| column.floor + self.radius - self.margin;
+        let floor_of = |column: &Column| column.floor + self.below - self.margin;
         let high = tracks.iter().map(|(_, c)| c.top).fold(f32::NEG_INFINITY, f32::max);
         let low = tracks.iter().map(|(_, c)| floor_of(c)).fold(f32::INFINITY, f32::min);
         let step = self.pitch.max(0.8 * self.radius);
@@ -97,7 +99,7 @@ mod tests {
         let grid = Grid::centred([80, 80, 60], Vec3::splat(0.1));
         let is_in = |p: Vec3| p.x.abs() < 2.0 && p.y.abs() < 1.5 && p.z > -1.0;
         let volume = Volume::from_distance(grid, 0.15, |p| (p.z - 1.0, if is_in(p) { decay } else { Label(1) }));
-        let excavation = Excavation { radius: 0.5, pitch: 0.3, margin: 0.0 };
+        let excavation = Excavation { radius: 0.5, below: 0.5, pitch: 0.3, margin: 0.0 };
         let path = excavation.path(&volume, |_, label| label == decay);
         let (low, high) = path.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
         assert!((low.z - (-1.0 + 0.5)).abs() < 0.11, "down to the floor: {low}");

@@ -6,8 +6,10 @@
 mod run;
 mod live;
 mod excavation;
+mod filling;
 mod operator;
 mod operator_file;
+mod sounding;
 mod refusal;
 
 pub use live::{Broken, COMMAND_LAG_TICKS, Heard, Kept, Live};
@@ -16,9 +18,10 @@ pub use operator_file::{ActionFile, OperatorFile};
 pub use refusal::Refusal;
 pub use run::{Observer, Progress, Trainee, run};
 
-use crate::content::Role;
+use crate::content::{EndEntry, Role};
 use crate::device::Spec;
-use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
+use crate::frame::Pose;
+use crate::scenario::{Periodontium, QuestionKind, Scenario, Site, Stage, Workpiece};
 use crate::sim::{Command, RAMP_TICKS, Setup, Step};
 use crate::tick::Tick;
 use crate::touch::{Coefficient, CuttingLaw, Matter};
@@ -33,6 +36,7 @@ pub fn setup(scenario: &Scenario, workpiece: &Workpiece, device: Spec) -> Setup 
         factors: scenario.factors.clone(),
         instruments: scenario.instruments.iter().map(|i| i.make()).collect(),
         carving: scenario.carving,
+        fillings: scenario.tissues.fillings(),
         vibration: scenario.vibration,
         guidances: scenario.guidances.clone(),
         world_from_tooth: workpiece.world_from_tooth,
@@ -50,12 +54,23 @@ pub enum Input {
     Answer { question: String, value: Answer },
     /// Gives one of a tissue's coefficients another value, where the stage lets people try what they feel like.
     Adjust { label: Label, coefficient: Coefficient, value: f32 },
+    /// Notes something in the periodontal chart, at the site where the instrument is.
+    Chart(Sign),
     /// Says that the stage is done.
     Confirm,
     /// Rates a statement of the questionnaire.
     Rate { item: String, value: u8 },
     /// Ends the session before its time.
     Abort,
+}
+
+/// What is noted in a periodontal chart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// The depth that the probe shows now. A second reading at a site replaces the first.
+    Depth,
+    /// Calculus is felt here. Said a second time at a site it is taken back.
+    Calculus,
 }
 
 /// An answer to a question.
@@ -94,6 +109,12 @@ pub enum Effect {
         stage: usize,
         question: usize,
     },
+    /// Something was noted in the chart, or taken back.
+    Charted {
+        stage: usize,
+        note: Note,
+        is_there: bool,
+    },
     StageEnded {
         stage: usize,
         by: EndedBy,
@@ -127,6 +148,35 @@ pub struct StageResult {
     pub answers: Vec<Option<Given>>,
     /// What the person changed of how tissues feel, in the order in which each was first changed.
     pub adjusted: Vec<(Label, Coefficient)>,
+    /// What was noted in the periodontal chart, in the order of its first noting.
+    pub charted: Vec<Note>,
+}
+
+/// A line of a periodontal chart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Note {
+    pub site: Site,
+    pub at: Tick,
+    pub what: Noted,
+}
+
+/// What stands in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Noted {
+    /// As the probe's marks show it, whole mm; as deep as its end was, mm; and how hard it was pressed, N.
+    Depth {
+        read: u8,
+        depth: f32,
+        force: f32,
+    },
+    Calculus,
+}
+
+impl Noted {
+    /// True when both say of the same thing, as a second reading at a site does.
+    pub fn is_like(&self, other: &Noted) -> bool {
+        matches!((self, other), (Noted::Depth { .. }, Noted::Depth { .. }) | (Noted::Calculus, Noted::Calculus))
+    }
 }
 
 /// An answer that was given.
@@ -164,7 +214,15 @@ pub struct Session {
     step_started: Tick,
     answers: Vec<Option<Given>>,
     adjusted: Vec<(Label, Coefficient)>,
+    charted: Vec<Note>,
+    /// The gum, and what turns the world's places into its own.
+    gum: Option<Arc<Periodontium>>,
+    tooth_from_world: Pose,
+    /// The newest tick, if there was one.
+    newest: Option<Step>,
     instrument: usize,
+    /// What carriers lay.
+    filling: Option<Label>,
     decay_at_start: usize,
     decay_gone: usize,
     outcome: Outcome,
@@ -206,7 +264,12 @@ impl Session {
             step_started: Tick::ZERO,
             answers: Vec::new(),
             adjusted: Vec::new(),
+            charted: Vec::new(),
+            gum: workpiece.periodontium.clone(),
+            tooth_from_world: workpiece.world_from_tooth.inverse(),
+            newest: None,
             instrument: 0,
+            filling: None,
             decay_at_start,
             decay_gone: 0,
             outcome: Outcome { ratings: vec![None; ratings], ..Outcome::default() },
@@ -274,7 +337,8 @@ impl Session {
 
     fn result(&self, ended_by: EndedBy) -> StageResult {
         let (answers, adjusted) = (self.answers.clone(), self.adjusted.clone());
-        StageResult { started: self.started, ended: self.now, ended_by, answers, adjusted }
+        let charted = self.charted.clone();
+        StageResult { started: self.started, ended: self.now, ended_by, answers, adjusted, charted }
     }
 
     fn start_stage(&mut self, index: usize) -> Vec<Effect> {
@@ -286,11 +350,16 @@ impl Session {
         self.phase = Phase::In(index);
         self.started = self.now;
         self.answers = vec![None; stage.ask.len()];
+        self.charted.clear();
         let mut effects =
             vec![Effect::StageStarted { stage: index }, Effect::Tell(Command::RunBur { running: stage.cutting })];
         if !stage.instruments.contains(&self.instrument) {
             self.instrument = stage.instruments[0];
             effects.push(Effect::Tell(Command::Take { instrument: self.instrument }));
+        }
+        if stage.filling != self.filling {
+            self.filling = stage.filling;
+            effects.push(Effect::Tell(Command::Fill { label: stage.filling }));
         }
         if stage.guidance.is_some() {
             effects.push(Effect::Tell(Command::Guide { guidance: stage.guidance }));
@@ -338,6 +407,7 @@ impl Session {
 
     fn tick(&mut self, step: &Step, edits: &[Edit]) -> Vec<Effect> {
         self.now = step.tick.next();
+        self.newest = Some(*step);
         self.instrument = step.instrument;
         let decay_gone = |e: &&Edit| e.removes() && self.is_decay[usize::from(e.before.label.0)];
         self.decay_gone += edits.iter().filter(decay_gone).count();
@@ -380,6 +450,7 @@ impl Session {
             (Input::Adjust { label, coefficient, value }, Phase::In(index)) => {
                 self.adjust(index, *label, *coefficient, *value)
             }
+            (Input::Chart(sign), Phase::In(index)) => self.chart(index, *sign),
             (Input::Confirm, Phase::In(index)) if self.scenario.stages[index].ends.confirmed => {
                 self.end_stage(index, EndedBy::Confirmation)
             }
@@ -410,6 +481,57 @@ impl Session {
             self.adjusted.push((label, coefficient));
         }
         vec![Effect::Tell(Command::Set { label, coefficient, value })]
+    }
+
+    fn chart(&mut self, index: usize, sign: Sign) -> Vec<Effect> {
+        match self.noted(index, sign) {
+            Err(why) => vec![Effect::Refused { why }],
+            Ok(note) => {
+                let before = self.charted.iter().position(|n| n.site == note.site && n.what.is_like(&note.what));
+                match before {
+                    Some(place) if sign == Sign::Calculus => {
+                        self.charted.remove(place);
+                    }
+                    Some(place) => self.charted[place] = note,
+                    None => self.charted.push(note),
+                }
+                let is_there = before.is_none() || sign != Sign::Calculus;
+                vec![Effect::Charted { stage: index, note, is_there }]
+            }
+        }
+    }
+
+    /// What is to be noted now, by where the instrument is.
+    fn noted(&self, index: usize, sign: Sign) -> Result<Note, Refusal> {
+        /// An end so far above the margin, mm, is not at a tooth's neck any more, nor one that far off the tooth.
+        const OFF: f32 = 2.0;
+        let chart = self.scenario.stages[index].chart;
+        let is_asked = match sign {
+            Sign::Depth => chart.depths,
+            Sign::Calculus => chart.calculus,
+        };
+        let (Some(gum), Some(step), true) = (&self.gum, &self.newest, is_asked) else { return Err(Refusal::NoChart) };
+        let entry = &self.scenario.instruments[step.instrument];
+        let shaft = self.tooth_from_world.turn(step.shaft);
+        let (probe, radius) = match &entry.end {
+            EndEntry::Probe(probe) => (Some(probe), 0.5 * probe.diameter_mm),
+            _ => (None, 0.0),
+        };
+        let end = self.tooth_from_world * step.tip - shaft * radius;
+        let depth = gum.depth_along(end, shaft);
+        if depth < -OFF || gum.away(end) > OFF {
+            return Err(Refusal::NotAtNeck);
+        }
+        let what = match (sign, probe) {
+            (Sign::Calculus, _) => Noted::Calculus,
+            (Sign::Depth, None) => return Err(Refusal::NoProbe),
+            (Sign::Depth, Some(_)) if depth <= 0.0 => return Err(Refusal::NotInSulcus),
+            (Sign::Depth, Some(probe)) => {
+                let force = step.touch.map_or(0.0, |touch| touch.spring);
+                Noted::Depth { read: probe.read(depth), depth, force }
+            }
+        };
+        Ok(Note { site: Site::nearest(gum.turn(end)), at: self.now, what })
     }
 
     fn answer(&mut self, index: usize, question: &str, value: &Answer) -> Vec<Effect> {

@@ -3,14 +3,18 @@
 //! It sees what a person sees (surfaces, and decay where the scenario shows it) and otherwise knows only what it felt.
 
 use super::excavation::Excavation;
+use super::filling::{Mouth, Place};
 use super::operator_file::{
-    ActionFile, AnswerActionFile, CutFile, FollowFile, OperatorFile, PlaceFile, PressFile, ProbeFile, WhenFile,
+    ActionFile, AnswerActionFile, CarveFile, ChartActionFile, CondenseFile, CutFile, ExploreFile, FillFile, FollowFile,
+    OperatorFile, PlaceFile, PressFile, ProbeFile, WhenFile,
 };
-use super::{Answer, Input, Session, Trainee};
-use crate::content::Role;
+use super::sounding::{self, Sounding};
+use super::{Answer, Input, Session, Sign, Trainee};
+use crate::content::{EndEntry, Role};
 use crate::device::{Device, Felt, Gone, HandModel, Move, Output, Reading, Scripted, Spec, Tremor};
 use crate::frame::Vec3;
-use crate::scenario::{Lesion, QuestionKind, Scenario, Stage, Workpiece};
+use crate::scenario::file::ZoneRole;
+use crate::scenario::{Lesion, QuestionKind, Scenario, Site, Stage, Workpiece};
 use crate::sim::Step;
 use crate::volume::{ISO, Label};
 use std::collections::VecDeque;
@@ -42,6 +46,10 @@ pub struct Operator {
     /// The place being felt.
     feeling: Option<(usize, Vec3)>,
     has_rated: bool,
+    /// Heights and distances from the tooth's middle of the tip on its way down a root, tooth space, mm.
+    trail: Option<Vec<[f32; 2]>>,
+    /// Where the tip was seen last, world space.
+    tip: Vec3,
 }
 
 /// What is left to do.
@@ -52,11 +60,22 @@ enum Task {
     Feel(Move, usize, Vec3),
     Input(Input),
     Answer(AnswerActionFile),
+    /// Begins to follow the tip down a root.
+    Trail,
+    /// Notes calculus if the tip was lifted by more than this on its way down, mm.
+    Notice(f32),
+    /// Along a way up, from the place of it that is nearest.
+    Withdraw {
+        up: Vec<Vec3>,
+        speed: f32,
+    },
     /// Drops the following so many tasks if the decay gone suffices.
     SkipIfCleared {
         percent: f64,
         tasks: usize,
     },
+    /// Goes on filling where the surface is still too low.
+    Fill(Filling),
     /// Begins the stage's rule again.
     Again,
 }
@@ -67,6 +86,18 @@ struct FeltPlace {
     place_in_tooth: Vec3,
     /// N/mm
     stiffness: f32,
+}
+
+/// A cavity being filled.
+#[derive(Clone, Debug)]
+struct Filling {
+    file: FillFile,
+    places: Vec<Place>,
+    /// Of the face, mm.
+    radius: f32,
+    /// The place pressed on last, and how often any was.
+    last: Option<usize>,
+    presses: u32,
 }
 
 /// How long a script stays in a stage without a time limit before it gives the session up: 20 minutes. A script that
@@ -96,6 +127,8 @@ impl Operator {
             felt: Vec::new(),
             feeling: None,
             has_rated: false,
+            trail: None,
+            tip: start,
         }
     }
 
@@ -149,7 +182,12 @@ impl Operator {
             ActionFile::Press(press) => self.press(press, self.radius(*instrument)),
             ActionFile::Follow(follow) => self.follow(follow, self.radius(*instrument)),
             ActionFile::Probe(probe) => self.probe(probe, self.radius(*instrument)),
-            ActionFile::Cut(cut) => self.cut(cut, self.radius(*instrument)),
+            ActionFile::Cut(cut) => self.cut(cut, *instrument),
+            ActionFile::Fill(fill) => self.fill(fill, *instrument),
+            ActionFile::Condense(condense) => self.condense(condense, *instrument),
+            ActionFile::Carve(carve) => self.carve(carve, *instrument),
+            ActionFile::Chart(chart) => self.chart(chart),
+            ActionFile::Explore(explore) => self.explore(explore),
             ActionFile::Answer(answer) => self.plan.push_back(Task::Answer(answer.clone())),
             ActionFile::Adjust(adjust) => {
                 // What the exercise does not know is air, which the session refuses to change.
@@ -168,7 +206,14 @@ impl Operator {
     fn choose(&self, name: &str, stage: &Stage) -> Option<usize> {
         let is_meant = |&&index: &&usize| {
             let entry = &self.scenario.instruments[index];
-            entry.id == name || (name == "bur" && entry.cuts) || (name == "explorer" && !entry.cuts)
+            let is_probe = matches!(entry.end, EndEntry::Probe(_));
+            let kind = match name {
+                "bur" => entry.is_bur(),
+                "explorer" => !entry.cuts && !is_probe && entry.packs.is_none(),
+                "probe" => is_probe,
+                _ => false,
+            };
+            entry.id == name || kind
         };
         stage.instruments.iter().find(is_meant).copied()
     }
@@ -312,7 +357,16 @@ impl Operator {
         self.plan.push_back(Task::Move(Move::Reach { to: above, speed }));
     }
 
-    fn cut(&mut self, cut: &CutFile, radius: f32) {
+    fn cut(&mut self, cut: &CutFile, instrument: usize) {
+        let radius = self.radius(instrument);
+        if !self.scenario.instruments[instrument].is_bur() {
+            self.scoop(cut, instrument);
+            self.lift_off();
+            return;
+        }
+        if self.workpiece.lesions.is_empty() {
+            self.prepare(cut, instrument);
+        }
         for lesion in &self.workpiece.clone().lesions {
             for pass in 0..cut.passes {
                 let before = self.plan.len();
@@ -360,11 +414,46 @@ impl Operator {
             let away = lesion.centre.distance_squared(place);
             lesions.iter().all(|other| other.centre.distance_squared(place) >= away)
         };
-        let excavation = Excavation { radius, pitch: cut.pitch_mm, margin: cut.margin_mm };
+        let excavation = Excavation { radius, below: radius, pitch: cut.pitch_mm, margin: cut.margin_mm };
         let path = excavation
             .path(&workpiece.volume, |place, label| tissues.role(label) == Some(Role::Decay) && is_own(place));
         let Some(first) = path.first() else { return };
         let above = Vec3::new(first.x, first.y, self.top() + radius + TOUCH_HEIGHT);
+        self.travel_to(above);
+        self.lead_bur(cut, [above].into_iter().chain(path));
+    }
+
+    /// With a blade: what of all decay it can cut, layer by layer from above, as often as there are passes.
+    fn scoop(&mut self, cut: &CutFile, instrument: usize) {
+        /// Of the end's width: a bowl is narrower where it cuts deepest.
+        const BOWL: f32 = 0.7;
+        let scenario = self.scenario.clone();
+        let materials = scenario.factors.get(instrument).map(|f| scenario.tissues.materials().times(f));
+        let can_cut = |label: Label| materials.as_ref().is_some_and(|m| m.get(label).cut_force.is_some());
+        let radius = BOWL * scenario.instruments[instrument].make().face_radius();
+        let excavation = Excavation { radius, below: 0.0, pitch: cut.pitch_mm, margin: cut.margin_mm };
+        let volume = self.workpiece.volume.clone();
+        let path =
+            excavation.path(&volume, |_, label| scenario.tissues.role(label) == Some(Role::Decay) && can_cut(label));
+        let Some(first) = path.first() else { return };
+        let above = first.with_z(self.top() + TOUCH_HEIGHT);
+        for _ in 0..cut.passes {
+            self.travel_to(above);
+            self.lead_bur(cut, [above].into_iter().chain(path.iter().copied()));
+        }
+    }
+
+    /// What an outline asks for in a sound tooth: all target zones, layer by layer from above.
+    fn prepare(&mut self, cut: &CutFile, instrument: usize) {
+        let radius = self.radius(instrument);
+        let scenario = self.scenario.clone();
+        let targets: Vec<_> = scenario.zones.iter().filter(|z| z.role == ZoneRole::Target).collect();
+        let wide = self.scenario.instruments[instrument].make().head_radius();
+        let excavation = Excavation { radius: wide, below: radius, pitch: cut.pitch_mm, margin: cut.margin_mm };
+        let volume = self.workpiece.volume.clone();
+        let path = excavation.path(&volume, |place, _| targets.iter().any(|zone| zone.region.holds(place)));
+        let Some(first) = path.first() else { return };
+        let above = first.with_z(self.top() + radius + TOUCH_HEIGHT);
         self.travel_to(above);
         self.lead_bur(cut, [above].into_iter().chain(path));
     }
@@ -379,6 +468,150 @@ impl Operator {
             force: cut.press_n,
             patience: cut.patience_s,
         }));
+    }
+
+    fn fill(&mut self, file: &FillFile, instrument: usize) {
+        let radius = self.scenario.instruments[instrument].make().face_radius();
+        let mouth = Mouth::of(&self.workpiece);
+        let places = mouth.map_or(Vec::new(), |mouth| mouth.places(radius, file.pitch_mm));
+        self.plan.push_back(Task::Fill(Filling { file: file.clone(), places, radius, last: None, presses: 0 }));
+        self.lift_off();
+    }
+
+    /// The next press of a filling, or nothing more where the surface is as high as it is to be.
+    fn go_on_filling(&mut self, mut filling: Filling) {
+        let tooth_from_world = self.workpiece.world_from_tooth.inverse();
+        if let Some(last) = filling.last {
+            let target = filling.places[last].contour.z + filling.file.to_mm;
+            let met = self.device.take_felt().and_then(|felt| felt.touched_at);
+            filling.places[last].height = (tooth_from_world * self.tip).z;
+            // Full is where the surface was met high enough before anything more was laid, and that more than once.
+            let is_high = met.is_some_and(|at| (tooth_from_world * at).z >= target);
+            filling.places[last].visits_left = filling.places[last].visits_left.saturating_sub(u32::from(is_high));
+        }
+        let count = filling.places.len();
+        let is_low = |p: &Place| p.visits_left > 0;
+        let after = filling.last.map_or(0, |last| last + 1);
+        let next = (0..count).map(|i| (after + i) % count).find(|&i| is_low(&filling.places[i]));
+        let Some(next) = next.filter(|_| filling.presses < filling.file.presses) else { return };
+        let place = filling.places[next];
+        // What was laid beside it may stand higher, and is met by the face's rim.
+        let reach = 2.0 * filling.radius + TOUCH_HEIGHT;
+        let beside = filling.places.iter().filter(|p| p.contour.truncate().distance(place.contour.truncate()) < reach);
+        let height = beside.map(|p| p.height).fold(place.height, f32::max);
+        let moves = self.press_down(place.contour, height, filling.file.press_n, filling.file.hold_s);
+        (filling.last, filling.presses) = (Some(next), filling.presses + 1);
+        self.plan.push_front(Task::Fill(filling));
+        moves.into_iter().rev().for_each(|next| self.plan.push_front(Task::Move(next)));
+    }
+
+    fn condense(&mut self, file: &CondenseFile, instrument: usize) {
+        /// A condensed surface may stand so far over the contour, mm.
+        const OVER: f32 = 1.5;
+        let radius = self.scenario.instruments[instrument].make().face_radius();
+        let Some(mouth) = Mouth::of(&self.workpiece) else { return };
+        for place in mouth.places(radius, file.pitch_mm) {
+            let moves = self.press_down(place.contour, place.contour.z + OVER, file.press_n, file.hold_s);
+            self.plan.extend(moves.into_iter().map(Task::Move));
+        }
+        self.lift_off();
+    }
+
+    /// A probe into the sulcus at each site, read where it is held up.
+    fn chart(&mut self, chart: &ChartActionFile) {
+        /// The middle of a probe's end runs so far off a root without calculus, mm: free between root and gum.
+        const OFF: f32 = 0.42;
+        for site in sounding::sites(chart.sites.as_deref()) {
+            let Some(way) = self.sounding(site, OFF) else { continue };
+            let path: Vec<Vec3> = way.down.iter().map(|p| self.in_world(*p)).collect();
+            self.come_to(&way);
+            let (force, hold, speed) = (chart.press_n, chart.hold_s, chart.speed_mm_s);
+            self.plan.push_back(Task::Move(Move::Slide { path, force, hold, speed }));
+            self.plan.push_back(Task::Input(Input::Chart(Sign::Depth)));
+            self.leave(&way, speed);
+        }
+        self.lift_off();
+    }
+
+    /// Up, across, and down on a place whose surface lies about so high.
+    fn press_down(&self, place: Vec3, height: f32, force: f32, hold: f32) -> [Move; 4] {
+        let speed = self.file.hand.speed_mm_s;
+        let top = self.top() + 1.0;
+        let rise = Move::Rise { to_height: self.in_world(place.with_z(top)).y, speed };
+        let above = Move::Reach { to: self.in_world(place.with_z(top)), speed };
+        let before = Move::Reach { to: self.in_world(place.with_z((height + TOUCH_HEIGHT).min(top))), speed };
+        let along = self.workpiece.world_from_tooth.turn(Vec3::NEG_Z);
+        [rise, above, before, Move::Press { along, force, hold, reach: 15.0, speed: TOUCH_SPEED.min(speed) }]
+    }
+
+    fn carve(&mut self, file: &CarveFile, instrument: usize) {
+        let instrument = self.scenario.instruments[instrument].make();
+        let Some(mouth) = Mouth::of(&self.workpiece) else { return };
+        for layer in &file.layers_mm {
+            let way = mouth.way(&instrument, file.pitch_mm, file.beyond_mm, layer.0);
+            let Some(first) = way.first() else { return };
+            let above = first.with_z(self.top() + TOUCH_HEIGHT);
+            self.travel_to(above);
+            let path = [above].into_iter().chain(way).map(|place| self.in_world(place)).collect();
+            self.plan.push_back(Task::Move(Move::Guide {
+                path,
+                speed: file.speed_mm_s,
+                lean: file.lean_mm,
+                force: file.press_n,
+                patience: file.patience_s,
+            }));
+            self.lift_off();
+        }
+    }
+
+    /// An explorer down each root, leaning on it.
+    fn explore(&mut self, explore: &ExploreFile) {
+        for site in sounding::sites(explore.sites.as_deref()) {
+            let Some(way) = self.sounding(site, -explore.lean_mm) else { continue };
+            let path: Vec<Vec3> = way.down.iter().map(|p| self.in_world(*p)).collect();
+            self.come_to(&way);
+            self.plan.push_back(Task::Trail);
+            let (force, speed) = (explore.press_n, explore.speed_mm_s);
+            self.plan.push_back(Task::Move(Move::Slide { path, force, hold: 0.05, speed }));
+            self.plan.push_back(Task::Notice(explore.notices_mm));
+            self.leave(&way, speed);
+        }
+        self.lift_off();
+    }
+
+    fn sounding(&self, site: Site, off: f32) -> Option<Sounding> {
+        let gum = self.workpiece.periodontium.as_ref()?;
+        let deposits: Vec<Label> =
+            self.scenario.tissues.entries().iter().filter(|e| e.role == Role::Deposit).map(|e| e.label()).collect();
+        let lowest = self.workpiece.teeth.first()?.low.z;
+        Sounding::at(site, gum, &self.workpiece.volume, &deposits, lowest, off)
+    }
+
+    /// From above, past the crown's bulge, to the gum's margin.
+    fn come_to(&mut self, way: &Sounding) {
+        let speed = TOUCH_SPEED.min(self.file.hand.speed_mm_s);
+        self.travel_to(way.beside.with_z(self.top() + 1.0));
+        for to in [way.beside, way.entry] {
+            let to = self.in_world(to);
+            self.plan.push_back(Task::Move(Move::Reach { to, speed }));
+        }
+    }
+
+    /// Up again the way it came.
+    fn leave(&mut self, way: &Sounding, speed: f32) {
+        self.plan.push_back(Task::Withdraw { up: way.up.iter().map(|p| self.in_world(*p)).collect(), speed });
+        for to in [way.entry, way.beside, way.beside.with_z(self.top() + 1.0)] {
+            let (to, speed) = (self.in_world(to), self.file.hand.speed_mm_s.min(20.0));
+            self.plan.push_back(Task::Move(Move::Reach { to, speed }));
+        }
+    }
+
+    /// Remembers where the tip is on its way down a root.
+    fn follow_trail(&mut self, tip: Vec3) {
+        let (Some(trail), Some(gum)) = (&mut self.trail, &self.workpiece.periodontium) else { return };
+        let place = self.workpiece.world_from_tooth.inverse() * tip;
+        let from_middle = (place - gum.middle()).with_z(0.0);
+        trail.push([place.z, from_middle.length()]);
     }
 
     /// The softest place felt, and how soft it is against the typical place of its kind.
@@ -448,6 +681,19 @@ impl Operator {
                     self.device.push(next);
                 }
                 Some(Task::Input(input)) => return vec![input],
+                Some(Task::Withdraw { up, speed }) => {
+                    // From where the tip is: the hand may lean far deeper.
+                    let from = up.iter().position(|p| p.y > self.tip.y).unwrap_or(up.len());
+                    let way = up[from..].iter().step_by(4);
+                    way.for_each(|to| self.device.push(Move::Reach { to: *to, speed }));
+                }
+                Some(Task::Trail) => self.trail = Some(Vec::new()),
+                Some(Task::Notice(more_than)) => {
+                    let trail = self.trail.take().unwrap_or_default();
+                    if sounding::bump(&trail) > more_than {
+                        return vec![Input::Chart(Sign::Calculus)];
+                    }
+                }
                 Some(Task::Answer(kind)) => {
                     let inputs = self.answers(&kind, &self.scenario.stages[index]);
                     if !inputs.is_empty() {
@@ -459,6 +705,7 @@ impl Operator {
                         self.plan.drain(..tasks.min(self.plan.len()));
                     }
                 }
+                Some(Task::Fill(filling)) => self.go_on_filling(filling),
                 Some(Task::Again) => {
                     self.felt.clear();
                     self.follow_rule(index);
@@ -501,6 +748,8 @@ impl Trainee for Operator {
     fn respond(&mut self, session: &Session, screen: Option<&Step>) -> Vec<Input> {
         if let Some(step) = screen {
             self.device.see(step.tip);
+            self.tip = step.tip;
+            self.follow_trail(step.tip);
         }
         match session.stage() {
             None => self.ratings(),

@@ -2,6 +2,7 @@
 
 use crate::content::{CoefficientName, Library, json};
 use crate::diagnostic::Diagnostic;
+use crate::scenario::file::SiteFile;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -77,6 +78,13 @@ pub enum ActionFile {
     Follow(FollowFile),
     Probe(ProbeFile),
     Cut(CutFile),
+    Fill(FillFile),
+    Condense(CondenseFile),
+    Carve(CarveFile),
+    /// Walk a periodontal probe round the tooth and note the depth at each site.
+    Chart(ChartActionFile),
+    /// Slide an explorer down into the sulcus at each site and note calculus where it clicks.
+    Explore(ExploreFile),
     Answer(AnswerActionFile),
     /// Give one of a tissue's coefficients another value, where the stage allows it.
     Adjust(AdjustFile),
@@ -191,6 +199,112 @@ pub struct CutFile {
     /// Share of the decay gone that the operator is content with, %: 1 to 100.
     #[schemars(range(min = 1.0, max = 100.0))]
     pub until_cleared_pct: f64,
+}
+
+/// Lay a filling into the prepared cavity, press by press, from its floor up.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FillFile {
+    /// N, 0.05 to 10.
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub press_n: f32,
+    /// How long each press lasts, s: 0.05 to 10.
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub hold_s: f32,
+    /// Distance between places, mm: 0.2 to 4.
+    #[schemars(range(min = 0.2, max = 4.0))]
+    pub pitch_mm: f32,
+    /// How far above the tooth's contour the filling is to reach, mm; negative: below it. -5 to 2.
+    #[schemars(range(min = -5.0, max = 2.0))]
+    pub to_mm: f32,
+    /// Most presses, 1 to 500.
+    #[schemars(range(min = 1, max = 500))]
+    pub presses: u32,
+}
+
+/// Press the filling together, place by place.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CondenseFile {
+    /// N, 0.05 to 10.
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub press_n: f32,
+    /// How long each press lasts, s: 0.05 to 10.
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub hold_s: f32,
+    /// Distance between places, mm: 0.2 to 4.
+    #[schemars(range(min = 0.2, max = 4.0))]
+    pub pitch_mm: f32,
+}
+
+/// Carve the filling back to the tooth's contour, layer by layer, to and fro over the cavity.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CarveFile {
+    /// Force at which the hand gives way, N: 0.05 to 10.
+    #[schemars(range(min = 0.05, max = 10.0))]
+    pub press_n: f32,
+    /// How long the hand waits where the blade does not get on, s: 0 to 10.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub patience_s: f32,
+    /// Speed of the hand, mm/s: 0.5 to 50.
+    #[schemars(range(min = 0.5, max = 50.0))]
+    pub speed_mm_s: f32,
+    /// Distance between strokes, mm: 0.1 to 2.
+    #[schemars(range(min = 0.1, max = 2.0))]
+    pub pitch_mm: f32,
+    /// How far the hand leans beyond where the blade is to go, mm: 0.1 to 12.
+    #[schemars(range(min = 0.1, max = 12.0))]
+    pub lean_mm: f32,
+    /// How far beyond the cavity's rim the strokes reach, mm: 0 to 3.
+    #[schemars(range(min = 0.0, max = 3.0))]
+    pub beyond_mm: f32,
+    /// Heights above the contour, one layer after the other, mm: -2 to 3.
+    #[schemars(length(min = 1, max = 10))]
+    pub layers_mm: Vec<LayerFile>,
+}
+
+/// mm, -2 to 3.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(transparent)]
+pub struct LayerFile(#[schemars(range(min = -2.0, max = 3.0))] pub f32);
+/// Walk a periodontal probe round the tooth.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChartActionFile {
+    /// Sites, in their order; without it all six.
+    #[serde(default)]
+    pub sites: Option<Vec<SiteFile>>,
+    /// Force at which the floor is taken to be felt, N: 0.1 to 5.
+    #[schemars(range(min = 0.1, max = 5.0))]
+    pub press_n: f32,
+    /// mm/s: 0.5 to 30.
+    #[schemars(range(min = 0.5, max = 30.0))]
+    pub speed_mm_s: f32,
+    /// How long the probe rests before it is read, s: 0 to 5.
+    #[schemars(range(min = 0.0, max = 5.0))]
+    pub hold_s: f32,
+}
+
+/// Slide an explorer down along the root.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExploreFile {
+    /// Sites, in their order; without it all six.
+    #[serde(default)]
+    pub sites: Option<Vec<SiteFile>>,
+    /// Force along the root at which it is taken to have ended, N: 0.2 to 5.
+    #[schemars(range(min = 0.2, max = 5.0))]
+    pub press_n: f32,
+    /// How far the hand leans into the root, mm: 0.1 to 2.
+    #[schemars(range(min = 0.1, max = 2.0))]
+    pub lean_mm: f32,
+    /// mm/s: 0.5 to 30.
+    #[schemars(range(min = 0.5, max = 30.0))]
+    pub speed_mm_s: f32,
+    /// A bump is noticed that lifts the tip by more than this, mm: 0.05 to 2.
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub notices_mm: f32,
 }
 
 /// Answer the stage's questions.

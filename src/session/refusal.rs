@@ -18,6 +18,10 @@ pub enum Refusal {
     NoQuestionnaire,
     NoStep,
     NoStatement,
+    NoChart,
+    NotAtNeck,
+    NoProbe,
+    NotInSulcus,
 }
 
 impl fmt::Display for Refusal {
@@ -36,6 +40,10 @@ impl fmt::Display for Refusal {
             Refusal::NoQuestionnaire => "there is no questionnaire",
             Refusal::NoStep => "the scale has no such step",
             Refusal::NoStatement => "the questionnaire has no such statement",
+            Refusal::NoChart => "this stage does not chart that",
+            Refusal::NotAtNeck => "the instrument is not at the tooth's neck",
+            Refusal::NoProbe => "depths are read off a periodontal probe",
+            Refusal::NotInSulcus => "the probe is not in the sulcus",
         })
     }
 }

@@ -18,8 +18,8 @@ use crate::device::{Output, Reading, Spec};
 use crate::frame::{Pose, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
-    Carver, Carving, Coefficient, Contact, Factors, ForceLimit, Gate, Guidance, Guide, Instrument, Law, Materials,
-    Matter, Press, Proxy, Pull, SpringLimit, Vibration,
+    Carver, Carving, Coefficient, Contact, Factors, Filling, ForceLimit, Gate, Guidance, Guide, Instrument, Law,
+    Materials, Matter, Packer, Press, Proxy, Pull, SpringLimit, Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
 
@@ -33,6 +33,8 @@ pub struct Setup {
     /// In the order in which [`Command::Take`] counts them; the first is in the hand at start.
     pub instruments: Vec<Instrument>,
     pub carving: Carving,
+    /// What can be laid and condensed.
+    pub fillings: Vec<Filling>,
     pub vibration: Vibration,
     /// In the order in which [`Command::Guide`] counts them.
     pub guidances: Vec<Guidance>,
@@ -57,6 +59,8 @@ pub enum Command {
     RunBur { running: bool },
     /// Leads the hand by a guidance from its beginning, or by none.
     Guide { guidance: Option<usize> },
+    /// Gives carriers a filling to lay, or none.
+    Fill { label: Option<Label> },
 }
 
 /// What one tick came to. Positions and forces in world space.
@@ -69,11 +73,15 @@ pub struct Step {
     pub torque: Vec3,
     /// Where the hand is, mm; the last trusted place when the reading was refused.
     pub hand: Vec3,
-    /// Where the working end is, mm.
+    /// Where the working end is, mm: as deep in soft matter as it is pressed.
     pub tip: Vec3,
+    /// Unit, from the working end along the handle toward the hand.
+    pub shaft: Vec3,
     pub touch: Option<Touch>,
     /// Matter fell, or would have within this tick's limits.
     pub cutting: bool,
+    /// A filling was laid or condensed.
+    pub packing: bool,
     /// Voxels that became air.
     pub removed: u32,
     /// How another hand led this one, N: part of `force`.
@@ -150,6 +158,10 @@ pub struct Simulation {
     proxy: Proxy,
     law: Law,
     carver: Carver,
+    fillings: Vec<Filling>,
+    /// Index into `fillings` of what is given.
+    filling: Option<usize>,
+    packer: Packer,
     gate: Gate,
 }
 
@@ -165,6 +177,7 @@ impl Simulation {
             mut factors,
             instruments,
             carving,
+            fillings,
             vibration,
             guidances,
             world_from_tooth,
@@ -202,6 +215,9 @@ impl Simulation {
             proxy,
             law: Law::new(spring),
             carver: Carver::new(carving),
+            fillings,
+            filling: None,
+            packer: Packer::new(),
             gate: Gate::default(),
         }
     }
@@ -241,6 +257,8 @@ impl Simulation {
         let tip = self.proxy.tip();
         let contact = self.proxy.contact().copied();
         let pull = self.law.pull(hand, tip, contact.as_ref());
+        self.packer.rest_unless(instrument.packs.is_some() && contact.is_some());
+        let mut packing = false;
         let cutting = match contact {
             // A bur that leans on its shank presses the less with what cuts, and without it not at all. And nobody cuts with a
             // force that is not felt yet.
@@ -249,12 +267,24 @@ impl Simulation {
                 let press = Press { tip, hand, orientation: held.orientation, pull, label };
                 self.carver.cut(&mut self.matter.volume, instrument, materials, &press)
             }
+            Some(Contact { at_head, label, .. }) if instrument.packs.is_some() && at_head > 0.0 => {
+                self.carver.rest();
+                let pull = Pull { spring: pull.spring * at_head * eased, ..pull };
+                let press = Press { tip, hand, orientation: held.orientation, pull, label };
+                packing = self.filling.zip(instrument.packs.as_ref()).is_some_and(|(filling, packs)| {
+                    self.packer.pack(&mut self.matter, instrument, packs, &self.fillings[filling], &press)
+                });
+                false
+            }
             _ => {
                 self.carver.rest();
                 false
             }
         };
-        let tremble = if cutting { self.vibration.force(tick) } else { Vec3::ZERO };
+        if !self.packer.edits().is_empty() {
+            self.proxy.look_again();
+        }
+        let tremble = if cutting && instrument.turns { self.vibration.force(tick) } else { Vec3::ZERO };
         let mut force = (self.world_from_tooth.turn(pull.force) + tremble) * eased;
         if self.lead != Vec3::ZERO {
             force += self.lead;
@@ -272,15 +302,20 @@ impl Simulation {
             spring: pull.spring,
             normal: self.world_from_tooth.turn(normal),
         });
+        // Only matter of a sulcus' floor gives way; all other tips are where they may be, to the bit.
+        let sunk = contact.and_then(|c| self.matter.sinking(c.label, tip, pull.spring));
+        let shown = sunk.map_or(tip, |(depth, out)| tip - out * depth.min((hand - tip).length()));
         Step {
             tick,
             force,
             torque,
             hand: pose.position,
-            tip: self.world_from_tooth * tip,
+            tip: self.world_from_tooth * shown,
+            shaft: pose.turn(Vec3::Z),
             touch,
             cutting,
-            removed: self.carver.edits().iter().filter(|e| e.removes()).count() as u32,
+            packing,
+            removed: self.edits().iter().filter(|e| e.removes()).count() as u32,
             lead: self.lead,
             guidance,
             instrument: self.instrument,
@@ -300,6 +335,7 @@ impl Simulation {
     fn let_go(&mut self, tick: Tick) -> Step {
         self.eased = 0;
         self.carver.rest();
+        self.packer.rest();
         self.law.forget();
         self.guide.let_go();
         self.proxy.let_go(self.tooth_from_world * self.hand.position);
@@ -309,8 +345,10 @@ impl Simulation {
             torque: Vec3::ZERO,
             hand: self.hand.position,
             tip: self.hand.position,
+            shaft: self.hand.turn(Vec3::Z),
             touch: None,
             cutting: false,
+            packing: false,
             removed: 0,
             lead: Vec3::ZERO,
             guidance: Vec3::ZERO,
@@ -339,17 +377,23 @@ impl Simulation {
             Command::Set { label, coefficient, value } => {
                 for (materials, factors) in self.materials.iter_mut().zip(&self.factors) {
                     let value = value * factors.get(label).of(coefficient);
+                    if !value.is_finite() {
+                        // What an instrument cannot cut it still cannot.
+                        continue;
+                    }
                     materials.set(label, materials.get(label).with(coefficient, value));
                 }
             }
             Command::RunBur { running } => self.bur_runs = running,
             Command::Guide { guidance } => self.guide.choose(guidance, self.tick),
+            Command::Fill { label } => self.filling = self.fillings.iter().position(|f| Some(f.label) == label),
         }
     }
 
     /// The last tick's changed voxels, in the order they changed.
     pub fn edits(&self) -> &[Edit] {
-        self.carver.edits()
+        // Whoever cuts does not pack.
+        if self.packer.edits().is_empty() { self.carver.edits() } else { self.packer.edits() }
     }
 
     /// The tick that comes next.

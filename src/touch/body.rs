@@ -123,6 +123,21 @@ impl Body {
         Body::enclosed(Head::Voxels(field), None, shell)
     }
 
+    /// A hand instrument: what is solid in a volume cuts or presses, the shaft on the axis behind it only touches.
+    pub fn of_end(volume: &Volume, shank: Shank) -> Body {
+        let Body { head, mut shell, .. } = Body::of_volume(volume);
+        let [low, high] = volume.grid().extent();
+        let foot = Place { r: 0.5 * shank.neck, z: 0.5 * (low.z + high.z) };
+        let shaft = Profile::shank(foot, Place { r: 0.5 * shank.diameter, z: shank.begins }, shank.ends);
+        let apart = SHANK_APART * (surface_of(&shaft) / POINTS).sqrt().clamp(APART[0], APART[1]);
+        let inside = |at: Vec3| if let Head::Voxels(field) = &head { field.distance(at) } else { f32::INFINITY };
+        shell.retain(|node| shaft.distance(Place::of(node.at)) > -1e-4);
+        let mut behind = Vec::new();
+        turn(&shaft, Region::Shank, apart, &mut behind);
+        shell.extend(behind.into_iter().filter(|node| inside(node.at) > 1e-3));
+        Body::enclosed(head, Some(shaft), shell)
+    }
+
     fn enclosed(head: Head, shank: Option<Profile>, shell: Vec<Node>) -> Body {
         let low = shell.iter().map(|n| n.at).fold(Vec3::splat(f32::INFINITY), Vec3::min);
         let high = shell.iter().map(|n| n.at).fold(Vec3::splat(f32::NEG_INFINITY), Vec3::max);
@@ -163,6 +178,19 @@ impl Body {
                 let [low, high] = field.grid.extent();
                 let aside = low.abs().max(high.abs());
                 (Place::of(aside).r, [low.z, high.z])
+            }
+        }
+    }
+
+    /// Radius of the face that presses along the shaft, mm.
+    pub(super) fn face_radius(&self) -> f32 {
+        match &self.head {
+            Head::Turned { profile, .. } => profile.radius(),
+            Head::Voxels(field) => {
+                // The face is what is narrowest; the grid is a little larger than its end.
+                let [low, high] = field.grid.extent();
+                let margin = 4.0 * field.grid.spacing.max_element();
+                (high.x.min(high.y).min(-low.x).min(-low.y) - margin).max(0.0)
             }
         }
     }
@@ -282,19 +310,7 @@ impl Field {
     fn distance(&self, point_in_handle: Vec3) -> f32 {
         let [low, high] = self.grid.extent();
         let inside = point_in_handle.clamp(low, high);
-        let [nx, ny, nz] = self.grid.dims.map(|n| n as usize);
-        let at = self.grid.from_tooth(inside);
-        let base = |v: f32, n: usize| (v.max(0.0) as usize).min(n.saturating_sub(2));
-        let (x, y, z) = (base(at.x, nx), base(at.y, ny), base(at.z, nz));
-        let f = at - Vec3::new(x as f32, y as f32, z as f32);
-        let value = |i: usize, j: usize, k: usize| {
-            let index = ((z + k).min(nz - 1) * ny + (y + j).min(ny - 1)) * nx + (x + i).min(nx - 1);
-            self.distances[index]
-        };
-        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let along_x = |j: usize, k: usize| mix(value(0, j, k), value(1, j, k), f.x);
-        let along_y = |k: usize| mix(along_x(0, k), along_x(1, k), f.y);
-        mix(along_y(0), along_y(1), f.z) + inside.distance(point_in_handle)
+        self.grid.mixed(&self.distances, inside) + inside.distance(point_in_handle)
     }
 
     fn slope(&self, point_in_handle: Vec3) -> Vec3 {

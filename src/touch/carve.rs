@@ -108,8 +108,10 @@ impl Carver {
     /// Cuts with a tip in contact. True while matter is being cut.
     pub fn cut(&mut self, volume: &mut Volume, instrument: &Instrument, materials: &Materials, press: &Press) -> bool {
         self.edits.clear();
-        let share = self.threshold_share(press.hand);
-        let is_wearing = match self.carving.law {
+        // A blade does not turn: it needs the whole force, and no bur's work.
+        let share = if instrument.turns { self.threshold_share(press.hand) } else { 1.0 };
+        let law = self.law_of(instrument);
+        let is_wearing = match law {
             CuttingLaw::Threshold => false,
             // What cannot be cut is not worn either, however hard a bur leans on it.
             CuttingLaw::Rate(_) if materials.get(press.label).cut_force.is_none() => {
@@ -124,11 +126,15 @@ impl Carver {
             None => self.carve(volume, &bite, done),
             Some(body) => self.carve_body(volume, body, &bite, done),
         }
-        if let CuttingLaw::Rate(_) = self.carving.law {
+        if let CuttingLaw::Rate(_) = law {
             self.account.pay(&self.edits, materials, volume.grid().voxel_mm3() as f32);
         }
         self.biting = (done + 1 < SHARES).then_some((bite, done + 1));
         true
+    }
+
+    fn law_of(&self, instrument: &Instrument) -> CuttingLaw {
+        if instrument.turns { self.carving.law } else { CuttingLaw::Threshold }
     }
 
     /// The next bite, if the force suffices for any tissue.
@@ -141,7 +147,8 @@ impl Carver {
         share: f32,
     ) -> Option<Bite> {
         let Press { tip, hand, orientation, pull, .. } = *press;
-        let (deepest, run_out) = match self.carving.law {
+        let law = self.law_of(instrument);
+        let (deepest, run_out) = match law {
             CuttingLaw::Threshold => (self.plan_advance(materials, &pull, share), RUN_OUT),
             CuttingLaw::Rate(_) => {
                 let most = self.most();
@@ -156,7 +163,7 @@ impl Carver {
         }
         let way = (hand - tip).normalize_or_zero() * deepest + self.arrears(tip, volume.band());
         // The rate law's account already remembers what a bite was too short for.
-        self.owed = matches!(self.carving.law, CuttingLaw::Threshold).then_some(tip + way);
+        self.owed = matches!(law, CuttingLaw::Threshold).then_some(tip + way);
         Some(Bite { tip, way, deepest, run_out, radius: instrument.radius() + run_out, orientation })
     }
 

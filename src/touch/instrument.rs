@@ -1,6 +1,7 @@
 //! What the hand holds.
 
 use super::body::Body;
+use super::pack::Packs;
 use crate::frame::Vec3;
 use std::sync::Arc;
 
@@ -8,8 +9,12 @@ use std::sync::Arc;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instrument {
     pub end: WorkingEnd,
-    /// A rotating bur removes matter; an explorer never does.
+    /// A bur or a blade removes matter; an explorer never does.
     pub cuts: bool,
+    /// A bur turns; a blade cuts by the hand's force alone.
+    pub turns: bool,
+    /// What it does with a filling, if anything.
+    pub packs: Option<Packs>,
     /// Directions from the end's centre in which its surface is watched, unit vectors.
     feelers: Vec<Vec3>,
 }
@@ -35,7 +40,17 @@ impl Instrument {
             WorkingEnd::Ball { radius } => spread_over_sphere(feelers_for(radius)),
             WorkingEnd::Shaped(_) => Vec::new(),
         };
-        Instrument { end, cuts, feelers }
+        Instrument { end, cuts, turns: cuts, packs: None, feelers }
+    }
+
+    /// The same, moved by the hand alone.
+    pub fn by_hand(self) -> Instrument {
+        Instrument { turns: false, ..self }
+    }
+
+    /// The same, for fillings.
+    pub fn packing(self, packs: Packs) -> Instrument {
+        Instrument { packs: Some(packs), ..self }
     }
 
     /// A working end of any shape.
@@ -54,6 +69,16 @@ impl Instrument {
     /// Greatest radius of what cuts, mm; zero for a point.
     pub fn head_radius(&self) -> f32 {
         self.body().map_or(self.radius(), Body::head_radius)
+    }
+
+    /// Radius of the end as it is seen along the shaft, mm.
+    pub fn face_radius(&self) -> f32 {
+        self.body().map_or(self.radius(), Body::face_radius)
+    }
+
+    /// Signed distance in mm (negative inside) of a point of handle space from the working end.
+    pub fn end_distance(&self, point_in_handle: Vec3) -> f32 {
+        self.body().map_or_else(|| point_in_handle.length() - self.radius(), |b| b.head_distance(point_in_handle))
     }
 
     pub(super) fn body(&self) -> Option<&Body> {

@@ -62,7 +62,7 @@ impl Material {
             damping: (self.damping * factor.damping).clamp(0.0, 1.0),
             static_friction: (self.static_friction * factor.static_friction).clamp(0.0, FRICTION_MAX),
             dynamic_friction: (self.dynamic_friction * factor.dynamic_friction).clamp(0.0, FRICTION_MAX),
-            cut_force: self.cut_force,
+            cut_force: self.cut_force.map(|force| force * factor.cut_force).filter(|force| force.is_finite()),
             hardness: self.hardness.map(|hv| hv * factor.hardness),
         }
     }
@@ -131,21 +131,29 @@ pub struct Factor {
     pub static_friction: f32,
     pub dynamic_friction: f32,
     pub hardness: f32,
+    /// Infinite where the tool cannot cut the tissue.
+    pub cut_force: f32,
 }
 
 impl Factor {
     /// Changes nothing, to the last bit.
-    pub const ONE: Factor =
-        Factor { stiffness: 1.0, damping: 1.0, static_friction: 1.0, dynamic_friction: 1.0, hardness: 1.0 };
+    pub const ONE: Factor = Factor {
+        stiffness: 1.0,
+        damping: 1.0,
+        static_friction: 1.0,
+        dynamic_friction: 1.0,
+        hardness: 1.0,
+        cut_force: 1.0,
+    };
 
-    /// What one number is multiplied by. Nothing changes the force from which a tissue is cut.
+    /// What one number is multiplied by.
     pub fn of(&self, which: Coefficient) -> f32 {
         match which {
             Coefficient::Stiffness => self.stiffness,
             Coefficient::Damping => self.damping,
             Coefficient::StaticFriction => self.static_friction,
             Coefficient::DynamicFriction => self.dynamic_friction,
-            Coefficient::CutForce => 1.0,
+            Coefficient::CutForce => self.cut_force,
         }
     }
 
@@ -157,6 +165,7 @@ impl Factor {
             static_friction: self.static_friction * other.static_friction,
             dynamic_friction: self.dynamic_friction * other.dynamic_friction,
             hardness: self.hardness * other.hardness,
+            cut_force: self.cut_force * other.cut_force,
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Everything that can be touched: the voxel tooth, and plain shapes around it that are never carved.
 
+use super::field::Field;
 use super::obstacle::{Meeting, Obstacle};
 use crate::frame::{Pose, Vec3};
 use crate::volume::{Label, Volume};
@@ -15,6 +16,9 @@ pub struct Matter {
 
 /// More than a distance of some metres loses by rounding, mm: what is farther than a reach by this is surely out of it.
 const ROUNDING: f32 = 1e-2;
+
+/// A tip rests on soft matter that its centre is nearer to than this, mm: a probe's radius and some more.
+const SINKS_WITHIN: f32 = 0.5;
 
 /// A solid described by a formula, or by its surface.
 #[derive(Clone, Debug)]
@@ -42,6 +46,8 @@ pub enum Form {
     },
     /// Whatever a closed mesh encloses.
     Mesh(Arc<Obstacle>),
+    /// Known by its distance at the points of a grid.
+    Field(Arc<Field>),
 }
 
 impl Shape {
@@ -58,6 +64,7 @@ impl Shape {
                 (p - Vec3::Z * p.z.clamp(-half_length, half_length)).length() - radius
             }
             Form::Mesh(obstacle) => obstacle.distance(p),
+            Form::Field(field) => field.distance(p),
         }
     }
 
@@ -69,8 +76,10 @@ impl Shape {
         }
         /// Small against every shape we model, large against f32 rounding at 100 mm.
         const STEP: f32 = 0.01;
+        // Over a sample's width, or the slope would step from cell to cell.
+        let step = if let Form::Field(field) = &self.form { 0.5 * field.spacing() } else { STEP };
         let along =
-            |axis: Vec3| self.distance(point_in_tooth + axis * STEP) - self.distance(point_in_tooth - axis * STEP);
+            |axis: Vec3| self.distance(point_in_tooth + axis * step) - self.distance(point_in_tooth - axis * step);
         let slope = Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z));
         (self.distance(point_in_tooth), slope.try_normalize().unwrap_or(Vec3::Z))
     }
@@ -80,7 +89,7 @@ impl Shape {
     pub(super) fn meet(&self, point_in_tooth: Vec3, within: f32, mut each: impl FnMut(f32, Vec3)) {
         match &self.form {
             // Its normal costs six distances more: only what is within reach is asked for it.
-            Form::Ball { .. } | Form::RoundBox { .. } | Form::Capsule { .. } => {
+            Form::Ball { .. } | Form::RoundBox { .. } | Form::Capsule { .. } | Form::Field(_) => {
                 if self.distance(point_in_tooth) > within + ROUNDING {
                     return;
                 }
@@ -96,6 +105,19 @@ impl Shape {
 }
 
 impl Matter {
+    /// How deep an end sinks into what it touches, mm, and out of it; `None` where that holds any force.
+    pub fn sinking(&self, touched: Label, tip: Vec3, force: f32) -> Option<(f32, Vec3)> {
+        // What has no field is asked for no distance: of a mesh it is dear.
+        let (shape, yields) = self.around.iter().find_map(|shape| match &shape.form {
+            Form::Field(field) if shape.label == touched && shape.distance(tip) < SINKS_WITHIN => {
+                Some((shape, field.yields))
+            }
+            _ => None,
+        })?;
+        let depth = yields.depth(force);
+        (depth > 0.0).then(|| (depth, shape.distance_and_normal(tip).1))
+    }
+
     /// A radius in mm around a point of tooth space that surely holds no matter; 0 where matter may be near.
     ///
     /// The bound is coarse and costs one look-up: it is the test that keeps empty space cheap.

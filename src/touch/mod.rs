@@ -4,6 +4,7 @@
 //! that fell. Never reads a clock, a file or a device; never allocates once made.
 
 mod matter;
+mod field;
 mod obstacle;
 mod profile;
 mod body;
@@ -16,12 +17,14 @@ mod proxy;
 mod law;
 mod rate;
 mod carve;
+mod pack;
 mod vibration;
 mod guidance;
 mod gate;
 
 pub use body::{Body, Node, Region, Shank};
 pub use carve::{Carver, Carving, CuttingLaw, Press};
+pub use field::{Field, Yield};
 pub use gate::{ForceLimit, Gate};
 pub use guidance::{
     DAMPING_TIME, EASE_S, Fixture, ForceRow, Forces, Guidance, Guide, Kind, POINT_DISTANCE, Path, Space,
@@ -31,6 +34,7 @@ pub use law::{Law, Pull, SpringLimit};
 pub use material::{Coefficient, Factor, Factors, Material, Materials};
 pub use matter::{Form, Matter, Shape};
 pub use obstacle::Obstacle;
+pub use pack::{Filling, Packer, Packs, VOIDS_MOST};
 pub use profile::{EDGE, Nearest, Place, Profile};
 pub use proxy::{Contact, Proxy};
 pub use rate::Rate;

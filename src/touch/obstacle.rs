@@ -72,6 +72,12 @@ impl Obstacle {
         Some(Obstacle { surface, beyond, spokes, first })
     }
 
+    /// Its triangles, without normals.
+    pub fn mesh(&self) -> Mesh {
+        let positions = self.surface.vertices().iter().map(|v| from_library(*v)).collect();
+        Mesh { positions, normals: Vec::new(), triangles: self.surface.indices().to_vec() }
+    }
+
     /// Signed distance of a point from the surface, mm; negative inside.
     pub fn distance(&self, point: Vec3) -> f32 {
         let (place, triangle, location) = self.nearest_place(point);

@@ -118,6 +118,11 @@ impl Proxy {
         self.watch.forget();
     }
 
+    /// Matter was laid where there was none: what was known to be clear is not any more.
+    pub fn look_again(&mut self) {
+        self.watch.forget();
+    }
+
     /// True when the instrument could be held so without entering matter; `hand` is `tooth_from_handle`.
     pub fn is_free_at(matter: &Matter, instrument: &Instrument, hand: &Pose) -> bool {
         if let Some(body) = instrument.body() {

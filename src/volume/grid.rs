@@ -96,6 +96,23 @@ impl Grid {
         })
     }
 
+    /// A value at a point of tooth space within the grid's extent, mixed straight from those of the eight voxels around it. A bit
+    /// outside it goes on as straight as it came.
+    pub fn mixed(&self, values: &[f32], point_in_tooth: Vec3) -> f32 {
+        let [nx, ny, nz] = self.dims.map(|n| n as usize);
+        let at = self.from_tooth(point_in_tooth);
+        let base = |v: f32, n: usize| (v.max(0.0) as usize).min(n.saturating_sub(2));
+        let (x, y, z) = (base(at.x, nx), base(at.y, ny), base(at.z, nz));
+        let part = at - Vec3::new(x as f32, y as f32, z as f32);
+        let value = |i: usize, j: usize, k: usize| {
+            values[((z + k).min(nz - 1) * ny + (y + j).min(ny - 1)) * nx + (x + i).min(nx - 1)]
+        };
+        let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
+        let along_x = |j: usize, k: usize| mix(value(0, j, k), value(1, j, k), part.x);
+        let along_y = |k: usize| mix(along_x(0, k), along_x(1, k), part.y);
+        mix(along_y(0), along_y(1), part.z)
+    }
+
     /// The six neighbours of a voxel that lie in the grid, as array indices.
     pub fn neighbours(&self, index: usize) -> impl Iterator<Item = usize> + use<> {
         let cell = self.cell(index);

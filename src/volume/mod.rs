@@ -230,22 +230,22 @@ impl Volume {
 
 /// Labels the voxels that have density without being solid: two rounds of asking the neighbours cover every ramp we make.
 fn label_surfaces(grid: &Grid, density: &[Density], label: &mut [Label], untold: Label) {
-    let is_open = |label: &[Label], i: usize| density[i] > Density::EMPTY && label[i] == Label::AIR;
+    let mut open: Vec<usize> =
+        (0..grid.len()).filter(|&i| density[i] > Density::EMPTY && label[i] == Label::AIR).collect();
     for _ in 0..2 {
         let mut found = Vec::new();
-        for index in (0..grid.len()).filter(|&i| is_open(label, i)) {
+        for &index in &open {
             let under = grid.neighbours(index).filter(|&n| label[n] != Label::AIR).max_by_key(|&n| density[n]);
             found.extend(under.map(|n| (index, label[n])));
         }
         for (index, name) in found {
             label[index] = name;
         }
+        open.retain(|&index| label[index] == Label::AIR);
     }
     // What is left is noise far from anything solid.
-    for index in 0..grid.len() {
-        if is_open(label, index) {
-            label[index] = untold;
-        }
+    for index in open {
+        label[index] = untold;
     }
 }
 

@@ -34,7 +34,7 @@ fn begun(name: &str, spec: &Spec) -> Begun {
     let workpiece = Workpiece::make(&scenario, 4).unwrap();
     let head = HeadFile { live: true, ..HeadFile::of(&scenario, spec, 4) };
     let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.mcap"));
-    let recorder = Recorder::create(&file, &head, &scenario, &workpiece.volume).unwrap();
+    let recorder = Recorder::create(&file, &head, &scenario, &workpiece).unwrap();
     let simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
     Begun { file, recorder, session: Session::new(scenario, &workpiece), simulation, workpiece }
 }

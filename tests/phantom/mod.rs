@@ -41,6 +41,7 @@ pub fn setup(volume: Volume, end: WorkingEnd, cuts: bool) -> Setup {
         factors: Vec::new(),
         instruments: vec![Instrument::new(end, cuts)],
         carving: Carving { dwell: 0.3, dwell_share: 1.0 / 3.0, max_feed: 30.0, law: CuttingLaw::Threshold },
+        fillings: Vec::new(),
         vibration: Vibration::NONE,
         guidances: Vec::new(),
         world_from_tooth: Pose::IDENTITY,

@@ -50,8 +50,24 @@ impl Reach {
 pub enum Entry {
     /// From the bottom of a groove in the chewing surface.
     Groove(Groove),
-    /// Through a place of a smooth surface, as wide there as half axes along two directions of it.
-    Smooth { at: Vec3, inward: Vec3, axes: [Vec3; 2], half: [f32; 2] },
+    Smooth(Patch),
+}
+
+/// A place of a smooth surface, as wide as half axes along two directions of it; tooth space, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    pub at: Vec3,
+    pub inward: Vec3,
+    pub axes: [Vec3; 2],
+    pub half: [f32; 2],
+}
+
+impl Patch {
+    /// The same place with another way in.
+    fn aimed(self, inward: Vec3) -> Patch {
+        let axes = self.axes.map(|axis| axis.reject_from_normalized(inward).normalize_or(axis));
+        Patch { inward, axes, ..self }
+    }
 }
 
 /// A lesion to be grown.
@@ -84,11 +100,16 @@ const DENTINE_MOST: f32 = 4.0;
 /// The voxels of enamel and dentine that a lesion takes, in array order. `volume` is one tooth, crown up.
 pub fn grow(volume: &Volume, tissues: &Tissues, growth: &Growth) -> Vec<Decayed> {
     let near = Near::around(volume, growth);
+    if let Entry::Smooth(patch) = &growth.entry
+        && let Some(entry) = near.aimed(patch, tissues).map(Entry::Smooth)
+    {
+        return grow(volume, tissues, &Growth { entry, ..*growth });
+    }
     let enamel = near.distances(|label| label == tissues.enamel);
     let pulp = near.distances(|label| label == tissues.pulp);
     match &growth.entry {
         Entry::Groove(groove) => from_groove(&near, groove, growth, tissues, &enamel, &pulp),
-        Entry::Smooth { .. } => through_surface(&near, growth, tissues, &enamel, &pulp),
+        Entry::Smooth(patch) => through_surface(&near, patch, growth, tissues, &enamel, &pulp),
     }
 }
 
@@ -111,7 +132,7 @@ impl<'a> Near<'a> {
                 let (low, high) = groove.extent();
                 (low - reach - Vec3::Z * DEPTH, high + reach)
             }
-            Entry::Smooth { at, inward, half, .. } => {
+            Entry::Smooth(Patch { at, inward, half, .. }) => {
                 let side = half[0].max(half[1]).max(growth.spread) + AROUND;
                 let end = *at + *inward * DEPTH;
                 (at.min(end) - side, at.max(end) + side)
@@ -139,27 +160,50 @@ impl<'a> Near<'a> {
         self.grid.nearest(place).map(|cell| self.labels[self.grid.index(cell)])
     }
 
+    /// Half a voxel: how finely ways through the tooth are walked, mm.
+    fn step(&self) -> f32 {
+        0.5 * self.grid.spacing.min_element()
+    }
+
+    /// After how many steps from a place of the surface inward matter begins, and where from there on a run of labels ends.
+    fn run(&self, from: Vec3, inward: Vec3, is_in: impl Fn(Label) -> bool) -> [u32; 2] {
+        let label = |i: u32| self.label_at(from + inward * (i as f32 * self.step()));
+        // A place on the surface may lie half a voxel outside.
+        let begin = (0..6).find(|&i| label(i).is_some_and(|label| label != Label::AIR)).unwrap_or(0);
+        [begin, (begin..).find(|&i| !label(i).is_some_and(&is_in)).unwrap_or(begin)]
+    }
+
     /// How thick the enamel is from a place of the surface inward, mm, and how thick the dentine from there to the pulp.
     fn thickness(&self, from: Vec3, inward: Vec3, tissues: &Tissues, pulp: &[f32]) -> [f32; 2] {
-        let step = 0.5 * self.grid.spacing.min_element();
-        let along = |i: u32| from + inward * (i as f32 * step);
-        let is_enamel = |place: Vec3| self.label_at(place) == Some(tissues.enamel);
-        // A place on the surface may lie half a voxel outside.
-        let begin = (0..6).find(|&i| self.label_at(along(i)).is_some_and(|label| label != Label::AIR)).unwrap_or(0);
-        let end = (begin..).find(|&i| !is_enamel(along(i))).unwrap_or(begin);
-        let junction = along(end);
-        let to_pulp = self.grid.nearest(junction).map_or(DENTINE_MOST, |cell| pulp[self.grid.index(cell)]);
-        [(end - begin) as f32 * step, to_pulp.min(DENTINE_MOST)]
+        let [begin, end] = self.run(from, inward, |label| label == tissues.enamel);
+        let junction = self.grid.nearest(from + inward * (end as f32 * self.step()));
+        let to_pulp = junction.map_or(DENTINE_MOST, |cell| pulp[self.grid.index(cell)]);
+        [(end - begin) as f32 * self.step(), to_pulp.min(DENTINE_MOST)]
+    }
+
+    /// The nearest place of a tissue.
+    fn nearest_of(&self, from: Vec3, tissue: Label) -> Option<Vec3> {
+        let cells = self.grid.cells().zip(&self.labels).filter(|(_, label)| **label == tissue);
+        let places = cells.map(|(cell, _)| self.grid.centre(cell));
+        places.min_by(|a, b| a.distance_squared(from).total_cmp(&b.distance_squared(from)))
+    }
+
+    /// A patch with the shortest way to the dentine, where its own way in runs along the enamel: prisms stand about square on
+    /// the dentine.
+    fn aimed(&self, patch: &Patch, tissues: &Tissues) -> Option<Patch> {
+        /// So many times as much enamel as on the shortest way, and so much more, mm, is along it.
+        const ASTRAY: [f32; 2] = [1.5, 0.5];
+        let [begin, end] = self.run(patch.at, patch.inward, |label| label == tissues.enamel);
+        let shortest = self.nearest_of(patch.at, tissues.dentine)? - patch.at;
+        let is_astray = (end - begin) as f32 * self.step() > ASTRAY[0] * shortest.length() + ASTRAY[1];
+        let aimed = patch.aimed(shortest.try_normalize()?);
+        // Not twice: what lies nearest cannot be aimed at any better.
+        (is_astray && aimed.inward.dot(patch.inward) < 0.99).then_some(aimed)
     }
 
     /// How thick the tooth is from a place of its surface inward, mm.
     fn through(&self, from: Vec3, inward: Vec3) -> f32 {
-        let step = 0.5 * self.grid.spacing.min_element();
-        let is_matter =
-            |i: &u32| self.label_at(from + inward * (*i as f32 * step)).is_some_and(|label| label != Label::AIR);
-        // A place on the surface may lie half a voxel outside.
-        let begin = (0..6).find(is_matter).unwrap_or(0);
-        (begin..).find(|i| !is_matter(i)).unwrap_or(begin) as f32 * step
+        self.run(from, inward, |label| label != Label::AIR)[1] as f32 * self.step()
     }
 
     /// Which places each column lies near to as seen from above, x fastest.
@@ -239,8 +283,15 @@ fn from_groove(
     })
 }
 
-fn through_surface(near: &Near, growth: &Growth, tissues: &Tissues, enamel: &[f32], pulp: &[f32]) -> Vec<Decayed> {
-    let Entry::Smooth { at, inward, axes, half } = growth.entry else { return Vec::new() };
+fn through_surface(
+    near: &Near,
+    patch: &Patch,
+    growth: &Growth,
+    tissues: &Tissues,
+    enamel: &[f32],
+    pulp: &[f32],
+) -> Vec<Decayed> {
+    let Patch { at, inward, axes, half } = *patch;
     let [in_enamel, in_dentine] = growth.reach.shares();
     let [enamel_depth, dentine_depth] = near.thickness(at, inward, tissues, pulp);
     let outside = near.distances(|label| label == Label::AIR);

@@ -58,7 +58,7 @@ fn played(tooth: Volume) -> Result<Recording, String> {
     let spec = Spec::phantom_omni();
     let head = HeadFile::of(&scenario, &spec, SEED);
     let file = Scratch::new("mcap");
-    let mut recorder = Recorder::create(&file.0, &head, &scenario, &workpiece.volume).map_err(|e| e.to_string())?;
+    let mut recorder = Recorder::create(&file.0, &head, &scenario, &workpiece).map_err(|e| e.to_string())?;
     let mut session = Session::new(scenario.clone(), &workpiece);
     let mut simulation = Simulation::new(session::setup(&scenario, &workpiece, spec.clone()));
     let mut trainee = Operator::new(operator, scenario, workpiece, spec, SEED);

@@ -1,10 +1,10 @@
 //! A learning record store, spoken to by xAPI 1.0.3 (Part Three) or 2.0.0 (IEEE 9274.1.1): one request, one answer.
 
+use crate::cli::trusted;
 use base64::Engine;
 use serde_json::Value as Json;
 use std::time::Duration;
 use ureq::Agent;
-use ureq::tls::{Certificate, PemItem, RootCerts, TlsConfig, parse_pem};
 
 /// For one request with its answer: a slow store over a bad line. Longer is as good as gone.
 const TIMEOUT: Duration = Duration::from_secs(30);
@@ -16,25 +16,7 @@ pub struct Lrs {
     agent: Agent,
     statements: String,
     authorization: String,
-    version: Version,
-}
-
-/// Of xAPI, as the store speaks it. What we send is right in both.
-#[derive(Clone, Copy, Debug, PartialEq, clap::ValueEnum)]
-pub enum Version {
-    #[value(name = "1.0.3")]
-    One,
-    #[value(name = "2.0.0")]
-    Two,
-}
-
-impl Version {
-    fn text(self) -> &'static str {
-        match self {
-            Version::One => "1.0.3",
-            Version::Two => "2.0.0",
-        }
-    }
+    version: String,
 }
 
 /// What a store makes of statements.
@@ -53,10 +35,11 @@ pub enum Answer {
 }
 
 impl Lrs {
-    /// `endpoint` is the address that `statements` is appended to. `roots` are certificates in PEM to trust in place of the usual.
+    /// `endpoint` is the address that `statements` is appended to. `version` is of xAPI; what we send is right in both.
+    /// `roots` are certificates in PEM to trust in place of the usual.
     ///
     /// `Err` for an address that would send the secret in the clear, or is none.
-    pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>, version: Version) -> Result<Lrs, String> {
+    pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>, version: &str) -> Result<Lrs, String> {
         let url = url::Url::parse(endpoint).map_err(|e| format!("\"{endpoint}\" is no address: {e}"))?;
         if !url.username().is_empty() || url.password().is_some() || url.query().is_some() || url.fragment().is_some() {
             return Err("give it without a name, secret, query or fragment; the key and its secret have options".into());
@@ -73,26 +56,13 @@ impl Lrs {
             "http" => return Err("over http the secret could be read on the way; use https".into()),
             other => return Err(format!("a store is reached by https, not by {other}")),
         }
-        let mut tls = TlsConfig::builder();
-        if let Some(pem) = roots {
-            let certificates: Vec<Certificate<'static>> = parse_pem(pem)
-                .filter_map(|item| match item {
-                    Ok(PemItem::Certificate(certificate)) => Some(certificate),
-                    _ => None,
-                })
-                .collect();
-            if certificates.is_empty() {
-                return Err("the file of certificates holds none in PEM".into());
-            }
-            tls = tls.root_certs(RootCerts::from(certificates));
-        }
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .timeout_global(Some(TIMEOUT))
             .max_redirects(0)
             // Over http a proxy would read the secret, and `localhost` would be another machine's.
             .proxy(if url.scheme() == "http" { None } else { ureq::Proxy::try_from_env() })
-            .tls_config(tls.build())
+            .tls_config(trusted::tls(roots)?)
             .user_agent(concat!("typodont/", env!("CARGO_PKG_VERSION")))
             .build();
         let login = base64::engine::general_purpose::STANDARD.encode(format!("{key}:{secret}"));
@@ -100,7 +70,7 @@ impl Lrs {
             agent: config.into(),
             statements: format!("{}/statements", endpoint.trim_end_matches('/')),
             authorization: format!("Basic {login}"),
-            version,
+            version: version.into(),
         })
     }
 
@@ -110,7 +80,7 @@ impl Lrs {
         let request = self
             .agent
             .post(&self.statements)
-            .header("X-Experience-API-Version", self.version.text())
+            .header("X-Experience-API-Version", &self.version)
             .header("Authorization", &self.authorization)
             .header("Content-Type", "application/json");
         answer(request.send(body))
@@ -122,7 +92,7 @@ impl Lrs {
             .agent
             .get(&self.statements)
             .query("statementId", id)
-            .header("X-Experience-API-Version", self.version.text())
+            .header("X-Experience-API-Version", &self.version)
             .header("Authorization", &self.authorization);
         match request.call() {
             Ok(response) if response.status() == 404 => {

@@ -1,6 +1,6 @@
 //! `typodont xapi send`: from the spool to the store, as long as it takes.
 
-use super::lrs::{Answer, Lrs, Version};
+use super::lrs::{Answer, Lrs};
 use super::{Failure, in_words, open, say, unusable};
 use crate::handover::spool::Spool;
 use serde_json::Value as Json;
@@ -25,8 +25,8 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.pem")]
     certificates: Option<PathBuf>,
     /// Version of xAPI that the store speaks
-    #[arg(long, value_name = "VERSION", default_value = "1.0.3")]
-    xapi_version: Version,
+    #[arg(long, value_name = "VERSION", default_value = "1.0.3", value_parser = ["1.0.3", "2.0.0"])]
+    xapi_version: String,
     /// For how long a store that does not answer is tried again, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     patience: f64,
@@ -102,7 +102,7 @@ fn store(arguments: &Arguments) -> Result<Lrs, Failure> {
         })?,
     };
     let roots = arguments.certificates.as_deref().map(crate::content::read_file).transpose()?;
-    Lrs::at(&arguments.endpoint, &arguments.key, &secret, roots.as_deref(), arguments.xapi_version)
+    Lrs::at(&arguments.endpoint, &arguments.key, &secret, roots.as_deref(), &arguments.xapi_version)
         .map_err(|e| Failure::misuse(format!("--endpoint: {e}")))
 }
 

@@ -2,7 +2,7 @@
 
 use super::Sight;
 use crate::frame::{Pose, Vec3};
-use crate::render::empty::Empty;
+use crate::render::empty::{self, Empty};
 use crate::render::hollow::Hollow;
 use crate::render::matter_box;
 use crate::render::scene::{Finish, Palette, Tooth};
@@ -66,13 +66,13 @@ impl<'a> Matter<'a> {
         [first, last]
     }
 
-    /// Steps to the nearest brick that may show something, and how far on the ray leaves the cube of bricks so wide.
+    /// The entry of the brick around a place, and how far on the ray leaves the cube of bricks in which there is no other.
     pub fn leap(&self, at: Vec3, along: Vec3) -> (u8, f32) {
         let dims = self.empty.dims();
         let brick: [u32; 3] =
             std::array::from_fn(|a| ((at[a] / BRICK as f32).floor().max(0.0) as u32).min(dims[a] - 1));
-        let steps = self.empty.steps()[((brick[2] * dims[1] + brick[1]) * dims[0] + brick[0]) as usize];
-        let reach = f32::from(steps.max(1));
+        let entry = self.empty.entries()[((brick[2] * dims[1] + brick[1]) * dims[0] + brick[0]) as usize];
+        let reach = f32::from(empty::steps(entry).max(1));
         let mut out = f32::INFINITY;
         for axis in 0..3 {
             // The first brick goes on where the grid has ended.
@@ -82,14 +82,14 @@ impl<'a> Matter<'a> {
             let room = if along[axis] > 0.0 { high - at[axis] } else { at[axis] - low };
             out = out.min((room.max(0.0) + NUDGE) / along[axis].abs().max(1e-9));
         }
-        (steps, out)
+        (entry, out)
     }
 
     /// How density rises, per mm in world space.
     pub fn slope(&self, at: Vec3) -> Vec3 {
-        let corner = |n: u32| Vec3::from([0, 1, 2].map(|a| if n >> a & 1 == 1 { 1.0 } else { -1.0 }));
-        let rise: Vec3 = (0..8).map(|n| corner(n) * self.density(at + corner(n))).sum();
-        self.world_from_tooth.turn(rise * 0.125 / self.volume.grid().spacing)
+        let corners = [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
+        let rise: Vec3 = corners.map(|corner| corner * self.density(at + corner)).into_iter().sum();
+        self.world_from_tooth.turn(rise * 0.25 / self.volume.grid().spacing)
     }
 
     /// Outward unit normal in world space; where density does not change, `otherwise`.

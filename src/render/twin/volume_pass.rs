@@ -4,6 +4,7 @@ use super::matter::{Matter, Ray};
 use super::{Canvas, Sight};
 use crate::frame::Vec3;
 use crate::render::blending_step;
+use crate::render::empty::{self, EVEN};
 use crate::render::scene::Finish;
 use crate::render::transfer::{Table, TransferFunction};
 
@@ -47,17 +48,21 @@ fn blend(matter: &Matter, tables: &[Table], ray: &Ray, pace: f32, near: f32, beh
     let mut z = number * pace;
     let mut blended = Blended { colour: Vec3::ZERO, alpha: 0.0, first: None };
     while z < end {
-        let (steps, way_out) = matter.leap(ray.at(z), ray.along);
+        let (brick, way_out) = matter.leap(ray.at(z), ray.along);
         let out = z + way_out;
-        if steps > 0 {
+        if empty::steps(brick) > 0 {
             number = (out / pace).ceil().max(number + 1.0);
             z = number * pace;
             continue;
         }
-        while z < out && z < end {
+        let out = out.min(end);
+        // Where all samples are one, one is taken for all.
+        let samples = if brick == EVEN { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
+        while z < out {
             let [r, g, b, a] = entry(matter, tables, ray.at(z)).map(|v| f32::from(v) / 255.0);
             if a > 0.0 {
-                let share = a * (1.0 - blended.alpha);
+                let opacity = if brick == EVEN { 1.0 - libm::powf(1.0 - a, samples) } else { a };
+                let share = opacity * (1.0 - blended.alpha);
                 blended.colour += Vec3::new(r, g, b) * share;
                 blended.alpha += share;
                 blended.first = blended.first.or(Some(z));
@@ -65,7 +70,7 @@ fn blend(matter: &Matter, tables: &[Table], ray: &Ray, pace: f32, near: f32, beh
                     return blended;
                 }
             }
-            number += 1.0;
+            number += samples;
             z = number * pace;
         }
     }

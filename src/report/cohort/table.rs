@@ -2,7 +2,7 @@
 
 use super::{Cohort, dedup};
 use crate::report::csv;
-use crate::scenario::metric::PLAIN;
+use crate::scenario::metric;
 
 impl Cohort {
     pub fn csv(&self) -> String {
@@ -40,7 +40,8 @@ impl Cohort {
     /// Every measure any session has, those of the table first and in its order.
     pub fn metric_names(&self) -> Vec<String> {
         let used = |name: &str| self.sessions.iter().any(|(_, s)| s.metric(name).is_some());
-        let mut names: Vec<String> = PLAIN.iter().map(|a| a.name.to_string()).filter(|n| used(n)).collect();
+        let mut names: Vec<String> =
+            metric::without_argument().map(|a| a.name.to_string()).filter(|n| used(n)).collect();
         let others = dedup(self.sessions.iter().flat_map(|(_, s)| s.metrics.keys().map(String::as_str)));
         let others: Vec<String> =
             others.into_iter().filter(|n| !names.iter().any(|k| k == n) && used(n)).map(String::from).collect();

@@ -16,7 +16,7 @@ pub(super) use tint::linear;
 
 use super::glb::Part;
 use crate::frame::Vec3;
-use crate::record::Recording;
+use crate::record::{Recording, Replay};
 use crate::scenario::ToothPlace;
 use crate::score::{Scored, Verdict};
 use crate::volume::march::{self, Camera, Picture as Pixels, Shot, Side};
@@ -96,7 +96,7 @@ fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn;
     let shot = Shot { camera: Camera::framing(side, before, 1.0), width: SIZE, height: SIZE };
     let first = march::look(before, &shot);
     let last = if is_unchanged(scored) { first.clone() } else { march::look_again(after, &shot, &first) };
-    let distal = distal(scored);
+    let distal = scored.replay.workpiece.distal();
     // What a side is called where y is mesial.
     let called = match side {
         Side::Mesial if distal.y < 0.0 => Side::Distal,
@@ -120,11 +120,6 @@ fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn;
     .map(|(shows, pixels)| Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, distal)))
 }
 
-/// Which way is distal in the first tooth.
-fn distal(scored: &Scored) -> Vec3 {
-    scored.replay.workpiece.teeth.first().map_or(Vec3::Y, ToothPlace::distal)
-}
-
 fn is_unchanged(scored: &Scored) -> bool {
     scored.replay.workpiece.volume.densities() == scored.replay.volume.densities()
 }
@@ -145,7 +140,10 @@ fn cuts(scored: &Scored, palette: &Palette, (side, name, title): (Side, &str, &s
         kept @ (Verdict::KeptSound | Verdict::Kept) => palette.quiet(label, kept),
         verdict => verdict.color(),
     };
-    let map = march::slice(before, &shot, middle, verdict);
+    let map = match laid_too(scored) {
+        Some(all) => march::slice(&all, &shot, middle, verdict),
+        None => march::slice(before, &shot, middle, verdict),
+    };
     let (was, is) = (line(before, FORMER_LINE), line(after, LINE));
     [
         (Shows::BeforeSlice, vec![cut(before), line(before, LINE)]),
@@ -156,8 +154,19 @@ fn cuts(scored: &Scored, palette: &Palette, (side, name, title): (Side, &str, &s
         let mut layers = layers.into_iter();
         let mut pixels = layers.next().unwrap_or_else(|| Pixels::clear(SIZE, SIZE));
         layers.for_each(|layer| pixels.lay_over(&layer));
-        Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, distal(scored)))
+        Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, scored.replay.workpiece.distal()))
     })
+}
+
+/// All matter that a filling's map is about: what was there, what was to be there and what was laid. `None` without a filling.
+fn laid_too(scored: &Scored) -> Option<Volume> {
+    let Replay { workpiece, volume: after, .. } = &scored.replay;
+    let original = workpiece.original.as_ref().filter(|_| scored.restoration.is_some())?;
+    let layers = [&*workpiece.volume, original, after];
+    let (grid, band) = (*after.grid(), after.band());
+    let most = |voxel: usize| layers.iter().map(|v| v.voxel(voxel)).max_by_key(|v| v.density).unwrap_or_default();
+    let (density, label) = (0..grid.len()).map(|voxel| (most(voxel).density, most(voxel).label)).unzip();
+    Volume::restored(grid, band, density, label)
 }
 
 /// Frames the crown of a tooth and the beginning of its roots.

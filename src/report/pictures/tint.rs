@@ -43,7 +43,9 @@ impl<'a> Tint<'a> {
     pub fn of(scored: &'a Scored) -> Tint<'a> {
         let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
         let grid = before.grid();
-        let is_removed = |v: usize| before.tissue(v) != Label::AIR && after.tissue(v) == Label::AIR;
+        // What is missing of a filling shows on the walls around it, as what was taken away does.
+        let is_missing = |v: usize| matches!(scored.verdicts[v], Verdict::Underfilled | Verdict::Void);
+        let is_removed = |v: usize| before.tissue(v) != Label::AIR && after.tissue(v) == Label::AIR || is_missing(v);
         let crop = Crop::around(grid, 3, (0..grid.len()).filter(|&v| is_removed(v)));
         let near = crop.map(|crop| {
             let (distances, nearest) = distance::to_nearest(&crop.grid, |i| is_removed(crop.whole_index(i)));
@@ -55,7 +57,7 @@ impl<'a> Tint<'a> {
     /// The colour of a solid voxel on the surface, where `kept` is that of a place where nothing was done.
     pub fn colour(&self, voxel: usize, kept: [f32; 3]) -> [f32; 3] {
         match self.scored.verdicts[voxel] {
-            own @ (Verdict::Left | Verdict::VulnerableTouched) => own.color(),
+            own @ (Verdict::Left | Verdict::VulnerableTouched | Verdict::Restored | Verdict::Overfilled) => own.color(),
             _ => self.bounded(voxel).map_or(kept, |(verdict, share)| mixed(kept, verdict.color(), share)),
         }
     }

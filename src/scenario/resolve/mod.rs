@@ -12,10 +12,13 @@ mod zones;
 use super::file::{self, ScenarioFile};
 use super::{Measures, OperatingField, Questionnaire, Scenario};
 use crate::content::json::Places;
-use crate::content::{AgeBand, FeelTable, InstrumentEntry, InstrumentTable, Library, TissueEntry, TissueTable, json};
+use crate::content::{
+    AgeBand, FeelTable, InstrumentEntry, InstrumentTable, Library, TissueEntry, TissueTable, json, pointer,
+};
 use crate::diagnostic::{Diagnostic, Source, did_you_mean};
 use crate::touch::{Carving, CuttingLaw, Factor, Factors, Guidance, Rate, Vibration};
 use crate::volume::Label;
+use rubric::Has;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -39,10 +42,20 @@ pub fn resolve(source: Arc<Source>, library: &Library, forms: Forms) -> Result<S
     let mut found = Vec::new();
     let tissues = TissueTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
     let instruments = InstrumentTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
+    let own = read.value.instrument_file.as_deref();
+    // A missing file is the scenario's mistake, a broken one the file's.
+    let told = |complaint: Diagnostic| match complaint.code {
+        "missing-file" => read.places.complain("/instrument_file", "missing-file", complaint.message, complaint.help),
+        _ => complaint,
+    };
+    let instruments = instruments.and_then(|table| match own {
+        None => Ok(table),
+        Some(name) => table.and_of(library, name).map_err(|complaints| found.extend(complaints.into_iter().map(told))),
+    });
     let (Ok(tissues), Ok(instruments)) = (tissues, instruments) else { return Err(found) };
     let feel = FeelTable::read(library);
-    let files = [TissueTable::NAME, InstrumentTable::NAME, FeelTable::NAME];
-    let files = files.iter().filter_map(|name| Some((name.to_string(), library.bytes(name).ok()?))).collect();
+    let files = [TissueTable::NAME, InstrumentTable::NAME, FeelTable::NAME].into_iter().chain(own);
+    let files = files.filter_map(|name| Some((name.to_string(), library.bytes(name).ok()?))).collect();
     let feel = feel.unwrap_or_else(|mut complaints| {
         found.append(&mut complaints);
         None
@@ -112,8 +125,8 @@ impl Resolver<'_> {
         let lesions: Vec<String> =
             scene.iter().flat_map(|s| &s.teeth).flat_map(|t| &t.decay).map(|d| d.id.clone()).collect();
         let stages = self.stages(written, &lesions);
-        let has_decay = written_teeth(&written.scene).iter().any(|t| !t.decay.is_empty());
-        let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, has_decay));
+        let has = Has::of(written, &stages);
+        let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, has));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
         let factors = self.factors(written, &instruments);
         let carving = self.carving(&written.carving);
@@ -175,7 +188,7 @@ impl Resolver<'_> {
             self.tissues.add(entry.clone(), self.places, &format!("/new_tissues/{index}"), &mut self.found);
         }
         for (name, change) in &written.tissues {
-            let path = format!("/tissues/{}", name.replace('~', "~0").replace('/', "~1"));
+            let path = pointer::under("/tissues", name);
             self.label(name, &path);
             if let Some(entry) = self.tissues.by_name_mut(name) {
                 entry.stiffness = change.stiffness.unwrap_or(entry.stiffness);

@@ -3,15 +3,21 @@
 use super::{Forms, Resolver, tooth_path};
 use crate::anatomy;
 use crate::anatomy::caries::Reach;
-use crate::content;
+use crate::content::{self, pointer};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::scenario::file;
 use crate::scenario::workpiece::anatomy_tissues;
-use crate::scenario::{Decay, DecayPlace, DecayShape, Form, Grown, GrownEntry, Layout, Scene, Tooth};
+use crate::scenario::{
+    Arch, ArchForm, Calculus, Cavity, Decay, DecayPlace, DecayShape, Filling, Form, Grown, GrownEntry, Layout, Pockets,
+    Proximal, Scene, Tooth,
+};
 use crate::touch::{self, Obstacle, Shape};
 use crate::volume::{Label, Volume};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+
+/// Half of the narrowest mouth of a cavity, mm: a carrier brings material in through it.
+const NARROWEST: f32 = 0.25;
 
 impl Resolver<'_> {
     pub(super) fn scene(&mut self, written: &file::SceneFile) -> Option<Scene> {
@@ -27,13 +33,65 @@ impl Resolver<'_> {
         let stains =
             teeth.iter().zip(&paths).flat_map(|(t, p)| t.stains.iter().enumerate().map(move |(i, s)| (s, p, i)));
         let stains = stains.map(|(s, p, i)| (s.id.as_str(), format!("{p}/stains/{i}/id")));
-        self.unique(decay.chain(stains));
+        let deposits =
+            teeth.iter().zip(&paths).flat_map(|(t, p)| t.calculus.iter().enumerate().map(move |(i, c)| (c, p, i)));
+        let deposits = deposits.map(|(c, p, i)| (c.id.as_str(), format!("{p}/calculus/{i}/id")));
+        let fillings =
+            teeth.iter().zip(&paths).flat_map(|(t, p)| t.old_fillings.iter().enumerate().map(move |(i, f)| (f, p, i)));
+        let fillings = fillings.map(|(f, p, i)| (f.id.as_str(), format!("{p}/old_fillings/{i}/id")));
+        self.unique(decay.chain(stains).chain(deposits).chain(fillings));
         let teeth: Vec<Option<Tooth>> = teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path)).collect();
         let around = match written {
             file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
             file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
         };
-        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, around })
+        let pockets = match written {
+            file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(pockets),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+        };
+        if pockets.is_some() && around.is_some() {
+            let help = "leave \"around\" out: gum with pockets brings its neighbours along";
+            let message = "meshes of one's own have no pockets";
+            self.complain("/scene/jaw/periodontium", "two-gums", message, help);
+        }
+        let arch = match written {
+            file::SceneFile::Jaw(jaw) => self.arch(&jaw.arch, jaw.tooth.fdi),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => Arch::default(),
+        };
+        let with_calculus = teeth.iter().position(|tooth| tooth.as_ref().is_some_and(|t| !t.calculus.is_empty()));
+        if let Some(tooth) = with_calculus.filter(|_| pockets.is_none()) {
+            let help = "put the tooth into a \"jaw\" and give that \"periodontium\": {}";
+            let message = "calculus is placed by the gum's margin, and there is none";
+            self.complain(&format!("{}/calculus", tooth_path(written, tooth)), "no-gum", message, help);
+        }
+        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, around, pockets, arch })
+    }
+
+    fn arch(&mut self, written: &file::ArchFile, own: u8) -> Arch {
+        let missing = written.missing.iter().enumerate().map(|(i, fdi)| (*fdi, format!("/scene/jaw/arch/missing/{i}")));
+        let rotated = written.rotated.iter().enumerate();
+        let rotated = rotated.map(|(i, r)| (r.fdi, format!("/scene/jaw/arch/rotated/{i}/fdi")));
+        let mut named = BTreeSet::new();
+        for (fdi, path) in missing.chain(rotated) {
+            if !named.insert(fdi) {
+                let help = "name each tooth once: it is missing, or it is turned";
+                self.complain(&path, "duplicate-tooth", format!("{fdi} was named before"), help);
+            } else if anatomy::teeth::tooth(fdi).is_none() {
+                let help = "FDI numbers run 11–18, 21–28, 31–38, 41–48";
+                self.complain(&path, "unknown-tooth", format!("there is no tooth {fdi}"), help);
+            } else if fdi == own {
+                let message = format!("{fdi} is the tooth that is worked on");
+                self.complain(&path, "wrong-tooth", message, "name one of the teeth around it");
+            }
+        }
+        let form = |f: file::ArchFormFile| ArchForm { width: f.width_mm, depth: f.depth_mm };
+        Arch {
+            upper: form(written.upper),
+            lower: form(written.lower),
+            angle_class: written.angle_class,
+            missing: written.missing.clone(),
+            rotated: written.rotated.iter().map(|r| (r.fdi, r.degrees)).collect(),
+        }
     }
 
     /// What stands around a tooth; an obstacle that cannot be read is complained about and left out.
@@ -89,7 +147,12 @@ impl Resolver<'_> {
             written.decay.iter().enumerate().map(|(i, d)| self.decay(d, &format!("{path}/decay/{i}"))).collect();
         let stains =
             written.stains.iter().enumerate().map(|(i, s)| self.stain(s, &format!("{path}/stains/{i}"))).collect();
-        Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay, stains })
+        let cavity = written.cavity.as_ref().map(|c| self.cavity(c, &format!("{path}/cavity")));
+        let calculus = written.calculus.iter().enumerate();
+        let calculus = calculus.map(|(i, c)| self.calculus(c, &format!("{path}/calculus/{i}"))).collect();
+        let fillings = written.old_fillings.iter().enumerate();
+        let fillings = fillings.map(|(i, f)| self.old_filling(f, &format!("{path}/old_fillings/{i}"))).collect();
+        Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay, stains, cavity, calculus, fillings })
     }
 
     fn form(&mut self, written: &file::FormFile, path: &str) -> Option<Form> {
@@ -141,7 +204,7 @@ impl Resolver<'_> {
     fn numbers(&mut self, written: &BTreeMap<String, String>, path: &str) -> BTreeMap<u8, Label> {
         let mut numbers = BTreeMap::new();
         for (number, tissue) in written {
-            let at = format!("{path}/{}", number.replace('~', "~0").replace('/', "~1"));
+            let at = pointer::under(path, number);
             let label = self.label(tissue, &at);
             match number.parse::<u8>() {
                 Ok(number) if number > 0 => {
@@ -192,6 +255,63 @@ impl Resolver<'_> {
         let label = self.tissue_with(&written.tissue, content::Role::Sound, &format!("{path}/tissue"));
         let shape = self.patch_shape(&patch, path);
         Decay { id: written.id.clone(), label, shape, surface: written.surface, place }
+    }
+
+    fn cavity(&mut self, written: &file::CavityFile, path: &str) -> Cavity {
+        let shape = file::DecayShapeFile::Sphere(file::SphereFile { radius_mm: 1.0 });
+        let patch = Patch { shape: &shape, surface: file::SurfaceFile::O, at: written.at, depth: 0.0 };
+        let place = self.patch_place(&patch, path);
+        if let Some(proximal) = &written.proximal
+            && proximal.depth_mm < written.depth_mm
+        {
+            let message = "the gingival floor lies above the cavity's own";
+            let help = "give the proximal box more depth_mm than the cavity has";
+            self.complain(&format!("{path}/proximal/depth_mm"), "shallow-box", message, help);
+        }
+        let mouth =
+            0.5 * written.width_mm.min(written.length_mm) + written.depth_mm * written.walls_deg.to_radians().tan();
+        if mouth < NARROWEST {
+            let message = "the walls lean together so far that the cavity has no mouth";
+            let help = "make it wider or less deep, or let the walls lean less (walls_deg)";
+            self.complain(&format!("{path}/walls_deg"), "closed-cavity", message, help);
+        }
+        let proximal = written.proximal.as_ref().map(|p| Proximal {
+            is_distal: p.side == file::ProximalSide::D,
+            width: p.width_mm,
+            axial: p.axial_mm,
+            depth: p.depth_mm,
+        });
+        Cavity {
+            place,
+            length: written.length_mm,
+            width: written.width_mm,
+            depth: written.depth_mm,
+            lean: written.walls_deg.to_radians(),
+            corner: written.corner_mm,
+            proximal,
+        }
+    }
+
+    fn calculus(&mut self, written: &file::CalculusFile, path: &str) -> Calculus {
+        Calculus {
+            id: written.id.clone(),
+            label: self.tissue_with(&written.tissue, content::Role::Deposit, &format!("{path}/tissue")),
+            site: written.site.into(),
+            below_margin: written.below_margin_mm,
+            thickness: written.thickness_mm,
+            width: written.width_mm,
+            height: written.height_mm,
+        }
+    }
+
+    fn old_filling(&mut self, written: &file::FillingFile, path: &str) -> Filling {
+        Filling {
+            id: written.id.clone(),
+            label: self.tissue_with(&written.tissue, content::Role::Material, &format!("{path}/tissue")),
+            offset: written.offset_mm.map(|o| o.0),
+            size: written.size_mm.map(|s| s.0),
+            depth: written.depth_mm,
+        }
     }
 
     fn patch_place(&mut self, patch: &Patch, path: &str) -> DecayPlace {
@@ -248,12 +368,24 @@ impl Resolver<'_> {
             let names: Vec<&str> = self.tissues.entries().iter().filter(fits).map(|e| e.name.as_str()).collect();
             let (role, kind) = match role {
                 content::Role::Decay => ("decay", "a kind of decay"),
+                content::Role::Deposit => ("deposit", "a deposit"),
+                content::Role::Material => ("material", "a filling material"),
                 _ => ("sound", "a sound tissue"),
             };
             let help = format!("tissues with the role \"{role}\": {}", names.join(", "));
             self.complain(path, "wrong-tissue", format!("\"{name}\" is not {kind}"), help);
         }
         label
+    }
+}
+
+fn pockets(written: &file::PeriodontiumFile) -> Pockets {
+    let filled = |written: [Option<f32>; 6], healthy: [f32; 6]| {
+        std::array::from_fn(|site| written[site].unwrap_or(healthy[site]))
+    };
+    Pockets {
+        depth: filled(written.pocket_mm.at_sites(), Pockets::HEALTHY.depth),
+        recession: filled(written.recession_mm.at_sites(), Pockets::HEALTHY.recession),
     }
 }
 

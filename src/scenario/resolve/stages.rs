@@ -1,9 +1,10 @@
 //! The parts of an exercise: what is in the tray, what is asked, when a part ends.
 
 use super::{Resolver, written_teeth};
+use crate::content::EndEntry;
 use crate::diagnostic::did_you_mean;
 use crate::scenario::file::{self, ScenarioFile};
-use crate::scenario::{Ends, Question, QuestionKind, Stage, StiffnessSteps};
+use crate::scenario::{Charted, Ends, Question, QuestionKind, Stage, StiffnessSteps};
 
 impl Resolver<'_> {
     pub(super) fn stages(&mut self, written: &ScenarioFile, lesions: &[String]) -> Vec<Stage> {
@@ -72,6 +73,7 @@ impl Resolver<'_> {
                 "add a bur to \"instruments\"",
             );
         }
+        let filling = written.filling.as_ref().and_then(|name| self.filling(name, &instruments, scenario, path));
         let steps = written.stiffness_steps.as_ref().map(|steps| StiffnessSteps {
             label: self.label(&steps.tissue, &format!("{path}/stiffness_steps/tissue")),
             coefficients: steps.coefficients.iter().map(|c| c.0).collect(),
@@ -83,6 +85,24 @@ impl Resolver<'_> {
             self.complain(&format!("{path}/adjustable"), "adjustable-steps", message, help);
         }
         let guidance = written.guidance.as_ref().and_then(|g| self.guidance(g, &format!("{path}/guidance")));
+        let chart = Charted {
+            depths: written.chart.contains(&file::ChartFile::Depth),
+            calculus: written.chart.contains(&file::ChartFile::Calculus),
+        };
+        if chart != Charted::default()
+            && !matches!(&scenario.scene, file::SceneFile::Jaw(jaw) if jaw.periodontium.is_some())
+        {
+            let help = "put the tooth into a \"jaw\" and give that \"periodontium\": {}";
+            self.complain(&format!("{path}/chart"), "no-gum", "there is no gum with a sulcus to be charted", help);
+        }
+        let is_probe = |index: &usize| {
+            let entry = scenario.instruments.get(*index).and_then(|id| self.instruments.by_id(id));
+            entry.is_some_and(|e| matches!(e.end, EndEntry::Probe(_)))
+        };
+        if chart.depths && !instruments.iter().any(is_probe) {
+            let help = "add a periodontal probe to \"instruments\": probe_unc15, probe_williams or probe_who";
+            self.complain(&format!("{path}/chart"), "no-probe", "no instrument of this stage measures depths", help);
+        }
         let ask = written
             .ask
             .iter()
@@ -96,13 +116,43 @@ impl Resolver<'_> {
             time_limit: written.time_limit_s,
             instruments,
             cutting: written.cutting,
+            filling,
             show_decay: written.show_decay,
             is_adjustable: written.adjustable,
             steps,
             guidance,
+            chart,
             ask,
             ends,
         }
+    }
+
+    /// What carriers lay: a tissue that can be packed, and an instrument that lays it.
+    fn filling(
+        &mut self,
+        name: &str,
+        instruments: &[usize],
+        scenario: &ScenarioFile,
+        path: &str,
+    ) -> Option<crate::volume::Label> {
+        let at = format!("{path}/filling");
+        let label = self.label(name, &at);
+        let entry = self.tissues.by_name(name)?;
+        if entry.packing.is_none() {
+            let packed: Vec<&str> =
+                self.tissues.entries().iter().filter(|e| e.packing.is_some()).map(|e| e.name.as_str()).collect();
+            let help = format!("give the tissue \"packing\", or take one of {}", packed.join(", "));
+            self.complain(&at, "no-filling", format!("\"{name}\" cannot be packed"), help);
+        }
+        let lays = |index: &usize| {
+            let entry = scenario.instruments.get(*index).and_then(|id| self.instruments.by_id(id));
+            entry.is_some_and(|e| e.packs.is_some_and(|p| p.mm3_per_s > 0.0))
+        };
+        if !instruments.iter().any(lays) {
+            let help = "add a carrier or a plastic instrument to \"instruments\"";
+            self.complain(&at, "nothing-lays", "no instrument of this stage lays a filling", help);
+        }
+        Some(label)
     }
 
     /// Indices of instruments of the tray.

@@ -1,26 +1,39 @@
 //! One trial of the workpiece: what only shows in the matter itself is told to the author too.
 
 use super::tooth_path;
+use crate::content::Role;
 use crate::content::json::Places;
 use crate::diagnostic::Diagnostic;
 use crate::frame::Vec3;
 use crate::scenario::file::ScenarioFile;
 use crate::scenario::workpiece::Unmakeable;
-use crate::scenario::{Scenario, Workpiece};
+use crate::scenario::{DecayPlace, Scenario, Workpiece};
 use crate::touch::Guidance;
+use crate::volume::Label;
 
 /// A path further from the teeth than this leads nowhere, mm.
 const PATH_AWAY: f32 = 10.0;
 
-/// Makes the workpiece once: what only shows in the matter itself (a decay outside its tooth) is told to the author too.
+/// Seeds that are tried where chance may put a cavity into the pulp.
+const DRAWN: std::ops::Range<u64> = 1..8;
+
+/// Makes the workpiece: what only shows in the matter itself (a decay outside its tooth) is told to the author too.
 pub(super) fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &Places, found: &mut Vec<Diagnostic>) {
-    let problem = match Workpiece::make(scenario, 0) {
+    let is_drawn = |place: &DecayPlace| matches!(place, DecayPlace::Random | DecayPlace::RandomQuadrant);
+    let is_cavity_drawn = scenario.scene.teeth.iter().filter_map(|t| t.cavity.as_ref()).any(|c| is_drawn(&c.place));
+    let mut problem = match Workpiece::make(scenario, 0) {
         Ok(workpiece) => {
             find_paths_away(scenario, &workpiece, places, found);
-            return find_zones_outside(scenario, &workpiece, places, found);
+            find_zones_outside(scenario, &workpiece, places, found);
+            find_decay_cut_away(scenario, written, &workpiece, places, found);
+            None
         }
-        Err(problem) => problem,
+        Err(problem) => Some(problem),
     };
+    if problem.is_none() && is_cavity_drawn {
+        problem = DRAWN.into_iter().find_map(|seed| Workpiece::make(scenario, seed).err());
+    }
+    let Some(problem) = problem else { return };
     let (path, help) = match &problem {
         Unmakeable::DecayOutside { tooth, decay } => (
             format!("{}/decay/{decay}", tooth_path(&written.scene, *tooth)),
@@ -34,6 +47,25 @@ pub(super) fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &
             format!("{}/stains/{stain}", tooth_path(&written.scene, *tooth)),
             "make it larger, or move it toward the surface's middle",
         ),
+        Unmakeable::CavityOutside { tooth } => (
+            format!("{}/cavity", tooth_path(&written.scene, *tooth)),
+            "move \"at\" toward the surface's middle, or make it deeper",
+        ),
+        Unmakeable::CavityInPulp { tooth } => (
+            format!("{}/cavity", tooth_path(&written.scene, *tooth)),
+            "make it less deep, or move it away from the pulp's horns",
+        ),
+        Unmakeable::NoRoot { tooth, calculus } => (
+            format!("{}/calculus/{calculus}/below_margin_mm", tooth_path(&written.scene, *tooth)),
+            "place it between the gum's margin and the root's end",
+        ),
+        Unmakeable::FillingOutside { tooth, filling } => (
+            format!("{}/old_fillings/{filling}/offset_mm", tooth_path(&written.scene, *tooth)),
+            "move it toward the crown's middle",
+        ),
+        Unmakeable::PocketTooDeep { .. } => {
+            ("/scene/jaw/periodontium".to_string(), "make the deepest pocket or the recession smaller")
+        }
         Unmakeable::NoEnamel { tooth } => {
             (format!("{}/form", tooth_path(&written.scene, *tooth)), "check which number or grey value is enamel")
         }
@@ -45,6 +77,26 @@ pub(super) fn try_to_make(scenario: &Scenario, written: &ScenarioFile, places: &
         Unmakeable::TooLarge { .. } | Unmakeable::OnlyRecorded => ("/scene".to_string(), "choose a larger spacing_mm"),
     };
     found.push(places.complain(&path, "impossible-scene", problem.to_string(), Some(help.into())));
+}
+
+/// Decay that lies within what is cut away before the session was never there.
+fn find_decay_cut_away(
+    scenario: &Scenario,
+    written: &ScenarioFile,
+    workpiece: &Workpiece,
+    places: &Places,
+    found: &mut Vec<Diagnostic>,
+) {
+    let is_decay = |label: Label| scenario.tissues.role(label) == Some(Role::Decay);
+    let is_left = || workpiece.volume.tissues().any(is_decay);
+    if let Some(tooth) = scenario.scene.teeth.iter().position(|t| !t.decay.is_empty())
+        && !is_left()
+    {
+        let message = "nothing of the decay is left: a cavity or an old filling takes all of its place";
+        let help = "move or enlarge the decay, or make the cavity smaller";
+        let path = format!("{}/decay", tooth_path(&written.scene, tooth));
+        found.push(places.complain(&path, "no-decay", message.into(), Some(help.into())));
+    }
 }
 
 /// A zone that no tooth reaches would never matter, and its author would never know.

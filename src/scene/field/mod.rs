@@ -77,7 +77,7 @@ impl Field {
     /// This allocates; what follows does not.
     pub fn new(options: OperatingField, tray: &[InstrumentEntry], mouth_of_suction: Option<Vec3>) -> Field {
         let drill = |entry: &InstrumentEntry| Drill {
-            cuts: entry.cuts,
+            cuts: entry.is_bur(),
             radius: entry.make().head_radius(),
             height: head_height(&entry.end),
         };

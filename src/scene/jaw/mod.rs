@@ -10,7 +10,9 @@ mod teeth;
 
 use self::arch::{Half, Seat};
 use self::crown::Coloured;
-use self::gum::{Jaw, Side};
+pub(super) use self::crown::smooth_normals;
+pub use self::gum::Jaw;
+use self::gum::Side;
 use self::teeth::Model;
 use super::around;
 use crate::anatomy::form::Sizes;
@@ -19,7 +21,8 @@ use crate::content::{Role, TissueTable};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::mesh::Mesh;
 use crate::render::{Finish, Quadrant, Rgb, Solid};
-use crate::scenario::{ToothPlace, Workpiece};
+use crate::scenario::file::AngleClassFile;
+use crate::scenario::{Arch as Plan, Periodontium, ToothPlace, Workpiece};
 use crate::touch::{Form, Shape};
 use crate::volume::{Label, rows};
 use glam::Mat3;
@@ -38,6 +41,9 @@ const OVERBITE: f32 = 2.0;
 /// How far behind the lower first molar's middle the upper one's lies, so that its mesiobuccal cusp meets the lower one's
 /// buccal groove (Angle's class I), mm.
 const MOLAR_RELATION: f32 = 0.9;
+
+/// The width of a cusp: by so much a lower jaw of Angle's class II stands back and one of class III forward, mm.
+const CUSP: f32 = 4.5;
 
 /// Wet gum and enamel.
 const GUM_GLOSS: f32 = 0.28;
@@ -99,15 +105,17 @@ impl Mouth {
             return None;
         }
         let jaw = if quadrant <= 2 { Jaw::Upper } else { Jaw::Lower };
-        let near = Arch::with(jaw, Some((tooth, number)));
-        let other = Arch::with(jaw.other(), None);
+        let plan = &workpiece.arch;
+        let near = Arch::with(jaw, Some((tooth, number)), plan);
+        let other = Arch::with(jaw.other(), None, plan);
         let seat = near.carved.half.seats[number - 1];
         let top = 0.5 * (tooth.crown_low + tooth.crown_high);
         let anchor = Vec3::new(top.x, top.y, tooth.crown_low.z);
         let sign = teeth_by_number::distal(tooth.fdi);
         let near_from_tooth = sided(seat.arch_from_tooth(), sign) * Pose::at(-anchor);
         let gums = tissues.by_name("gingiva").map(|e| e.label());
-        let felt = Felt { tooth, shapes: &workpiece.around, gums, near_from_tooth };
+        let periodontium = workpiece.periodontium.as_deref();
+        let felt = Felt { tooth, shapes: &workpiece.around, periodontium, gums, near_from_tooth };
         let colour = |name: &str, otherwise: Rgb| tissues.by_name(name).map_or(otherwise, |e| e.rgb());
         let (enamel, pink) = (colour("neighbour", [0.93, 0.91, 0.86]), colour("gingiva", [0.85, 0.53, 0.50]));
         let drawn =
@@ -116,17 +124,30 @@ impl Mouth {
                 gum: Drawn::of(arch.gum(fit), pink, GUM_GLOSS),
             };
         let is_taken = |is_carved_side: bool, index: usize, seat: &Seat| {
-            (is_carved_side && index + 1 == number) || felt.takes(seat, if is_carved_side { sign } else { -sign })
+            let side = if is_carved_side { sign } else { -sign };
+            let is_missing = plan.missing.contains(&jaw.number(side, index));
+            is_missing
+                || (is_carved_side && index + 1 == number)
+                || felt.takes(seat, if is_carved_side { sign } else { -sign })
         };
-        let is_soft =
-            |shape: &Shape| tissues.role(shape.label) == Some(Role::Soft) && !matches!(shape.form, Form::Mesh(_));
-        let touched = workpiece.around.iter().filter(|shape| !is_soft(shape));
+        let is_drawn = |shape: &&Shape| {
+            let is_soft = tissues.role(shape.label) == Some(Role::Soft);
+            around::is_seen(shape, tissues) && (!is_soft || has_own_surface(shape))
+        };
+        let touched = workpiece.around.iter().filter(is_drawn);
         Some(Mouth {
             near: drawn(&near, &is_taken, &|p| felt.fitted(p)),
-            opposite: drawn(&other, &|_, _, _| false, &|p| p),
+            opposite: drawn(
+                &other,
+                &|is_carved_side, index, _| {
+                    let side = if is_carved_side { other.sign } else { -other.sign };
+                    plan.missing.contains(&other.jaw.number(side, index))
+                },
+                &|p| p,
+            ),
             jaw,
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
-            near_from_opposite: closed(jaw, &near, &other),
+            near_from_opposite: closed(jaw, &near, &other, plan.angle_class),
             touched: touched.map(|shape| around::solid(shape, workpiece, tissues)).collect(),
         })
     }
@@ -178,6 +199,34 @@ impl Mouth {
     }
 }
 
+/// One jaw of 28 teeth by itself; arch space: x to the patient's left in the lower jaw and to the right in the upper one, y back,
+/// z occlusal, mm.
+pub struct JawAlone {
+    /// Gum with palate or floor of the mouth, closed, with a colour at each corner.
+    pub gum: Mesh,
+    pub gum_colours: Vec<Rgb>,
+    /// Where each tooth stands, by its number: `arch_from_tooth`.
+    pub teeth: Vec<(u8, Pose)>,
+}
+
+impl JawAlone {
+    pub fn of(jaw: Jaw, tissues: &TissueTable) -> JawAlone {
+        let arch = Arch::with(jaw, None, &Plan::default());
+        let Coloured { mesh, tints } = arch.gum(&|p| p);
+        let pink = tissues.by_name("gingiva").map_or([0.85, 0.53, 0.50], |e| e.rgb());
+        let gum_colours = tints.iter().map(|tint| std::array::from_fn(|c| pink[c] * tint[c])).collect();
+        let quadrants = match jaw {
+            Jaw::Upper => [(1, 1.0), (2, -1.0)],
+            Jaw::Lower => [(3, 1.0), (4, -1.0)],
+        };
+        let teeth = quadrants.into_iter().flat_map(|(quadrant, sign)| {
+            let seats = arch.plain.half.seats.iter().zip(1u8..);
+            seats.map(move |(seat, number)| (10 * quadrant + number, sided(seat.arch_from_tooth(), sign)))
+        });
+        JawAlone { gum: mesh, gum_colours, teeth: teeth.collect() }
+    }
+}
+
 impl Jaw {
     fn other(self) -> Jaw {
         match self {
@@ -193,11 +242,23 @@ impl Jaw {
         }
     }
 
-    fn form(self) -> arch::Form {
-        match self {
-            Jaw::Upper => arch::UPPER,
-            Jaw::Lower => arch::LOWER,
-        }
+    fn form(self, plan: &Plan) -> arch::Form {
+        let (average, own) = match self {
+            Jaw::Upper => (arch::UPPER, plan.upper),
+            Jaw::Lower => (arch::LOWER, plan.lower),
+        };
+        arch::Form { width: own.width.unwrap_or(average.width), depth: own.depth, ..average }
+    }
+
+    /// The number of the tooth at a place from the midline on a side of x.
+    fn number(self, side: f32, index: usize) -> u8 {
+        let quadrant = match (self, side > 0.0) {
+            (Jaw::Upper, true) => 1,
+            (Jaw::Upper, false) => 2,
+            (Jaw::Lower, true) => 3,
+            (Jaw::Lower, false) => 4,
+        };
+        10 * quadrant + index as u8 + 1
     }
 }
 
@@ -212,6 +273,7 @@ struct Arch {
 }
 
 /// Half a jaw's teeth.
+#[derive(Clone)]
 struct Row {
     half: Half,
     models: Vec<Model>,
@@ -219,19 +281,27 @@ struct Row {
 
 impl Arch {
     /// A jaw of 28 teeth, with room for a carved tooth of its own size; with the third molars where that is one.
-    fn with(jaw: Jaw, carved: Option<(&ToothPlace, usize)>) -> Arch {
+    fn with(jaw: Jaw, carved: Option<(&ToothPlace, usize)>, plan: &Plan) -> Arch {
         let count = if carved.is_some_and(|(_, number)| number == 8) { 8 } else { 7 };
         let plain = jaw.models()[..count].to_vec();
         let mut models = plain.clone();
         if let Some((tooth, number)) = carved {
             models[number - 1] = fitting(&models[number - 1], tooth);
         }
-        let row = |models: Vec<Model>| {
-            let teeth: Vec<(Model, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
-            Row { half: Half::of(jaw.form(), &teeth), models }
-        };
         let sign = carved.map_or(1.0, |(tooth, _)| teeth_by_number::distal(tooth.fdi));
-        Arch { jaw, sign, carved: row(models), plain: row(plain) }
+        let row = |mut models: Vec<Model>, side: f32| {
+            for (index, model) in models.iter_mut().enumerate() {
+                let number = jaw.number(side, index);
+                model.turn = plan.rotated.iter().find(|(fdi, _)| *fdi == number).map_or(0.0, |(_, degrees)| *degrees);
+            }
+            let teeth: Vec<(Model, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
+            Row { half: Half::of(jaw.form(plan), &teeth), models }
+        };
+        if carved.is_none() && plan.rotated.is_empty() {
+            let both = row(plain, -sign);
+            return Arch { jaw, sign, carved: both.clone(), plain: both };
+        }
+        Arch { jaw, sign, carved: row(models, sign), plain: row(plain, -sign) }
     }
 
     /// All crowns but those that are taken: on the carved tooth's side or the other, by their place from the midline.
@@ -286,10 +356,15 @@ fn fitting(model: &Model, tooth: &ToothPlace) -> Model {
 }
 
 /// The opposite jaw's arch space in the near one's when the jaws are closed.
-fn closed(near: Jaw, own: &Arch, other: &Arch) -> Pose {
+fn closed(near: Jaw, own: &Arch, other: &Arch, class: AngleClassFile) -> Pose {
+    let ahead = match class {
+        AngleClassFile::I => 0.0,
+        AngleClassFile::II => -CUSP,
+        AngleClassFile::III => CUSP,
+    };
     let (upper, lower) = if near == Jaw::Upper { (own, other) } else { (other, own) };
     let first_molar = |arch: &Arch| arch.plain.half.seats[5].top.y;
-    let forward = first_molar(lower) + MOLAR_RELATION - first_molar(upper);
+    let forward = first_molar(lower) + MOLAR_RELATION + ahead - first_molar(upper);
     // Turned about y by half a turn: left becomes right and up becomes down.
     let orientation = Quat::from_rotation_y(std::f32::consts::PI);
     let lower_from_upper = Pose { position: Vec3::new(0.0, forward, -OVERBITE), orientation };
@@ -300,6 +375,8 @@ fn closed(near: Jaw, own: &Arch, other: &Arch) -> Pose {
 struct Felt<'a> {
     tooth: &'a ToothPlace,
     shapes: &'a [Shape],
+    /// Gum with a margin of its own.
+    periodontium: Option<&'a Periodontium>,
     gums: Option<Label>,
     near_from_tooth: Pose,
 }
@@ -329,18 +406,35 @@ impl Felt<'_> {
         let deep = crown_low.z - point.z;
         let near = (1.0 - between(aside.length(), AS_FELT)) * (1.0 - between(deep, DEEP));
         // A mesh is slow to ask.
-        let share = if near > 0.0 { near * (1.0 - between(gum.distance(point).abs(), FAR)) } else { 0.0 };
+        let away = |p: Vec3| self.periodontium.map_or_else(|| gum.distance(p), |own| own.filled_gum(p));
+        let share = if near > 0.0 { near * (1.0 - between(away(point).abs(), FAR)) } else { 0.0 };
         if share <= 0.0 {
             return point_in_arch;
         }
-        let wanted = if matches!(gum.form, Form::Mesh(_)) { -UNDER } else { 0.0 };
+        let wanted = if has_own_surface(gum) { -UNDER } else { 0.0 };
         let start = point;
         for _ in 0..3 {
-            let (distance, out) = gum.distance_and_normal(point);
+            let (distance, out) = match self.periodontium {
+                Some(own) => (own.filled_gum(point), steepest(&|p| own.filled_gum(p), point)),
+                None => gum.distance_and_normal(point),
+            };
             point -= out * (distance - wanted);
         }
         self.near_from_tooth * start.lerp(point, share)
     }
+}
+
+/// The way in which a distance grows, unit.
+fn steepest(distance: &dyn Fn(Vec3) -> f32, point: Vec3) -> Vec3 {
+    /// mm
+    const STEP: f32 = 0.15;
+    let along = |axis: Vec3| distance(point + axis * STEP) - distance(point - axis * STEP);
+    Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or(Vec3::Z)
+}
+
+/// True for what is drawn for itself, the drawn jaw giving way to it.
+fn has_own_surface(shape: &Shape) -> bool {
+    matches!(shape.form, Form::Mesh(_))
 }
 
 /// 0 up to the first bound, 1 from the second on.

@@ -17,6 +17,12 @@ pub struct Model {
     pub lean: f32,
     /// How far cusps or edge stay short of the occlusal plane, mm.
     pub short: f32,
+    /// How far its middle stands out of the arch's line toward lip or cheek, mm: a canine is an arch's corner.
+    pub out: f32,
+    /// How far its root leans distally under its crown, degrees (Andrews's tip).
+    pub tip: f32,
+    /// How far its mesial side is turned toward lip or cheek, degrees.
+    pub turn: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,10 +37,10 @@ pub enum Kind {
 pub const UPPER: [Model; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::UPPER;
     [
-        model(a, Kind::Incisor, 20.0, 0.0),
-        model(b, Kind::Incisor, 18.0, 0.6),
-        model(c, Kind::Canine, 8.0, 0.0),
-        model(d, Kind::Premolar, 0.0, 0.3),
+        tipped(model(a, Kind::Incisor, 20.0, 0.0), 5.0),
+        tipped(model(b, Kind::Incisor, 18.0, 0.6), 6.0),
+        tipped(standing_out(model(c, Kind::Canine, 8.0, 0.0), 2.3), 6.0),
+        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.9),
         model(e, Kind::Premolar, 0.0, 0.3),
         model(f, Kind::Molar, 2.0, 0.3),
         model(g, Kind::Molar, 2.0, 0.3),
@@ -46,10 +52,10 @@ pub const UPPER: [Model; 8] = {
 pub const LOWER: [Model; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::LOWER;
     [
-        model(a, Kind::Incisor, 12.0, 0.0),
-        model(b, Kind::Incisor, 11.0, 0.0),
-        model(c, Kind::Canine, 5.0, 0.0),
-        model(d, Kind::Premolar, 0.0, 0.3),
+        tipped(model(a, Kind::Incisor, 12.0, 0.0), 2.0),
+        tipped(model(b, Kind::Incisor, 11.0, 0.0), 2.0),
+        tipped(standing_out(model(c, Kind::Canine, 5.0, 0.0), 2.2), 3.0),
+        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.9),
         model(e, Kind::Premolar, 0.0, 0.3),
         model(f, Kind::Molar, -3.0, 0.3),
         model(g, Kind::Molar, -3.0, 0.3),
@@ -58,5 +64,13 @@ pub const LOWER: [Model; 8] = {
 };
 
 const fn model(form: Form, kind: Kind, lean: f32, short: f32) -> Model {
-    Model { form, sizes: form.sizes, kind, lean, short }
+    Model { form, sizes: form.sizes, kind, lean, short, out: 0.0, tip: 0.0, turn: 0.0 }
+}
+
+const fn tipped(model: Model, tip: f32) -> Model {
+    Model { tip, ..model }
+}
+
+const fn standing_out(model: Model, out: f32) -> Model {
+    Model { out, ..model }
 }

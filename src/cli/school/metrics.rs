@@ -1,0 +1,88 @@
+//! Counters for Prometheus, on this machine's loopback: text exposition format 0.0.4.
+
+use crate::school::work::Tally;
+use std::io::{self, Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+/// For a question and its answer; who is slower is let go.
+const WAIT: Duration = Duration::from_secs(2);
+
+#[derive(Debug, Default)]
+pub struct Counters {
+    pub scored: AtomicU64,
+    pub failed: AtomicU64,
+    pub set_aside: AtomicU64,
+    milliseconds: AtomicU64,
+    queue: [AtomicI64; 4],
+}
+
+impl Counters {
+    pub fn add_seconds(&self, time: Duration) {
+        self.milliseconds.fetch_add(time.as_millis() as u64, Ordering::Relaxed);
+    }
+
+    pub fn set_queue(&self, tally: Tally) {
+        let now = [tally.waiting, tally.leased, tally.done, tally.set_aside];
+        for (gauge, value) in self.queue.iter().zip(now) {
+            gauge.store(value, Ordering::Relaxed);
+        }
+    }
+
+    /// What Prometheus reads.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut counter = |name: &str, help: &str, value: f64| {
+            text +=
+                &format!("# HELP typodont_{name} {help}\n# TYPE typodont_{name} counter\ntypodont_{name} {value}\n");
+        };
+        let count = |of: &AtomicU64| of.load(Ordering::Relaxed) as f64;
+        counter("sessions_scored_total", "Sessions that this worker scored.", count(&self.scored));
+        counter("attempts_failed_total", "Attempts of this worker that failed.", count(&self.failed));
+        counter("sessions_set_aside_total", "Sessions that this worker set aside.", count(&self.set_aside));
+        counter("scoring_seconds_total", "Time spent on fetching and scoring.", count(&self.milliseconds) / 1000.0);
+        text += "# HELP typodont_jobs Sessions in the queue of this scorer version, when last asked.\n# TYPE typodont_jobs gauge\n";
+        for (state, gauge) in ["waiting", "leased", "done", "set_aside"].iter().zip(&self.queue) {
+            text += &format!("typodont_jobs{{state=\"{state}\"}} {}\n", gauge.load(Ordering::Relaxed));
+        }
+        text
+    }
+}
+
+/// Answers on a thread of its own, until the program ends.
+pub fn serve(port: u16, counters: Arc<Counters>) -> io::Result<SocketAddr> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+    let at = listener.local_addr()?;
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            // Whoever breaks off asks again.
+            let _ = answer(stream, &counters);
+        }
+    });
+    Ok(at)
+}
+
+fn answer(mut stream: TcpStream, counters: &Counters) -> io::Result<()> {
+    stream.set_read_timeout(Some(WAIT))?;
+    stream.set_write_timeout(Some(WAIT))?;
+    let mut head = [0; 2048];
+    let mut length = 0;
+    while length < head.len() && !head[..length].windows(4).any(|w| w == b"\r\n\r\n") {
+        match stream.read(&mut head[length..])? {
+            0 => break,
+            more => length += more,
+        }
+    }
+    let (status, body) = match head.starts_with(b"GET /metrics ") {
+        true => ("200 OK", counters.text()),
+        false => ("404 Not Found", "counters are at /metrics\n".to_string()),
+    };
+    let length = body.len();
+    write!(
+        stream,
+        "HTTP/1.1 {status}\r\nContent-Type: text/plain; version=0.0.4\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+    )
+}
