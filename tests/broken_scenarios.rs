@@ -360,7 +360,9 @@ fn parts_that_do_not_fit_together() {
         &[("unknown-zone", "/rubric/hard_fails/1/metric"), ("duplicate-id", "/zones/1/id")],
     );
     let one_tooth = edited("4-diagnosis.json", "/stages/0/ask/0/answer", Some(json!({ "tooth_with": "lesion" })));
-    check_text("which tooth of one", &one_tooth, &[("no-choice", "/stages/0/ask/0/answer")]);
+    // The rubric's points were for the quadrant, which nobody asks any more.
+    let unasked = ["/rubric/items/0/metric", "/rubric/items/1/metric"].map(|at| ("no-question", at));
+    check_text("which tooth of one", &one_tooth, &[unasked[0], unasked[1], ("no-choice", "/stages/0/ask/0/answer")]);
     let tissue = json!([{ "id": 1, "name": "enamel", "title": "E", "role": "sound", "color": "red", "stiffness": 1, "damping": 1, "static_friction": 0, "dynamic_friction": 0, "cut_force_n": 1 }]);
     check("a new tissue that clashes", "/new_tissues", tissue, &[("wrong-form", "/new_tissues/0/color")]);
     let pair = edited("2-decay.json", "/scene/pair/right/form/procedural/spacing_mm", Some(json!(0.2)));

@@ -585,12 +585,43 @@ fn nobody_reads_what_is_not_theirs() {
     refused("station-1", &forged("station-2", "station-2/x"));
     refused("station-1", &forged("station-1", "station-2/x"));
     refused("station-1", "INSERT INTO typodont.metric_value SELECT gen_random_uuid(), 1, 'dice', 1");
+    // What was sent stays as it was sent: nothing is added to it later.
+    refused(
+        "station-1",
+        "INSERT INTO typodont.metric_value SELECT id, scorer_version, 'made_up', 1 FROM typodont.session",
+    );
+    refused("station-1", "INSERT INTO typodont.rating SELECT id, 'q', 99, 'i', 'c', 1, 1 FROM typodont.session");
+    // A bundle's name leads nowhere.
+    for name in ["/srv/other", "..", "a/../../b", "a\\b"] {
+        let sql = format!(
+            "INSERT INTO typodont.session (id, class_id, exercise_id, bundle, ended_because, length_s, scorer_version, result, manifest)
+             SELECT g.id, c.id, e.id, '{name}', '', 1, 1, '{{}}', json_build_object('folder', 'station-1/' || g.id)
+             FROM typodont.class c, typodont.exercise e, (SELECT gen_random_uuid() AS id) g LIMIT 1"
+        );
+        let error = cluster.client("station-1").batch_execute(&sql).unwrap_err();
+        assert!(error.as_db_error().unwrap().message().contains("session_bundle_check"), "{name}: {error:?}");
+    }
     // An examiner reads a class and judges there; its people, and no others.
     assert_eq!(seen("examiner", &of("session")), Ok(1));
     assert_eq!(seen("examiner", "SELECT count(*) FROM typodont.participant WHERE code = 'anna'"), Ok(1));
     assert_eq!(seen("examiner", "SELECT count(*) FROM typodont.participant WHERE code = 'berk'"), Ok(0));
     assert_eq!(seen("examiner", &of("metric_value")), Ok(3));
     refused("examiner", "UPDATE typodont.session SET points = 100");
+    // Nor does a line about one's own session judge another's.
+    let id = |person: &str| -> String {
+        let sql = "SELECT s.id::text FROM typodont.session s JOIN typodont.participant p ON p.id = s.participant_id
+          WHERE p.code = $1";
+        cluster.client("owner").query_one(sql, &[&person]).unwrap().get(0)
+    };
+    for (number, about) in [(1i64, "anna"), (2, "berk")] {
+        let line = judgement(&id(about), "2026-11-22T09:00:00Z", 99.0).to_string();
+        let sql = "INSERT INTO typodont.override (log, number, session_id, line, sha256)
+          SELECT 'by hand', $1, id, $2, '' FROM typodont.session WHERE id::text = $3";
+        cluster.client("examiner").execute(sql, &[&number, &line, &id("anna")]).unwrap();
+    }
+    let told = typodont::school::records::judgements(&mut cluster.client("registrar")).unwrap();
+    let about: Vec<&str> = told.counting().map(|entry| entry.draft.session.as_str()).collect();
+    assert_eq!(about, [id("anna").as_str()]);
     refused("examiner", "SELECT * FROM typodont.audit");
     refused("examiner", "SELECT typodont.erase_sessions('{}', 'x')");
     // A registrar reads all and changes no grade; a worker does not learn who it was; nobody rewrites the audit log.
@@ -821,6 +852,13 @@ fn python_reads_the_partitions() {
     assert!(output.status.success(), "{}{}", String::from_utf8_lossy(&output.stdout), complained(&output));
 }
 
+/// The first line of an examiner's log: the whole grade of a session is judged otherwise.
+fn judgement(session: &str, at: &str, points: f64) -> Value {
+    json!({ "version": 1, "number": 1, "previous": "0".repeat(64), "at": at, "session": session, "recording": "",
+        "item": null, "machine": { "points": 50.0, "passed": false }, "examiner": { "points": points, "passed": true },
+        "reason": "'; DROP TABLE typodont.override; --", "name": "Dr. Öz" })
+}
+
 #[test]
 fn what_examiners_judged_is_entered_and_counts() {
     let Some(cluster) = school_of(&["station-1"]) else { return };
@@ -830,10 +868,7 @@ fn what_examiners_judged_is_entered_and_counts() {
     enter(&own, "bundle", school::session("5-grinding", "anna", 50.0), 500);
     sync(&cluster, "station-1", &own, &address, "A");
     let id: String = cluster.client("owner").query_one("SELECT id::text FROM typodont.session", &[]).unwrap().get(0);
-    let zeros = "0".repeat(64);
-    let line = json!({ "version": 1, "number": 1, "previous": zeros, "at": "2026-11-22T09:00:00Z", "session": id, "recording": "",
-        "item": null, "machine": { "points": 50.0, "passed": false }, "examiner": { "points": 88.0, "passed": true },
-        "reason": "'; DROP TABLE typodont.override; --", "name": "Dr. Öz" });
+    let line = judgement(&id, "2026-11-22T09:00:00Z", 88.0);
     fs::write(own.join("overrides.jsonl"), line.to_string() + "\n").unwrap();
     assert!(cluster.ask("examiner", &["school", "judgements", &text(&own)]).contains("1 judgements entered"));
     assert!(cluster.ask("examiner", &["school", "judgements", &text(&own)]).contains("0 judgements entered"));
@@ -853,6 +888,18 @@ fn what_examiners_judged_is_entered_and_counts() {
     assert!(
         cluster.ask("examiner", &["school", "judgements", &text(&desk)]).contains("0 judgements entered, 0 taken over")
     );
+    // Judged at a third desk since, and entered later: the older word does not overrule it there, and the newer one counts.
+    let late = folder.join("late");
+    fs::create_dir_all(&late).unwrap();
+    fs::write(late.join("overrides.jsonl"), judgement(&id, "2026-11-22T10:30:00Z", 60.0).to_string() + "\n").unwrap();
+    let exchanged = cluster.ask("examiner", &["school", "judgements", &text(&late)]);
+    assert!(exchanged.contains("1 judgements entered, 0 taken over"), "{exchanged}");
+    let grades = folder.join("grades-later.csv");
+    cluster.ask(
+        "registrar",
+        &["gradebook", "--database", &database, "--for", "moodle", "--overrides", "-o", &text(&grades)],
+    );
+    assert!(fs::read_to_string(grades).unwrap().contains("anna,60,"));
     // Of a class that is not theirs examiners enter nothing.
     cluster.ask("owner", &["school", "admit", "other", "--as", "examiner", "--class", "B"]);
     assert!(cluster.ask("other", &["school", "judgements", &text(&own)]).contains("0 judgements entered"));

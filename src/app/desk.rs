@@ -239,7 +239,9 @@ impl Desk {
         let Some(exercise) = self.shelf.exercise() else { return };
         match (exercise.path.clone(), shelf::shipped_text(&exercise.name)) {
             (Some(path), _) => self.open_author(&path, Watch::Edit, ctx),
-            (None, Some(text)) => self.screen = Screen::Author(Box::new(Authoring::copy(text, wake(ctx)))),
+            (None, Some(text)) => {
+                self.screen = Screen::Author(Box::new(Authoring::copy(&exercise.name, text, wake(ctx))));
+            }
             (None, None) => {}
         }
     }

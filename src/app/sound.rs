@@ -186,7 +186,6 @@ mod tests {
             shaft: Vec3::Y,
             touch: touched.map(|(label, spring)| Touch { label, spring, normal: Vec3::Y }),
             cutting: touched.is_some(),
-            packing: false,
             removed: 0,
             lead: Vec3::ZERO,
             guidance: Vec3::ZERO,

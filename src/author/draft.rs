@@ -75,9 +75,18 @@ impl Draft {
         Ok(())
     }
 
-    /// The whole text anew, as somebody typed it.
+    /// The whole text anew, as somebody types it: letter after letter of a line is one step.
     pub fn write(&mut self, text: String) {
+        let is_new_line = text.lines().count() != self.text.lines().count();
         self.change(text, Some("text"));
+        if is_new_line {
+            self.joins = None;
+        }
+    }
+
+    /// The whole text anew, as it comes from elsewhere: a step of its own.
+    pub fn replace(&mut self, text: String) {
+        self.change(text, None);
     }
 
     pub fn undo(&mut self) {
@@ -149,6 +158,22 @@ mod tests {
         draft.redo();
         draft.redo();
         assert_eq!(draft.text(), after);
+    }
+
+    #[test]
+    fn typing_is_taken_back_line_by_line_and_what_came_from_elsewhere_by_itself() {
+        let mut draft = Draft::of("a");
+        for text in ["ab", "abc", "abc\n", "abc\nd", "abc\nde"] {
+            draft.write(text.into());
+        }
+        draft.replace("theirs".into());
+        draft.write("theirs!".into());
+        let mut back = Vec::new();
+        while draft.can_undo() {
+            draft.undo();
+            back.push(draft.text().to_string());
+        }
+        assert_eq!(back, ["theirs", "abc\nde", "abc\n", "a"]);
     }
 
     #[test]

@@ -88,12 +88,47 @@ pub(super) fn remove(text: &str, pointer: &str) -> Result<String, Unfit> {
         _ => return Ok(text.to_string()),
     };
     let Some(at) = at.filter(|&at| at < parts.len()) else { return Ok(text.to_string()) };
-    let gone = match at {
-        0 if parts.len() > 1 => parts[0].start..parts[1].start,
+    let gap = match at {
+        0 if parts.len() > 1 => parts[0].end..parts[1].start,
         0 => inside.start + 1..inside.end - 1,
-        at => parts[at - 1].end..parts[at].end,
+        at => parts[at - 1].end..parts[at].start,
     };
-    Ok(replaced(text, gone, ""))
+    let own = parts[at].clone();
+    let around = if gap.contains(&own.start) {
+        [&text[gap.start..own.start], &text[own.end..gap.end]].concat()
+    } else {
+        text[gap.clone()].to_string()
+    };
+    if !has_comment(&around) {
+        return Ok(replaced(text, gap.start.min(own.start)..gap.end.max(own.end), ""));
+    }
+    // Comments stay where they stand: the value goes, with the white space before it and one comma.
+    let value = own.start - before(text, own.start).len()..own.end;
+    Ok(match comma(text, gap).filter(|_| parts.len() > 1) {
+        Some(comma) if comma < value.start => replaced(&replaced(text, value, ""), comma..comma + 1, ""),
+        Some(comma) => replaced(&replaced(text, comma..comma + 1, ""), value, ""),
+        None => replaced(text, value, ""),
+    })
+}
+
+/// True where anything stands between values but white space and commas.
+fn has_comment(between: &str) -> bool {
+    between.contains('/')
+}
+
+/// Where the comma between two values stands, past comments.
+fn comma(text: &str, between: Range<usize>) -> Option<usize> {
+    let mut at = between.start;
+    while at < between.end {
+        let rest = &text[at..between.end];
+        at += match rest.as_bytes() {
+            [b',', ..] => return Some(at),
+            [b'/', b'/', ..] => rest.find('\n').unwrap_or(rest.len()),
+            [b'/', b'*', ..] => rest.find("*/").map_or(rest.len(), |end| end + 2),
+            _ => rest.chars().next().map_or(1, char::len_utf8),
+        };
+    }
+    None
 }
 
 /// The text with one more entry at the end of a list; the list is made where there is none.
@@ -198,6 +233,11 @@ fn indent_after(text: &str, white: &str, byte: usize) -> usize {
 fn with_key(text: &str, object: &Object, key: &str, value: &Json) -> String {
     let breaks = Breaks::of(text);
     let Some(first) = object.properties.first() else {
+        let inside = object.range.start + 1;
+        if has_comment(&text[inside..object.range.end - 1]) {
+            let new = written(value, line_indent(text, object.range.start), breaks);
+            return replaced(text, inside..inside, &format!(" {}: {new}", quoted(key)));
+        }
         let indent = line_indent(text, object.range.start);
         let whole = Json::Object([(key.to_string(), value.clone())].into_iter().collect());
         return replaced(text, bytes(object), &written(&whole, indent, breaks));
@@ -223,6 +263,11 @@ fn with_key(text: &str, object: &Object, key: &str, value: &Json) -> String {
 fn with_entry(text: &str, array: &Array, value: &Json) -> String {
     let breaks = Breaks::of(text);
     let Some(last) = array.elements.last() else {
+        let inside = array.range.start + 1;
+        if has_comment(&text[inside..array.range.end - 1]) {
+            let new = written(value, line_indent(text, array.range.start), breaks);
+            return replaced(text, inside..inside, &new);
+        }
         let whole = Json::Array(vec![value.clone()]);
         return replaced(text, bytes(array), &written(&whole, line_indent(text, array.range.start), breaks));
     };
@@ -270,8 +315,19 @@ mod tests {
     fn what_goes_takes_its_comma_along() {
         check(remove(TEXT, "/title"), ", \"title\": \"A\"", "");
         check(remove(TEXT, "/id"), "\"id\":   \"a\", ", "");
-        check(remove(TEXT, "/list/1"), ", // first\n    { \"id\": 2 }", "");
+        check(remove(TEXT, "/list/0"), "[\n    { \"id\": 1 }, // first", "[ // first");
+        check(remove(TEXT, "/list/1"), ", // first\n    { \"id\": 2 }", " // first");
         check(remove(TEXT, "/nothing/here"), "a", "a");
+    }
+
+    #[test]
+    fn comments_outlive_what_they_stand_beside() {
+        let text = "{ /* empty */ }";
+        assert_eq!(set(text, "/a", &json!(1)).unwrap(), "{ \"a\": 1 /* empty */ }");
+        assert_eq!(push("[ // none, yet\n]", "", &json!(1)).unwrap(), "[1 // none, yet\n]");
+        assert_eq!(remove("[1 // one, and no more\n]", "/0").unwrap(), "[ // one, and no more\n]");
+        assert_eq!(remove("[1 /* , */, 2]", "/0").unwrap(), "[ /* , */ 2]");
+        assert_eq!(remove("[1 /* , */, 2]", "/1").unwrap(), "[1 /* , */]");
     }
 
     #[test]

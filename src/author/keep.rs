@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
 use std::fs::{self, File};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -99,7 +99,13 @@ pub fn save(path: &Path, text: &str, over: Kept) -> Result<Stand, Unkept> {
     let unwritable = |why: &dyn fmt::Display| Unkept::Unwritable { path: path.to_path_buf(), why: why.to_string() };
     // A link stays a link: what it leads to is written.
     let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
-    let there = fs::read(&target).ok();
+    let there = match fs::read(&target) {
+        Ok(bytes) => Some(bytes),
+        Err(error) if error.kind() == ErrorKind::NotFound => None,
+        // What cannot be read is not written over unasked.
+        Err(_) if matches!(over, Kept::Anything) => None,
+        Err(error) => return Err(unwritable(&error)),
+    };
     let is_free = match (over, &there) {
         (Kept::Anything, _) | (_, None) => true,
         (Kept::New, Some(_)) => false,

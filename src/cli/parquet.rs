@@ -21,6 +21,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let Some(folder) = source.folder.as_ref().filter(|_| source.at.database.is_none()) else {
         return school::write_partitions(source, output);
     };
+    source.takes_all()?;
     let cohort = cohort::read(folder)?;
     let unmade = |e: std::io::Error| Failure::wrong(format!("{}: unwritable-folder: {e}", output.display()));
     std::fs::create_dir_all(output).map_err(unmade)?;

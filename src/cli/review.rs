@@ -14,8 +14,8 @@ use std::time::Duration;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth; what examiners judge is written beside them. With --database the bundles that you may
-    /// read are fetched into it first
+    /// Folder that holds bundles, at any depth; what examiners judge is written beside them. With --database, --store or --class the
+    /// bundles that you may read are fetched into it first
     folder: PathBuf,
     #[command(flatten)]
     at: At,
@@ -51,7 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !folder.is_dir() {
         return Err(Failure::wrong(format!("{}: missing-folder: there is no such folder", folder.display())));
     }
-    if arguments.at.database.is_some() {
+    let Arguments { at, store, class, .. } = arguments;
+    if at.database.is_some() || store.store.is_some() || class.is_some() {
         exchange(arguments)?;
     }
     let password = password(arguments)?;

@@ -63,8 +63,11 @@ struct Class {
     /// Letters, digits, dot, dash and underscore
     name: String,
     /// Sessions are kept for so many days after they began; without it, as they were kept before, at first for ever
-    #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(i32).range(1..))]
+    #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(i32).range(1..=36500))]
     keep_days: Option<i32>,
+    /// Sessions are kept for ever again
+    #[arg(long, conflicts_with = "keep_days")]
+    keep_always: bool,
     #[command(flatten)]
     at: At,
 }
@@ -108,9 +111,12 @@ fn class(arguments: &Class) -> Result<(), Failure> {
     }
     let mut line = arguments.at.line()?;
     let sql = "INSERT INTO typodont.class (name, keep_days) VALUES ($1, $2)
-      ON CONFLICT (name) DO UPDATE SET keep_days = coalesce(excluded.keep_days, class.keep_days)
+      ON CONFLICT (name) DO UPDATE
+      SET keep_days = CASE WHEN $3 THEN NULL ELSE coalesce(excluded.keep_days, class.keep_days) END
       RETURNING keep_days";
-    let row = line.ask(|client| client.query_one(sql, &[&arguments.name, &arguments.keep_days]))?;
+    let values: &[&(dyn postgres::types::ToSql + Sync)] =
+        &[&arguments.name, &arguments.keep_days, &arguments.keep_always];
+    let row = line.ask(|client| client.query_one(sql, values))?;
     match row.get::<_, Option<i32>>(0) {
         Some(1) => say(format!("{}: sessions are kept for a day", arguments.name)),
         Some(days) => say(format!("{}: sessions are kept for {days} days", arguments.name)),

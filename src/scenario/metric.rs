@@ -340,7 +340,7 @@ pub const CHARTING: &[About] = &[
         "Readings with too much force",
         "",
         Lower,
-        "readings at which the probe was pressed with more than 0.35 N (0.25 N is taught)",
+        "readings at which the probe was pressed with more than 0.35 N (0.25 N is taught); none without a reading",
     ),
     about(
         "calculus_found_pct",
@@ -354,7 +354,7 @@ pub const CHARTING: &[About] = &[
         "Calculus marked where there is none",
         "",
         Lower,
-        "sites that were marked and have none; none if not asked",
+        "sites that were marked and have none; none if not asked, or if there is some and no site was marked",
     ),
 ];
 

@@ -159,16 +159,15 @@ impl Workpiece {
             }
             parts.push(volume);
         }
-        let together = |mut parts: Vec<Volume>| match scenario.scene.layout {
-            Layout::Pair { gap } => side_by_side(&parts, gap),
-            Layout::Single | Layout::Jaw => Ok(parts.swap_remove(0)),
+        let (volume, original) = match scenario.scene.layout {
+            // They stand where they stood whole: a proximal box may take a tooth's outermost place.
+            Layout::Pair { gap } if has_cavity => {
+                (side_by_side(&parts, &wholes, gap)?, Some(side_by_side(&wholes, &wholes, gap)?))
+            }
+            Layout::Pair { gap } => (side_by_side(&parts, &parts, gap)?, None),
+            Layout::Single | Layout::Jaw => (parts.swap_remove(0), wholes.pop()),
         };
-        let original = if has_cavity { Some(Arc::new(together(wholes)?)) } else { None };
-        let volume = together(parts)?;
-        // A proximal box may take a pair's outermost place: teeth side by side then no longer lie where they lay.
-        if original.as_ref().is_some_and(|original| original.grid() != volume.grid()) {
-            return Err(Unmakeable::UnequalSpacing);
-        }
+        let original = original.map(Arc::new);
         if volume.grid().len() as u64 > VOXELS_MAX {
             return Err(Unmakeable::TooLarge { voxels: volume.grid().len() as u64 });
         }
@@ -339,25 +338,26 @@ impl Bounds {
     }
 }
 
-/// One volume with two teeth, the first on the left (y > 0), each `gap`/2 mm from the plane between them.
-fn side_by_side(teeth: &[Volume], gap: f32) -> Result<Volume, Unmakeable> {
+/// One volume with two teeth, the first on the left (y > 0), each of which would stand `gap`/2 mm from the plane between them if
+/// it were `whole`.
+fn side_by_side(teeth: &[Volume], whole: &[Volume], gap: f32) -> Result<Volume, Unmakeable> {
     let spacing = teeth[0].grid().spacing;
     if teeth.iter().any(|t| (t.grid().spacing - spacing).abs().max_element() > 1e-6) {
         return Err(Unmakeable::UnequalSpacing);
     }
     // Each tooth moves by whole voxels, so that its densities need no resampling.
     let mut moves = Vec::new();
-    for (index, tooth) in teeth.iter().enumerate() {
+    for (index, tooth) in whole.iter().enumerate() {
         let [low, high] = tight_extent(tooth);
         let middle = 0.5 * (low + high);
         let aside = if index == 0 { 0.5 * gap - low.y } else { -0.5 * gap - high.y };
         let wanted = Vec3::new(-middle.x, aside, 0.0);
-        let origin = teeth[index].grid().origin;
+        let origin = tooth.grid().origin;
         // Grids meet when both origins are the same number of voxels from zero.
         moves.push(((origin + wanted) / spacing).round() * spacing - origin);
     }
-    let low = teeth.iter().zip(&moves).map(|(t, m)| tight_extent(t)[0] + *m).fold(Vec3::INFINITY, Vec3::min);
-    let high = teeth.iter().zip(&moves).map(|(t, m)| tight_extent(t)[1] + *m).fold(Vec3::NEG_INFINITY, Vec3::max);
+    let low = whole.iter().zip(&moves).map(|(t, m)| tight_extent(t)[0] + *m).fold(Vec3::INFINITY, Vec3::min);
+    let high = whole.iter().zip(&moves).map(|(t, m)| tight_extent(t)[1] + *m).fold(Vec3::NEG_INFINITY, Vec3::max);
     let low = (low / spacing).round() * spacing;
     let grid = Grid::covering(low, high, spacing, 4);
     let voxels = grid.dims.iter().map(|&n| u64::from(n)).product();

@@ -9,6 +9,7 @@ use postgres::error::SqlState;
 use postgres::{Client, Error, GenericClient};
 use std::collections::BTreeMap;
 use std::error::Error as _;
+use std::path::{Component, Path};
 
 /// What the records say of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -250,9 +251,11 @@ pub fn sessions(client: &mut Client, which: &Which) -> Result<(Vec<Kept>, Vec<St
             };
             Ok((session, serde_json::from_str(&manifest)?))
         });
+        let [class, bundle, month]: [String; 3] = [1, 2, 3].map(|column| row.get(column));
         match read {
+            // A station named it: it must not lead elsewhere.
+            Ok(_) if !is_name(&bundle) => unread.push(format!("{id}: \"{bundle}\" is not a bundle's name")),
             Ok((session, manifest)) => {
-                let [class, bundle, month] = [1, 2, 3].map(|column| row.get(column));
                 kept.push(Kept { id, class, bundle, month, session, manifest, differs: row.get(7) });
             }
             Err(error) => unread.push(format!("{id}: not a session: {error}")),
@@ -265,6 +268,11 @@ pub fn sessions(client: &mut Client, which: &Which) -> Result<(Vec<Kept>, Vec<St
     Ok((kept, unread))
 }
 
+/// Whether a word is the name of something within a folder, and no way out of it.
+pub fn is_name(word: &str) -> bool {
+    Path::new(word).components().all(|part| matches!(part, Component::Normal(_))) && !word.contains(['/', '\\'])
+}
+
 /// A result made anew in the place of the one that was written: it is of the same bundle.
 fn again(written: &SessionFile, anew: SessionFile) -> SessionFile {
     SessionFile { digests: written.digests.clone(), template_sha256: written.template_sha256.clone(), ..anew }
@@ -272,8 +280,13 @@ fn again(written: &SessionFile, anew: SessionFile) -> SessionFile {
 
 /// What examiners judged, in the order in which they did.
 pub fn judgements(client: &mut Client) -> Result<Told, Error> {
-    let rows = client.query("SELECT line FROM typodont.override", &[])?;
-    let mut entries: Vec<Entry> = rows.iter().filter_map(|row| serde_json::from_str(row.get(0)).ok()).collect();
+    let rows = client.query("SELECT session_id::text, line FROM typodont.override", &[])?;
+    // Whoever wrote the line was let in by its session: of another one it says nothing.
+    let entry = |row: &postgres::Row| {
+        let entry = serde_json::from_str::<Entry>(row.get(1)).ok()?;
+        (entry.draft.session == row.get::<_, &str>(0)).then_some(entry)
+    };
+    let mut entries: Vec<Entry> = rows.iter().filter_map(entry).collect();
     entries.sort_by(|a, b| (&a.at, a.number).cmp(&(&b.at, b.number)));
     Ok(Told::of(entries))
 }

@@ -79,13 +79,17 @@ pub fn measure(name: &str, chart: &[SiteResult]) -> Option<f64> {
         "probing_error_mm" => mean(&mut off.iter().map(|d| d.abs())),
         "probing_bias_mm" => mean(&mut off.iter().copied()),
         "probing_force_max_n" => forces().reduce(f32::max).map(f64::from),
-        "probing_force_high" => Some(forces().filter(|force| *force > HARD).count() as f64),
+        "probing_force_high" => {
+            forces().next().is_some().then(|| forces().filter(|force| *force > HARD).count() as f64)
+        }
         "calculus_found_pct" if is_asked => {
             let there = || chart.iter().filter(|s| s.has_calculus);
             share(there().filter(marked).count(), there().count())
         }
+        // Where there is some and nobody noted any, it was not looked for.
         "calculus_false_alarms" if is_asked => {
-            Some(chart.iter().filter(|s| !s.has_calculus).filter(marked).count() as f64)
+            let was_looked_for = chart.iter().any(|s| marked(&s)) || !chart.iter().any(|s| s.has_calculus);
+            was_looked_for.then(|| chart.iter().filter(|s| !s.has_calculus).filter(marked).count() as f64)
         }
         _ => None,
     }
@@ -124,6 +128,13 @@ mod tests {
         check("calculus_found_pct", 50.0);
         check("calculus_false_alarms", 1.0);
         let unread: Vec<SiteResult> = chart.iter().map(|s| SiteResult { reading: None, ..*s }).collect();
-        assert_eq!(measure("probing_error_mm", &unread), None);
+        for name in ["probing_error_mm", "probing_force_max_n", "probing_force_high"] {
+            assert_eq!(measure(name, &unread), None, "{name}: who reads nothing is not praised for it");
+        }
+        let unmarked: Vec<SiteResult> =
+            chart.iter().map(|s| SiteResult { calculus_marked: Some(false), ..*s }).collect();
+        assert_eq!(measure("calculus_false_alarms", &unmarked), None, "nor who looks for nothing");
+        let clean: Vec<SiteResult> = unmarked.iter().map(|s| SiteResult { has_calculus: false, ..*s }).collect();
+        assert_eq!(measure("calculus_false_alarms", &clean), Some(0.0));
     }
 }

@@ -35,7 +35,7 @@ impl Restoration {
         let start = &workpiece.volume;
         let grid = original.grid();
         let solid = |volume: &Volume, voxel: usize| volume.densities()[voxel].is_solid();
-        let is_cavity = |voxel: usize| solid(original, voxel) && !solid(start, voxel);
+        let is_cavity = |voxel: usize| workpiece.is_in_cavity(voxel);
         let cavity = (0..grid.len()).filter(|&v| is_cavity(v)).count();
         let filled = (0..grid.len()).filter(|&v| is_cavity(v) && solid(end, v)).count();
         let voids = enclosed(end, &is_cavity);

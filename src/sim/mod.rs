@@ -80,8 +80,6 @@ pub struct Step {
     pub touch: Option<Touch>,
     /// Matter fell, or would have within this tick's limits.
     pub cutting: bool,
-    /// A filling was laid or condensed.
-    pub packing: bool,
     /// Voxels that became air.
     pub removed: u32,
     /// How another hand led this one, N: part of `force`.
@@ -257,27 +255,30 @@ impl Simulation {
         let tip = self.proxy.tip();
         let contact = self.proxy.contact().copied();
         let pull = self.law.pull(hand, tip, contact.as_ref());
-        self.packer.rest_unless(instrument.packs.is_some() && contact.is_some());
-        let mut packing = false;
         let cutting = match contact {
             // A bur that leans on its shank presses the less with what cuts, and without it not at all. And nobody cuts with a
             // force that is not felt yet.
             Some(Contact { at_head, label, .. }) if instrument.cuts && self.bur_runs && at_head > 0.0 => {
                 let pull = Pull { spring: pull.spring * at_head * eased, ..pull };
                 let press = Press { tip, hand, orientation: held.orientation, pull, label };
+                self.packer.rest();
                 self.carver.cut(&mut self.matter.volume, instrument, materials, &press)
             }
             Some(Contact { at_head, label, .. }) if instrument.packs.is_some() && at_head > 0.0 => {
                 self.carver.rest();
                 let pull = Pull { spring: pull.spring * at_head * eased, ..pull };
                 let press = Press { tip, hand, orientation: held.orientation, pull, label };
-                packing = self.filling.zip(instrument.packs.as_ref()).is_some_and(|(filling, packs)| {
-                    self.packer.pack(&mut self.matter, instrument, packs, &self.fillings[filling], &press)
-                });
+                match self.filling.zip(instrument.packs.as_ref()) {
+                    Some((filling, packs)) => {
+                        self.packer.pack(&mut self.matter, instrument, packs, &self.fillings[filling], &press);
+                    }
+                    None => self.packer.rest(),
+                }
                 false
             }
             _ => {
                 self.carver.rest();
+                self.packer.rest();
                 false
             }
         };
@@ -314,7 +315,6 @@ impl Simulation {
             shaft: pose.turn(Vec3::Z),
             touch,
             cutting,
-            packing,
             removed: self.edits().iter().filter(|e| e.removes()).count() as u32,
             lead: self.lead,
             guidance,
@@ -348,7 +348,6 @@ impl Simulation {
             shaft: self.hand.turn(Vec3::Z),
             touch: None,
             cutting: false,
-            packing: false,
             removed: 0,
             lead: Vec3::ZERO,
             guidance: Vec3::ZERO,

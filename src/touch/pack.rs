@@ -137,17 +137,6 @@ impl Packer {
         &self.edits
     }
 
-    /// Rests, unless something may be packed in this tick.
-    pub fn rest_unless(&mut self, may_pack: bool) {
-        if !may_pack && self.is_busy() {
-            self.rest();
-        }
-    }
-
-    fn is_busy(&self) -> bool {
-        !self.edits.is_empty() || self.saved != 0.0 || self.area != 0.0
-    }
-
     /// A tick in which nothing is packed.
     pub fn rest(&mut self) {
         self.edits.clear();
@@ -155,7 +144,7 @@ impl Packer {
         (self.done, self.saved, self.area, self.moved) = (0, 0.0, 0.0, 0.0);
     }
 
-    /// Packs with an instrument in contact. True while it is pressed hard enough.
+    /// Packs with an instrument in contact, if it is pressed hard enough.
     pub fn pack(
         &mut self,
         matter: &mut Matter,
@@ -163,14 +152,13 @@ impl Packer {
         packs: &Packs,
         filling: &Filling,
         press: &Press,
-    ) -> bool {
+    ) {
         self.edits.clear();
         let force = press.pull.spring;
         let is_laying = packs.rate > 0.0 && force >= filling.least_force;
         let is_condensing = packs.condenses && force >= filling.condense_force;
         if !is_laying && !is_condensing {
-            self.rest();
-            return false;
+            return self.rest();
         }
         let radius = instrument.face_radius();
         let face = Face { instrument, press, axis: press.orientation * Vec3::Z, radius };
@@ -181,7 +169,6 @@ impl Packer {
         if is_laying {
             self.lay(matter, &face, packs, filling);
         }
-        true
     }
 
     /// Lays this tick's share of a bite.

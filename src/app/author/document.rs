@@ -25,6 +25,8 @@ pub struct Authoring {
     pub draft: Draft,
     /// Where it is saved; none while it is new.
     pub path: Option<PathBuf>,
+    /// Stands for the shipped exercise that a new one was copied from.
+    copied: Option<PathBuf>,
     /// The text of the file as it was last read or written.
     saved: Option<String>,
     stand: Option<Stand>,
@@ -69,36 +71,46 @@ pub enum Watch {
 impl Authoring {
     /// A new exercise of this text; what was once begun and not saved comes back.
     pub fn new(text: String, wake: Box<dyn Fn() + Send>) -> Authoring {
-        let kept = folder().and_then(|folder| drafts::find(&folder, None));
-        let told = kept.as_ref().map(|_| ("author.brought_back", String::new()));
-        let text = kept.unwrap_or(text);
-        Authoring { told, ..Authoring::of(text, None, Library::shipped(), wake) }
+        Authoring::of(text, None, Library::shipped(), wake).brought_back()
     }
 
-    /// One that ships: a copy, which is saved elsewhere.
-    pub fn copy(text: &str, wake: Box<dyn Fn() + Send>) -> Authoring {
-        Authoring::of(text.to_string(), None, Library::shipped(), wake)
+    /// One that ships: a copy, which is saved elsewhere. What was once begun with it and not saved comes back.
+    pub fn copy(name: &str, text: &str, wake: Box<dyn Fn() + Send>) -> Authoring {
+        let mut authoring = Authoring::of(text.to_string(), None, Library::shipped(), wake);
+        authoring.copied = Some(Path::new("/shipped").join(name));
+        authoring.brought_back()
     }
 
     /// A file.
     pub fn open(path: &Path, watch: Watch, wake: Box<dyn Fn() + Send>) -> Result<Authoring, Diagnostic> {
         let (text, stand) = read(path)?;
         let mut authoring = Authoring::of(text.clone(), Some(path.to_path_buf()), library_for(path), wake);
-        (authoring.saved, authoring.stand) = (Some(text.clone()), Some(stand));
+        (authoring.saved, authoring.stand) = (Some(text), Some(stand));
         authoring.is_watched = watch == Watch::Only;
-        let kept = folder().and_then(|folder| drafts::find(&folder, Some(path)));
-        if let Some(kept) = kept.filter(|kept| *kept != text && watch == Watch::Edit) {
-            authoring.draft.write(kept);
-            authoring.told = Some(("author.brought_back", String::new()));
-            authoring.make();
+        Ok(if authoring.is_watched { authoring } else { authoring.brought_back() })
+    }
+
+    /// With the text that was not saved the last time, if there is one: a step that can be taken back.
+    fn brought_back(mut self) -> Authoring {
+        let kept = folder().and_then(|folder| drafts::find(&folder, self.drafted()));
+        if let Some(kept) = kept.filter(|kept| kept != self.draft.text()) {
+            self.draft.replace(kept);
+            self.told = Some(("author.brought_back", String::new()));
+            self.make();
         }
-        Ok(authoring)
+        self
+    }
+
+    /// What its draft is kept by: its file, or the shipped one that it was copied from.
+    fn drafted(&self) -> Option<&Path> {
+        self.path.as_deref().or(self.copied.as_deref())
     }
 
     fn of(text: String, path: Option<PathBuf>, library: Library, wake: Box<dyn Fn() + Send>) -> Authoring {
         let mut authoring = Authoring {
             draft: Draft::of(text),
             path,
+            copied: None,
             saved: None,
             stand: None,
             tissues: TissueTable::read(&library).map(|table| table.entries().to_vec()).unwrap_or_default(),
@@ -198,7 +210,7 @@ impl Authoring {
     }
 
     fn take_over(&mut self, text: String) {
-        self.draft.write(text.clone());
+        self.draft.replace(text.clone());
         self.saved = Some(text);
         self.told = Some(("author.shown_anew", String::new()));
         self.forget();
@@ -226,7 +238,7 @@ impl Authoring {
         let Some(folder) = folder().filter(|_| !self.is_watched) else { return };
         self.is_kept = true;
         if self.is_unsaved() && self.draft.can_undo() {
-            if let Err(why) = drafts::keep(&folder, self.path.as_deref(), self.draft.text()) {
+            if let Err(why) = drafts::keep(&folder, self.drafted(), self.draft.text()) {
                 self.told = Some(("author.failed", why));
             }
         } else {
@@ -236,8 +248,9 @@ impl Authoring {
 
     fn forget(&mut self) {
         self.is_kept = true;
-        if let Some(folder) = folder() {
-            drafts::forget(&folder, self.path.as_deref());
+        // Who only looks on has no draft: one that is there is the author's.
+        if let Some(folder) = folder().filter(|_| !self.is_watched) {
+            drafts::forget(&folder, self.drafted());
         }
     }
 

@@ -12,7 +12,7 @@ use clap::Args;
 #[derive(Args)]
 pub struct Erase {
     /// The participant's code; `-` reads it from standard input
-    #[arg(required_unless_present = "done")]
+    #[arg(required_unless_present_any = ["done", "gone"])]
     participant: Option<String>,
     #[command(flatten)]
     at: At,
@@ -27,6 +27,9 @@ pub struct Erase {
     /// An export that was dealt with by hand, as it was listed
     #[arg(long, value_name = "DESTINATION", conflicts_with_all = ["participant", "dry_run"])]
     done: Option<String>,
+    /// An export that is no more, as it was listed: nobody is looked for there from now on
+    #[arg(long, value_name = "DESTINATION", conflicts_with_all = ["participant", "dry_run", "done"])]
+    gone: Option<String>,
 }
 
 #[derive(Args)]
@@ -44,13 +47,20 @@ pub fn erase(arguments: &Erase) -> Result<(), Failure> {
     let mut line = arguments.at.line()?;
     if let Some(destination) = &arguments.done {
         let sql = "DELETE FROM typodont.erasing WHERE kind = 'export' AND place = $1";
-        let gone = line.ask(|client| client.execute(sql, &[destination]))?;
-        let sql = "DELETE FROM typodont.export WHERE destination = $1";
-        line.ask(|client| client.execute(sql, &[destination]))?;
-        if gone == 0 {
+        let done = line.ask(|client| client.execute(sql, &[destination]))?;
+        if done == 0 {
             return Err(Failure::wrong(format!("{destination}: unknown-export: nothing is left to do there")));
         }
-        return say(format!("{destination}: {gone} partitions dealt with"));
+        return say(format!("{destination}: {done} partitions dealt with"));
+    }
+    if let Some(destination) = &arguments.gone {
+        let sql = "DELETE FROM typodont.export WHERE destination = $1";
+        if line.ask(|client| client.execute(sql, &[destination]))? == 0 {
+            return Err(Failure::wrong(format!("{destination}: unknown-export: nothing was exported there")));
+        }
+        let sql = "DELETE FROM typodont.erasing WHERE kind = 'export' AND place = $1";
+        line.ask(|client| client.execute(sql, &[destination]))?;
+        return say(format!("{destination}: forgotten"));
     }
     let code = code(arguments.participant.as_deref().unwrap_or_default())?;
     if code.is_empty() {

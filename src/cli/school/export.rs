@@ -5,8 +5,10 @@ use super::patience::Patience;
 use super::source::Source;
 use super::store::Store;
 use crate::cli::{Failure, say};
+use crate::report::harmless;
 use crate::school::partition;
-use crate::school::records::Kept;
+use crate::school::records::{self, Kept, Which};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Writes every partition to a folder, or to a store by URL.
@@ -19,7 +21,7 @@ pub fn write(source: &Source, destination: &Path) -> Result<(), Failure> {
     let wrong = |e: String| Failure::misuse(format!("--output: {e}"));
     let (mut line, kept) = source.kept()?;
     let store = Store::at(&destination, patience).map_err(wrong)?;
-    note(&mut line, &destination, &kept)?;
+    note(&mut line, &destination, source.scorer_version()?, &kept)?;
     let count = kept.len();
     let partitions = partition::partitions(kept);
     for (name, sessions) in &partitions {
@@ -42,12 +44,14 @@ fn written(destination: &Path) -> Result<String, Failure> {
 }
 
 /// Writes down which sessions go where, before any of them does.
-fn note(line: &mut Line, destination: &str, kept: &[Kept]) -> Result<(), Failure> {
+fn note(line: &mut Line, destination: &str, scorer_version: Option<u32>, kept: &[Kept]) -> Result<(), Failure> {
+    let version = scorer_version.map(i64::from);
     let ids: Vec<&str> = kept.iter().map(|k| k.id.as_str()).collect();
     line.ask(|client| {
         let mut change = client.transaction()?;
-        let sql = "INSERT INTO typodont.export (what, destination) VALUES ('parquet', $1) RETURNING id";
-        let export: i64 = change.query_one(sql, &[&destination])?.get(0);
+        let sql =
+            "INSERT INTO typodont.export (what, destination, scorer_version) VALUES ('parquet', $1, $2) RETURNING id";
+        let export: i64 = change.query_one(sql, &[&destination, &version])?.get(0);
         let sql = "INSERT INTO typodont.exported (export_id, session_id)
           SELECT $1, id::uuid FROM unnest($2::text[]) AS chosen (id)";
         change.execute(sql, &[&export, &ids])?;
@@ -63,19 +67,28 @@ fn note(line: &mut Line, destination: &str, kept: &[Kept]) -> Result<(), Failure
 pub fn anew(line: &mut Line, destination: &str, partition: &str, patience: Patience) -> Result<(), Failure> {
     let place = Path::new(destination);
     if !destination.contains("://") && !place.is_dir() {
-        let why = "missing-folder: it is not here; delete what it holds of them by hand, then say --done";
+        let why = "missing-folder: it is not here; delete what it holds of them by hand, then say --done, or --gone if it \
+                   is no more";
         return Err(Failure::wrong(format!("{destination}: {why}")));
     }
     let store = Store::at(destination, patience).map_err(Failure::Wrong)?;
     let class = partition.split('/').next().and_then(|part| part.strip_prefix("class=")).map(String::from);
-    let which = crate::school::records::Which { class, scorer_version: None };
-    let (kept, _) = line.ask(|client| crate::school::records::sessions(client, &which))?;
-    // Only what this export held: sessions that came later are no part of it.
-    let sql = "SELECT DISTINCT x.session_id::text FROM typodont.exported x JOIN typodont.export e ON e.id = x.export_id
-      WHERE e.destination = $1";
-    let held: Vec<String> =
-        line.ask(|client| client.query(sql, &[&destination]))?.iter().map(|row| row.get(0)).collect();
-    let kept = kept.into_iter().filter(|k| held.contains(&k.id)).collect();
+    // Only what this export held, with the scores that it had: sessions that came later are no part of it.
+    let sql = "SELECT DISTINCT ON (x.session_id) x.session_id::text, e.scorer_version
+      FROM typodont.exported x JOIN typodont.export e ON e.id = x.export_id
+      WHERE e.destination = $1 ORDER BY x.session_id, e.id DESC";
+    let held: BTreeMap<String, Option<i64>> =
+        line.ask(|client| client.query(sql, &[&destination]))?.iter().map(|row| (row.get(0), row.get(1))).collect();
+    let versions: BTreeSet<Option<i64>> = held.values().copied().collect();
+    let mut kept = Vec::new();
+    for version in versions {
+        let which = Which { class: class.clone(), scorer_version: version.and_then(|v| u32::try_from(v).ok()) };
+        let (read, unread) = line.ask(|client| records::sessions(client, &which))?;
+        for what in unread {
+            eprintln!("{destination}: {partition}: skipped: {}", harmless(&what, 300));
+        }
+        kept.extend(read.into_iter().filter(|k| held.get(&k.id) == Some(&version)));
+    }
     let mut partitions = partition::partitions(kept);
     for file in partition::names(partition) {
         store.settle(file.rsplit_once('/').map_or("", |(folder, _)| folder));

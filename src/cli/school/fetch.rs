@@ -3,18 +3,18 @@
 use super::asking::Line;
 use super::database::At;
 use super::mark;
-use super::source::Source;
+use super::source::{Source, note_read};
 use super::store::Named;
 use super::sync::bar;
 use crate::cli::{Failure, say};
 use crate::report::harmless;
 use crate::review::{Entry, Log, OVERRIDES, Told, Unwritten};
 use crate::scenario::hex;
-use crate::school::records::{self, Kept};
+use crate::school::records::{self, Kept, is_name};
 use clap::Args;
 use sha2::{Digest, Sha256};
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -47,6 +47,7 @@ pub fn bundles(at: &At, store: &Named, class: Option<&str>, folder: &Path) -> Re
     let store = store.open(at.patience()?)?;
     let (mut line, kept) = source.kept()?;
     mark::check(&mut line, &store)?;
+    note_read(&mut line, &kept)?;
     let bar = bar(kept.len() as u64, "fetched");
     let (mut fetched, mut failed) = (0, 0);
     for k in &kept {
@@ -74,7 +75,7 @@ fn bundle(store: &super::Store, kept: &Kept, partial: &Path) -> Result<(), Strin
     let unwritable = |e: std::io::Error| format!("unwritable-folder: {e}: {}", partial.display());
     for file in &kept.manifest.files {
         // A station named it: it must not lead elsewhere.
-        if Path::new(&file.name).components().any(|c| !matches!(c, Component::Normal(_))) {
+        if !file.name.split('/').all(is_name) {
             return Err(format!("\"{}\" is not a file of a bundle", file.name));
         }
         let path = partial.join(&file.name);
@@ -119,7 +120,12 @@ pub fn exchange(line: &mut Line, folder: &Path) -> Result<Exchanged, Failure> {
         entered = line.ask(|client| records::judge(client, &name, &lines))?;
     }
     let mut taken = 0;
-    for entry in theirs.counting().filter(|entry| !is_in(&own, entry)) {
+    // What was judged here since stands: a line that is taken over later must not overrule it.
+    let is_overtaken = |entry: &Entry| {
+        let item = entry.draft.item.as_ref().map(|item| item.index);
+        own.last_of(&entry.draft.session, item).is_some_and(|last| last.at > entry.at)
+    };
+    for entry in theirs.counting().filter(|entry| !is_in(&own, entry) && !is_overtaken(entry)) {
         let append = log.append(&entry.at, None, |_| Ok::<_, std::convert::Infallible>(entry.draft.clone()));
         append.map_err(|unwritten| match unwritten {
             Unwritten::Failed(error) => failed(error),

@@ -61,6 +61,7 @@ impl Source {
             if self.at.database.is_some() {
                 return Err(Failure::misuse("a folder, or --database: sessions come from one of them"));
             }
+            self.takes_all()?;
             let cohort = cohort::read(folder)?;
             let name = folder.display().to_string();
             return Ok(Read { cohort, name, line: None, folder: Some(folder.clone()), _fetched: None });
@@ -73,8 +74,23 @@ impl Source {
         };
         let base = fetched.as_ref().map_or(Path::new(""), |fetched| &fetched.0);
         cohort.sessions = kept.iter().map(|k| (base.join(&k.id).join(&k.bundle), k.session.clone())).collect();
-        line.ask(|client| client.query("SELECT typodont.note('sessions read', $1)", &[&kept.len().to_string()]))?;
+        note_read(&mut line, &kept)?;
         Ok(Read { cohort, name: "--database".into(), line: Some(line), folder: None, _fetched: fetched })
+    }
+
+    /// Fails where a choice is made that a folder does not offer.
+    pub fn takes_all(&self) -> Result<(), Failure> {
+        match self.class.is_some() || self.scorer.is_some() {
+            true => {
+                Err(Failure::misuse("--class and --scorer choose among the sessions of a --database, not of a folder"))
+            }
+            false => Ok(()),
+        }
+    }
+
+    /// Whose scores are asked for: workers' of this version, or else the stations' own.
+    pub fn scorer_version(&self) -> Result<Option<u32>, Failure> {
+        self.scorer.as_deref().map(scorer).transpose()
     }
 
     /// The sessions of a database, whatever is known of them.
@@ -82,7 +98,7 @@ impl Source {
         if !self.at.is_named() {
             return Err(Failure::misuse("no-sessions: name a folder that holds bundles, or a --database"));
         }
-        let scorer_version = self.scorer.as_deref().map(scorer).transpose()?;
+        let scorer_version = self.scorer_version()?;
         let which = Which { class: self.class.clone(), scorer_version };
         let mut line = self.at.line()?;
         let (kept, unread) = line.ask(|client| records::sessions(client, &which))?;
@@ -101,6 +117,12 @@ impl Source {
             false => Ok((line, kept)),
         }
     }
+}
+
+/// Writes down that so many sessions were read, and by whom.
+pub fn note_read(line: &mut Line, kept: &[Kept]) -> Result<(), Failure> {
+    line.ask(|client| client.query("SELECT typodont.note('sessions read', $1)", &[&kept.len().to_string()]))?;
+    Ok(())
 }
 
 impl Read {

@@ -5,6 +5,7 @@ use super::patience::{Passing, Patience};
 use crate::cli::Failure;
 use crate::report::harmless;
 use crate::school::Manifest;
+use crate::school::records::is_name;
 use clap::Args;
 use hyper::body::Bytes;
 use object_store::aws::{AmazonS3Builder, Checksum};
@@ -206,7 +207,8 @@ impl Store {
     /// Removes what a killed program left half written right within a folder. Only folders of this machine have such files, and call
     /// them `NAME#1`; elsewhere an object is whole or absent.
     pub fn settle(&self, folder: &str) {
-        let own = self.folder.as_ref().map(|base| base.join(folder));
+        let is_within = folder.split('/').all(is_name);
+        let own = self.folder.as_ref().filter(|_| is_within).map(|base| base.join(folder));
         let entries = own.and_then(|own| std::fs::read_dir(own).ok()).into_iter().flatten().flatten();
         for entry in entries.filter(|entry| entry.file_name().to_string_lossy().contains('#')) {
             // What cannot be removed is met again by whoever comes next.

@@ -3,6 +3,7 @@
 use super::asking::{Line, Unanswered};
 use super::database::At;
 use super::mark;
+use super::patience::Passing;
 use super::store::{Named, Store, Undone};
 use crate::cli::{Failure, say};
 use crate::handover::session_id;
@@ -117,6 +118,10 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
                 if told.insert("wrong-store".into()) {
                     failure.tell();
                 }
+            }
+            // A store that is away will be back; one that refuses says so once.
+            Some(Stopped::Store(undone)) if !undone.is_passing() && told.insert(undone.why.clone()) => {
+                Failure::from(undone).tell();
             }
             Some(Stopped::Database(_) | Stopped::Store(_)) => {}
         }

@@ -1,9 +1,10 @@
 //! `typodont worker`: scores what was enqueued, a session at a time, until it is ended.
 
-use super::asking::Line;
+use super::asking::{Line, Unanswered};
 use super::database::At;
 use super::mark;
 use super::metrics::{self, Counters};
+use super::patience::Passing;
 use super::store::{Named, Store};
 use super::sync::bar;
 use crate::cli::{Failure, say};
@@ -73,9 +74,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     let held = Arc::new(Mutex::new(None));
     beat(line.another(), lease.clone(), Arc::clone(&held), Arc::clone(&stop));
     let bar = bar(0, "scored");
-    // The school's servers may be away for a while; a worker that stays waits for them.
     let mut counted: Option<Instant> = None;
-    while !stop.load(Ordering::Relaxed) {
+    let mut look = || -> Result<Looked, Unanswered> {
         let job = line.ask(|client| work::lease(client, &lease))?;
         // Counting reads every job there is: not for each of them.
         let is_empty = if job.is_none() || counted.is_none_or(|at| at.elapsed() > COUNT_EVERY) {
@@ -87,16 +87,28 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         } else {
             false
         };
-        match job {
-            Some(job) => {
-                *lock(&held) = Some(job.session.clone());
-                let done = turn(&mut line, &store, &lease, &job, &counters);
-                *lock(&held) = None;
-                done?;
-                bar.set_position(counters.scored.load(Ordering::Relaxed));
+        let Some(job) = job else { return Ok(if is_empty { Looked::Empty } else { Looked::Nothing }) };
+        *lock(&held) = Some(job.session.clone());
+        let done = turn(&mut line, &store, &lease, &job, &counters);
+        *lock(&held) = None;
+        done?;
+        bar.set_position(counters.scored.load(Ordering::Relaxed));
+        Ok(Looked::Worked)
+    };
+    let mut is_away = false;
+    while !stop.load(Ordering::Relaxed) {
+        match look() {
+            Ok(Looked::Worked) => is_away = false,
+            Ok(Looked::Empty) if *drain => break,
+            Ok(Looked::Empty | Looked::Nothing) => nap(&stop),
+            // The school's servers may be away for a while: a worker that stays waits for them, and says so once.
+            Err(away) if away.is_passing() && !drain => {
+                if !std::mem::replace(&mut is_away, true) {
+                    Failure::from(away).tell();
+                }
+                nap(&stop);
             }
-            None if *drain && is_empty => break,
-            None => nap(&stop),
+            Err(unanswered) => return Err(unanswered.into()),
         }
     }
     bar.finish_and_clear();
@@ -109,6 +121,15 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     ))
 }
 
+/// What came of a look for work.
+enum Looked {
+    Worked,
+    /// Nothing that is due, though something is leased or waits for its time.
+    Nothing,
+    /// Nothing at all.
+    Empty,
+}
+
 /// What the worker is called in the records: nobody else is.
 fn name() -> String {
     let mut chance = [0; 6];
@@ -118,7 +139,7 @@ fn name() -> String {
 }
 
 /// Scores a session and writes down what came of it.
-fn turn(line: &mut Line, store: &Store, lease: &Lease, job: &Job, counters: &Counters) -> Result<(), Failure> {
+fn turn(line: &mut Line, store: &Store, lease: &Lease, job: &Job, counters: &Counters) -> Result<(), Unanswered> {
     let begun = Instant::now();
     let scored = store.take(&job.manifest, RECORDING).map_err(|(why, passing)| (why, !passing));
     let scored = scored.and_then(|bytes| rescored(&job.session, &bytes).map_err(|unscored| (unscored.0, true)));

@@ -24,7 +24,7 @@ GRANT USAGE ON SCHEMA typodont TO typodont_station, typodont_examiner, typodont_
 CREATE TABLE typodont.class (
   id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   name text NOT NULL UNIQUE CHECK (name ~ '^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$'),
-  keep_days integer CHECK (keep_days > 0),
+  keep_days integer CHECK (keep_days BETWEEN 1 AND 36500),
   made_at timestamptz NOT NULL DEFAULT now()
 );
 
@@ -49,7 +49,8 @@ CREATE TABLE typodont.session (
   class_id bigint NOT NULL REFERENCES typodont.class,
   participant_id bigint REFERENCES typodont.participant,
   exercise_id bigint NOT NULL REFERENCES typodont.exercise,
-  bundle text NOT NULL,
+  -- A folder's name, and no way anywhere.
+  bundle text NOT NULL CHECK (bundle !~ '[/\\]' AND bundle NOT IN ('.', '..')),
   started_at timestamptz,
   received_at timestamptz NOT NULL DEFAULT now(),
   ended_because text NOT NULL,
@@ -105,7 +106,7 @@ CREATE TABLE typodont.override (
   line text NOT NULL,
   sha256 text NOT NULL,
   received_at timestamptz NOT NULL DEFAULT now(),
-  PRIMARY KEY (log, number)
+  PRIMARY KEY (log, number, sha256)
 );
 CREATE INDEX override_by_session ON typodont.override (session_id);
 
@@ -130,7 +131,9 @@ CREATE TABLE typodont.export (
   at timestamptz NOT NULL DEFAULT now(),
   login text NOT NULL DEFAULT session_user,
   what text NOT NULL,
-  destination text NOT NULL
+  destination text NOT NULL,
+  -- Whose scores it has: workers' of this version, or else the stations' own.
+  scorer_version bigint
 );
 CREATE TABLE typodont.exported (
   export_id bigint NOT NULL REFERENCES typodont.export ON DELETE CASCADE,

@@ -176,16 +176,19 @@ ALTER TABLE typodont.participant ENABLE ROW LEVEL SECURITY;
 
 CREATE POLICY station_reads_own ON typodont.session FOR SELECT TO typodont_station USING (station = session_user);
 CREATE POLICY station_writes_own ON typodont.session FOR INSERT TO typodont_station
-  WITH CHECK (station = session_user AND starts_with(manifest->>'folder', session_user || '/'));
+  WITH CHECK (station = session_user AND received_at = now() AND manifest->>'folder' = session_user || '/' || id::text);
 CREATE POLICY station_reads_own ON typodont.metric_value FOR SELECT TO typodont_station
   USING (EXISTS (SELECT FROM typodont.session s WHERE s.id = session_id AND s.station = session_user));
+-- With its session, in one step, or not at all.
 CREATE POLICY station_writes_own ON typodont.metric_value FOR INSERT TO typodont_station
   WITH CHECK (EXISTS (SELECT FROM typodont.session s
-    WHERE s.id = session_id AND s.station = session_user AND s.scorer_version = metric_value.scorer_version));
+    WHERE s.id = session_id AND s.station = session_user AND s.received_at = now()
+      AND s.scorer_version = metric_value.scorer_version));
 CREATE POLICY station_reads_own ON typodont.rating FOR SELECT TO typodont_station
   USING (EXISTS (SELECT FROM typodont.session s WHERE s.id = session_id AND s.station = session_user));
 CREATE POLICY station_writes_own ON typodont.rating FOR INSERT TO typodont_station
-  WITH CHECK (EXISTS (SELECT FROM typodont.session s WHERE s.id = session_id AND s.station = session_user));
+  WITH CHECK (EXISTS (SELECT FROM typodont.session s
+    WHERE s.id = session_id AND s.station = session_user AND s.received_at = now()));
 
 CREATE POLICY examiner_reads_class ON typodont.session FOR SELECT TO typodont_examiner
   USING (class_id IN (SELECT e.class_id FROM typodont.examines e WHERE e.login = session_user));
