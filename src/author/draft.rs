@@ -77,7 +77,8 @@ impl Draft {
 
     /// The whole text anew, as somebody types it: letter after letter of a line is one step.
     pub fn write(&mut self, text: String) {
-        let is_new_line = text.lines().count() != self.text.lines().count();
+        let lines = |text: &str| text.bytes().filter(|byte| *byte == b'\n').count();
+        let is_new_line = lines(&text) != lines(&self.text);
         self.change(text, Some("text"));
         if is_new_line {
             self.joins = None;

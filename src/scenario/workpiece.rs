@@ -519,3 +519,26 @@ fn beside(fdi: u8) -> [Option<u8>; 2] {
     let mesial = if position == 1 { other } else { Some(fdi - 1) };
     [mesial, (position < 7).then_some(fdi + 1)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tooth_without_its_contact_point_stands_where_it_stood() {
+        // Aim: what is cut from one of two teeth before they are set up moves neither. Method: two blocks, one shorter on the
+        // side of the other; it once moved up to the gap's middle.
+        let grid = Grid::centred([20, 20, 20], Vec3::splat(0.5));
+        let block = |back: f32| {
+            Volume::from_distance(grid, 0.75, |p| ((p.abs().max_element() - 3.0).max(back - p.y), Label(1)))
+        };
+        let whole = [block(-9.0), block(-9.0)];
+        let before = side_by_side(&whole, &whole, 1.0).unwrap();
+        let after = side_by_side(&[block(-1.5), block(-9.0)], &whole, 1.0).unwrap();
+        assert_eq!(before.grid(), after.grid());
+        let pairs = || before.densities().iter().zip(after.densities());
+        assert!(pairs().all(|(was, is)| was.is_solid() || !is.is_solid()), "nothing stands where nothing stood");
+        let gone = pairs().filter(|(was, is)| was.is_solid() && !is.is_solid()).count();
+        assert_eq!(gone, 3 * 12 * 12, "1.5 mm of 6 mm by 6 mm");
+    }
+}
