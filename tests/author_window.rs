@@ -204,6 +204,21 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     desk.until("unsaved", |unsaved| unsaved == "false");
     let saved = fs::read_to_string(&file).unwrap();
     assert_eq!(saved, text.replace("Grinding out the decay", "Mine"), "only the title has changed");
+
+    // A new exercise that was begun outlives whoever only looks at it; it was once forgotten then.
+    for is_begun in [false, true] {
+        desk.click("leave");
+        desk.until("screen", |screen| screen == "shelf");
+        desk.click("shelf.new");
+        desk.until("screen", |screen| screen == "author");
+        if !is_begun {
+            desk.write("/title", "Begun and not saved");
+        }
+    }
+    desk.click("leave");
+    desk.until("screen", |screen| screen == "shelf");
+    let kept = fs::read_to_string(drafts.join("new.draft.json")).unwrap();
+    assert!(kept.contains("Begun and not saved"), "{kept}");
 }
 
 #[test]
