@@ -19,6 +19,17 @@ pub struct Place {
     pub visits_left: u32,
 }
 
+/// How strokes lie over a cavity, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Strokes {
+    /// Between neighbouring ones.
+    pub apart: f32,
+    /// How far they reach beyond the rim.
+    pub beyond: f32,
+    /// How far above the contour the end stays.
+    pub above: f32,
+}
+
 /// The cavity as seen from above.
 pub struct Mouth {
     grid: Grid,
@@ -72,13 +83,25 @@ impl Mouth {
         places.map(of).collect()
     }
 
-    /// The way of an instrument's tip over the contour, so far beyond the cavity's rim, so that nothing of the end lies deeper
-    /// than `above` over the contour.
-    pub fn way(&self, instrument: &Instrument, apart: f32, beyond: f32, above: f32) -> Vec<Vec3> {
+    /// The way of an instrument's tip over the contour, so that nothing of the end lies deeper than it may.
+    pub fn way(&self, instrument: &Instrument, strokes: Strokes) -> Vec<Vec3> {
         let profile = self.profile(instrument);
-        let is_meant = |i: usize| self.outside[i] <= beyond && self.contour[i].is_finite();
-        let columns = self.columns(apart, is_meant);
-        columns.map(|(at, i)| at.with_z(self.rest(&profile, i) + above)).collect()
+        let columns = self.columns(strokes.apart, |i| self.is_near(i, strokes.beyond));
+        columns.map(|(at, i)| at.with_z(self.rest(&profile, i) + strokes.above)).collect()
+    }
+
+    /// Those places of that way at which the end would take more than so much of what stands there now, mm.
+    pub fn way_of_high(&self, instrument: &Instrument, strokes: Strokes, now: &Volume, over: f32) -> Vec<Vec3> {
+        let profile = self.profile(instrument);
+        let surface = heights(now);
+        let columns = self.columns(strokes.apart, |i| self.is_near(i, strokes.beyond));
+        let places = columns.map(|(at, i)| (at.with_z(self.rest(&profile, i) + strokes.above), i));
+        let is_high = |tip: f32, i: usize| self.under(&profile, i).any(|(i, height)| surface[i] > tip + height + over);
+        places.filter(|&(place, i)| is_high(place.z, i)).map(|(place, _)| place).collect()
+    }
+
+    fn is_near(&self, column: usize, beyond: f32) -> bool {
+        self.outside[column] <= beyond && self.contour[column].is_finite()
     }
 
     /// Columns so far apart, to and fro along y.
@@ -120,14 +143,18 @@ impl Mouth {
 
     /// How high a tip must stay over a column so that its end lies on the contour and nowhere in it.
     fn rest(&self, profile: &[([i64; 2], f32)], column: usize) -> f32 {
+        self.under(profile, column).map(|(i, height)| self.contour[i] - height).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// The columns below an end whose tip is over a column, and how high its underside lies there over the tip.
+    fn under<'a>(&self, profile: &'a [([i64; 2], f32)], column: usize) -> impl Iterator<Item = (usize, f32)> + use<'a> {
         let [x, y, _] = self.grid.cell(column).map(i64::from);
         let [nx, ny, _] = self.grid.dims.map(i64::from);
-        let over = profile.iter().filter_map(|&([i, j], height)| {
+        profile.iter().filter_map(move |&([i, j], height)| {
             let (x, y) = (x + i, y + j);
             let is_in = (0..nx).contains(&x) && (0..ny).contains(&y);
-            is_in.then(|| self.contour[(y * nx + x) as usize] - height)
-        });
-        over.fold(f32::NEG_INFINITY, f32::max)
+            is_in.then_some(((y * nx + x) as usize, height))
+        })
     }
 }
 
@@ -175,7 +202,7 @@ mod tests {
         };
         let mouth = Mouth::of(&workpiece).unwrap();
         let ball = Instrument::new(WorkingEnd::Ball { radius: 0.5 }, true).by_hand();
-        let way = mouth.way(&ball, 0.3, 0.2, 0.0);
+        let way = mouth.way(&ball, Strokes { apart: 0.3, beyond: 0.2, above: 0.0 });
         assert!(way.len() > 40, "{}", way.len());
         for place in &way {
             let clearance = surface(*place);
