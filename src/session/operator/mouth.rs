@@ -68,19 +68,31 @@ impl Mouth {
         })
     }
 
-    /// Where a face of a radius finds room, so far apart; to and fro, so that the hand has short ways.
+    /// Where a face of a radius finds room, no farther apart than so; to and fro, so that the hand has short ways. The outermost
+    /// places lie as near to the walls as they may: what no face comes near is left open.
     pub fn places(&self, radius: f32, apart: f32) -> Vec<Place> {
         let widest = self.inside.iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, &b| a.max(b));
         // In a cavity narrower than the face it stands on the rim.
         let least = (radius + ROOM).min(0.8 * widest);
-        let is_meant = |i: usize| self.inside[i] >= least && self.contour[i].is_finite();
-        let places = self.columns(apart, is_meant);
-        let of = |(at, i): (Vec3, usize)| Place {
-            contour: at.with_z(self.contour[i]),
-            height: self.start[i],
-            visits_left: VISITS,
+        let is_meant = |x: u32, y: u32| {
+            let i = self.grid.index([x, y, 0]);
+            self.inside[i] >= least && self.contour[i].is_finite()
         };
-        places.map(of).collect()
+        let [nx, ny, _] = self.grid.dims;
+        let [in_x, in_y] = [0, 1].map(|axis| (apart / self.grid.spacing[axis]).max(1.0) as u32);
+        let rows = spread((0..nx).filter(|&x| (0..ny).any(|y| is_meant(x, y))), in_x);
+        let mut places = Vec::new();
+        for (row, x) in rows.into_iter().enumerate() {
+            let mut ys = spread((0..ny).filter(|&y| is_meant(x, y)), in_y);
+            if row % 2 == 1 {
+                ys.reverse();
+            }
+            places.extend(ys.into_iter().filter(|&y| is_meant(x, y)).map(|y| {
+                let (at, i) = (self.grid.centre([x, y, 0]), self.grid.index([x, y, 0]));
+                Place { contour: at.with_z(self.contour[i]), height: self.start[i], visits_left: VISITS }
+            }));
+        }
+        places
     }
 
     /// The way of an instrument's tip over the contour, so that nothing of the end lies deeper than it may.
@@ -156,6 +168,16 @@ impl Mouth {
             is_in.then_some(((y * nx + x) as usize, height))
         })
     }
+}
+
+/// From the first to the last of some columns, evenly, no more than so many from one to the next.
+fn spread(columns: impl Iterator<Item = u32>, apart: u32) -> Vec<u32> {
+    let columns: Vec<u32> = columns.collect();
+    let (Some(first), Some(last)) = (columns.first(), columns.last()) else { return Vec::new() };
+    let parts = (last - first).div_ceil(apart).max(1);
+    let mut spread: Vec<u32> = (0..=parts).map(|i| first + ((last - first) * i + parts / 2) / parts).collect();
+    spread.dedup();
+    spread
 }
 
 /// Height of the highest surface of every column, mm; −∞ where there is none.

@@ -161,7 +161,7 @@ impl Operator {
     fn guide(&self, cut: &CutFile, path: impl Iterator<Item = Vec3>) -> Task {
         let path = path.map(|place| self.in_world(place)).collect();
         let (speed, lean, force, patience) = (cut.speed_mm_s, cut.lean_mm, cut.press_n, cut.patience_s);
-        Task::Move(Move::Guide { path, speed, lean, force, patience })
+        Task::Move(Move::Guide { path, speed, lean, force, patience, yields: false })
     }
 }
 

@@ -117,7 +117,7 @@ impl Operator {
         let path = [above].into_iter().chain(way).map(|place| self.in_world(place)).collect();
         let (speed, lean, force, patience) = (file.speed_mm_s, file.lean_mm, file.press_n, file.patience_s);
         let mut tasks = self.way_to(above);
-        tasks.push(Task::Move(Move::Guide { path, speed, lean, force, patience }));
+        tasks.push(Task::Move(Move::Guide { path, speed, lean, force, patience, yields: true }));
         tasks.push(self.way_up());
         tasks
     }
