@@ -123,6 +123,20 @@ fn deep_decay_tells_them_apart() {
 }
 
 #[test]
+fn preparing_an_outline_tells_them_apart() {
+    // Aim: who gives the bur its time cuts what is drawn and no more. Method: both outlines, in coarse voxels.
+    for name in ["10-class-one.json", "11-class-two.json"] {
+        let mean = played(name, &["expert", "careful", "hasty"]);
+        for better in ["careful", "expert"] {
+            grows(&mean, "points", &["hasty", better]);
+            grows(&mean, "dice", &["hasty", better]);
+        }
+        assert!(mean("expert", "points") >= Some(70.0), "{name}: the expert passes");
+        assert_eq!(mean("expert", "pulp_exposed"), Some(0.0), "{name}");
+    }
+}
+
+#[test]
 fn scooping_soft_decay_tells_them_apart_and_leaves_sound_dentine() {
     let mean = played("13-spoon.json", &["expert", "hasty"]);
     grows(&mean, "zone_removed_pct(soft)", &["hasty", "expert"]);

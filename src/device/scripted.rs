@@ -29,8 +29,9 @@ pub enum Move {
     /// Guides the tip that is seen on the screen along a path, leaning toward where it lags behind.
     ///
     /// The hand leans up to `lean` mm beyond the path and no harder than `force` N; where the tip does not follow it waits
-    /// for up to `patience` s before it goes on.
-    Guide { path: Vec<Vec3>, speed: f32, lean: f32, force: f32, patience: f32 },
+    /// for up to `patience` s before it goes on. A hand that `yields` takes its lean back at once where the tip is beyond the path:
+    /// what it carves is soft, and gives way suddenly.
+    Guide { path: Vec<Vec3>, speed: f32, lean: f32, force: f32, patience: f32, yields: bool },
     /// Holds still for so many seconds.
     Wait { seconds: f32 },
 }
@@ -56,6 +57,9 @@ const PRESS_GAIN: f32 = 15.0;
 
 /// How eagerly a guiding hand leans toward where the tip should be, 1/s. From 20 on it overshoots in soft decay.
 const GUIDE_GAIN: f32 = 12.0;
+
+/// How eagerly a hand that yields takes its lean back, 1/s. A startled hand does in 50 ms what else takes it 100.
+const YIELD_GAIN: f32 = 40.0;
 
 /// How far the tip may lag behind before a guiding hand waits for it, mm.
 const GUIDE_SLACK: f32 = 0.15;
@@ -227,10 +231,12 @@ impl Scripted {
                 self.hand.goal = on_path + *along * now.lean;
                 at_end
             }
-            Move::Guide { path, speed, lean, force: most, patience } => {
+            Move::Guide { path, speed, lean, force: most, patience, yields } => {
                 let (on_path, at_end) = point_along(path, now.travelled);
                 let lag = on_path - self.seen;
-                now.aside = (now.aside + lag * (GUIDE_GAIN * dt)).clamp_length_max(*lean);
+                let is_beyond = *yields && lag.dot(now.aside) < 0.0;
+                let gain = if is_beyond { YIELD_GAIN } else { GUIDE_GAIN };
+                now.aside = (now.aside + lag * (gain * dt)).clamp_length_max(*lean);
                 if force.length() > *most {
                     now.aside *= 1.0 - 5.0 * dt;
                 }

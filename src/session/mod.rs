@@ -5,16 +5,11 @@
 
 mod run;
 mod live;
-mod excavation;
-mod filling;
 mod operator;
-mod operator_file;
-mod sounding;
 mod refusal;
 
 pub use live::{Broken, COMMAND_LAG_TICKS, Heard, Kept, Live};
-pub use operator::Operator;
-pub use operator_file::{ActionFile, OperatorFile};
+pub use operator::{ActionFile, Operator, OperatorFile};
 pub use refusal::Refusal;
 pub use run::{Observer, Progress, Trainee, run};
 

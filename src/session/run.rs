@@ -8,6 +8,9 @@ use crate::volume::Edit;
 
 /// Someone who moves a device and answers: a person at the screen, a script, a recording.
 pub trait Trainee: Device {
+    /// What changed in the last tick, as the picture shows it.
+    fn watch(&mut self, _edits: &[Edit]) {}
+
     /// What they do besides moving, before the step of this tick. `screen` is the tick they see, if there was one.
     fn respond(&mut self, session: &Session, screen: Option<&Step>) -> Vec<Input>;
 }
@@ -65,6 +68,7 @@ pub fn run<O: Observer>(
         };
         let step = simulation.step(&reading);
         output = step.output();
+        trainee.watch(simulation.edits());
         observer.turned(&reading, &step, simulation.edits())?;
         tick = step.tick.next();
         screen = Some(step);

@@ -193,7 +193,7 @@ pub struct CutFile {
     /// How far the hand leans beyond where the bur is to go, mm: 0.5 to 12. Decay yields from about 2.2 on.
     #[schemars(range(min = 0.5, max = 12.0))]
     pub lean_mm: f32,
-    /// Most passes over each decay, 1 to 50.
+    /// Most passes over each decay, 1 to 50. Over an outline all but the first go only to what still stands.
     #[schemars(range(min = 1, max = 50))]
     pub passes: u32,
     /// Share of the decay gone that the operator is content with, %: 1 to 100.
@@ -260,14 +260,33 @@ pub struct CarveFile {
     #[schemars(range(min = 0.0, max = 3.0))]
     pub beyond_mm: f32,
     /// Heights above the contour, one layer after the other, mm: -2 to 3.
-    #[schemars(length(min = 1, max = 10))]
+    #[schemars(length(max = 10))]
     pub layers_mm: Vec<LayerFile>,
+    /// Then look, and carve again where the filling stands too high; without it, not.
+    #[serde(default)]
+    pub again: Option<CarveAgainFile>,
+}
+
+/// Look at a carved filling and carve again where it stands too high.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CarveAgainFile {
+    /// Most often, 1 to 20.
+    #[schemars(range(min = 1, max = 20))]
+    pub times: u32,
+    /// How far over the blade's own way the filling must stand to be seen as too high, mm: 0.01 to 1.
+    #[schemars(range(min = 0.01, max = 1.0))]
+    pub over_mm: f32,
+    /// Height of that way above the contour, mm: -0.2 to 0.5.
+    #[schemars(range(min = -0.2, max = 0.5))]
+    pub to_mm: f32,
 }
 
 /// mm, -2 to 3.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct LayerFile(#[schemars(range(min = -2.0, max = 3.0))] pub f32);
+
 /// Walk a periodontal probe round the tooth.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -19,6 +19,17 @@ pub struct Place {
     pub visits_left: u32,
 }
 
+/// How strokes lie over a cavity, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Strokes {
+    /// Between neighbouring ones.
+    pub apart: f32,
+    /// How far they reach beyond the rim.
+    pub beyond: f32,
+    /// How far above the contour the end stays.
+    pub above: f32,
+}
+
 /// The cavity as seen from above.
 pub struct Mouth {
     grid: Grid,
@@ -57,28 +68,52 @@ impl Mouth {
         })
     }
 
-    /// Where a face of a radius finds room, so far apart; to and fro, so that the hand has short ways.
+    /// Where a face of a radius finds room, no farther apart than so; to and fro, so that the hand has short ways. The outermost
+    /// places lie as near to the walls as they may: what no face comes near is left open.
     pub fn places(&self, radius: f32, apart: f32) -> Vec<Place> {
         let widest = self.inside.iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, &b| a.max(b));
         // In a cavity narrower than the face it stands on the rim.
         let least = (radius + ROOM).min(0.8 * widest);
-        let is_meant = |i: usize| self.inside[i] >= least && self.contour[i].is_finite();
-        let places = self.columns(apart, is_meant);
-        let of = |(at, i): (Vec3, usize)| Place {
-            contour: at.with_z(self.contour[i]),
-            height: self.start[i],
-            visits_left: VISITS,
+        let is_meant = |x: u32, y: u32| {
+            let i = self.grid.index([x, y, 0]);
+            self.inside[i] >= least && self.contour[i].is_finite()
         };
-        places.map(of).collect()
+        let [nx, ny, _] = self.grid.dims;
+        let [in_x, in_y] = [0, 1].map(|axis| (apart / self.grid.spacing[axis]).max(1.0) as u32);
+        let rows = spread((0..nx).filter(|&x| (0..ny).any(|y| is_meant(x, y))), in_x);
+        let mut places = Vec::new();
+        for (row, x) in rows.into_iter().enumerate() {
+            let mut ys = spread((0..ny).filter(|&y| is_meant(x, y)), in_y);
+            if row % 2 == 1 {
+                ys.reverse();
+            }
+            places.extend(ys.into_iter().filter(|&y| is_meant(x, y)).map(|y| {
+                let (at, i) = (self.grid.centre([x, y, 0]), self.grid.index([x, y, 0]));
+                Place { contour: at.with_z(self.contour[i]), height: self.start[i], visits_left: VISITS }
+            }));
+        }
+        places
     }
 
-    /// The way of an instrument's tip over the contour, so far beyond the cavity's rim, so that nothing of the end lies deeper
-    /// than `above` over the contour.
-    pub fn way(&self, instrument: &Instrument, apart: f32, beyond: f32, above: f32) -> Vec<Vec3> {
+    /// The way of an instrument's tip over the contour, so that nothing of the end lies deeper than it may.
+    pub fn way(&self, instrument: &Instrument, strokes: Strokes) -> Vec<Vec3> {
         let profile = self.profile(instrument);
-        let is_meant = |i: usize| self.outside[i] <= beyond && self.contour[i].is_finite();
-        let columns = self.columns(apart, is_meant);
-        columns.map(|(at, i)| at.with_z(self.rest(&profile, i) + above)).collect()
+        let columns = self.columns(strokes.apart, |i| self.is_near(i, strokes.beyond));
+        columns.map(|(at, i)| at.with_z(self.rest(&profile, i) + strokes.above)).collect()
+    }
+
+    /// Those places of that way at which the end would take more than so much of what stands there now, mm.
+    pub fn way_of_high(&self, instrument: &Instrument, strokes: Strokes, now: &Volume, over: f32) -> Vec<Vec3> {
+        let profile = self.profile(instrument);
+        let surface = heights(now);
+        let columns = self.columns(strokes.apart, |i| self.is_near(i, strokes.beyond));
+        let places = columns.map(|(at, i)| (at.with_z(self.rest(&profile, i) + strokes.above), i));
+        let is_high = |tip: f32, i: usize| self.under(&profile, i).any(|(i, height)| surface[i] > tip + height + over);
+        places.filter(|&(place, i)| is_high(place.z, i)).map(|(place, _)| place).collect()
+    }
+
+    fn is_near(&self, column: usize, beyond: f32) -> bool {
+        self.outside[column] <= beyond && self.contour[column].is_finite()
     }
 
     /// Columns so far apart, to and fro along y.
@@ -120,15 +155,29 @@ impl Mouth {
 
     /// How high a tip must stay over a column so that its end lies on the contour and nowhere in it.
     fn rest(&self, profile: &[([i64; 2], f32)], column: usize) -> f32 {
+        self.under(profile, column).map(|(i, height)| self.contour[i] - height).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// The columns below an end whose tip is over a column, and how high its underside lies there over the tip.
+    fn under<'a>(&self, profile: &'a [([i64; 2], f32)], column: usize) -> impl Iterator<Item = (usize, f32)> + use<'a> {
         let [x, y, _] = self.grid.cell(column).map(i64::from);
         let [nx, ny, _] = self.grid.dims.map(i64::from);
-        let over = profile.iter().filter_map(|&([i, j], height)| {
+        profile.iter().filter_map(move |&([i, j], height)| {
             let (x, y) = (x + i, y + j);
             let is_in = (0..nx).contains(&x) && (0..ny).contains(&y);
-            is_in.then(|| self.contour[(y * nx + x) as usize] - height)
-        });
-        over.fold(f32::NEG_INFINITY, f32::max)
+            is_in.then_some(((y * nx + x) as usize, height))
+        })
     }
+}
+
+/// From the first to the last of some columns, evenly, no more than so many from one to the next.
+fn spread(columns: impl Iterator<Item = u32>, apart: u32) -> Vec<u32> {
+    let columns: Vec<u32> = columns.collect();
+    let (Some(first), Some(last)) = (columns.first(), columns.last()) else { return Vec::new() };
+    let parts = (last - first).div_ceil(apart).max(1);
+    let mut spread: Vec<u32> = (0..=parts).map(|i| first + ((last - first) * i + parts / 2) / parts).collect();
+    spread.dedup();
+    spread
 }
 
 /// Height of the highest surface of every column, mm; −∞ where there is none.
@@ -175,7 +224,7 @@ mod tests {
         };
         let mouth = Mouth::of(&workpiece).unwrap();
         let ball = Instrument::new(WorkingEnd::Ball { radius: 0.5 }, true).by_hand();
-        let way = mouth.way(&ball, 0.3, 0.2, 0.0);
+        let way = mouth.way(&ball, Strokes { apart: 0.3, beyond: 0.2, above: 0.0 });
         assert!(way.len() > 40, "{}", way.len());
         for place in &way {
             let clearance = surface(*place);
