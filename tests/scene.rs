@@ -30,7 +30,7 @@ fn scenarios() -> PathBuf {
 }
 
 fn resolved(source: Arc<Source>) -> (Scenario, Workpiece) {
-    let library = Library::shipped().with_folder(&scenarios());
+    let library = Library::shipped().with_folder(scenarios());
     let scenario = scenario::resolve(source, &library, Forms::Made).unwrap();
     let workpiece = Workpiece::make(&scenario, 0).unwrap();
     (scenario, workpiece)
