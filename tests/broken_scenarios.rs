@@ -448,6 +448,13 @@ fn laws_patients_and_hardness() {
     check("an unknown law", "/carving", json!({ "law": "ohm" }), &[("unknown-word", "/carving/law")]);
     check("a patient", "/patient", json!({ "age_years": 45 }), &[]);
     check("an unborn patient", "/patient", json!({ "age_years": 0 }), &[("out-of-range", "/patient/age_years")]);
+    check("a patient who looks the age", "/patient", json!({ "age_years": 70, "shows_age": true }), &[]);
+    check(
+        "a child's mouth",
+        "/patient",
+        json!({ "age_years": 8, "shows_age": true }),
+        &[("out-of-range", "/patient/age_years")],
+    );
     check(
         "a nameless patient",
         "/patient",

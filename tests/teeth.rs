@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use typodont::anatomy::form::Sizes;
-use typodont::anatomy::{Tissues, caliper, charted, grid_of_spacing, grow, teeth};
+use typodont::anatomy::{Tissues, caliper, grid_of_spacing, grow, teeth};
 use typodont::content::scan;
 use typodont::content::{Library, nrrd};
 use typodont::diagnostic::Source;
@@ -14,7 +14,7 @@ use typodont::mesh::Mesh;
 use typodont::scenario::{self, Forms, Workpiece};
 use typodont::scene::Mouth;
 use typodont::volume::march::{self, Camera, Picture, Shot, Side};
-use typodont::volume::{Grid, Label, Volume, distance, surface};
+use typodont::volume::{Label, Volume, distance, surface};
 
 const TISSUES: Tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
@@ -250,8 +250,8 @@ fn any_tooth_can_be_worked_on_in_its_own_gap() {
         // Which side of the jaw: arch space has the patient's left at +x below and his right at +x above.
         let is_plus = matches!(fdi / 10, 1 | 3);
         assert_eq!(middle.x > 0.0, is_plus, "{fdi} stands at {middle}");
-        // How deep drawn neighbours reach into the carved crown; roots of leaning front teeth meet unseen. A tenth of a
-        // millimetre is the aim, three voxels what the plain arch gives.
+        // How deep drawn neighbours reach into the carved crown; roots of leaning front teeth meet unseen. Crowns on grids of 0.36 and
+        // 0.2 mm: two voxels are what this can tell. The arch's own overlaps are measured finer (`tests/arches.rs`).
         let grid = workpiece.volume.grid();
         let from_air = distance::to_set(grid, |voxel| workpiece.volume.tissue(voxel) == Label::AIR);
         let corners = teeth.mesh.positions.iter().map(|p| tooth_from_jaw * *p);
@@ -259,7 +259,7 @@ fn any_tooth_can_be_worked_on_in_its_own_gap() {
         let crowns = corners.filter(|p| p.z > above_gum).filter_map(|p| grid.nearest(p));
         let deepest = crowns.map(|cell| from_air[grid.index(cell)]).fold(0.0, f32::max);
         println!("{fdi}: drawn neighbours reach {deepest:.2} mm into its crown");
-        assert!(deepest < 0.7, "{fdi}: a neighbour {deepest} mm inside");
+        assert!(deepest < 0.45, "{fdi}: a neighbour {deepest} mm inside");
     }
 }
 
@@ -380,7 +380,9 @@ fn open_mandible() -> Option<PathBuf> {
 #[test]
 fn the_first_molar_is_like_one_that_was_scanned() {
     // Aim: Dice of the whole tooth at least 0.80 after rigid alignment, crown sizes within 5 %, mean enamel within 20 %.
-    // Method: from several turns about the tooth's axis, smaller and smaller steps in six directions as long as they help.
+    // Method: alignment from several turns about the tooth's axis, smaller and smaller steps in six directions as long as they help.
+    // Sizes are the boxes of both crowns' enamel as each stands in its jaw, turned only about the vertical: the scanned tooth's roots
+    // lean 20° against its crown, and along an axis that follows them by 11° its buccal side measures 6.4 to 8.2 mm.
     let Some(path) = open_mandible() else { return };
     let image = nrrd::read(&path).unwrap();
     let names = (1..=3).map(|number| (number, Label(number))).collect();
@@ -390,30 +392,24 @@ fn the_first_molar_is_like_one_that_was_scanned() {
     println!("Dice {:.3}", alignment.dice);
     let thickness = [&own, &scanned].map(|tooth| caliper::enamel(tooth, &TISSUES).unwrap());
     println!("enamel {:.3} mm, scanned {:.3} mm", thickness[0].mean, thickness[1].mean);
+    let distal = alignment.turn * Vec3::Y;
     let [mine, theirs] =
-        [&own, &carried_over(&scanned, &alignment)].map(|t| caliper::sizes(t, &TISSUES, false).unwrap());
-    println!("crown {:.2}, {:?}, {:?} mm", mine.crown, mine.mesiodistal, mine.buccolingual);
-    println!("scanned {:.2}, {:?}, {:?} mm", theirs.crown, theirs.mesiodistal, theirs.buccolingual);
+        [(&own, Vec3::Y), (&scanned, distal.with_z(0.0).normalize())].map(|(t, way)| crown_box(t, way));
+    println!("crown, buccolingually, mesiodistally and high: {mine:.2} mm, scanned {theirs:.2} mm");
     assert!(alignment.dice >= 0.80, "Dice {}", alignment.dice);
     assert!((thickness[0].mean / thickness[1].mean - 1.0).abs() < 0.2, "{thickness:?}");
-    for (mine, theirs) in [(mine.mesiodistal, theirs.mesiodistal), (mine.buccolingual, theirs.buccolingual)] {
-        assert!((mine[0] / theirs[0] - 1.0).abs() < 0.05, "{mine:?} {theirs:?}");
-    }
-    assert!((mine.crown / theirs.crown - 1.0).abs() < CROWN_LENGTH, "{mine:?} {theirs:?}");
+    assert!((mine / theirs - 1.0).abs().max_element() < 0.05, "{mine} mm and {theirs} mm");
 }
 
-/// The scanned tooth's enamel reaches farther down its buccal side than the table's; how much longer its crown may be for it.
-const CROWN_LENGTH: f32 = 0.12;
-
-/// A scanned tooth turned and moved to where ours is.
-fn carried_over(scanned: &Volume, alignment: &Alignment) -> Volume {
-    let grid = Grid::centred([90, 90, 140], Vec3::splat(0.2));
-    let grid = Grid { origin: grid.origin - Vec3::Z * 3.5, ..grid };
-    let label = |cell: [u32; 3]| {
-        let place = alignment.turn * grid.centre(cell) + alignment.shift;
-        scanned.grid().nearest(place).map_or(Label::AIR, |c| scanned.tissue(scanned.grid().index(c)))
-    };
-    charted(&grid, grid.cells().map(label).collect()).unwrap()
+/// How far a tooth's enamel reaches across a level way, along it, and up, mm.
+fn crown_box(tooth: &Volume, distal: Vec3) -> Vec3 {
+    let buccal = distal.cross(Vec3::Z);
+    let enamel = tooth.grid().cells().zip(tooth.tissues()).filter(|(_, tissue)| *tissue == TISSUES.enamel);
+    let places =
+        enamel.map(|(cell, _)| tooth.grid().centre(cell)).map(|p| Vec3::new(p.dot(buccal), p.dot(distal), p.z));
+    let [low, high] = places.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], p| [l.min(p), h.max(p)]);
+    // A voxel more than its centres are apart.
+    high - low + tooth.grid().spacing
 }
 
 /// Their place of a place of ours: `turn * p + shift`.

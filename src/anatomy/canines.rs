@@ -91,6 +91,7 @@ pub const UPPER: Form = Form {
     ]),
     sides: Sides::AlongNormals,
     is_mirrored: false,
+    aged: None,
 };
 
 pub const LOWER: Form = Form {

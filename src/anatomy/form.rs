@@ -10,6 +10,8 @@
 //! Forms are written so that x, y and z are a right-handed space, as buccal, distal and occlusal are in the lower left and the
 //! upper right of a mouth. Their twins on the other side are grown as mirror images: [`Form::is_mirrored`].
 
+use super::age::Aged;
+
 /// One row of a table of tooth sizes, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sizes {
@@ -39,6 +41,8 @@ pub struct Form {
     pub sides: Sides,
     /// Grown as its mirror image: y then runs from distal (−) to mesial (+), so that the space stays right-handed.
     pub is_mirrored: bool,
+    /// What years have made of it; `None`: unworn, as written.
+    pub aged: Option<Aged>,
 }
 
 /// How the distance to a limb's side is taken. Where the side lies is the same in both.

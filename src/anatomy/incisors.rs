@@ -78,6 +78,7 @@ pub const UPPER_CENTRAL: Form = Form {
     ]),
     sides: Sides::AlongNormals,
     is_mirrored: false,
+    aged: None,
 };
 
 pub const UPPER_LATERAL: Form = Form {
@@ -141,6 +142,7 @@ pub const UPPER_LATERAL: Form = Form {
     ]),
     sides: Sides::AlongNormals,
     is_mirrored: false,
+    aged: None,
 };
 
 pub const LOWER_CENTRAL: Form = Form {
@@ -206,6 +208,7 @@ pub const LOWER_CENTRAL: Form = Form {
     pulp: LOWER_PULP,
     sides: Sides::AlongNormals,
     is_mirrored: false,
+    aged: None,
 };
 
 const LOWER_PULP: super::form::Pulp = single(&[

@@ -18,6 +18,7 @@ mod premolars;
 mod upper_molars;
 mod lower_molars;
 pub mod teeth;
+pub mod age;
 mod pieces;
 pub mod caliper;
 mod window;

@@ -31,6 +31,7 @@ pub const LOWER_FIRST: Form = Form {
     pulp: PULP,
     sides: Sides::AlongRays,
     is_mirrored: false,
+    aged: None,
 };
 
 /// From the roof of the furcation to the cusps.

@@ -144,6 +144,7 @@ pub const UPPER_FIRST: Form = Form {
     },
     sides: Sides::AlongNormals,
     is_mirrored: false,
+    aged: None,
 };
 
 pub const UPPER_SECOND: Form = Form {

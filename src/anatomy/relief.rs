@@ -1,5 +1,6 @@
 //! The chewing surface as a map of heights.
 
+use super::age::Aged;
 use super::blend::{bump, mix, soft_max};
 use super::form;
 use super::track::Track;
@@ -12,6 +13,15 @@ pub(super) struct Relief {
     floor: f32,
     /// Fall of the flanks of crests and of triangular ridges.
     flanks: [f32; 2],
+    worn: Option<Worn>,
+}
+
+/// How far chewing has come down, mm.
+enum Worn {
+    /// An edge: level.
+    Edge(f32),
+    /// Cusps: x, y and the height that is left of each.
+    Cusps(Vec<[f32; 3]>),
 }
 
 /// The ground at one place.
@@ -21,6 +31,8 @@ pub(super) struct Ground {
     pub(super) height: f32,
     /// What fissures take from it, mm.
     pub(super) carved: f32,
+    /// Chewing has left nothing above this height, mm.
+    pub(super) worn: Option<f32>,
 }
 
 /// A straight piece of a ridge or a fissure: two points, each x, y and a value.
@@ -41,9 +53,13 @@ const VALLEY: f32 = 0.6;
 /// Radius of a ridge's back, mm.
 const BACK: f32 = 0.7;
 
+/// Worn facets are hollow: how much they rise with the square of the way from where the tip was, mm per mm². The enamel at their rim
+/// outlasts what is within.
+const HOLLOW: f32 = 0.08;
+
 impl Relief {
     /// `mm` turns shares x, y, z into mm.
-    pub(super) fn new(relief: &form::Relief, mm: impl Fn([f32; 3]) -> [f32; 3]) -> Relief {
+    pub(super) fn new(relief: &form::Relief, aged: Option<Aged>, mm: impl Fn([f32; 3]) -> [f32; 3]) -> Relief {
         let crest = |crest: &form::Crest| smooth(&crest.iter().map(|&p| mm(p)).collect::<Vec<_>>());
         // The triangular ridge starts where blending with the crest adds next to nothing to the tip's height.
         let lowered = |[x, y, z]: [f32; 3]| [x, y, z - 0.5 * VALLEY];
@@ -59,6 +75,7 @@ impl Relief {
             fissures: relief.fissures.iter().map(fissure).collect(),
             floor: mm([0.0, 0.0, relief.floor])[2],
             flanks: relief.flanks,
+            worn: aged.map(|aged| worn(relief, aged, mm)),
         }
     }
 
@@ -73,7 +90,30 @@ impl Relief {
         let triangular = self.triangular.iter().map(|s| beside(s, gentle, place));
         let height = crests.chain(triangular).fold(self.floor, |a, b| soft_max(a, b, VALLEY));
         let carved = self.fissures.iter().map(|f| f.depth_at(place)).fold(0.0, f32::max);
-        Ground { height, carved }
+        Ground { height, carved, worn: self.worn.as_ref().map(|worn| worn.at(place)) }
+    }
+}
+
+fn worn(relief: &form::Relief, aged: Aged, mm: impl Fn([f32; 3]) -> [f32; 3]) -> Worn {
+    let cusps: Vec<[f32; 3]> = relief.cusps.iter().map(|cusp| mm(cusp.tip)).collect();
+    if cusps.is_empty() {
+        let edge = relief.crests.iter().flat_map(|crest| crest.iter()).map(|&p| mm(p)[2]).fold(f32::MIN, f32::max);
+        return Worn::Edge(edge - aged.wear);
+    }
+    // A crown ends at its length, where a tip is written higher.
+    let ends = mm([0.0, 0.0, 1.0])[2];
+    Worn::Cusps(cusps.into_iter().map(|[x, y, z]| [x, y, z.min(ends) - aged.off_cusp(x)]).collect())
+}
+
+impl Worn {
+    fn at(&self, [x, y]: [f32; 2]) -> f32 {
+        match self {
+            Worn::Edge(level) => *level,
+            Worn::Cusps(cusps) => {
+                let over = |&[cx, cy, left]: &[f32; 3]| left + HOLLOW * ((x - cx) * (x - cx) + (y - cy) * (y - cy));
+                cusps.iter().map(over).fold(f32::INFINITY, f32::min)
+            }
+        }
     }
 }
 

@@ -12,7 +12,22 @@ pub(super) struct Limb {
     furrows: Vec<Track<4>>,
     round: f32,
     sides: Sides,
+    lined: Option<Lined>,
 }
+
+/// What secondary dentine has left of a limb of the pulp.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lined {
+    /// Of its widths.
+    pub(super) width: f32,
+    /// Of its height above the neck.
+    pub(super) height: f32,
+    /// How much its floor has risen, mm.
+    pub(super) floor: f32,
+}
+
+/// No pulp gets narrower than so, half its width in mm: thinner threads no file finds, nor a grid holds together.
+pub(super) const THREAD: f32 = 0.13;
 
 /// How far sideways a taper is followed, in half widths: beyond, an outline would turn inside out.
 const TAPER_REACH: f32 = 1.3;
@@ -50,24 +65,42 @@ impl Limb {
             furrows: limb.furrows.iter().map(furrow).collect(),
             round: limb.round,
             sides,
+            lined: None,
         }
     }
 
+    /// The same, lined with secondary dentine.
+    pub(super) fn lined(self, lined: Option<Lined>) -> Limb {
+        Limb { lined, ..self }
+    }
+
     pub(super) fn lowest(&self) -> f32 {
-        self.outlines.start()
+        let start = self.outlines.start();
+        self.lined.map_or(start, |lined| start + lined.floor)
     }
 
     pub(super) fn highest(&self) -> f32 {
-        self.outlines.end()
+        let end = self.outlines.end();
+        self.lined.map_or(end, |lined| if end > 0.0 { end * lined.height } else { end })
     }
 
     pub(super) fn cut(&self, z: f32) -> Section {
-        let [cx, cy, ax, ay, square, taper_x, taper_y, skew] = self.outlines.at(z);
+        let written = match self.lined {
+            Some(lined) if z > 0.0 => z / lined.height,
+            _ => z,
+        };
+        let [cx, cy, ax, ay, square, taper_x, taper_y, skew] = self.outlines.at(written);
+        let narrowed = |half: f32| self.lined.map_or(half, |lined| (half * lined.width).max(half.min(THREAD)));
+        let [ax, ay] = [ax, ay].map(narrowed);
         let notch = |track: &Track<4>| {
             let [x, y, depth, width] = track.at(z);
             let beside = z < track.start() || z > track.end() || depth <= 0.0;
             (!beside).then_some(Notch { at: [x, y], depth, width })
         };
+        // What has become lower is not rounded away.
+        let upright = 0.35 * (self.highest() - self.lowest());
+        let rounds =
+            [self.round, UPPER_ROUND].map(|round| if self.lined.is_some() { round.min(upright) } else { round });
         Section {
             centre: [cx, cy],
             half: [ax, ay],
@@ -77,7 +110,7 @@ impl Limb {
             notches: self.furrows.iter().filter_map(notch).collect(),
             below: self.lowest() - z,
             above: z - self.highest(),
-            round: self.round,
+            rounds,
             sides: self.sides,
         }
     }
@@ -94,7 +127,8 @@ pub(super) struct Section {
     /// Signed distances to the limb's ends.
     below: f32,
     above: f32,
-    round: f32,
+    /// Roundings of its lower and its upper end.
+    rounds: [f32; 2],
     sides: Sides,
 }
 
@@ -118,7 +152,7 @@ impl Section {
 
     /// Signed distance to the limb of a place so far from its side, furrows and all.
     pub(super) fn ended(&self, side: f32) -> f32 {
-        common(common(side, self.below, self.round), self.above, UPPER_ROUND)
+        common(common(side, self.below, self.rounds[0]), self.above, self.rounds[1])
     }
 
     /// Distance to the outline, as if the limb had no ends and no furrows.

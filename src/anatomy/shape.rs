@@ -56,6 +56,9 @@ pub(super) struct Depths {
 /// Rounding of the dentine under the crown's edge, mm.
 const DENTINE_EDGE: f32 = 1.1;
 
+/// Rounding of the rim of a worn facet, mm.
+const FACET: f32 = 0.15;
+
 /// Share of a fissure's depth by which the dentine under it sinks too.
 const FOLLOWS: f32 = 0.6;
 
@@ -74,7 +77,7 @@ impl Slice<'_> {
 impl Shape {
     /// `thinnest` is the thinnest enamel to make, mm.
     pub(super) fn new(form: &Form, thinnest: f32) -> Shape {
-        let Form { sizes, body, roots, relief, enamel, pulp: _, sides, is_mirrored: _ } = form;
+        let Form { sizes, body, roots, relief, enamel, pulp: _, sides, is_mirrored: _, aged } = form;
         let crown = |p| crown_mm(sizes, p);
         let neck = |p| neck_mm(sizes, p);
         let limbs: Vec<Limb> = roots.iter().map(|root| Limb::new(root, *sides, neck)).collect();
@@ -83,7 +86,7 @@ impl Shape {
         let [low, high] = bounds(form);
         Shape {
             sizes: *sizes,
-            relief: Relief::new(relief, crown),
+            relief: Relief::new(relief, *aged, crown),
             edge: relief.edge,
             enamel: *enamel,
             fissure: relief.fissures.iter().map(|f| f.depth).fold(0.0, f32::max),
@@ -120,6 +123,10 @@ impl Shape {
         let side = slice.body.side(place);
         let notched = slice.body.notched(place);
         let above = (slice.z - column.ground.height + column.ground.carved) * column.upright;
+        let above = match column.ground.worn {
+            Some(left) => common(above, slice.z - left, FACET),
+            None => above,
+        };
         let body = common(slice.body.ended(side + notched), above, self.edge);
         let tooth = slice.roots.iter().fold(body, |tooth, root| {
             let distance = root.distance(place) + root.sunk();

@@ -4,6 +4,7 @@
 //! left-handed one in the upper left and the lower right. Tooth space is right-handed everywhere: x is buccal and z occlusal in
 //! all four quadrants, y is distal in the first and third and mesial in the second and fourth.
 
+use super::age::Aged;
 use super::form::Form;
 use super::{canines, incisors, lower_molars, molar, premolars, upper_molars};
 
@@ -41,6 +42,12 @@ pub fn tooth(fdi: u8) -> Option<Form> {
     };
     let form = half.get(position.checked_sub(1)?)?;
     Some(Form { is_mirrored: is_mirrored(fdi), ..*form })
+}
+
+/// The same as it is in a mouth of so many years; as written without.
+pub fn tooth_of_age(fdi: u8, years: Option<f32>) -> Option<Form> {
+    let aged = years.and_then(|years| Aged::of(fdi, years));
+    tooth(fdi).map(|form| Form { aged, ..form })
 }
 
 /// All numbers, quadrant by quadrant, from the midline outward.

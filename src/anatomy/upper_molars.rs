@@ -166,6 +166,7 @@ pub const FIRST: Form = Form {
     pulp: PULP,
     sides: Sides::AlongNormals,
     is_mirrored: false,
+    aged: None,
 };
 
 const MESIOBUCCAL: [f32; 3] = [0.56, -0.48, 0.98];

@@ -1,7 +1,7 @@
 //! `typodont anatomy`: teeth as files, and a table of their sizes.
 
 use super::{Failure, say, write};
-use crate::anatomy::{self, Tissues, caliper, teeth};
+use crate::anatomy::{self, Tissues, age, caliper, teeth};
 use crate::content::{Library, TissueTable, obj};
 use crate::report::{SurfacePart, surfaces_glb, tissue_map};
 use crate::scenario;
@@ -22,6 +22,10 @@ pub struct Arguments {
     /// One jaw in place of single teeth: JAW.glb, with a part for each of its 14 teeth and one for the gum
     #[arg(long, value_name = "JAW", conflicts_with_all = ["fdi", "all"])]
     arch: Option<ArchName>,
+    /// As in a mouth of so many years, 12 to 90: pulps narrowed, cusps worn, of a jaw the gum gone back; without it unworn, with the
+    /// pulps and the gum of an adult of 30
+    #[arg(long, value_name = "YEARS", value_parser = age)]
+    age: Option<f32>,
     /// Size of a voxel
     #[arg(long, value_name = "MM", default_value_t = 0.1, value_parser = spacing)]
     spacing_mm: f32,
@@ -58,18 +62,18 @@ struct Row {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { fdi, all, arch, spacing_mm, output } = arguments;
+    let Arguments { fdi, all, arch, age, spacing_mm, output } = arguments;
     let table = TissueTable::read(&Library::shipped())?;
     let tissues = scenario::anatomy_tissues(&table);
     std::fs::create_dir_all(output)
         .map_err(|e| Failure::wrong(format!("{}: unwritable-folder: {e}", output.display())))?;
     if let Some(arch) = arch {
-        return save_arch(output, *arch, *spacing_mm, &table, &tissues);
+        return save_arch(output, *arch, Made { age: *age, spacing: *spacing_mm }, &table, &tissues);
     }
     let numbers: Vec<u8> = if *all { teeth::numbers().collect() } else { fdi.clone() };
     let mut rows = Vec::new();
     for fdi in numbers {
-        let form = teeth::tooth(fdi).ok_or_else(|| Failure::misuse(NO_SUCH))?;
+        let form = teeth::tooth_of_age(fdi, *age).ok_or_else(|| Failure::misuse(NO_SUCH))?;
         let grid = anatomy::grid_of_spacing(&form, *spacing_mm);
         let tooth = anatomy::grow(&form, grid, &tissues);
         save(output, fdi, &tooth, &table, &tissues)?;
@@ -85,23 +89,25 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
     write(&output.join("teeth.json"), text + "\n")
 }
 
-/// A jaw as one glTF file: a part for each tooth, named by its number, and one for the gum.
-fn save_arch(
-    folder: &Path,
-    arch: ArchName,
+/// At which age a jaw is made, in years, and of how large voxels, mm.
+#[derive(Clone, Copy)]
+struct Made {
+    age: Option<f32>,
     spacing: f32,
-    table: &TissueTable,
-    tissues: &Tissues,
-) -> Result<(), Failure> {
+}
+
+/// A jaw as one glTF file: a part for each tooth, named by its number, and one for the gum.
+fn save_arch(folder: &Path, arch: ArchName, made: Made, table: &TissueTable, tissues: &Tissues) -> Result<(), Failure> {
+    let Made { age, spacing } = made;
     let (jaw, name) = match arch {
         ArchName::Upper => (Jaw::Upper, "upper"),
         ArchName::Lower => (Jaw::Lower, "lower"),
     };
-    let JawAlone { gum, gum_colours, teeth: standing } = JawAlone::of(jaw, table);
+    let JawAlone { gum, gum_colours, teeth: standing } = JawAlone::of(jaw, age, table);
     let enamel = table.by_label(tissues.enamel).map_or([0.95, 0.94, 0.9], |e| e.rgb());
     let mut parts = vec![SurfacePart::coloured("gum", gum, &gum_colours)];
     for (fdi, arch_from_tooth) in standing {
-        let form = teeth::tooth(fdi).ok_or_else(|| Failure::misuse(NO_SUCH))?;
+        let form = teeth::tooth_of_age(fdi, age).ok_or_else(|| Failure::misuse(NO_SUCH))?;
         let tooth = anatomy::grow(&form, anatomy::grid_of_spacing(&form, spacing), tissues);
         let mut mesh = surface::extract(&tooth);
         mesh.positions.iter_mut().for_each(|p| *p = arch_from_tooth * *p);
@@ -166,4 +172,9 @@ fn number(text: &str) -> Result<u8, String> {
 fn spacing(text: &str) -> Result<f32, String> {
     let spacing = text.parse().ok().filter(|mm| (0.04..=0.4).contains(mm));
     spacing.ok_or_else(|| "a tooth is grown with voxels of 0.04 to 0.4 mm".to_string())
+}
+
+fn age(text: &str) -> Result<f32, String> {
+    let age = text.parse().ok().filter(|years| (age::LEAST..=age::MOST).contains(years));
+    age.ok_or_else(|| format!("a mouth can look {} to {} years old", age::LEAST, age::MOST))
 }

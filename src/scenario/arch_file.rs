@@ -28,7 +28,7 @@ pub struct ArchFile {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ArchFormFile {
-    /// Between the middles of the second molars, mm: 40 to 62. Average: 51.5 above, 48.8 below.
+    /// Between the middles of the second molars, mm: 40 to 62. Average: 54 above, 50.3 below.
     #[serde(default)]
     #[schemars(range(min = 40.0, max = 62.0))]
     pub width_mm: Option<f32>,

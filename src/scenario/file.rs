@@ -302,6 +302,10 @@ pub struct PatientFile {
     /// tissue is in `content/touch.json`.
     #[schemars(range(min = 3.0, max = 110.0))]
     pub age_years: f32,
+    /// True: the mouth looks its age too, from 12 to 90 years. Pulps of the teeth that the program grows are as narrow, cusps as worn and
+    /// healthy gum as far back as they usually are then. Without it teeth are unworn, with the pulp and the gum of an adult of 30.
+    #[serde(default)]
+    pub shows_age: bool,
 }
 
 /// How a bur takes matter away.

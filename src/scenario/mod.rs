@@ -104,6 +104,8 @@ pub struct Arch {
     pub missing: Vec<u8>,
     /// Numbers of teeth that are turned, and by how much, degrees.
     pub rotated: Vec<(u8, f32)>,
+    /// The age that teeth and gum show, years; `None`: as written.
+    pub age: Option<f32>,
 }
 
 /// Of one jaw; `None` for the average.
@@ -171,8 +173,8 @@ pub fn distal(fdi: u8) -> Vec3 {
 /// Where a tooth's shape comes from.
 #[derive(Clone, Debug)]
 pub enum Form {
-    /// Made by the program from its number, at a voxel size in mm.
-    Procedural { spacing: f32 },
+    /// Made by the program from its number, at a voxel size in mm and an age in years.
+    Procedural { spacing: f32, age: Option<f32> },
     /// Read from a file and made ready: enamel up, tissues labelled.
     Given(Arc<Volume>),
     /// To be found in a recording: nothing is made anew.

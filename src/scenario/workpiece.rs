@@ -205,9 +205,7 @@ impl Workpiece {
         }
         let around = match (scenario.scene.layout, &scenario.scene.around) {
             (Layout::Jaw, Some(meshes)) => meshes.clone(),
-            (Layout::Jaw, None) => {
-                surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch.missing, &scenario.tissues)
-            }
+            (Layout::Jaw, None) => surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues),
             (Layout::Single | Layout::Pair { .. }, _) => Vec::new(),
         };
         let low = teeth.iter().map(|t| t.crown_low).reduce(Vec3::min).unwrap_or_default();
@@ -275,8 +273,9 @@ fn form_of(tooth: &Tooth, tissues: &TissueTable) -> Result<Volume, Unmakeable> {
     match &tooth.form {
         Form::Given(volume) => Ok(volume.as_ref().clone()),
         Form::Recorded => Err(Unmakeable::OnlyRecorded),
-        Form::Procedural { spacing } => {
-            let form = anatomy::teeth::tooth(tooth.fdi).ok_or(Unmakeable::NoSuchTooth { fdi: tooth.fdi })?;
+        Form::Procedural { spacing, age } => {
+            let form =
+                anatomy::teeth::tooth_of_age(tooth.fdi, *age).ok_or(Unmakeable::NoSuchTooth { fdi: tooth.fdi })?;
             let grid = anatomy::grid_of_spacing(&form, *spacing);
             Ok(anatomy::grow(&form, grid, &anatomy_tissues(tissues)))
         }
@@ -392,7 +391,7 @@ const CONTACT_GAP: f32 = 0.05;
 fn surroundings(
     tooth: &ToothPlace,
     periodontium: Option<&Periodontium>,
-    missing: &[u8],
+    arch: &Arch,
     tissues: &TissueTable,
 ) -> Vec<Shape> {
     /// Rounding of a crown, mm.
@@ -404,7 +403,7 @@ fn surroundings(
     let own = sizes(tooth.fdi).map_or([10.5, 11.0], |s| [s.buccolingual[0], s.mesiodistal[0]]);
     let neighbour = |fdi: u8, toward: Vec3| {
         if periodontium.is_some() {
-            return neighbour_as_grown(fdi, toward, tooth, label("neighbour"));
+            return neighbour_as_grown(fdi, toward, tooth, arch.age, label("neighbour"));
         }
         let sizes = sizes(fdi)?;
         let half = Vec3::new(0.5 * sizes.buccolingual[0], 0.5 * sizes.mesiodistal[0], 4.5);
@@ -418,11 +417,12 @@ fn surroundings(
             form: touch::Form::RoundBox { half, rounding: ROUNDING.min(0.6 * half.min_element()) },
         })
     };
-    let [mesial, distal] = beside(tooth.fdi).map(|fdi| fdi.filter(|fdi| !missing.contains(fdi)));
+    let [mesial, distal] = beside(tooth.fdi).map(|fdi| fdi.filter(|fdi| !arch.missing.contains(fdi)));
+    let gone = arch.age.map_or(0.0, |years| anatomy::age::recession(years).iter().sum::<f32>() / 6.0);
     let gum_half = Vec3::new(0.5 * own[0] + 1.25, 22.0, 8.0);
     let gum = Shape {
         label: label("gingiva"),
-        tooth_from_shape: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gum_half.z)),
+        tooth_from_shape: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gone - gum_half.z)),
         form: touch::Form::RoundBox { half: gum_half, rounding: 4.0 },
     };
     let mesial = mesial.and_then(|fdi| neighbour(fdi, -tooth.distal()));
@@ -435,12 +435,12 @@ fn surroundings(
 }
 
 /// A neighbour with the form of its kind: a probe beside it goes where there is room.
-fn neighbour_as_grown(fdi: u8, toward: Vec3, tooth: &ToothPlace, label: Label) -> Option<Shape> {
+fn neighbour_as_grown(fdi: u8, toward: Vec3, tooth: &ToothPlace, age: Option<f32>, label: Label) -> Option<Shape> {
     /// Voxels, mm: what is only met from the side needs no fissures.
     const SPACING: f32 = 0.3;
     /// Of its root so much is kept below the neck, mm: deeper no probe goes.
     const ROOT: f32 = 7.0;
-    let form = anatomy::teeth::tooth(fdi)?;
+    let form = anatomy::teeth::tooth_of_age(fdi, age)?;
     let whole = anatomy::grid_of_spacing(&form, SPACING);
     let cut = (((-ROOT - whole.origin.z) / SPACING).max(0.0) as u32).min(whole.dims[2] - 2);
     let [nx, ny, nz] = whole.dims;

@@ -89,6 +89,7 @@ const LABELS: &[(&str, &str)] = &[
     ("suction", "label.suction"),
     ("patient", "label.patient"),
     ("age_years", "label.age"),
+    ("shows_age", "label.shows_age"),
     ("instruments", "label.instruments"),
     ("zones", "label.zones"),
     ("role", "label.role"),

@@ -111,12 +111,13 @@ fn make(job: &Job, tell: &mut impl FnMut(News) -> bool) {
 
 /// The same with coarse voxels, where the program grows the teeth itself and no map is drawn on their voxels.
 fn quick(scenario: &Scenario) -> Option<Scenario> {
-    let is_grown = |form: &Form| matches!(form, Form::Procedural { spacing } if *spacing < QUICK);
+    let is_grown = |form: &Form| matches!(form, Form::Procedural { spacing, .. } if *spacing < QUICK);
     let has_maps = scenario.zones.iter().any(|zone| zone.region.map_dims().is_some());
     if has_maps || !scenario.scene.teeth.iter().all(|tooth| is_grown(&tooth.form)) {
         return None;
     }
     let mut quick = scenario.clone();
-    quick.scene.teeth.iter_mut().for_each(|tooth| tooth.form = Form::Procedural { spacing: QUICK });
+    let age = quick.scene.arch.age;
+    quick.scene.teeth.iter_mut().for_each(|tooth| tooth.form = Form::Procedural { spacing: QUICK, age });
     Some(quick)
 }

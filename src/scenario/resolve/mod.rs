@@ -119,7 +119,8 @@ impl Resolver<'_> {
     /// Everything; `None` only when something needed is missing and was complained about.
     fn scenario(&mut self, written: &ScenarioFile, text: &str) -> Option<Scenario> {
         self.change_tissues(written);
-        let scene = self.scene(&written.scene);
+        let age = self.age_shown(written);
+        let scene = self.scene(&written.scene, age);
         let instruments = self.tray(&written.instruments);
         let zones = self.zones(&written.zones);
         let lesions: Vec<String> =

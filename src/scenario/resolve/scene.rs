@@ -2,6 +2,7 @@
 
 use super::{Forms, Resolver, tooth_path};
 use crate::anatomy;
+use crate::anatomy::age;
 use crate::anatomy::caries::Reach;
 use crate::content::{self, pointer};
 use crate::frame::{Pose, Quat, Vec3};
@@ -20,7 +21,19 @@ use std::sync::Arc;
 const NARROWEST: f32 = 0.25;
 
 impl Resolver<'_> {
-    pub(super) fn scene(&mut self, written: &file::SceneFile) -> Option<Scene> {
+    /// The age that the mouth is to look, years.
+    pub(super) fn age_shown(&mut self, written: &file::ScenarioFile) -> Option<f32> {
+        let age = written.patient.as_ref().filter(|patient| patient.shows_age)?.age_years;
+        if !(age::LEAST..=age::MOST).contains(&age) {
+            let message =
+                format!("{age} years is an age that no mouth can be made to look: {} to {}", age::LEAST, age::MOST);
+            let help = "leave \"shows_age\" out: the age then only changes how tissues feel";
+            self.complain("/patient/age_years", "out-of-range", message, help);
+        }
+        Some(age)
+    }
+
+    pub(super) fn scene(&mut self, written: &file::SceneFile, age: Option<f32>) -> Option<Scene> {
         let (layout, teeth) = match written {
             file::SceneFile::Tooth(tooth) => (Layout::Single, vec![tooth]),
             file::SceneFile::Pair(pair) => (Layout::Pair { gap: pair.gap_mm }, vec![&pair.left, &pair.right]),
@@ -40,13 +53,14 @@ impl Resolver<'_> {
             teeth.iter().zip(&paths).flat_map(|(t, p)| t.old_fillings.iter().enumerate().map(move |(i, f)| (f, p, i)));
         let fillings = fillings.map(|(f, p, i)| (f.id.as_str(), format!("{p}/old_fillings/{i}/id")));
         self.unique(decay.chain(stains).chain(deposits).chain(fillings));
-        let teeth: Vec<Option<Tooth>> = teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path)).collect();
+        let teeth: Vec<Option<Tooth>> =
+            teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path, age)).collect();
         let around = match written {
             file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
             file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
         };
         let pockets = match written {
-            file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(pockets),
+            file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(|gum| pockets(gum, age)),
             file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
         };
         if pockets.is_some() && around.is_some() {
@@ -55,8 +69,8 @@ impl Resolver<'_> {
             self.complain("/scene/jaw/periodontium", "two-gums", message, help);
         }
         let arch = match written {
-            file::SceneFile::Jaw(jaw) => self.arch(&jaw.arch, jaw.tooth.fdi),
-            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => Arch::default(),
+            file::SceneFile::Jaw(jaw) => self.arch(&jaw.arch, jaw.tooth.fdi, age),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => Arch { age, ..Arch::default() },
         };
         let with_calculus = teeth.iter().position(|tooth| tooth.as_ref().is_some_and(|t| !t.calculus.is_empty()));
         if let Some(tooth) = with_calculus.filter(|_| pockets.is_none()) {
@@ -67,7 +81,7 @@ impl Resolver<'_> {
         Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, around, pockets, arch })
     }
 
-    fn arch(&mut self, written: &file::ArchFile, own: u8) -> Arch {
+    fn arch(&mut self, written: &file::ArchFile, own: u8, age: Option<f32>) -> Arch {
         let missing = written.missing.iter().enumerate().map(|(i, fdi)| (*fdi, format!("/scene/jaw/arch/missing/{i}")));
         let rotated = written.rotated.iter().enumerate();
         let rotated = rotated.map(|(i, r)| (r.fdi, format!("/scene/jaw/arch/rotated/{i}/fdi")));
@@ -91,6 +105,7 @@ impl Resolver<'_> {
             angle_class: written.angle_class,
             missing: written.missing.clone(),
             rotated: written.rotated.iter().map(|r| (r.fdi, r.degrees)).collect(),
+            age,
         }
     }
 
@@ -132,7 +147,7 @@ impl Resolver<'_> {
         }
     }
 
-    fn tooth(&mut self, written: &file::ToothFile, path: &str) -> Option<Tooth> {
+    fn tooth(&mut self, written: &file::ToothFile, path: &str, age: Option<f32>) -> Option<Tooth> {
         if anatomy::teeth::tooth(written.fdi).is_none() {
             let message = format!("there is no tooth {}", written.fdi);
             self.complain(
@@ -142,7 +157,7 @@ impl Resolver<'_> {
                 "FDI numbers run 11–18, 21–28, 31–38, 41–48",
             );
         }
-        let form = self.form(&written.form, path);
+        let form = self.form(&written.form, path, age);
         let decay =
             written.decay.iter().enumerate().map(|(i, d)| self.decay(d, &format!("{path}/decay/{i}"))).collect();
         let stains =
@@ -155,10 +170,10 @@ impl Resolver<'_> {
         Some(Tooth { id: written.id.clone(), fdi: written.fdi, form: form?, decay, stains, cavity, calculus, fillings })
     }
 
-    fn form(&mut self, written: &file::FormFile, path: &str) -> Option<Form> {
+    fn form(&mut self, written: &file::FormFile, path: &str, age: Option<f32>) -> Option<Form> {
         match written {
             _ if self.forms == Forms::Recorded => Some(Form::Recorded),
-            file::FormFile::Procedural(made) => Some(Form::Procedural { spacing: made.spacing_mm }),
+            file::FormFile::Procedural(made) => Some(Form::Procedural { spacing: made.spacing_mm, age }),
             file::FormFile::Ct(scan) => {
                 let path = format!("{path}/form/ct/file");
                 let spacing = scan.spacing_mm.map(|s| s.map(|s| s.0));
@@ -379,13 +394,15 @@ impl Resolver<'_> {
     }
 }
 
-fn pockets(written: &file::PeriodontiumFile) -> Pockets {
+/// Gum as it is written; what is left out is healthy, at an age in years.
+fn pockets(written: &file::PeriodontiumFile, age: Option<f32>) -> Pockets {
+    let healthy = age::healthy(age);
     let filled = |written: [Option<f32>; 6], healthy: [f32; 6]| {
         std::array::from_fn(|site| written[site].unwrap_or(healthy[site]))
     };
     Pockets {
-        depth: filled(written.pocket_mm.at_sites(), Pockets::HEALTHY.depth),
-        recession: filled(written.recession_mm.at_sites(), Pockets::HEALTHY.recession),
+        depth: filled(written.pocket_mm.at_sites(), healthy.depth),
+        recession: filled(written.recession_mm.at_sites(), healthy.recession),
     }
 }
 

@@ -5,6 +5,7 @@
 use super::arch::{Half, Seat};
 use super::crown::{Coloured, smooth_normals};
 use super::teeth::Model;
+use crate::anatomy::periodontium::{AtSites, Site};
 use crate::frame::Vec3;
 use crate::render::Rgb;
 
@@ -39,6 +40,8 @@ const VAULT: f32 = -20.5;
 pub struct Side<'a> {
     pub half: &'a Half,
     pub models: &'a [Model],
+    /// How far the margin has gone back, mm.
+    pub gone: AtSites,
     /// −1 to be mirrored to the other side.
     pub sign: f32,
 }
@@ -154,13 +157,15 @@ impl Side<'_> {
         };
         let pad = ((way - self.half.length()) / PAD).clamp(0.0, 1.0);
         let neck = between_seats(&|i| neck_of(&seats[i])) - 2.0 * pad * pad;
+        let [buccal, lingual, beside] =
+            [Site::Buccal, Site::Lingual, Site::MesioBuccal].map(|site| self.gone[site as usize]);
         let risen = |low: f32, high: f32| low + (high - low) * between - 4.0 * pad * pad;
         Section {
             neck,
             offset: between_seats(&|i| offset_of(&seats[i])),
             half: between_seats(&half_of),
-            margin: risen(neck_of(seat) + MARGIN, papilla),
-            inner_margin: risen(neck_of(seat) + MARGIN + 0.2, papilla - 0.5),
+            margin: risen(neck_of(seat) + MARGIN - buccal, papilla - beside),
+            inner_margin: risen(neck_of(seat) + MARGIN + 0.2 - lingual, papilla - 0.5 - beside),
             between,
             root: 0.6 * (1.0 - from_middle * from_middle) * if here == 2 { 1.6 } else { 1.0 },
             pad,

@@ -15,6 +15,7 @@ pub use self::gum::Jaw;
 use self::gum::Side;
 use self::teeth::Model;
 use super::around;
+use crate::anatomy::age::{self, Aged};
 use crate::anatomy::form::Sizes;
 use crate::anatomy::teeth as teeth_by_number;
 use crate::content::{Role, TissueTable};
@@ -50,8 +51,9 @@ const GUM_GLOSS: f32 = 0.28;
 const TOOTH_GLOSS: f32 = 0.22;
 
 /// Around the carved tooth's box the gum is drawn as it is felt up to the first distance, as the jaw has it from the second
-/// on, mm.
+/// on, mm. Among the front teeth the arch bends away from the straight ridge that is felt: farther off that would be no tooth's gum.
 const AS_FELT: [f32; 2] = [6.0, 13.0];
+const AS_FELT_IN_FRONT: [f32; 2] = [2.0, 5.0];
 
 /// Touched shapes nearer than this to the middle of a crown take its place, mm.
 const TAKEN: f32 = 1.0;
@@ -210,8 +212,9 @@ pub struct JawAlone {
 }
 
 impl JawAlone {
-    pub fn of(jaw: Jaw, tissues: &TissueTable) -> JawAlone {
-        let arch = Arch::with(jaw, None, &Plan::default());
+    /// As written, or at an age in years.
+    pub fn of(jaw: Jaw, age: Option<f32>, tissues: &TissueTable) -> JawAlone {
+        let arch = Arch::with(jaw, None, &Plan { age, ..Plan::default() });
         let Coloured { mesh, tints } = arch.gum(&|p| p);
         let pink = tissues.by_name("gingiva").map_or([0.85, 0.53, 0.50], |e| e.rgb());
         let gum_colours = tints.iter().map(|tint| std::array::from_fn(|c| pink[c] * tint[c])).collect();
@@ -265,6 +268,7 @@ impl Jaw {
 /// One jaw before it is drawn.
 struct Arch {
     jaw: Jaw,
+    age: Option<f32>,
     /// On which side of x the carved tooth stands: 1 or −1.
     sign: f32,
     /// The side with the carved tooth and the other; each is laid out at x > 0.
@@ -292,6 +296,9 @@ impl Arch {
         let row = |mut models: Vec<Model>, side: f32| {
             for (index, model) in models.iter_mut().enumerate() {
                 let number = jaw.number(side, index);
+                let is_carved = side == sign && carved.is_some_and(|(_, carved)| carved == index + 1);
+                // The carved one's own crown was measured as it is.
+                model.form.aged = plan.age.filter(|_| !is_carved).and_then(|years| Aged::of(number, years));
                 model.turn = plan.rotated.iter().find(|(fdi, _)| *fdi == number).map_or(0.0, |(_, degrees)| *degrees);
             }
             let teeth: Vec<(Model, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
@@ -299,9 +306,9 @@ impl Arch {
         };
         if carved.is_none() && plan.rotated.is_empty() {
             let both = row(plain, -sign);
-            return Arch { jaw, sign, carved: both.clone(), plain: both };
+            return Arch { jaw, age: plan.age, sign, carved: both.clone(), plain: both };
         }
-        Arch { jaw, sign, carved: row(models, sign), plain: row(plain, -sign) }
+        Arch { jaw, age: plan.age, sign, carved: row(models, sign), plain: row(plain, -sign) }
     }
 
     /// All crowns but those that are taken: on the carved tooth's side or the other, by their place from the midline.
@@ -326,7 +333,8 @@ impl Arch {
     fn gum(&self, fit: &dyn Fn(Vec3) -> Vec3) -> Coloured {
         let rows = if self.sign > 0.0 { [&self.plain, &self.carved] } else { [&self.carved, &self.plain] };
         let sides = [(rows[0], -1.0), (rows[1], 1.0)];
-        gum::gum(self.jaw, sides.map(|(row, sign)| Side { half: &row.half, models: &row.models, sign }), fit)
+        let gone = self.age.map_or([0.0; 6], age::recession);
+        gum::gum(self.jaw, sides.map(|(row, sign)| Side { half: &row.half, models: &row.models, gone, sign }), fit)
     }
 }
 
@@ -404,7 +412,8 @@ impl Felt<'_> {
         let mut point = self.near_from_tooth.inverse() * point_in_arch;
         let aside = (point - point.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
         let deep = crown_low.z - point.z;
-        let near = (1.0 - between(aside.length(), AS_FELT)) * (1.0 - between(deep, DEEP));
+        let as_felt = if self.tooth.fdi % 10 <= 3 { AS_FELT_IN_FRONT } else { AS_FELT };
+        let near = (1.0 - between(aside.length(), as_felt)) * (1.0 - between(deep, DEEP));
         // A mesh is slow to ask.
         let away = |p: Vec3| self.periodontium.map_or_else(|| gum.distance(p), |own| own.filled_gum(p));
         let share = if near > 0.0 { near * (1.0 - between(away(point).abs(), FAR)) } else { 0.0 };

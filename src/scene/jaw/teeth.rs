@@ -15,7 +15,8 @@ pub struct Model {
     pub kind: Kind,
     /// The crown's axis leans so far toward lip or cheek, degrees.
     pub lean: f32,
-    /// How far cusps or edge stay short of the occlusal plane, mm.
+    /// How far cusps or edge stay short of the occlusal plane, mm; a canine's tip stands beyond it, which brings its contact level with
+    /// the lateral incisor's.
     pub short: f32,
     /// How far its middle stands out of the arch's line toward lip or cheek, mm: a canine is an arch's corner.
     pub out: f32,
@@ -38,10 +39,10 @@ pub const UPPER: [Model; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::UPPER;
     [
         tipped(model(a, Kind::Incisor, 20.0, 0.0), 5.0),
-        tipped(model(b, Kind::Incisor, 18.0, 0.6), 6.0),
-        tipped(standing_out(model(c, Kind::Canine, 8.0, 0.0), 2.3), 6.0),
-        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.9),
-        model(e, Kind::Premolar, 0.0, 0.3),
+        tipped(model(b, Kind::Incisor, 16.0, 0.6), 6.0),
+        tipped(standing_out(model(c, Kind::Canine, 12.0, -0.4), 2.2), 2.0),
+        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.8),
+        standing_out(model(e, Kind::Premolar, 0.0, 0.3), 0.1),
         model(f, Kind::Molar, 2.0, 0.3),
         model(g, Kind::Molar, 2.0, 0.3),
         model(h, Kind::Molar, 2.0, 0.3),
@@ -53,10 +54,10 @@ pub const LOWER: [Model; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::LOWER;
     [
         tipped(model(a, Kind::Incisor, 12.0, 0.0), 2.0),
-        tipped(model(b, Kind::Incisor, 11.0, 0.0), 2.0),
-        tipped(standing_out(model(c, Kind::Canine, 5.0, 0.0), 2.2), 3.0),
-        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.9),
-        model(e, Kind::Premolar, 0.0, 0.3),
+        tipped(standing_out(model(b, Kind::Incisor, 8.0, 0.0), -0.2), 2.0),
+        tipped(standing_out(model(c, Kind::Canine, 12.0, -1.0), 2.5), 2.0),
+        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.6),
+        standing_out(model(e, Kind::Premolar, 0.0, 0.3), 0.1),
         model(f, Kind::Molar, -3.0, 0.3),
         model(g, Kind::Molar, -3.0, 0.3),
         model(h, Kind::Molar, -3.0, 0.3),
