@@ -303,21 +303,28 @@ fn bundles_go_to_a_store_that_speaks_s3() {
     );
 }
 
-/// An exercise of a few tenths of a second, on a coarse tooth.
-fn brief(folder: &Path) -> PathBuf {
+/// Somebody who grinds a coarse tooth on and on, until the time is over: the exercise, and their operator file.
+fn grinder(folder: &Path) -> [PathBuf; 2] {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
     let mut scenario: Value = serde_json::from_str(&fs::read_to_string(source).unwrap()).unwrap();
     scenario["stages"][0]["time_limit_s"] = json!(number("TYPODONT_SECONDS", 1));
     let all = scenario["stages"].as_array_mut().unwrap();
     all.truncate(1);
-    let path = folder.join("brief.json");
-    fs::write(&path, scenario.to_string()).unwrap();
-    path
+    let cut = json!({ "press_n": 1.5, "patience_s": 0.5, "speed_mm_s": 5, "pitch_mm": 0.3, "margin_mm": 0.0, "lean_mm": 4.0,
+        "passes": 1, "until_cleared_pct": 100 });
+    let follow = json!({ "press_n": 0.5, "speed_mm_s": 5, "lines": 6 });
+    let operator = json!({ "id": "grinder", "title": "Grinds on", "hand": { "speed_mm_s": 40, "tremor_mm": 0.02 }, "agrees": 3,
+        "rules": [{ "when": "always", "do": [{ "take": "bur" }, { "cut": cut }, { "follow": follow }], "repeat": true }] });
+    let files = ["grinding.json", "grinder.json"].map(|name| folder.join(name));
+    fs::write(&files[0], scenario.to_string()).unwrap();
+    fs::write(&files[1], operator.to_string()).unwrap();
+    files
 }
 
 /// Bundles of one real recording by many people: the session is another because the result says so.
 fn recorded(folder: &Path, count: usize) -> Vec<PathBuf> {
-    let made = bundle::run(&text(&brief(folder)), "hasty", &folder.join("made"), &["--participant", "somebody"]);
+    let [exercise, grinder] = grinder(folder).map(|file| text(&file));
+    let made = bundle::run(&exercise, &grinder, &folder.join("made"), &["--participant", "somebody"]);
     let mut session: Value = serde_json::from_str(&fs::read_to_string(made.join("session.json")).unwrap()).unwrap();
     let recording = session["digests"]["recording.mcap"].clone();
     session["digests"] = json!({ "recording.mcap": recording });
