@@ -4,7 +4,6 @@ use super::{Failure, say, write};
 use crate::anatomy;
 use crate::anatomy::shells::{self, Shaped, UNITS, Unsound};
 use crate::content::imaging::{self, Cut, Told, raw};
-use crate::content::nrrd::segmentation::Segmentation;
 use crate::content::nrrd::{Image, Samples};
 use crate::content::{Library, TissueTable, scan, surfaces};
 use crate::frame::Vec3;
@@ -318,21 +317,14 @@ fn crop(arguments: &Arguments) -> Option<[Vec3; 2]> {
 /// Which number of a label map is which tissue; `None` for grey values.
 fn names(image: &Image, arguments: &Arguments, table: &TissueTable) -> Result<Option<BTreeMap<u8, Label>>, String> {
     if !arguments.labels.is_empty() {
-        let pair = |(name, number): &(String, u8)| Ok((*number, known(table, name)?));
+        let pair = |(name, number): &(String, u8)| Ok((*number, table.label_of(name)?));
         return arguments.labels.iter().map(pair).collect::<Result<_, String>>().map(Some);
     }
-    if image.key("Segment0_ID").is_some() {
-        let segments = Segmentation::from_image(image.clone()).map_err(|e| e.to_string())?.segments;
-        let pair = |segment: &crate::content::nrrd::segmentation::Segment| {
-            let by_id = known(table, &segment.id.to_lowercase());
-            let label = by_id.or_else(|_| known(table, &segment.name.to_lowercase()));
-            label.map(|label| (segment.label_value, label)).map_err(|unknown| {
-                format!(
-                    "{unknown}; name the numbers of the map with --labels, as in --labels enamel=1,dentine=2,pulp=3"
-                )
-            })
-        };
-        return segments.iter().map(pair).collect::<Result<_, String>>().map(Some);
+    let hint = |unknown| {
+        format!("{unknown}; name the numbers of the map with --labels, as in --labels enamel=1,dentine=2,pulp=3")
+    };
+    if let Some(named) = scan::named(image, table).map_err(hint)? {
+        return Ok(Some(named));
     }
     match few_values(&image.samples) {
         None => Ok(None),
@@ -364,15 +356,8 @@ fn few_values(samples: &Samples) -> Option<String> {
     (is_map && found.len() > 1 && found.contains(&0)).then(list)
 }
 
-fn known(table: &TissueTable, name: &str) -> Result<Label, String> {
-    table.by_name(name).map(|entry| entry.label()).ok_or_else(|| {
-        let known = table.entries().iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
-        format!("no tissue is named \"{}\"; known: {known}", name.escape_debug())
-    })
-}
-
 fn label(table: &TissueTable, name: &str) -> Result<Label, Failure> {
-    known(table, name).map_err(|unknown| Failure::misuse(format!("unknown-tissue: {unknown}")))
+    table.label_of(name).map_err(|unknown| Failure::misuse(format!("unknown-tissue: {unknown}")))
 }
 
 fn wrong(path: &Path, what: &impl fmt::Display) -> Failure {

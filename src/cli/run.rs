@@ -49,7 +49,7 @@ pub struct Arguments {
     /// Decides what the exercise leaves to chance; drawn from the clock if left out
     #[arg(long)]
     seed: Option<u64>,
-    /// A CT volume (NRRD) to work on instead of the exercise's own tooth
+    /// A CT volume, or a map of its tissues as `typodont import` writes it (NRRD), to work on instead of the exercise's own tooth
     #[arg(long, value_name = "VOLUME")]
     tooth: Option<PathBuf>,
     /// Distance between that volume's voxels, where its header lacks it

@@ -2,14 +2,29 @@
 //!
 //! Takes images as files hold them. Gives volumes and masks; what is wrong, as one complaint for the author.
 
+use super::TissueTable;
+use super::nrrd::segmentation::Segmentation;
 use super::nrrd::{Geometry, Image, Samples, Space};
-use crate::anatomy::{Tissues, charted, segment};
+use crate::anatomy::{Tissues, charted, segment, set_upright};
 use crate::frame::Vec3;
 use crate::volume::{Grid, Label, Volume};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most numbers that a complaint lists.
 const LISTED: usize = 8;
+
+/// A tooth from its CT, or from a label map that names its tissues; crown up.
+pub fn tooth(
+    image: &Image,
+    spacing: Option<[f32; 3]>,
+    table: &TissueTable,
+    tissues: &Tissues,
+) -> Result<Volume, String> {
+    match named(image, table)? {
+        Some(names) => Ok(set_upright(labelled(image, spacing, &names)?, tissues)),
+        None => segmented(image, spacing, tissues),
+    }
+}
 
 /// A CT of one tooth, its tissues told apart and its crown up.
 ///
@@ -37,6 +52,20 @@ fn in_order(image: &Image, spacing: Option<[f32; 3]>) -> Result<(Grid, Vec<f32>)
         Samples::F32(samples) => order.walk(samples, |v| v),
     };
     Ok((grid, values))
+}
+
+/// Which number of a label map is which tissue, where the file names its segments as 3D Slicer does; `None` where it names none.
+pub fn named(image: &Image, table: &TissueTable) -> Result<Option<BTreeMap<u8, Label>>, String> {
+    if image.key("Segment0_ID").is_none() {
+        return Ok(None);
+    }
+    let segments = Segmentation::from_image(image.clone()).map_err(|e| e.to_string())?.segments;
+    let tissues = segments.iter().map(|segment| {
+        let by_id = table.label_of(&segment.id.to_lowercase());
+        let label = by_id.or_else(|_| table.label_of(&segment.name.to_lowercase()))?;
+        Ok((segment.label_value, label))
+    });
+    tissues.collect::<Result<_, String>>().map(Some)
 }
 
 /// A label map as it was drawn, its surface smoothed. `names` says which number is which tissue; 0 is air.
@@ -169,6 +198,7 @@ fn listed(numbers: &BTreeSet<i32>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::content::Library;
     use glam::DVec3;
 
     /// A box of 2×3×4 voxels, numbered in array order.
@@ -207,6 +237,25 @@ mod tests {
         let expected = turned.geometry.position(cell);
         assert!(place.distance(Vec3::from(expected.to_array().map(|mm| mm as f32))) < 1e-5, "{place}");
         assert!(mask(&turned, 2).unwrap_err().contains("order x, y, z"));
+    }
+
+    #[test]
+    fn a_map_that_names_its_tissues_is_a_tooth_as_drawn() {
+        // Aim: what somebody told apart is not told apart again. Method: a root that is drawn with other numbers than our own.
+        let table = TissueTable::read(&Library::shipped()).unwrap();
+        let tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+        let mut drawn = image(Samples::U8([[7; 12], [9; 12]].concat()), UPRIGHT);
+        let mut segment = |n: u32, id: &str, name: &str, value: u8| {
+            let value = value.to_string();
+            let pairs = [("ID", id), ("Name", name), ("LabelValue", &value), ("Color", "1 1 1")];
+            drawn.keys.extend(pairs.map(|(key, value)| (format!("Segment{n}_{key}"), value.to_string())));
+        };
+        segment(0, "dentine", "Segment_1", 7);
+        segment(1, "Segment_2", "Pulp", 9);
+        let volume = tooth(&drawn, None, &table, &tissues).unwrap();
+        assert_eq!([tissues.enamel, tissues.dentine, tissues.pulp].map(|label| volume.count(label)), [0, 12, 12]);
+        drawn.keys.iter_mut().for_each(|(_, value)| *value = value.replace("Pulp", "Nerve"));
+        assert!(tooth(&drawn, None, &table, &tissues).unwrap_err().contains("\"nerve\"; known: "));
     }
 
     #[test]

@@ -181,6 +181,14 @@ impl TissueTable {
         self.entries.iter().map(|e| e.name.as_str())
     }
 
+    /// The label of a tissue, or a complaint that lists those that there are.
+    pub fn label_of(&self, name: &str) -> Result<Label, String> {
+        self.by_name(name).map(TissueEntry::label).ok_or_else(|| {
+            let known = self.entries().iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
+            format!("no tissue is named \"{}\"; known: {known}", name.escape_debug())
+        })
+    }
+
     pub fn by_name(&self, name: &str) -> Option<&TissueEntry> {
         self.entries.iter().find(|e| e.name == name)
     }

@@ -1,4 +1,4 @@
-//! The CT of a real tooth in the place of an exercise's own.
+//! The CT of a real tooth, or a map of its tissues, in the place of an exercise's own.
 
 use super::Failed;
 use crate::content::{self, nrrd, scan};
@@ -17,7 +17,7 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// Reads a CT volume (NRRD).
+    /// Reads a CT volume or a label map (NRRD).
     pub fn read(path: &Path, spacing: Option<f32>) -> Result<Scan, Failed> {
         let bytes = content::read_file(path)?;
         let image = nrrd::read(path).map_err(|error| wrong(path, error.to_string()))?;
@@ -32,8 +32,9 @@ impl Scan {
     /// Puts it in the place of every tooth.
     pub fn replace_teeth(&self, scenario: &mut Scenario) -> Result<(), Failed> {
         let tissues = scenario::anatomy_tissues(&scenario.tissues);
-        let volume = scan::segmented(&self.image, self.spacing.map(|mm| [mm; 3]), &tissues);
-        let volume = Arc::new(volume.map_err(|error| wrong(&self.path, error.to_string()))?);
+        let spacing = self.spacing.map(|mm| [mm; 3]);
+        let volume = scan::tooth(&self.image, spacing, &scenario.tissues, &tissues);
+        let volume = Arc::new(volume.map_err(|why| wrong(&self.path, why))?);
         for tooth in &mut scenario.scene.teeth {
             tooth.form = Form::Given(volume.clone());
         }
