@@ -184,7 +184,7 @@ impl TissueTable {
     /// The label of a tissue, or a complaint that lists those that there are.
     pub fn label_of(&self, name: &str) -> Result<Label, String> {
         self.by_name(name).map(TissueEntry::label).ok_or_else(|| {
-            let known = self.entries().iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
+            let known = self.names().collect::<Vec<_>>().join(", ");
             format!("no tissue is named \"{}\"; known: {known}", name.escape_debug())
         })
     }

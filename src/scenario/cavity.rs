@@ -125,6 +125,21 @@ impl Workpiece {
         let solid = |volume: &Volume| volume.densities()[voxel].is_solid();
         self.original.as_ref().is_some_and(|original| solid(original)) && !solid(&self.volume)
     }
+
+    /// A volume in which a cavity was cut, before and after, with nothing else known of it.
+    #[cfg(test)]
+    pub fn prepared(whole: Volume, cut: Volume) -> Workpiece {
+        Workpiece {
+            volume: cut.into(),
+            original: Some(whole.into()),
+            teeth: Vec::new(),
+            lesions: Vec::new(),
+            around: Vec::new(),
+            periodontium: None,
+            arch: Default::default(),
+            world_from_tooth: crate::frame::Pose::IDENTITY,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -34,10 +34,9 @@ impl Restoration {
         let original = workpiece.original.as_ref()?;
         let start = &workpiece.volume;
         let grid = original.grid();
-        let solid = |volume: &Volume, voxel: usize| volume.densities()[voxel].is_solid();
         let is_cavity = |voxel: usize| workpiece.is_in_cavity(voxel);
         let cavity = (0..grid.len()).filter(|&v| is_cavity(v)).count();
-        let filled = (0..grid.len()).filter(|&v| is_cavity(v) && solid(end, v)).count();
+        let filled = (0..grid.len()).filter(|&v| is_cavity(v) && end.densities()[v].is_solid()).count();
         let voids = enclosed(end, &is_cavity);
         // Density tells volumes finer than whole voxels do.
         let over = |voxel: usize| {
@@ -164,9 +163,7 @@ impl Look<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Pose;
     use crate::volume::{Grid, Label, Voxel};
-    use std::sync::Arc;
 
     const TOOTH: Label = Label(1);
     const FILLING: Label = Label(21);
@@ -178,16 +175,7 @@ mod tests {
         let hole = |p: Vec3| (p.truncate().length() - 1.5).max(-2.0 - p.z);
         let whole = Volume::from_distance(grid, band, |p| (p.z, TOOTH));
         let cut = Volume::from_distance(grid, band, |p| (p.z.max(-hole(p)), TOOTH));
-        Workpiece {
-            volume: Arc::new(cut),
-            original: Some(Arc::new(whole)),
-            teeth: Vec::new(),
-            lesions: Vec::new(),
-            around: Vec::new(),
-            periodontium: None,
-            arch: Default::default(),
-            world_from_tooth: Pose::IDENTITY,
-        }
+        Workpiece::prepared(whole, cut)
     }
 
     /// The hole filled up to a height over the former surface.

@@ -221,6 +221,11 @@ impl Operator {
         questionnaire.items().map(rate).collect()
     }
 
+    /// Puts tasks before what else is left to do.
+    fn do_next(&mut self, tasks: impl IntoIterator<Item = Task, IntoIter: DoubleEndedIterator>) {
+        tasks.into_iter().rev().for_each(|task| self.plan.push_front(task));
+    }
+
     /// Goes on with the plan until the hand is busy or something is to be said.
     fn go_on(&mut self, session: &Session, index: usize) -> Vec<Input> {
         while self.device.is_idle() {

@@ -198,10 +198,8 @@ fn heights(volume: &Volume) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Pose;
     use crate::touch::WorkingEnd;
     use crate::volume::Label;
-    use std::sync::Arc;
 
     #[test]
     fn a_ball_is_led_so_that_it_lies_on_the_contour_and_never_in_it() {
@@ -212,16 +210,7 @@ mod tests {
         let hole = |p: Vec3| (p.x.abs().max(p.y.abs()) - 1.0).max(-1.0 - p.z);
         let whole = Volume::from_distance(grid, 0.15, |p| (surface(p), Label(1)));
         let cut = Volume::from_distance(grid, 0.15, |p| (surface(p).max(-hole(p)), Label(1)));
-        let workpiece = Workpiece {
-            volume: Arc::new(cut),
-            original: Some(Arc::new(whole)),
-            teeth: Vec::new(),
-            lesions: Vec::new(),
-            around: Vec::new(),
-            periodontium: None,
-            arch: Default::default(),
-            world_from_tooth: Pose::IDENTITY,
-        };
+        let workpiece = Workpiece::prepared(whole, cut);
         let mouth = Mouth::of(&workpiece).unwrap();
         let ball = Instrument::new(WorkingEnd::Ball { radius: 0.5 }, true).by_hand();
         let way = mouth.way(&ball, Strokes { apart: 0.3, beyond: 0.2, above: 0.0 });

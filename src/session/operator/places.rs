@@ -1,10 +1,38 @@
 //! Where things are as a person sees them, and the ways through the air to them.
 
-use super::file::PlaceFile;
+use super::file::{CarveFile, CutFile, PlaceFile};
 use super::{Operator, TOUCH_HEIGHT, TOUCH_SPEED, TRAVEL_HEIGHT, Task};
 use crate::device::Move;
 use crate::frame::Vec3;
 use crate::volume::ISO;
+
+/// How a hand leads a tip along a way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lead {
+    /// mm/s.
+    speed: f32,
+    /// mm.
+    lean: f32,
+    /// N.
+    force: f32,
+    /// s.
+    patience: f32,
+    yields: bool,
+}
+
+impl From<&CutFile> for Lead {
+    fn from(file: &CutFile) -> Lead {
+        let CutFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
+        Lead { speed, lean, force, patience, yields: false }
+    }
+}
+
+impl From<&CarveFile> for Lead {
+    fn from(file: &CarveFile) -> Lead {
+        let CarveFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
+        Lead { speed, lean, force, patience, yields: true }
+    }
+}
 
 impl Operator {
     pub(super) fn in_world(&self, point_in_tooth: Vec3) -> Vec3 {
@@ -76,6 +104,21 @@ impl Operator {
         let above = Vec3::new(point_in_tooth.x, point_in_tooth.y, self.top() + TRAVEL_HEIGHT);
         let (above, to) = (self.in_world(above), self.in_world(point_in_tooth));
         vec![self.way_up(), Task::Move(Move::Reach { to: above, speed }), Task::Move(Move::Reach { to, speed })]
+    }
+
+    /// From above onto a way of tooth space and along it, with an end that reaches so far below its tip, mm.
+    pub(super) fn run_over(&self, lead: Lead, radius: f32, way: Vec<Vec3>) -> Vec<Task> {
+        let Some(first) = way.first() else { return Vec::new() };
+        let above = first.with_z(self.top() + radius + TOUCH_HEIGHT);
+        let mut tasks = self.way_to(above);
+        tasks.push(self.guide(lead, [above].into_iter().chain(way)));
+        tasks
+    }
+
+    pub(super) fn guide(&self, lead: Lead, way: impl Iterator<Item = Vec3>) -> Task {
+        let path = way.map(|place| self.in_world(place)).collect();
+        let Lead { speed, lean, force, patience, yields } = lead;
+        Task::Move(Move::Guide { path, speed, lean, force, patience, yields })
     }
 
     /// Up, across, and down on a place whose surface lies about so high.

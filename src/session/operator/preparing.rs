@@ -4,7 +4,6 @@ use super::excavation::Excavation;
 use super::file::CutFile;
 use super::{Operator, TOUCH_HEIGHT, Task};
 use crate::content::Role;
-use crate::device::Move;
 use crate::frame::Vec3;
 use crate::scenario::file::ZoneRole;
 use crate::scenario::{Lesion, Scenario};
@@ -117,7 +116,7 @@ impl Operator {
         let wide = self.scenario.instruments[instrument].make().head_radius();
         let excavation = Excavation { radius: wide, below: radius, pitch: cut.pitch_mm, margin: cut.margin_mm };
         let path = excavation.path(&self.workpiece.volume, |place, _| is_outlined(&self.scenario, place));
-        let run = self.run_over(cut, instrument, path.clone());
+        let run = self.run_over(cut.into(), radius, path.clone());
         self.plan.extend(run);
         if cut.passes > 1 {
             let left = cut.passes - 1;
@@ -128,6 +127,7 @@ impl Operator {
     /// Looks, and leads the bur along those places of its way where it would still meet what is to go.
     pub(super) fn prepare_again(&mut self, preparing: Preparing) {
         let Preparing { cut, instrument, path, left } = &preparing;
+        let radius = self.radius(*instrument);
         let Some(seen) = &self.seen else { return };
         let bur = self.scenario.instruments[*instrument].make();
         let standing = standing(seen, |place| is_outlined(&self.scenario, place));
@@ -135,33 +135,18 @@ impl Operator {
         let path: Vec<Vec3> = path.iter().filter(is_met).copied().collect();
         let mut tasks = Vec::new();
         for run in path.chunk_by(|a, b| a.distance(*b) < 3.0 * cut.pitch_mm) {
-            tasks.extend(self.run_over(cut, *instrument, run.to_vec()));
+            tasks.extend(self.run_over(cut.into(), radius, run.to_vec()));
         }
         if !path.is_empty() && *left > 1 {
             tasks.push(Task::PrepareAgain(Preparing { left: left - 1, ..preparing }));
         }
-        tasks.into_iter().rev().for_each(|task| self.plan.push_front(task));
-    }
-
-    /// From above onto a way and along it.
-    fn run_over(&self, cut: &CutFile, instrument: usize, path: Vec<Vec3>) -> Vec<Task> {
-        let Some(first) = path.first() else { return Vec::new() };
-        let above = first.with_z(self.top() + self.radius(instrument) + TOUCH_HEIGHT);
-        let mut tasks = self.way_to(above);
-        tasks.push(self.guide(cut, [above].into_iter().chain(path)));
-        tasks
+        self.do_next(tasks);
     }
 
     /// Along places of tooth space, waiting where the bur does not get on.
     fn lead_bur(&mut self, cut: &CutFile, path: impl Iterator<Item = Vec3>) {
-        let guide = self.guide(cut, path);
+        let guide = self.guide(cut.into(), path);
         self.plan.push_back(guide);
-    }
-
-    fn guide(&self, cut: &CutFile, path: impl Iterator<Item = Vec3>) -> Task {
-        let path = path.map(|place| self.in_world(place)).collect();
-        let (speed, lean, force, patience) = (cut.speed_mm_s, cut.lean_mm, cut.press_n, cut.patience_s);
-        Task::Move(Move::Guide { path, speed, lean, force, patience, yields: false })
     }
 }
 

@@ -3,7 +3,6 @@
 use super::file::{CarveAgainFile, CarveFile, CondenseFile, FillFile};
 use super::mouth::{Mouth, Place, Strokes};
 use super::{Operator, TOUCH_HEIGHT, Task};
-use crate::device::Move;
 use crate::frame::Vec3;
 
 /// A cavity being filled.
@@ -63,8 +62,7 @@ impl Operator {
         let height = beside.map(|p| p.height).fold(place.height, f32::max);
         let moves = self.press_down(place.contour, height, filling.file.press_n, filling.file.hold_s);
         (filling.last, filling.presses) = (Some(next), filling.presses + 1);
-        self.plan.push_front(Task::Fill(filling));
-        moves.into_iter().rev().for_each(|next| self.plan.push_front(Task::Move(next)));
+        self.do_next(moves.into_iter().map(Task::Move).chain([Task::Fill(filling)]));
     }
 
     pub(super) fn condense(&mut self, file: &CondenseFile, instrument: usize) {
@@ -107,18 +105,15 @@ impl Operator {
         if !way.is_empty() && times + 1 < again.times {
             tasks.push(Task::CarveAgain(Recarving { times: times + 1, ..carving }));
         }
-        tasks.into_iter().rev().for_each(|task| self.plan.push_front(task));
+        self.do_next(tasks);
     }
 
     /// From above onto a way, along it and up again.
-    fn stroke(&mut self, file: &CarveFile, way: Vec<Vec3>) -> Vec<Task> {
-        let Some(first) = way.first() else { return Vec::new() };
-        let above = first.with_z(self.top() + TOUCH_HEIGHT);
-        let path = [above].into_iter().chain(way).map(|place| self.in_world(place)).collect();
-        let (speed, lean, force, patience) = (file.speed_mm_s, file.lean_mm, file.press_n, file.patience_s);
-        let mut tasks = self.way_to(above);
-        tasks.push(Task::Move(Move::Guide { path, speed, lean, force, patience, yields: true }));
-        tasks.push(self.way_up());
+    fn stroke(&self, file: &CarveFile, way: Vec<Vec3>) -> Vec<Task> {
+        let mut tasks = self.run_over(file.into(), 0.0, way);
+        if !tasks.is_empty() {
+            tasks.push(self.way_up());
+        }
         tasks
     }
 }
