@@ -1,15 +1,15 @@
-//! What a tick costs, and that it does not grow with the volume: `cargo bench`.
+//! Time of a tick, which must not grow with the volume: `cargo bench`.
 
-#[path = "../tests/phantom/mod.rs"]
+#[path = "../tests/support/phantom.rs"]
 mod phantom;
 
 use divan::{Bencher, black_box};
 use phantom::{SOFT, setup, volume};
-use typodont::device::Reading;
-use typodont::frame::Vec3;
-use typodont::sim::Simulation;
-use typodont::touch::WorkingEnd;
-use typodont::volume::{Label, Volume, distance};
+use typodont_core::device::Reading;
+use typodont_core::frame::Vec3;
+use typodont_core::sim::Simulation;
+use typodont_core::touch::WorkingEnd;
+use typodont_core::volume::{Label, Volume, distance};
 
 fn main() {
     divan::main();

@@ -1,11 +1,11 @@
-// The surface of the carved tooth, met by a ray through each pixel. After view.wgsl and tooth.wgsl.
-// Its twin is src/render/twin/iso_pass.rs.
+// Surface of the carved tooth, found by a ray through each pixel. Compiled after view.wgsl and tooth.wgsl.
+// CPU twin: src/render/cpu/iso_pass.rs.
 
 // Density at which matter begins.
 const ISO: f32 = 0.5;
 // Step within a surface, in voxels: even a single voxel is solid for longer than that.
 const STEP: f32 = 0.8;
-// Step where nothing is, in the same: matter can be noticed, if not yet solid, two voxels long.
+// Step in empty space, in voxels: even a single voxel gives a density above zero over two voxels of a ray.
 const STEP_IN_AIR: f32 = 1.6;
 // False positions after one halving: together a hundredth of a voxel.
 const SECANTS: i32 = 2;
@@ -15,7 +15,7 @@ struct Seen {
     @builtin(frag_depth) depth: f32,
 }
 
-// Depth of the first place with matter along a ray; -1 where there is none.
+// Depth, mm, of the first place with matter along a ray; -1 if there is none.
 fn first_hit(start: vec3f, along: vec3f) -> f32 {
     let ends = span(start, along);
     let pace = max(max(abs(along.x), abs(along.y)), abs(along.z));

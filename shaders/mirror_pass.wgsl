@@ -1,18 +1,18 @@
-// A plane mirror: what its reflected eye sees, shown on a disc. After view.wgsl and tooth.wgsl.
-// Its twin is src/render/twin/mirror_pass.rs.
+// Plane mirror: the picture of its reflected eye, drawn on a disc. Compiled after view.wgsl and tooth.wgsl.
+// CPU twin: src/render/cpu/mirror_pass.rs.
 
 struct Mirror {
     // w: radius.
     middle: vec4f,
-    // Across the face as its picture has them; w of the first: share of light that comes back.
+    // Axes across the face, as in its picture; right.w: share of light that is reflected.
     right: vec4f,
     up: vec4f,
-    // Out of the reflecting face.
+    // Unit normal of the reflecting face.
     normal: vec4f,
 }
 
 @group(2) @binding(0) var<uniform> mirror: Mirror;
-// What comes from before the mirror: its upper left corner is left of and above the disc.
+// Picture of the reflected eye; its upper left corner is left of and above the disc.
 @group(2) @binding(1) var reflected: texture_2d<f32>;
 
 struct Seen {

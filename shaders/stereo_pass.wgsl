@@ -1,11 +1,12 @@
-// Two pictures to one. Stands alone. Its twin is src/render/twin/stereo_pass.rs.
+// Combines the pictures of both eyes for a stereo screen. Needs no other shader. CPU twin:
+// src/render/cpu/stereo_pass.rs.
 
 struct Pair {
     // 0 side by side, 1 top and bottom, 2 rows, 3 anaglyph, 4 left, 5 right.
     arrangement: u32,
-    // 1 where the pictures hold linear light already.
+    // 1 if the pictures already contain linear light.
     is_linear: u32,
-    // Of the left eye's picture.
+    // Size of the left eye's picture, pixels.
     width: u32,
     height: u32,
     // From both pictures' linear light to red, green and blue; rows of the left eye's, then of the right eye's.

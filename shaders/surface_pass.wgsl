@@ -1,5 +1,5 @@
-// Triangles with light per pixel: solids, and the carved tooth as marching cubes give it. After view.wgsl and tooth.wgsl.
-// Its twin is src/render/twin/surface_pass.rs.
+// Triangles shaded per pixel: solids, and the carved tooth as a mesh. Compiled after view.wgsl and tooth.wgsl.
+// CPU twin: src/render/cpu/surface_pass.rs.
 
 struct Solid {
     world_from_solid: mat4x4f,

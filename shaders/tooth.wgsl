@@ -1,5 +1,5 @@
-// The carved tooth as a volume, for the passes that look into it. After view.wgsl. Its twin is src/render/twin/matter.rs.
-// `at` is a place in voxel steps from the first voxel's middle.
+// The carved tooth as a volume, for the passes that sample it. Compiled after view.wgsl.
+// CPU twin: src/render/cpu/volume_sampler.rs. `at` is a place in voxel steps from the centre of the first voxel.
 
 struct Tooth {
     world_from_voxel: mat4x4f,
@@ -7,11 +7,11 @@ struct Tooth {
     world_from_tooth: mat4x4f,
     // Voxels; w: voxels along the edge of a cube of `hollow`.
     dims: vec4f,
-    // The box that holds all matter; w: length of a step of blending, mm.
+    // Corners of the box that contains all matter; low.w: step of blending, mm.
     low: vec4f,
     // w: share of the colour that lamps shade in blending.
     high: vec4f,
-    // Between voxels, mm.
+    // Voxel spacing, mm.
     spacing: vec4f,
     // Colour and gloss by label.
     palette: array<vec4f, 256>,
@@ -29,7 +29,7 @@ struct Tooth {
 @group(1) @binding(5) var transfer: texture_2d<f32>;
 
 const BRICK: f32 = 8.0;
-// A brick that shows the same wherever it is sampled.
+// A brick in which every sample is the same.
 const EVEN: u32 = 0x80u;
 // Share of a voxel that surely leads across a border between bricks, however numbers are rounded.
 const NUDGE: f32 = 0.004;
@@ -44,7 +44,7 @@ fn density(at: vec3f) -> f32 {
     return value * inside.x * inside.y * inside.z;
 }
 
-// Where the ray is within the box of matter, as depths. Empty when x > y.
+// Depths, mm, at which the ray enters and leaves the box of matter; empty if x > y.
 fn span(start: vec3f, along: vec3f) -> vec2f {
     let safe = select(along, vec3f(1e-9), abs(along) < vec3f(1e-9));
     let a = (tooth.low.xyz - start) / safe;
@@ -54,7 +54,7 @@ fn span(start: vec3f, along: vec3f) -> vec2f {
     return vec2f(max(max(first.x, first.y), first.z), min(min(last.x, last.y), last.z));
 }
 
-// How far on the ray leaves the cube of bricks around this one; 0 or less never comes out.
+// Distance after which the ray leaves the cube of bricks around this one; always above 0.
 fn way_out(at: vec3f, along: vec3f, brick: vec3f, steps: f32) -> f32 {
     let reach = max(steps, 1.0);
     // The first brick goes on where the grid has ended.
@@ -71,8 +71,8 @@ fn brick_of(at: vec3f) -> vec3f {
     return clamp(floor(at / BRICK), vec3f(0.0), ceil(tooth.dims.xyz / BRICK) - 1.0);
 }
 
-// How density rises, per mm in world space: between four corners of a cube two voxels wide, so that stairs that carving
-// along voxels leaves do not catch the light.
+// Gradient of the density, per mm in world space, from four corners of a cube two voxels wide, so that the steps that
+// carving leaves along voxels are not visible in the shading.
 fn slope(at: vec3f) -> vec3f {
     let a = density(at + vec3f(1.0, -1.0, -1.0));
     let b = density(at + vec3f(-1.0, -1.0, 1.0));
@@ -120,7 +120,7 @@ fn box_corner(index: u32) -> vec3f {
     return mix(tooth.low.xyz, tooth.high.xyz, share);
 }
 
-// The far sides of the box of matter, so that each pixel is asked once and the eye may be inside.
+// Far sides of the box of matter, so that each pixel is drawn once and the eye may be inside the box.
 @vertex
 fn box_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
     return view.clip_from_world * (tooth.world_from_voxel * vec4f(box_corner(index), 1.0));

@@ -1,10 +1,10 @@
-// What every pass knows: one eye, the lamps, and how light falls on a finish. Its twin is src/render/twin/light.rs.
-// Colours are as a screen shows them, 0 to 1; lengths in mm; world space.
+// Uniform and functions of every pass: one eye, the lamps, and the lighting. CPU twin: src/render/cpu/light.rs.
+// Colours are sRGB, 0 to 1; lengths in mm; world space.
 
 struct Lamp {
-    // w: how far it reaches round the edge of its own shadow.
+    // w: reach past the edge of its own shadow, as a cosine.
     position: vec4f,
-    // Times its strength.
+    // Colour multiplied by intensity.
     colour: vec4f,
 }
 
@@ -22,7 +22,7 @@ struct View {
     size: vec4f,
     background_top: vec4f,
     background_bottom: vec4f,
-    // x: from everywhere.
+    // x: ambient light.
     ambient: vec4f,
     lamps: array<Lamp, 2>,
 }
@@ -36,7 +36,7 @@ const WARMTH: f32 = 0.12;
 // Share of the ambient light that comes from above.
 const SKY: f32 = 0.25;
 
-// The way through a pixel for each mm of depth.
+// Ray through a pixel, per mm of depth.
 fn ray(pixel: vec2f) -> vec3f {
     let at = pixel / view.size.xy;
     let right = view.window.x + (view.window.y - view.window.x) * at.x;
@@ -61,7 +61,7 @@ fn tight(x: f32) -> f32 {
     return x16 * x16;
 }
 
-// A finish (rgb, gloss) at a point with a unit normal; `open`: share of light that reaches it.
+// Shaded colour of a surface (rgb, gloss) at a point with a unit normal; `open`: share of light that reaches it.
 fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
     let to_eye = normalize(view.position.xyz - point);
     let away = 1.0 - clamp(dot(normal, to_eye), 0.0, 1.0);
@@ -80,12 +80,12 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
     }
     light *= open * (1.0 - RIM * away * away);
     let warm = light + vec3f(WARMTH, 0.0, -WARMTH) * max(vec3f(1.0) - light, vec3f(0.0)) * light;
-    // A square is near enough to a screen's curve.
+    // A square approximates the sRGB curve.
     let linear = finish.rgb * finish.rgb * warm + shine * (finish.a * open);
     return sqrt(clamp(linear, vec3f(0.0), vec3f(1.0)));
 }
 
-// A screen's colour for this target.
+// Converts an sRGB colour for this target.
 fn screen(colour: vec3f) -> vec3f {
     if view.size.z == 0.0 {
         return colour;

@@ -1,12 +1,12 @@
-// Colours and opacities by density, blended along each ray. After view.wgsl and tooth.wgsl.
-// Its twin is src/render/twin/volume_pass.rs.
+// Direct volume rendering: colours and opacities by density, blended along each ray. Compiled after view.wgsl and
+// tooth.wgsl. CPU twin: src/render/cpu/volume_pass.rs.
 
-// Depths of what is already drawn.
+// Depth buffer of the scene drawn so far.
 @group(2) @binding(0) var scene_depth: texture_depth_2d;
 
-// Opacity at which nothing behind is seen any more.
+// Opacity at which nothing behind is visible.
 const OPAQUE: f32 = 0.99;
-// Gloss of what is lit.
+// Gloss of the shaded share.
 const GLOSS: f32 = 0.12;
 
 struct Blended {
@@ -16,7 +16,7 @@ struct Blended {
     first: f32,
 }
 
-// What the table of the nearest voxel's label says for the density at a place.
+// Entry of the table of the nearest voxel's label for the density at a place.
 fn entry(at: vec3f) -> vec4f {
     let last = vec3i(tooth.dims.xyz) - 1;
     let nearest = clamp(vec3i(floor(at + 0.5)), vec3i(0), last);
@@ -45,7 +45,7 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
             continue;
         }
         out = min(out, end);
-        // Where all samples are one, one is taken for all.
+        // In a uniform brick all samples are equal, so one sample stands for all of them.
         let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
         while z < out {
             let found = entry(start + along * z);

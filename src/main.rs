@@ -1,5 +1,9 @@
-//! The `typodont` program.
+//! The `typodont` program; the module `cli` contains its command line.
+
+#![deny(unsafe_code)]
+
+mod cli;
 
 fn main() -> std::process::ExitCode {
-    typodont::cli::main()
+    cli::main()
 }

@@ -1,6 +1,6 @@
-// Sections through the tooth, drawn voxel by voxel: they need no graphics adapter.
+// Sections through the tooth, drawn voxel by voxel on a 2D canvas, without WebGL.
 
-/** Which way each section looks: to the right and upward in tooth space, as in the program's pictures. */
+/** Viewing side of each section: its right and upward directions in tooth space, as in the program's pictures. */
 const SECTIONS = [SIDES.mesial, SIDES.buccal, SIDES.occlusal];
 
 /** Space around the work, mm. */
@@ -15,7 +15,7 @@ const PIXELS = 260;
 /** Letters at the ends of the axes: buccal and lingual, distal and mesial (or, mirrored, mesial and distal), occlusal and apical. */
 const LETTERS = [['L', 'B'], ['M', 'D'], ['A', 'O']];
 
-/** What a pixel shows. */
+/** Content of a pixel: remaining matter, or removed matter. */
 const STANDS = 1, GONE = 2;
 
 /** A colour of 0 to 1 as a pixel, opaque. */
@@ -72,7 +72,7 @@ class Cut {
     return point;
   }
 
-  /** Where a voxel is in the picture, pixels. */
+  /** Position of a voxel in the picture, pixels. */
   place(cell) {
     const offset = axis => (cell[axis] - this.middle[axis]) * this.voxels.spacing[axis] / this.half;
     return [0.5 * PIXELS * (1 + this.right[this.across] * offset(this.across)), 0.5 * PIXELS * (1 - this.up[this.along] * offset(this.along))];

@@ -1,6 +1,6 @@
-// The page: joins time, tooth, sections, curves and words.
+// Script of the page: connects the timeline, the tooth, the sections, the curves and the texts.
 
-/** How many times finer along each side the tooth is drawn when it rests; all pixels, where the adapter is quick. */
+/** Factor by which the tooth is drawn finer along each side at rest; with a fast adapter, at full resolution. */
 const FINER = 3;
 
 const byId = id => document.getElementById(id);
@@ -361,7 +361,7 @@ class Page {
     canvas.addEventListener('webglcontextrestored', () => {
       const old = this.solid;
       const begun = Solid.begin(canvas, byId('solid-shader').textContent);
-      this.solid = Object.assign(new Solid(canvas, this.voxels, this.palette, begun), { eye: old.eye, clips: old.clips });
+      this.solid = new Solid(canvas, this.voxels, this.palette, begun).resume(old);
       this.drawSoon();
     });
   }

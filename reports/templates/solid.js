@@ -1,4 +1,4 @@
-// The tooth in space: rays through the density, drawn by WebGL 2.
+// The tooth in 3D: rays through the density, drawn with WebGL 2.
 
 const BRICK = 8;
 
@@ -10,7 +10,7 @@ void main() {
   gl_Position = vec4(corner, 0.0, 1.0);
 }`;
 
-/** To the right and upward in a picture from a side, tooth space; as in the program's own pictures. */
+/** Right and upward directions of a view from each side, in tooth space; as in the program's own pictures. */
 const SIDES = {
   occlusal: [[0, -1, 0], [1, 0, 0]],
   buccal: [[0, 1, 0], [0, 0, 1]],
@@ -26,7 +26,7 @@ const scaled = (a, s) => a.map(v => v * s);
 const added = (a, b) => a.map((v, i) => v + b[i]);
 const unit = a => scaled(a, 1 / Math.hypot(...a));
 
-/** An orthographic eye: what is a millimetre in the tooth is as long everywhere in the picture. */
+/** An orthographic camera: a millimetre has the same length everywhere in the picture. */
 class Eye {
   constructor(middle, half) {
     this.middle = middle;
@@ -74,14 +74,14 @@ class Solid {
 
   /** Throws where the browser has no WebGL 2 or not the memory; `begun` is what [begin] gave. */
   constructor(canvas, voxels, palette, begun) {
-    if (!begun) throw new Error('no WebGL 2');
+    if (!begun) throw new Error('WebGL 2 is not available');
     const { gl, program } = begun;
     Object.assign(this, { canvas, voxels, gl, program });
     const most = gl.getParameter(gl.MAX_3D_TEXTURE_SIZE);
-    if (voxels.dims.some(n => n > most)) throw new Error('a volume too large for this adapter');
+    if (voxels.dims.some(n => n > most)) throw new Error('the volume is too large for this graphics adapter');
     if (!gl.getProgramParameter(program, gl.LINK_STATUS)) {
       const logs = gl.getAttachedShaders(program).map(part => gl.getShaderInfoLog(part));
-      throw new Error(`the tooth's shader: ${gl.getProgramInfoLog(program)} ${logs.join(' ')}`);
+      throw new Error(`shader of the tooth: ${gl.getProgramInfoLog(program)} ${logs.join(' ')}`);
     }
     gl.useProgram(program);
     gl.bindVertexArray(gl.createVertexArray());
@@ -93,6 +93,14 @@ class Solid {
     this.asked = null;
     this.byVerdict = true;
     this.patterns = true;
+    const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS);
+    const names = Array.from({ length: count }, (_, number) => gl.getActiveUniform(program, number).name);
+    this.uniforms = Object.fromEntries(names.map(name => [name, gl.getUniformLocation(program, name)]));
+  }
+
+  /** Shows what another one showed: after an adapter was lost and a new one begins with nothing in it. */
+  resume({ eye, clips, asked, byVerdict, patterns }) {
+    return Object.assign(this, { eye, clips, asked, byVerdict, patterns });
   }
 
   textures(palette) {
@@ -182,7 +190,7 @@ class Solid {
     const width = Math.max(Math.round(canvas.clientWidth * ratio), 1), height = Math.max(Math.round(canvas.clientHeight * ratio), 1);
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     gl.viewport(0, 0, width, height);
-    const set = (name, values) => gl.uniform3fv(gl.getUniformLocation(this.program, name), values);
+    const set = (name, values) => gl.uniform3fv(this.uniforms[name], values);
     const inVoxels = vector => vector.map((v, axis) => v / voxels.spacing[axis]);
     const [low, high] = this.remaining();
     set('dims', voxels.dims);
@@ -194,8 +202,8 @@ class Solid {
     set('up', inVoxels(scaled(eye.up, eye.half)));
     set('away', inVoxels(scaled(eye.back, -1)));
     set('asked', this.asked || [-1, -1, -1]);
-    gl.uniform1i(gl.getUniformLocation(this.program, 'byVerdict'), this.byVerdict);
-    gl.uniform1i(gl.getUniformLocation(this.program, 'patterns'), this.patterns);
+    gl.uniform1i(this.uniforms.byVerdict, this.byVerdict);
+    gl.uniform1i(this.uniforms.patterns, this.patterns);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.drawArrays(gl.TRIANGLES, 0, 3);

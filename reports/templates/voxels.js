@@ -1,14 +1,15 @@
 'use strict';
-// The tooth of a session as it stood at any moment.
+// The tooth of a session at any moment.
 //
-// Takes what the page carries: the density at the start in 32 steps, tissues, verdicts, and for the part that changed the
-// density at the end and when each voxel fell. Coordinates are voxels of the page, [i, j, k] with i fastest.
+// Takes the packed voxels of the page: the density at the start in 32 steps, tissues, verdicts, and for the part that
+// changed the density at the end and the tick at which each voxel was removed. Gives the density at a given moment.
+// Coordinates are voxels of the page, [i, j, k] with i fastest.
 
 /** Steps of density from which a voxel is solid, of 32. */
 const SOLID = 16;
 /** Each step as 0 to 255. */
 const FULL = Uint8Array.from({ length: 32 }, (_, step) => Math.round(step * 255 / 31));
-/** A tick in ms later than any. */
+/** A tick (ms) later than any tick of a session. */
 const NEVER = 0xffffffff;
 /** Numbers of the verdicts, as in performance.seg.nrrd. */
 const VERDICT = { outside: 0, keptSound: 1, rightlyRemoved: 2, withinLeeway: 3, overcut: 4, left: 5, vulnerableTouched: 6, kept: 7, restored: 8, overfilled: 9 };
@@ -87,7 +88,7 @@ class Voxels {
     this.thinned = this.timesOfThinned();
   }
 
-  /** When voxels changed that did not fall: with the first of their neighbours. */
+  /** Time at which voxels changed that were not removed: that of the first of their neighbours. */
   timesOfThinned() {
     const times = this.fell.slice();
     for (let round = 0; round < 2; round++) {
@@ -112,7 +113,7 @@ class Voxels {
         for (let i = Math.max(x - 1, 0); i <= Math.min(x + 1, nx - 1); i++) visit((k * ny + j) * nx + i, i - x, j - y, k - z);
   }
 
-  /** Lets the tooth stand as it did at a moment, s. */
+  /** Sets the tooth to its state at a moment, s. */
   standAt(seconds) {
     const tick = Math.round(seconds * 1000);
     if (tick === this.moment) return;
@@ -127,7 +128,7 @@ class Voxels {
     });
   }
 
-  /** Where the cut has come so far no ramp of density was ever stored: there the steps are rounded. */
+  /** Smooths the density along the cut at intermediate moments, for which no density ramp is stored. */
   smoothFront(tick) {
     const GONE = 1, TO_FALL = 2;
     const state = new Uint8Array(this.fell.length);
@@ -167,7 +168,7 @@ class Voxels {
     return (at[2] * this.size[1] + at[1]) * this.size[0] + at[0];
   }
 
-  /** When a voxel fell, as a tick; NEVER where it did not. */
+  /** Tick at which a voxel was removed; NEVER if it was not. */
   fellAt(cell) {
     const own = this.own(cell);
     return own < 0 ? NEVER : this.fell[own];
@@ -189,7 +190,7 @@ class Voxels {
     return this.start[index] >= SOLID ? this.label[index] : 0;
   }
 
-  /** How a voxel fell: force in N, instrument by its place on the tray. */
+  /** Removal of a voxel: force in N, and the index of the instrument in the tray. */
   fallOf(cell) {
     const tick = this.fellAt(cell);
     if (tick === NEVER) return null;
@@ -232,7 +233,7 @@ class Voxels {
 
 // Colours, the same in space and in sections.
 
-/** What was kept steps back: its verdict's colour with a touch of its tissue's. */
+/** Colour of unchanged matter: its verdict's colour with a little of its tissue's, so that the work stands out. */
 const TOUCH = 0.35;
 
 class Palette {

@@ -1,28 +1,28 @@
-//! Joining signed distances (mm, negative inside) without sharp edges.
+//! Combination of signed distances (mm, negative inside) without sharp edges.
 
-/// The common part of two bodies, its convex edge rounded with a radius.
+/// Returns the intersection of two bodies, its convex edge rounded with a radius.
 #[inline]
-pub(super) fn common(a: f32, b: f32, radius: f32) -> f32 {
+pub(super) fn smooth_intersection(a: f32, b: f32, radius: f32) -> f32 {
     let (over_a, over_b) = (a + radius, b + radius);
     if over_a > 0.0 && over_b > 0.0 { (over_a * over_a + over_b * over_b).sqrt() - radius } else { a.max(b) }
 }
 
-/// Two bodies in one, the concave edge between them filled with a radius.
+/// Returns the union of two bodies, the concave edge between them filled with a radius.
 #[inline]
-pub(super) fn joined(a: f32, b: f32, radius: f32) -> f32 {
-    -common(-a, -b, radius)
+pub(super) fn smooth_union(a: f32, b: f32, radius: f32) -> f32 {
+    -smooth_intersection(-a, -b, radius)
 }
 
-/// The higher of two values; where they come within `width` of each other the way from one to the other is soft.
+/// Returns the maximum of two values, with a smooth transition where they differ by less than `width`.
 ///
-/// Highest where both are equal: a quarter of the width above them.
+/// The excess over the maximum is greatest where both are equal: a quarter of the width.
 #[inline]
-pub(super) fn soft_max(a: f32, b: f32, width: f32) -> f32 {
+pub(super) fn smooth_max(a: f32, b: f32, width: f32) -> f32 {
     let near = (width - (a - b).abs()).max(0.0);
     a.max(b) + near * near / (4.0 * width)
 }
 
-/// A bump of height 1 at 0 that has run out, smoothly, at `width`.
+/// Returns a bump of height 1 at 0 that decreases smoothly to 0 at `width`.
 #[inline]
 pub(super) fn bump(distance: f32, width: f32) -> f32 {
     let share = (distance / width).min(1.0);

@@ -1,25 +1,26 @@
-//! A grown tooth measured as a dentist measures one: with a caliper, on its voxels.
+//! Measurement of a generated tooth, on its voxels, as with a caliper.
 
-use super::Tissues;
-use super::form::Sizes;
-use crate::frame::Vec3;
-use crate::volume::{Label, Volume, distance};
+use crate::TissueLabels;
+use crate::form::Sizes;
+use typodont_core::frame::Vec3;
+use typodont_core::volume::{Label, Volume, distance};
 
-/// Half the width of the strip in the middle of a side in which the neckline is looked for, mm.
+/// Half-width of the strip in the middle of a side in which the cervical line is searched for, mm.
 const STRIP: f32 = 0.5;
 
-/// Mean and greatest thickness of enamel, mm.
+/// Mean and maximum thickness of enamel, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thickness {
+pub struct EnamelThickness {
     pub mean: f32,
     pub most: f32,
 }
 
-/// The sizes of a tooth in tooth space; `None` where it has no enamel on one of its sides.
+/// Measures a tooth in tooth space; `None` if one of its sides has no enamel.
 ///
-/// The neck is where enamel ends: in the middle of the buccal side for lengths and the buccolingual width there, in the middle
-/// of the mesial and distal sides for the mesiodistal width. `is_mirrored` as in [`Form`](super::Form).
-pub fn sizes(volume: &Volume, tissues: &Tissues, is_mirrored: bool) -> Option<Sizes> {
+/// The neck is the end of the enamel: in the middle of the buccal side for lengths and the buccolingual width at the
+/// neck, in the middle of the mesial and distal sides for the mesiodistal width at the neck. For `is_mirrored`, see
+/// [`ToothForm::is_mirrored`](crate::ToothForm::is_mirrored).
+pub fn sizes(volume: &Volume, tissues: &TissueLabels, is_mirrored: bool) -> Option<Sizes> {
     let neck = |is_there: &dyn Fn(Vec3) -> bool| {
         let enamel = solid(volume).filter(|&(tissue, at)| tissue == tissues.enamel && is_there(at));
         Some(span(volume, enamel.map(|(_, at)| at), 2)?[0])
@@ -43,8 +44,9 @@ pub fn sizes(volume: &Volume, tissues: &Tissues, is_mirrored: bool) -> Option<Si
     })
 }
 
-/// Over the enamel voxels that face air: how far the nearest dentine is. `None` without enamel or without dentine.
-pub fn enamel(volume: &Volume, tissues: &Tissues) -> Option<Thickness> {
+/// Measures the enamel by the distances of its outer voxels from the nearest dentine; `None` without enamel or without
+/// dentine.
+pub fn enamel_thickness(volume: &Volume, tissues: &TissueLabels) -> Option<EnamelThickness> {
     let grid = volume.grid();
     let found: Vec<Label> = volume.tissues().collect();
     if !found.contains(&tissues.dentine) {
@@ -58,16 +60,16 @@ pub fn enamel(volume: &Volume, tissues: &Tissues) -> Option<Thickness> {
         let thick = f64::from(from_dentine[index]);
         (sum, count, most) = (sum + thick, count + 1.0, most.max(thick));
     }
-    (count > 0.0).then(|| Thickness { mean: (sum / count) as f32, most: most as f32 })
+    (count > 0.0).then(|| EnamelThickness { mean: (sum / count) as f32, most: most as f32 })
 }
 
-/// Tissue and place of every solid voxel.
+/// Returns the tissue and the position of every solid voxel.
 fn solid(volume: &Volume) -> impl Iterator<Item = (Label, Vec3)> {
     let places = volume.tissues().zip(volume.grid().cells()).filter(|(tissue, _)| *tissue != Label::AIR);
     places.map(|(tissue, cell)| (tissue, volume.grid().centre(cell)))
 }
 
-/// From the lower face of the lowest voxel to the upper face of the highest, mm.
+/// Returns the range from the lower face of the lowest voxel to the upper face of the highest, mm.
 fn span(volume: &Volume, places: impl Iterator<Item = Vec3>, axis: usize) -> Option<[f32; 2]> {
     let half = 0.5 * volume.grid().spacing[axis];
     let [low, high] = places.fold([f32::MAX, f32::MIN], |[low, high], at| [low.min(at[axis]), high.max(at[axis])]);

@@ -1,26 +1,30 @@
-//! The lower second and third molar, as written for the lower left; the first has a [file of its own](super::molar).
+//! The lower second and third molar, in the form of the lower left quadrant; for the first molar, see
+//! [`lower_first_molar`](crate::lower_first_molar).
 //!
-//! Sizes: Wheeler's table (Ash & Nelson). Shape, by eye after the same book: the second has four cusps between grooves that cross
-//! at right angles, and two roots that lean distally and stand closer than the first's; the third is rounder, its surface
-//! wrinkled by many grooves, its roots short and grown together.
+//! Sizes: Wheeler's table (Ash & Nelson). Shape, estimated by eye after the same book: the second molar has four cusps
+//! between grooves that cross at right angles, and two roots that incline distally and are closer together than those
+//! of the first; the third is rounder, with an occlusal surface wrinkled by many grooves and short, fused roots.
 
-use super::form::{Canal, Cusp, Form, Limb, Pulp, Relief, Sides, beside_ridge, groove, outline, place, sizes};
-use super::molar::LOWER_FIRST;
+use crate::form::{
+    CanalForm, Cusp, LoftForm, OcclusalForm, PulpForm, SideMetric, ToothForm, beside_ridge, groove, place, section,
+    sizes,
+};
+use crate::lower_first_molar::LOWER_FIRST;
 
-pub const SECOND: Form = Form {
+pub const SECOND: ToothForm = ToothForm {
     sizes: sizes([7.0, 13.0], [10.5, 8.0], [10.0, 9.0], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-0.28, [-0.68, 0.70], [-0.72, 0.72], 0.5, [0.0, 0.0]),
-            outline(-0.14, [-0.88, 0.89], [-0.91, 0.90], 0.5, [-0.03, 0.02]),
-            outline(-0.05, [-0.96, 0.965], [-0.97, 0.96], 0.5, [-0.04, 0.02]),
-            outline(0.0, [-0.99, 1.0], [-1.0, 1.0], 0.5, [-0.04, 0.02]),
-            outline(0.08, [-0.915, 0.93], [-0.77, 0.77], 0.5, [-0.05, 0.02]),
-            outline(0.26, [-0.955, 0.99], [-0.86, 0.87], 0.52, [-0.05, 0.0]),
-            outline(0.46, [-0.99, 0.965], [-0.94, 0.95], 0.54, [-0.06, 0.0]),
-            outline(0.64, [-0.985, 0.89], [-0.99, 0.995], 0.56, [-0.07, 0.0]),
-            outline(0.82, [-0.925, 0.78], [-0.955, 0.945], 0.56, [-0.07, 0.0]),
-            outline(1.0, [-0.835, 0.66], [-0.88, 0.86], 0.56, [-0.07, 0.0]),
+    body: LoftForm {
+        sections: &[
+            section(-0.28, [-0.68, 0.70], [-0.72, 0.72], 0.5, [0.0, 0.0]),
+            section(-0.14, [-0.88, 0.89], [-0.91, 0.90], 0.5, [-0.03, 0.02]),
+            section(-0.05, [-0.96, 0.965], [-0.97, 0.96], 0.5, [-0.04, 0.02]),
+            section(0.0, [-0.99, 1.0], [-1.0, 1.0], 0.5, [-0.04, 0.02]),
+            section(0.08, [-0.915, 0.93], [-0.77, 0.77], 0.5, [-0.05, 0.02]),
+            section(0.26, [-0.955, 0.99], [-0.86, 0.87], 0.52, [-0.05, 0.0]),
+            section(0.46, [-0.99, 0.965], [-0.94, 0.95], 0.54, [-0.06, 0.0]),
+            section(0.64, [-0.985, 0.89], [-0.99, 0.995], 0.56, [-0.07, 0.0]),
+            section(0.82, [-0.925, 0.78], [-0.955, 0.945], 0.56, [-0.07, 0.0]),
+            section(1.0, [-0.835, 0.66], [-0.88, 0.86], 0.56, [-0.07, 0.0]),
         ],
         furrows: &[
             &[
@@ -44,18 +48,18 @@ pub const SECOND: Form = Form {
                 place([-0.78, 0.02, -0.30], 1.0, 1.8),
             ],
         ],
-        round: 0.8,
+        rounding: 0.8,
     },
     roots: &[
-        Limb {
-            outlines: &[
-                outline(-0.04, [-0.945, 0.955], [-0.97, -0.02], 0.5, [0.0, 0.0]),
-                outline(-0.14, [-0.89, 0.90], [-0.94, -0.04], 0.5, [0.0, 0.0]),
-                outline(-0.30, [-0.82, 0.83], [-0.92, -0.10], 0.45, [0.0, 0.0]),
-                outline(-0.55, [-0.66, 0.67], [-0.84, -0.17], 0.35, [0.0, 0.0]),
-                outline(-0.78, [-0.48, 0.48], [-0.66, -0.12], 0.2, [0.0, 0.0]),
-                outline(-0.93, [-0.30, 0.30], [-0.42, 0.0], 0.1, [0.0, 0.0]),
-                outline(-1.0, [-0.20, 0.20], [-0.28, 0.06], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.04, [-0.945, 0.955], [-0.97, -0.02], 0.5, [0.0, 0.0]),
+                section(-0.14, [-0.89, 0.90], [-0.94, -0.04], 0.5, [0.0, 0.0]),
+                section(-0.30, [-0.82, 0.83], [-0.92, -0.10], 0.45, [0.0, 0.0]),
+                section(-0.55, [-0.66, 0.67], [-0.84, -0.17], 0.35, [0.0, 0.0]),
+                section(-0.78, [-0.48, 0.48], [-0.66, -0.12], 0.2, [0.0, 0.0]),
+                section(-0.93, [-0.30, 0.30], [-0.42, 0.0], 0.1, [0.0, 0.0]),
+                section(-1.0, [-0.20, 0.20], [-0.28, 0.06], 0.0, [0.0, 0.0]),
             ],
             furrows: &[
                 &[
@@ -69,26 +73,26 @@ pub const SECOND: Form = Form {
                     place([0.0, -0.1, -0.88], 0.0, 0.9),
                 ],
             ],
-            round: 0.65,
+            rounding: 0.65,
         },
-        Limb {
-            outlines: &[
-                outline(-0.04, [-0.89, 0.90], [0.05, 0.96], 0.45, [0.0, 0.0]),
-                outline(-0.14, [-0.84, 0.85], [0.07, 0.94], 0.45, [0.0, 0.0]),
-                outline(-0.30, [-0.72, 0.73], [0.13, 0.94], 0.4, [0.0, 0.0]),
-                outline(-0.55, [-0.54, 0.55], [0.28, 0.97], 0.3, [0.0, 0.0]),
-                outline(-0.78, [-0.38, 0.39], [0.44, 0.98], 0.2, [0.0, 0.0]),
-                outline(-0.95, [-0.20, 0.22], [0.60, 0.96], 0.05, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.04, [-0.89, 0.90], [0.05, 0.96], 0.45, [0.0, 0.0]),
+                section(-0.14, [-0.84, 0.85], [0.07, 0.94], 0.45, [0.0, 0.0]),
+                section(-0.30, [-0.72, 0.73], [0.13, 0.94], 0.4, [0.0, 0.0]),
+                section(-0.55, [-0.54, 0.55], [0.28, 0.97], 0.3, [0.0, 0.0]),
+                section(-0.78, [-0.38, 0.39], [0.44, 0.98], 0.2, [0.0, 0.0]),
+                section(-0.95, [-0.20, 0.22], [0.60, 0.96], 0.05, [0.0, 0.0]),
             ],
             furrows: &[&[
                 place([0.0, 0.12, -0.2], 0.1, 1.2),
                 place([0.0, 0.28, -0.5], 0.22, 1.1),
                 place([0.0, 0.48, -0.8], 0.0, 0.9),
             ]],
-            round: 0.65,
+            rounding: 0.65,
         },
     ],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.48, -0.42, 0.985], foot: [0.08, -0.22, 0.69], horn: 0.9 },
             Cusp { tip: [0.47, 0.42, 0.955], foot: [0.08, 0.24, 0.69], horn: 0.6 },
@@ -159,42 +163,42 @@ pub const SECOND: Form = Form {
             beside_ridge(&[[-0.06, 0.16, 0.8], [-0.26, 0.22, 0.9], [-0.46, 0.22, 0.0]]),
             beside_ridge(&[[-0.06, 0.46, 0.8], [-0.26, 0.52, 0.9], [-0.44, 0.60, 0.0]]),
         ],
-        ..LOWER_FIRST.relief
+        ..LOWER_FIRST.occlusal
     },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.06, [-0.42, 0.46], [-0.58, 0.54], 0.35, [-0.15, 0.0]),
-                outline(0.143, [-0.43, 0.47], [-0.56, 0.52], 0.35, [-0.15, 0.0]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.06, [-0.42, 0.46], [-0.58, 0.54], 0.35, [-0.15, 0.0]),
+                section(0.143, [-0.43, 0.47], [-0.56, 0.52], 0.35, [-0.15, 0.0]),
             ],
             furrows: &[],
-            round: 0.5,
+            rounding: 0.5,
         },
         horn_spread: 0.6,
         canals: &[
-            Canal { root: 0, at: [0.42, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.8 },
-            Canal { root: 0, at: [-0.42, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.8 },
-            Canal { root: 1, at: [0.0, 0.0], orifice: [0.7, 0.4], end: 0.16, closed: 0.8 },
+            CanalForm { root: 0, at: [0.42, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.8 },
+            CanalForm { root: 0, at: [-0.42, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.8 },
+            CanalForm { root: 1, at: [0.0, 0.0], orifice: [0.7, 0.4], end: 0.16, closed: 0.8 },
         ],
     },
-    sides: Sides::AlongNormals,
+    side_metric: SideMetric::AlongNormals,
     ..LOWER_FIRST
 };
 
-pub const THIRD: Form = Form {
+pub const THIRD: ToothForm = ToothForm {
     sizes: sizes([7.0, 11.0], [10.0, 7.5], [9.5, 9.0], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-0.42, [-0.48, 0.48], [-0.44, 0.60], 0.3, [0.0, 0.0]),
-            outline(-0.22, [-0.80, 0.81], [-0.84, 0.88], 0.45, [-0.03, 0.02]),
-            outline(-0.06, [-0.96, 0.965], [-0.97, 0.97], 0.42, [-0.05, 0.02]),
-            outline(0.0, [-0.99, 1.0], [-1.0, 1.0], 0.42, [-0.06, 0.02]),
-            outline(0.08, [-0.96, 0.97], [-0.775, 0.775], 0.40, [-0.07, 0.02]),
-            outline(0.26, [-0.975, 0.995], [-0.86, 0.87], 0.40, [-0.08, 0.0]),
-            outline(0.46, [-0.995, 0.96], [-0.945, 0.95], 0.40, [-0.10, 0.0]),
-            outline(0.64, [-0.98, 0.88], [-0.995, 0.985], 0.40, [-0.12, 0.0]),
-            outline(0.82, [-0.91, 0.77], [-0.955, 0.92], 0.40, [-0.13, 0.0]),
-            outline(1.0, [-0.81, 0.65], [-0.86, 0.81], 0.40, [-0.13, 0.0]),
+    body: LoftForm {
+        sections: &[
+            section(-0.42, [-0.48, 0.48], [-0.44, 0.60], 0.3, [0.0, 0.0]),
+            section(-0.22, [-0.80, 0.81], [-0.84, 0.88], 0.45, [-0.03, 0.02]),
+            section(-0.06, [-0.96, 0.965], [-0.97, 0.97], 0.42, [-0.05, 0.02]),
+            section(0.0, [-0.99, 1.0], [-1.0, 1.0], 0.42, [-0.06, 0.02]),
+            section(0.08, [-0.96, 0.97], [-0.775, 0.775], 0.40, [-0.07, 0.02]),
+            section(0.26, [-0.975, 0.995], [-0.86, 0.87], 0.40, [-0.08, 0.0]),
+            section(0.46, [-0.995, 0.96], [-0.945, 0.95], 0.40, [-0.10, 0.0]),
+            section(0.64, [-0.98, 0.88], [-0.995, 0.985], 0.40, [-0.12, 0.0]),
+            section(0.82, [-0.91, 0.77], [-0.955, 0.92], 0.40, [-0.13, 0.0]),
+            section(1.0, [-0.81, 0.65], [-0.86, 0.81], 0.40, [-0.13, 0.0]),
         ],
         furrows: &[
             &[
@@ -218,39 +222,39 @@ pub const THIRD: Form = Form {
                 place([-0.70, 0.10, -0.42], 0.9, 1.6),
             ],
         ],
-        round: 0.7,
+        rounding: 0.7,
     },
     roots: &[
-        Limb {
-            outlines: &[
-                outline(-0.05, [-0.945, 0.955], [-0.97, 0.02], 0.45, [0.0, 0.0]),
-                outline(-0.22, [-0.85, 0.86], [-0.90, 0.04], 0.45, [0.0, 0.0]),
-                outline(-0.42, [-0.70, 0.71], [-0.80, 0.08], 0.4, [0.0, 0.0]),
-                outline(-0.65, [-0.52, 0.53], [-0.60, 0.14], 0.25, [0.0, 0.0]),
-                outline(-0.85, [-0.34, 0.34], [-0.30, 0.26], 0.1, [0.0, 0.0]),
-                outline(-1.0, [-0.18, 0.18], [0.02, 0.36], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [-0.945, 0.955], [-0.97, 0.02], 0.45, [0.0, 0.0]),
+                section(-0.22, [-0.85, 0.86], [-0.90, 0.04], 0.45, [0.0, 0.0]),
+                section(-0.42, [-0.70, 0.71], [-0.80, 0.08], 0.4, [0.0, 0.0]),
+                section(-0.65, [-0.52, 0.53], [-0.60, 0.14], 0.25, [0.0, 0.0]),
+                section(-0.85, [-0.34, 0.34], [-0.30, 0.26], 0.1, [0.0, 0.0]),
+                section(-1.0, [-0.18, 0.18], [0.02, 0.36], 0.0, [0.0, 0.0]),
             ],
             furrows: &[&[
                 place([0.02, -1.0, -0.15], 0.0, 1.1),
                 place([0.02, -0.9, -0.42], 0.22, 1.2),
                 place([0.0, -0.5, -0.85], 0.0, 0.9),
             ]],
-            round: 0.6,
+            rounding: 0.6,
         },
-        Limb {
-            outlines: &[
-                outline(-0.05, [-0.87, 0.88], [0.0, 0.96], 0.42, [0.0, 0.0]),
-                outline(-0.22, [-0.75, 0.76], [0.06, 0.95], 0.4, [0.0, 0.0]),
-                outline(-0.42, [-0.60, 0.61], [0.16, 0.98], 0.35, [0.0, 0.0]),
-                outline(-0.65, [-0.43, 0.44], [0.36, 1.03], 0.2, [0.0, 0.0]),
-                outline(-0.85, [-0.26, 0.27], [0.58, 1.06], 0.1, [0.0, 0.0]),
-                outline(-0.95, [-0.17, 0.18], [0.72, 1.06], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [-0.87, 0.88], [0.0, 0.96], 0.42, [0.0, 0.0]),
+                section(-0.22, [-0.75, 0.76], [0.06, 0.95], 0.4, [0.0, 0.0]),
+                section(-0.42, [-0.60, 0.61], [0.16, 0.98], 0.35, [0.0, 0.0]),
+                section(-0.65, [-0.43, 0.44], [0.36, 1.03], 0.2, [0.0, 0.0]),
+                section(-0.85, [-0.26, 0.27], [0.58, 1.06], 0.1, [0.0, 0.0]),
+                section(-0.95, [-0.17, 0.18], [0.72, 1.06], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.6,
+            rounding: 0.6,
         },
     ],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.48, -0.40, 0.99], foot: [0.08, -0.18, 0.70], horn: 0.7 },
             Cusp { tip: [0.45, 0.38, 0.94], foot: [0.06, 0.20, 0.70], horn: 0.4 },
@@ -310,28 +314,28 @@ pub const THIRD: Form = Form {
             wrinkle(&[[-0.04, 0.36, 0.8], [-0.24, 0.40, 1.0], [-0.42, 0.48, 0.0]]),
         ],
         floor: 0.62,
-        ..LOWER_FIRST.relief
+        ..LOWER_FIRST.occlusal
     },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.10, [-0.38, 0.42], [-0.52, 0.50], 0.3, [-0.12, 0.0]),
-                outline(0.143, [-0.39, 0.43], [-0.50, 0.48], 0.3, [-0.12, 0.0]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.10, [-0.38, 0.42], [-0.52, 0.50], 0.3, [-0.12, 0.0]),
+                section(0.143, [-0.39, 0.43], [-0.50, 0.48], 0.3, [-0.12, 0.0]),
             ],
             furrows: &[],
-            round: 0.5,
+            rounding: 0.5,
         },
         horn_spread: 0.6,
         canals: &[
-            Canal { root: 0, at: [0.35, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.9 },
-            Canal { root: 0, at: [-0.35, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.9 },
-            Canal { root: 1, at: [0.0, 0.0], orifice: [0.6, 0.4], end: 0.16, closed: 0.9 },
+            CanalForm { root: 0, at: [0.35, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.9 },
+            CanalForm { root: 0, at: [-0.35, 0.0], orifice: [0.4, 0.32], end: 0.14, closed: 0.9 },
+            CanalForm { root: 1, at: [0.0, 0.0], orifice: [0.6, 0.4], end: 0.16, closed: 0.9 },
         ],
     },
     ..SECOND
 };
 
-/// One of the many shallow grooves of a third molar.
-const fn wrinkle(line: &'static [[f32; 3]]) -> super::form::Fissure {
+/// Returns one of the many shallow grooves of a third molar.
+const fn wrinkle(line: &'static [[f32; 3]]) -> crate::form::FissureForm {
     groove(line, 0.24, 0.30)
 }

@@ -1,15 +1,15 @@
-//! What holds a tooth: gum with its sulcus or pockets, the attachment at their floor, the bone below.
+//! The periodontium: gingiva with its sulcus or pockets, the attachment at their floor, and the bone below.
 //!
-//! A periodontal chart has six sites a tooth. Between them margin and floor change smoothly round the tooth, so that a probe
-//! that is walked along the gum finds no step.
+//! A periodontal chart has six sites per tooth. Between the sites, margin and floor change smoothly around the tooth,
+//! so that a probe that is walked along the gingiva meets no step.
 
-use crate::frame::Vec3;
-use crate::volume::{Grid, ISO, Label, Volume, distance};
 use std::f32::consts::PI;
+use typodont_core::frame::Vec3;
+use typodont_core::volume::{Grid, ISO, Label, Volume, distance};
 
-/// One of the six places where a periodontal chart has a reading.
+/// One of the six sites of a periodontal chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Site {
+pub enum ProbingSite {
     MesioBuccal,
     Buccal,
     DistoBuccal,
@@ -18,130 +18,143 @@ pub enum Site {
     DistoLingual,
 }
 
-impl Site {
-    /// In the order of a chart: along the cheek from mesial, then along the tongue.
-    pub const ALL: [Site; 6] =
-        [Site::MesioBuccal, Site::Buccal, Site::DistoBuccal, Site::MesioLingual, Site::Lingual, Site::DistoLingual];
+impl ProbingSite {
+    /// All sites in the order of a chart: along the buccal side from mesial to distal, then along the lingual side.
+    pub const ALL: [ProbingSite; 6] = [
+        ProbingSite::MesioBuccal,
+        ProbingSite::Buccal,
+        ProbingSite::DistoBuccal,
+        ProbingSite::MesioLingual,
+        ProbingSite::Lingual,
+        ProbingSite::DistoLingual,
+    ];
 
-    /// As charts write it.
+    /// Returns the site's abbreviation in charts.
     pub fn code(self) -> &'static str {
         ["MB", "B", "DB", "ML", "L", "DL"][self as usize]
     }
 
-    /// Where round the tooth it lies, rad: 0 in the middle of the cheek's side, growing toward distal. The sites beside the
-    /// neighbours lie at the line angles, where a probe comes in under the contact.
-    pub fn turn(self) -> f32 {
+    /// Returns the azimuth of the site around the tooth, rad: 0 in the middle of the buccal side, increasing toward
+    /// distal. The interproximal sites are at the line angles, at which a probe enters under the contact.
+    pub fn azimuth(self) -> f32 {
         const ANGLE: f32 = 50.0 * PI / 180.0;
         [-ANGLE, 0.0, ANGLE, ANGLE - PI, PI, PI - ANGLE][self as usize]
     }
 
-    /// The site that is nearest to a place round the tooth.
-    pub fn nearest(turn: f32) -> Site {
-        let off = |site: &Site| wrapped(site.turn() - turn).abs();
-        Site::ALL.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(Site::Buccal)
+    /// Returns the site nearest to an azimuth, rad.
+    pub fn nearest(azimuth: f32) -> ProbingSite {
+        let off = |site: &ProbingSite| wrap_angle(site.azimuth() - azimuth).abs();
+        ProbingSite::ALL.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(ProbingSite::Buccal)
     }
 }
 
-/// A length at each site, mm, in the order of [`Site::ALL`].
-pub type AtSites = [f32; 6];
+/// A length at each site, mm, in the order of [`ProbingSite::ALL`].
+pub type SiteLengths = [f32; 6];
 
-/// How deep the gum reaches round a tooth; mm.
+/// Probing depth and recession around a tooth, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pockets {
-    /// From the gum's margin to the floor of the sulcus or pocket.
-    pub depth: AtSites,
-    /// How far the margin has gone back below the neckline; negative where it covers enamel.
-    pub recession: AtSites,
+    /// Probing depths from the gingival margin to the floor of the sulcus or pocket.
+    pub depth: SiteLengths,
+    /// Recession of the gingival margin below the cemento-enamel junction; negative if the margin covers enamel.
+    pub recession: SiteLengths,
 }
 
 impl Pockets {
-    /// Healthy gum: a sulcus of 1 to 3 mm, its margin on enamel.
+    /// Healthy gingiva: a sulcus of 1 to 3 mm, with its margin on enamel.
     pub const HEALTHY: Pockets =
         Pockets { depth: [2.4, 1.4, 2.4, 2.4, 1.4, 2.4], recession: [-1.2, -0.8, -1.2, -1.2, -0.8, -1.2] };
 }
 
-/// From the floor of a sulcus to the bone's crest, mm: epithelial 0.97 and connective 1.07 (A. W. Gargiulo and others,
-/// *Dimensions and relations of the dentogingival junction in humans*, 1961).
+/// Height of the attachment from the floor of a sulcus to the crest of the bone, mm: epithelial 0.97 and connective
+/// 1.07 (A. W. Gargiulo and others, *Dimensions and relations of the dentogingival junction in humans*, 1961).
 pub const ATTACHMENT: f32 = 2.04;
 
-/// How far a sulcus stands open for a probe, mm. Gum lies on the tooth and gives way to the end of a probe, 0.5 mm thick; half
-/// as much again keeps the end from being clamped between two walls that each are good to a tenth.
-pub const OPEN: f32 = 0.75;
+/// Width of the sulcus for a probe, mm. Gingiva lies on the tooth and yields to the end of a probe, which is 0.5 mm
+/// thick; the additional half prevents the end from being clamped between two walls, each of which is accurate to 0.1
+/// mm.
+pub const PROBING_GAP: f32 = 0.75;
 
-/// How far a sulcus stands open to the eye, mm.
-const CLOSED: f32 = 0.1;
+/// Visible width of the sulcus, mm.
+const VISUAL_GAP: f32 = 0.1;
 
-/// The gum's top slopes about so: a height over it is so much of a distance.
+/// Ratio of the distance from the top of the gingiva to the height above it, from the typical slope of the top.
 const SLOPE: f32 = 0.85;
 
-/// Distance between samples of the distance from the tooth, mm.
+/// Spacing of the samples of the distance from the tooth, mm.
 const SPACING: f32 = 0.16;
 
-/// What is known of the gum beside the tooth: so far from its crown's box, and above the margin, mm.
+/// Extent of the sampled region beside the box of the crown and above the gingival margin, mm.
 const BESIDE: f32 = 3.0;
 const ABOVE: f32 = 1.5;
 
-/// Steps round the tooth in which its neckline is looked for.
-const TURNS: usize = 72;
+/// Number of steps around the tooth at which the cemento-enamel junction is sampled.
+const AZIMUTH_STEPS: usize = 72;
 
-/// Gum round one tooth; tooth space, mm.
+/// Gingiva around one tooth; tooth space, mm.
 #[derive(Clone, Debug)]
 pub struct Periodontium {
     pub pockets: Pockets,
-    /// The crown's box.
+    /// Corners of the bounding box of the crown.
     crown: [Vec3; 2],
-    /// +1 where y is distal, -1 where it is mesial.
+    /// +1 if y is distal, -1 if it is mesial.
     distal: f32,
-    /// Height of the neckline by place round the tooth.
-    neckline: [f32; TURNS],
+    /// Height of the cemento-enamel junction by step around the tooth.
+    neckline: [f32; AZIMUTH_STEPS],
     grid: Grid,
-    /// From the tooth's surface, what has settled on it included; negative inside.
-    away: Vec<f32>,
+    /// Signed distances from the tooth's surface including its deposits, negative inside.
+    tooth_distances: Vec<f32>,
 }
 
-/// A tooth as its gum sees it.
+/// Data of a tooth from which its periodontium is made.
 #[derive(Clone, Copy, Debug)]
-pub struct Standing<'a> {
+pub struct ToothContext<'a> {
     pub volume: &'a Volume,
     pub enamel: Label,
-    /// Corners of the box around the crown, tooth space.
+    /// Corners of the bounding box of the crown, tooth space, mm.
     pub crown: [Vec3; 2],
-    /// +1 where y is distal, -1 where it is mesial.
+    /// +1 if y is distal, -1 if it is mesial.
     pub distal: f32,
 }
 
 impl Periodontium {
-    pub fn around(standing: &Standing, pockets: Pockets) -> Periodontium {
-        let Standing { volume, crown, distal, .. } = *standing;
-        let neckline = neckline(standing);
-        let mut made =
-            Periodontium { pockets, crown, distal, neckline, grid: Grid::centred([1; 3], Vec3::ONE), away: Vec::new() };
-        let heights = (0..TURNS).map(|i| (made.margin(turn_of(i)), made.floor(turn_of(i))));
+    pub fn around(tooth: &ToothContext, pockets: Pockets) -> Periodontium {
+        let ToothContext { volume, crown, distal, .. } = *tooth;
+        let neckline = neckline(tooth);
+        let mut made = Periodontium {
+            pockets,
+            crown,
+            distal,
+            neckline,
+            grid: Grid::centred([1; 3], Vec3::ONE),
+            tooth_distances: Vec::new(),
+        };
+        let heights = (0..AZIMUTH_STEPS).map(|i| (made.margin(azimuth_of_step(i)), made.floor(azimuth_of_step(i))));
         let [low, high] = heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], (margin, floor)| {
             [low.min(floor), high.max(margin)]
         });
         let (from, to) = (crown[0].with_z(low - 1.0), crown[1].with_z(high + ABOVE));
         let beside = Vec3::new(BESIDE, BESIDE, 0.0);
         made.grid = Grid::covering(from - beside, to + beside, Vec3::splat(SPACING), 1);
-        made.away = away(volume, &made.grid);
+        made.tooth_distances = distances_to_tooth(volume, &made.grid);
         made
     }
 
-    /// Where round the tooth a point lies, rad, as [`Site::turn`] counts.
-    pub fn turn(&self, point: Vec3) -> f32 {
+    /// Returns the azimuth of a point around the tooth, rad, as in [`ProbingSite::azimuth`].
+    pub fn azimuth(&self, point: Vec3) -> f32 {
         let (middle, half) = self.middle_and_half();
         let at = (point - middle) / half;
         libm::atan2f(at.y * self.distal, at.x)
     }
 
-    /// The way from the tooth's middle outward at a place round it; level, unit.
-    pub fn outward(&self, turn: f32) -> Vec3 {
+    /// Returns the horizontal unit vector from the centre of the tooth outward at an azimuth.
+    pub fn outward(&self, azimuth: f32) -> Vec3 {
         let (_, half) = self.middle_and_half();
-        let level = Vec3::new(libm::cosf(turn) * half.x, libm::sinf(turn) * self.distal * half.y, 0.0);
+        let level = Vec3::new(libm::cosf(azimuth) * half.x, libm::sinf(azimuth) * self.distal * half.y, 0.0);
         level.normalize_or(Vec3::X)
     }
 
-    /// The middle of the crown, level with the origin.
+    /// Returns the centre of the crown, at the height of the origin.
     pub fn middle(&self) -> Vec3 {
         self.middle_and_half().0
     }
@@ -151,169 +164,174 @@ impl Periodontium {
         ((0.5 * (low + high)).with_z(0.0), (0.5 * (high - low)).with_z(1.0))
     }
 
-    /// Height of the neckline (the cemento-enamel junction).
-    pub fn neckline(&self, turn: f32) -> f32 {
-        let at = wrapped(turn) / (2.0 * PI) * TURNS as f32 + TURNS as f32;
+    /// Returns the height of the cemento-enamel junction.
+    pub fn neckline(&self, azimuth: f32) -> f32 {
+        let at = wrap_angle(azimuth) / (2.0 * PI) * AZIMUTH_STEPS as f32 + AZIMUTH_STEPS as f32;
         let (before, part) = (at as usize, at.fract());
-        let [a, b] = [before, before + 1].map(|i| self.neckline[i % TURNS]);
+        let [a, b] = [before, before + 1].map(|i| self.neckline[i % AZIMUTH_STEPS]);
         a + (b - a) * part
     }
 
-    /// Height of the gum's margin.
-    pub fn margin(&self, turn: f32) -> f32 {
-        self.neckline(turn) - between_sites(&self.pockets.recession, turn)
+    /// Returns the height of the gingival margin.
+    pub fn margin(&self, azimuth: f32) -> f32 {
+        self.neckline(azimuth) - between_sites(&self.pockets.recession, azimuth)
     }
 
-    /// Height of the floor of the sulcus or pocket.
-    pub fn floor(&self, turn: f32) -> f32 {
-        self.margin(turn) - between_sites(&self.pockets.depth, turn)
+    /// Returns the height of the floor of the sulcus or pocket.
+    pub fn floor(&self, azimuth: f32) -> f32 {
+        self.margin(azimuth) - between_sites(&self.pockets.depth, azimuth)
     }
 
-    /// Height of the bone's crest.
-    pub fn bone(&self, turn: f32) -> f32 {
-        self.floor(turn) - ATTACHMENT
+    /// Returns the height of the crest of the bone.
+    pub fn bone(&self, azimuth: f32) -> f32 {
+        self.floor(azimuth) - ATTACHMENT
     }
 
-    /// The lowest floor of all.
-    pub fn deepest(&self) -> f32 {
-        (0..TURNS).map(|i| self.floor(turn_of(i))).fold(f32::INFINITY, f32::min)
+    /// Returns the height of the lowest point of the floor.
+    pub fn lowest_floor(&self) -> f32 {
+        (0..AZIMUTH_STEPS).map(|i| self.floor(azimuth_of_step(i))).fold(f32::INFINITY, f32::min)
     }
 
-    /// How deep in the sulcus a place lies, along a shaft that points from there toward the hand; negative above the margin.
+    /// Returns the depth of a point in the sulcus, mm, measured along a shaft that points from there toward the handle;
+    /// negative above the margin.
     pub fn depth_along(&self, place: Vec3, shaft: Vec3) -> f32 {
-        // A shaft that lies nearly level would read any depth.
+        // Limit for the inclination: a nearly horizontal shaft would give an arbitrary depth.
         const STEEP: f32 = 0.5;
-        (self.margin(self.turn(place)) - place.z) / shaft.z.max(STEEP)
+        (self.margin(self.azimuth(place)) - place.z) / shaft.z.max(STEEP)
     }
 
-    /// From the tooth's surface to a point; negative inside. Good to a twentieth of a millimetre beside the gum, never more
-    /// than it is elsewhere.
-    pub fn away(&self, point: Vec3) -> f32 {
+    /// Returns the signed distance from the tooth's surface to a point, mm; negative inside. It is accurate to 0.05 mm
+    /// beside the gingiva; elsewhere it does not exceed the true distance.
+    pub fn distance_to_tooth(&self, point: Vec3) -> f32 {
         let [low, high] = self.grid.extent();
         let inside = point.clamp(low, high);
-        self.grid.mixed(&self.away, inside) + point.distance(inside)
+        self.grid.trilinear(&self.tooth_distances, inside) + point.distance(inside)
     }
 
-    /// Signed distance from the gum as a probe feels it, up to its outer border: it stands off the tooth by [`OPEN`].
-    pub fn gum(&self, point: Vec3) -> f32 {
-        self.gum_standing_off(point, OPEN)
+    /// Returns the signed distance from the gingiva for a probe, mm, up to its outer border: the gingiva is displaced
+    /// from the tooth by [`PROBING_GAP`].
+    pub fn gum_sdf_probing(&self, point: Vec3) -> f32 {
+        self.gum_sdf(point, PROBING_GAP)
     }
 
-    /// The same as the eye sees it: it lies on the tooth.
-    pub fn seen_gum(&self, point: Vec3) -> f32 {
-        self.gum_standing_off(point, CLOSED)
+    /// Returns the signed distance from the visible gingiva, mm, which lies on the tooth.
+    pub fn gum_sdf_visual(&self, point: Vec3) -> f32 {
+        self.gum_sdf(point, VISUAL_GAP)
     }
 
-    /// The same as if the tooth were gum too: its top goes on through the tooth as its margin runs there. What a drawn sheet of gum is
-    /// laid on.
-    pub fn filled_gum(&self, point: Vec3) -> f32 {
-        ((point.z - self.top(point)) * SLOPE).max(self.ridge(point))
+    /// Returns the signed distance from the gingiva as if the tooth were gingiva too, mm: its top continues through the
+    /// tooth at the height of the margin. The displayed surface of the gingiva is derived from this.
+    pub fn gum_sdf_filled(&self, point: Vec3) -> f32 {
+        ((point.z - self.gum_height(point)) * SLOPE).max(self.alveolar_ridge_sdf(point))
     }
 
-    fn gum_standing_off(&self, point: Vec3, open: f32) -> f32 {
-        let below = (point.z - self.top(point)) * SLOPE;
-        below.max(open - self.away(point)).max(self.ridge(point))
+    fn gum_sdf(&self, point: Vec3, open: f32) -> f32 {
+        let below = (point.z - self.gum_height(point)) * SLOPE;
+        below.max(open - self.distance_to_tooth(point)).max(self.alveolar_ridge_sdf(point))
     }
 
-    /// Signed distance from the ridge that the tooth stands in: a rounded wall along the arch.
-    fn ridge(&self, point: Vec3) -> f32 {
-        /// How far it reaches beyond the crown toward cheek and tongue, how round its edge is, and how far that stays over the
+    /// Returns the signed distance from the alveolar ridge, a rounded wall along the arch, mm.
+    fn alveolar_ridge_sdf(&self, point: Vec3) -> f32 {
+        /// Extent beyond the crown toward buccal and lingual, radius of the edge, and height of the ridge above the
         /// margin, mm.
         const BEYOND: f32 = 1.5;
         const ROUND: f32 = 4.0;
         const OVER: f32 = 0.9;
         let (middle, half) = self.middle_and_half();
-        let top = Site::ALL.map(|site| self.margin(site.turn())).into_iter().fold(f32::NEG_INFINITY, f32::max) + OVER;
+        let top =
+            ProbingSite::ALL.map(|site| self.margin(site.azimuth())).into_iter().fold(f32::NEG_INFINITY, f32::max)
+                + OVER;
         let aside = (point.x - middle.x).abs() - (half.x + BEYOND - ROUND);
         let over = point.z - (top - ROUND);
         libm::hypotf(aside.max(0.0), over.max(0.0)) + aside.max(over).min(0.0) - ROUND
     }
 
-    /// Height of the gum's top over a place: a rounded margin that falls away toward cheek and tongue, a papilla that rises
-    /// toward the contacts.
-    fn top(&self, point: Vec3) -> f32 {
-        /// Free gum is so thick before it falls away, mm, and so round.
+    /// Returns the height of the top of the gingiva at a point: a rounded margin that descends toward buccal and
+    /// lingual, and a papilla that rises toward the contacts.
+    fn gum_height(&self, point: Vec3) -> f32 {
+        /// Thickness of the free gingiva before it descends, and radius of the descent, mm.
         const THICK: f32 = 0.7;
         const ROUND: f32 = 2.2;
-        /// How far a papilla rises over the margin, and over which way, mm.
+        /// Height of a papilla above the margin, and the distance over which it rises, mm.
         const PAPILLA: f32 = 0.9;
         const RISE: f32 = 1.2;
-        let turn = self.turn(point);
-        let margin = self.margin(turn);
-        let aside = (self.away(point.with_z(margin)) - CLOSED).max(0.0);
-        let (cheekward, mesiodistal) = (libm::cosf(turn), libm::sinf(turn));
+        let azimuth = self.azimuth(point);
+        let margin = self.margin(azimuth);
+        let aside = (self.distance_to_tooth(point.with_z(margin)) - VISUAL_GAP).max(0.0);
+        let (cheekward, mesiodistal) = (libm::cosf(azimuth), libm::sinf(azimuth));
         let falls = (aside - THICK).max(0.0);
         let falls = falls * falls / ROUND;
         let share = (aside / RISE).clamp(0.0, 1.0);
         let papilla = PAPILLA * share * share * (3.0 - 2.0 * share);
-        // Only between two teeth is a papilla held up.
+        // A papilla exists only between two teeth.
         let between = mesiodistal * mesiodistal * mesiodistal * mesiodistal;
         margin - falls.min(6.0) * cheekward * cheekward + papilla * between
     }
 
-    /// Signed distance from what closes the sulcus below.
-    pub fn attachment(&self, point: Vec3) -> f32 {
-        /// How far it reaches under the gum, and down, mm: nobody gets there.
+    /// Returns the signed distance from the attachment that closes the sulcus, mm.
+    pub fn attachment_sdf(&self, point: Vec3) -> f32 {
+        /// Extent under the gingiva and downward, mm: beyond the reach of any instrument.
         const UNDER: f32 = 0.4;
         const DOWN: f32 = 3.0;
-        let floor = self.floor(self.turn(point));
-        (point.z - floor).max(self.away(point) - OPEN - UNDER).max(floor - DOWN - point.z)
+        let floor = self.floor(self.azimuth(point));
+        (point.z - floor).max(self.distance_to_tooth(point) - PROBING_GAP - UNDER).max(floor - DOWN - point.z)
     }
 }
 
-fn turn_of(step: usize) -> f32 {
-    2.0 * PI * step as f32 / TURNS as f32
+fn azimuth_of_step(step: usize) -> f32 {
+    2.0 * PI * step as f32 / AZIMUTH_STEPS as f32
 }
 
-/// An angle within half a turn of zero.
-fn wrapped(turn: f32) -> f32 {
-    turn - (turn / (2.0 * PI)).round() * 2.0 * PI
+/// Returns an equivalent angle within −π to π.
+fn wrap_angle(angle: f32) -> f32 {
+    angle - (angle / (2.0 * PI)).round() * 2.0 * PI
 }
 
-/// Between the two sites on either side of a place, with level ends: no reading between two sites is beyond both.
-fn between_sites(values: &AtSites, turn: f32) -> f32 {
-    // Round the tooth from the tongue's side over mesial: sites in the order of their angles.
+/// Interpolates between the two sites on either side of an azimuth, with a slope of 0 at the sites, so that no value
+/// between two sites exceeds both.
+fn between_sites(values: &SiteLengths, azimuth: f32) -> f32 {
+    // Indices of the sites in the order of their azimuths, around the tooth from lingual over mesial.
     const ROUND: [usize; 7] = [4, 3, 0, 1, 2, 5, 4];
-    let turn = wrapped(turn);
-    let angle = |place: usize| if place == 0 { -PI } else { Site::ALL[ROUND[place]].turn() };
-    let place = (0..6).rev().find(|&place| angle(place) <= turn).unwrap_or(0);
+    let wrapped_azimuth = wrap_angle(azimuth);
+    let angle = |place: usize| if place == 0 { -PI } else { ProbingSite::ALL[ROUND[place]].azimuth() };
+    let place = (0..6).rev().find(|&place| angle(place) <= wrapped_azimuth).unwrap_or(0);
     let (from, to) = (angle(place), if place == 5 { PI } else { angle(place + 1) });
-    let share = ((turn - from) / (to - from)).clamp(0.0, 1.0);
+    let share = ((wrapped_azimuth - from) / (to - from)).clamp(0.0, 1.0);
     let (a, b) = (values[ROUND[place]], values[ROUND[place + 1]]);
     a + (b - a) * share * share * (3.0 - 2.0 * share)
 }
 
-/// The lowest enamel all round, smoothed over some degrees: a voxel's step is not the neckline's.
-fn neckline(standing: &Standing) -> [f32; TURNS] {
-    /// Steps on either side over which it is smoothed.
+/// Returns the height of the lowest enamel around the tooth, smoothed over some degrees to remove the steps of voxels.
+fn neckline(tooth: &ToothContext) -> [f32; AZIMUTH_STEPS] {
+    /// Number of steps on either side over which heights are averaged.
     const AROUND: i32 = 4;
-    let Standing { volume, enamel, crown: [low, high], distal } = *standing;
+    let ToothContext { volume, enamel, crown: [low, high], distal } = *tooth;
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
     let grid = volume.grid();
-    let mut lowest = [f32::INFINITY; TURNS];
+    let mut lowest = [f32::INFINITY; AZIMUTH_STEPS];
     for (index, _) in volume.tissues().enumerate().filter(|(_, label)| *label == enamel) {
         let at = (grid.centre(grid.cell(index)) - middle) / half;
-        let turn = wrapped(libm::atan2f(at.y * distal, at.x)) / (2.0 * PI) * TURNS as f32;
-        let step = (turn.round() as i32).rem_euclid(TURNS as i32) as usize;
+        let turn = wrap_angle(libm::atan2f(at.y * distal, at.x)) / (2.0 * PI) * AZIMUTH_STEPS as f32;
+        let step = (turn.round() as i32).rem_euclid(AZIMUTH_STEPS as i32) as usize;
         let height = grid.centre(grid.cell(index)).z;
         lowest[step] = lowest[step].min(height);
     }
-    // A side without enamel has its neckline where the others have it.
+    // A side without enamel takes the mean height of the other sides.
     let known = lowest.iter().copied().filter(|z| z.is_finite());
     let (sum, count) = known.fold((0.0, 0u32), |(sum, count), z| (sum + z, count + 1));
     let mean = if count > 0 { sum / count as f32 } else { low.z };
     lowest.iter_mut().filter(|z| !z.is_finite()).for_each(|z| *z = mean);
     std::array::from_fn(|i| {
-        let near = (-AROUND..=AROUND).map(|by| lowest[(i as i32 + by).rem_euclid(TURNS as i32) as usize]);
+        let near = (-AROUND..=AROUND).map(|by| lowest[(i as i32 + by).rem_euclid(AZIMUTH_STEPS as i32) as usize]);
         near.sum::<f32>() / (2 * AROUND + 1) as f32
     })
 }
 
-/// From a volume's surface to each point of a grid, finer than its samples: by the nearest sample inside and how deep that
-/// one lies.
-fn away(volume: &Volume, grid: &Grid) -> Vec<f32> {
+/// Returns the signed distance from a volume's surface to each point of a grid, mm, more accurate than its samples:
+/// from the nearest sample inside and the depth of that sample.
+fn distances_to_tooth(volume: &Volume, grid: &Grid) -> Vec<f32> {
     let density: Vec<f32> = grid.cells().map(|cell| volume.density_at(grid.centre(cell))).collect();
-    let depth = |i: usize| (density[i] - ISO) * 2.0 * volume.band();
+    let depth = |i: usize| (density[i] - ISO) * 2.0 * volume.half_band();
     let (mut away, nearest) = distance::to_nearest(grid, |i| density[i] >= ISO);
     for (i, away) in away.iter_mut().enumerate() {
         *away = match *away {
@@ -324,15 +342,15 @@ fn away(volume: &Volume, grid: &Grid) -> Vec<f32> {
     away
 }
 
-/// From a tooth that is not there, mm.
+/// Distance assigned if the volume is empty, mm.
 const FAR: f32 = 100.0;
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::anatomy::{Tissues, grid_of_spacing, grow, teeth};
+    use crate::{TissueLabels, grid_of_spacing, grow, teeth};
 
-    const TISSUES: Tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+    const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
     fn tooth(fdi: u8) -> (Volume, [Vec3; 2]) {
         let form = teeth::tooth(fdi).unwrap();
@@ -350,11 +368,12 @@ mod tests {
     fn each_site_has_its_own_depth_and_between_two_it_changes_without_a_step() {
         let pockets = Pockets { depth: [6.0, 2.0, 4.0, 3.0, 1.0, 8.0], recession: [0.0; 6] };
         let (volume, crown) = tooth(36);
-        let gum = Periodontium::around(&Standing { volume: &volume, enamel: Label(1), crown, distal: 1.0 }, pockets);
-        for (site, depth) in Site::ALL.into_iter().zip(pockets.depth) {
-            let turn = site.turn();
+        let gum =
+            Periodontium::around(&ToothContext { volume: &volume, enamel: Label(1), crown, distal: 1.0 }, pockets);
+        for (site, depth) in ProbingSite::ALL.into_iter().zip(pockets.depth) {
+            let turn = site.azimuth();
             assert!((gum.margin(turn) - gum.floor(turn) - depth).abs() < 1e-4, "{site:?}");
-            assert_eq!(Site::nearest(gum.turn(gum.middle() + gum.outward(turn) * 5.0)), site);
+            assert_eq!(ProbingSite::nearest(gum.azimuth(gum.middle() + gum.outward(turn) * 5.0)), site);
         }
         let steps: Vec<f32> = (0..=720).map(|i| gum.floor(i as f32 * PI / 360.0)).collect();
         let widest = steps.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f32::max);
@@ -363,28 +382,37 @@ mod tests {
 
     #[test]
     fn a_probe_finds_room_down_to_the_floor_and_none_below() {
-        // Aim: a cleft, no tunnel. Method: places 0.4 mm off the root, all round, above and below the floor.
+        // Aim: the sulcus is a cleft that ends at its floor. Method: points 0.4 mm from the root, all around, above and
+        // below the floor.
         for (fdi, distal) in [(36, 1.0), (11, 1.0), (46, -1.0)] {
             let (volume, crown) = tooth(fdi);
-            let standing = Standing { volume: &volume, enamel: Label(1), crown, distal };
+            let standing = ToothContext { volume: &volume, enamel: Label(1), crown, distal };
             let pockets = Pockets { depth: [4.0, 3.0, 4.0, 4.0, 3.0, 5.0], recession: [-1.0; 6] };
             let gum = Periodontium::around(&standing, pockets);
-            for site in Site::ALL {
-                let (turn, out) = (site.turn(), gum.outward(site.turn()));
+            for site in ProbingSite::ALL {
+                let (turn, out) = (site.azimuth(), gum.outward(site.azimuth()));
                 let place = |z: f32| {
                     let at = |i: u32| (gum.middle() + out * (12.0 - 0.02 * i as f32)).with_z(z);
-                    (0..600).map(at).find(|p| gum.away(*p) < 0.4).unwrap()
+                    (0..600).map(at).find(|p| gum.distance_to_tooth(*p) < 0.4).unwrap()
                 };
                 for z in [gum.margin(turn) - 0.3, gum.floor(turn) + 0.4] {
                     let at = place(z);
-                    assert!(gum.gum(at) > 0.2, "{fdi} {site:?}: {} from the gum at {z}", gum.gum(at));
-                    assert!(gum.attachment(at) > 0.2, "{fdi} {site:?}: {}", gum.attachment(at));
+                    assert!(
+                        gum.gum_sdf_probing(at) > 0.2,
+                        "{fdi} {site:?}: {} from the gum at {z}",
+                        gum.gum_sdf_probing(at)
+                    );
+                    assert!(gum.attachment_sdf(at) > 0.2, "{fdi} {site:?}: {}", gum.attachment_sdf(at));
                 }
-                // Its top is round; further down there is a wall.
+                // The top of the gingiva is round; further down it is a wall.
                 let outside = place(gum.floor(turn) + 0.4) + out;
-                assert!(gum.gum(outside) < 0.0, "{fdi} {site:?}: {} from the gum outside", gum.gum(outside));
+                assert!(
+                    gum.gum_sdf_probing(outside) < 0.0,
+                    "{fdi} {site:?}: {} from the gum outside",
+                    gum.gum_sdf_probing(outside)
+                );
                 let at = place(gum.floor(turn) - 0.5);
-                assert!(gum.attachment(at) < 0.0, "{fdi} {site:?}: {}", gum.attachment(at));
+                assert!(gum.attachment_sdf(at) < 0.0, "{fdi} {site:?}: {}", gum.attachment_sdf(at));
             }
         }
     }

@@ -1,16 +1,18 @@
-//! Premolars, as written for the upper right and the lower left.
+//! Premolars, in the form of the upper right and the lower left quadrant.
 //!
-//! Sizes: Wheeler's table (Ash & Nelson). Shape, by eye after the same book. Upper: a buccal and a lingual cusp with a central
-//! groove between marginal ridges; the first has the longer buccal cusp, a groove over its mesial marginal ridge, a hollow
-//! mesial neck and two roots; the second is rounder, its cusps nearly level, with one root. Lower: the first is nearly a canine,
-//! its small lingual cusp tied to the buccal one by a transverse ridge between two pits, with a mesiolingual groove; the second
-//! has two lingual cusps and a groove like a Y.
+//! Sizes: Wheeler's table (Ash & Nelson). Shape, estimated by eye after the same book. Upper: a buccal and a lingual
+//! cusp with a central groove between marginal ridges; the first premolar has the longer buccal cusp, a groove over its
+//! mesial marginal ridge, a concave mesial neck and two roots; the second is rounder, with cusps of nearly equal height
+//! and one root. Lower: the first premolar resembles a canine, with a small lingual cusp joined to the buccal cusp by a
+//! transverse ridge between two pits, and a mesiolingual groove; the second has two lingual cusps and a Y-shaped
+//! groove.
 
-use super::form::{
-    Canal, Cusp, Enamel, Form, Furrow, Limb, Pulp, Relief, Sides, beside_ridge, groove, outline, place, sizes,
+use crate::form::{
+    CanalForm, Cusp, Enamel, Furrow, LoftForm, OcclusalForm, PulpForm, SideMetric, ToothForm, beside_ridge, groove,
+    place, section, sizes,
 };
 
-/// The hollow of the mesial neck, and the furrow between the two roots.
+/// The concavity of the mesial neck, and the furrow between the two roots.
 const MESIAL_HOLLOW: Furrow = &[
     place([0.0, -1.0, 0.20], 0.0, 1.4),
     place([-0.02, -1.0, -0.02], 0.28, 1.7),
@@ -19,24 +21,24 @@ const MESIAL_HOLLOW: Furrow = &[
     place([0.0, -0.5, -0.95], 0.4, 1.4),
 ];
 
-pub const UPPER_FIRST: Form = Form {
+pub const UPPER_FIRST: ToothForm = ToothForm {
     sizes: sizes([8.5, 14.0], [7.0, 5.0], [9.0, 8.0], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-0.50, [-0.48, 0.50], [-0.34, 0.34], 0.2, [0.0, 0.0]),
-            outline(-0.35, [-0.56, 0.58], [-0.42, 0.42], 0.2, [0.0, 0.0]),
-            outline(-0.20, [-0.68, 0.70], [-0.54, 0.54], 0.2, [0.0, 0.0]),
-            outline(-0.10, [-0.83, 0.84], [-0.70, 0.70], 0.2, [0.0, 0.02]),
-            outline(-0.04, [-0.95, 0.955], [-0.90, 0.90], 0.2, [0.0, 0.04]),
-            outline(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.2, [0.0, 0.06]),
-            outline(0.06, [-0.92, 0.92], [-0.725, 0.72], 0.2, [0.0, 0.08]),
-            outline(0.16, [-0.96, 0.98], [-0.77, 0.77], 0.22, [0.0, 0.10]),
-            outline(0.30, [-0.99, 1.0], [-0.86, 0.86], 0.24, [0.0, 0.11]),
-            outline(0.45, [-1.0, 0.98], [-0.94, 0.945], 0.26, [0.0, 0.11]),
-            outline(0.60, [-0.98, 0.92], [-0.985, 0.995], 0.28, [0.0, 0.11]),
-            outline(0.74, [-0.92, 0.83], [-0.96, 0.97], 0.28, [0.0, 0.10]),
-            outline(0.88, [-0.82, 0.72], [-0.88, 0.90], 0.28, [0.0, 0.10]),
-            outline(1.0, [-0.72, 0.62], [-0.79, 0.80], 0.28, [0.0, 0.10]),
+    body: LoftForm {
+        sections: &[
+            section(-0.50, [-0.48, 0.50], [-0.34, 0.34], 0.2, [0.0, 0.0]),
+            section(-0.35, [-0.56, 0.58], [-0.42, 0.42], 0.2, [0.0, 0.0]),
+            section(-0.20, [-0.68, 0.70], [-0.54, 0.54], 0.2, [0.0, 0.0]),
+            section(-0.10, [-0.83, 0.84], [-0.70, 0.70], 0.2, [0.0, 0.02]),
+            section(-0.04, [-0.95, 0.955], [-0.90, 0.90], 0.2, [0.0, 0.04]),
+            section(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.2, [0.0, 0.06]),
+            section(0.06, [-0.92, 0.92], [-0.725, 0.72], 0.2, [0.0, 0.08]),
+            section(0.16, [-0.96, 0.98], [-0.77, 0.77], 0.22, [0.0, 0.10]),
+            section(0.30, [-0.99, 1.0], [-0.86, 0.86], 0.24, [0.0, 0.11]),
+            section(0.45, [-1.0, 0.98], [-0.94, 0.945], 0.26, [0.0, 0.11]),
+            section(0.60, [-0.98, 0.92], [-0.985, 0.995], 0.28, [0.0, 0.11]),
+            section(0.74, [-0.92, 0.83], [-0.96, 0.97], 0.28, [0.0, 0.10]),
+            section(0.88, [-0.82, 0.72], [-0.88, 0.90], 0.28, [0.0, 0.10]),
+            section(1.0, [-0.72, 0.62], [-0.79, 0.80], 0.28, [0.0, 0.10]),
         ],
         furrows: &[
             MESIAL_HOLLOW,
@@ -57,37 +59,37 @@ pub const UPPER_FIRST: Form = Form {
                 place([0.64, 0.54, 1.04], 0.22, 1.3),
             ],
         ],
-        round: 0.8,
+        rounding: 0.8,
     },
     roots: &[
-        Limb {
-            outlines: &[
-                outline(0.14, [-0.02, 0.94], [-0.96, 0.95], 0.15, [0.0, 0.05]),
-                outline(-0.05, [-0.02, 0.96], [-0.96, 0.95], 0.15, [0.0, 0.05]),
-                outline(-0.25, [0.02, 0.92], [-0.88, 0.87], 0.1, [0.0, 0.05]),
-                outline(-0.45, [0.09, 0.86], [-0.76, 0.77], 0.05, [0.0, 0.0]),
-                outline(-0.68, [0.22, 0.76], [-0.54, 0.60], 0.0, [0.0, 0.0]),
-                outline(-0.88, [0.32, 0.65], [-0.28, 0.46], 0.0, [0.0, 0.0]),
-                outline(-1.0, [0.40, 0.55], [-0.02, 0.30], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(0.14, [-0.02, 0.94], [-0.96, 0.95], 0.15, [0.0, 0.05]),
+                section(-0.05, [-0.02, 0.96], [-0.96, 0.95], 0.15, [0.0, 0.05]),
+                section(-0.25, [0.02, 0.92], [-0.88, 0.87], 0.1, [0.0, 0.05]),
+                section(-0.45, [0.09, 0.86], [-0.76, 0.77], 0.05, [0.0, 0.0]),
+                section(-0.68, [0.22, 0.76], [-0.54, 0.60], 0.0, [0.0, 0.0]),
+                section(-0.88, [0.32, 0.65], [-0.28, 0.46], 0.0, [0.0, 0.0]),
+                section(-1.0, [0.40, 0.55], [-0.02, 0.30], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.5,
+            rounding: 0.5,
         },
-        Limb {
-            outlines: &[
-                outline(0.14, [-0.94, 0.02], [-0.93, 0.92], 0.15, [0.0, -0.05]),
-                outline(-0.05, [-0.96, 0.02], [-0.93, 0.92], 0.15, [0.0, -0.05]),
-                outline(-0.25, [-0.91, -0.02], [-0.84, 0.83], 0.1, [0.0, -0.05]),
-                outline(-0.45, [-0.84, -0.10], [-0.72, 0.72], 0.05, [0.0, 0.0]),
-                outline(-0.68, [-0.72, -0.22], [-0.50, 0.56], 0.0, [0.0, 0.0]),
-                outline(-0.86, [-0.60, -0.28], [-0.26, 0.42], 0.0, [0.0, 0.0]),
-                outline(-0.96, [-0.52, -0.36], [-0.04, 0.26], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(0.14, [-0.94, 0.02], [-0.93, 0.92], 0.15, [0.0, -0.05]),
+                section(-0.05, [-0.96, 0.02], [-0.93, 0.92], 0.15, [0.0, -0.05]),
+                section(-0.25, [-0.91, -0.02], [-0.84, 0.83], 0.1, [0.0, -0.05]),
+                section(-0.45, [-0.84, -0.10], [-0.72, 0.72], 0.05, [0.0, 0.0]),
+                section(-0.68, [-0.72, -0.22], [-0.50, 0.56], 0.0, [0.0, 0.0]),
+                section(-0.86, [-0.60, -0.28], [-0.26, 0.42], 0.0, [0.0, 0.0]),
+                section(-0.96, [-0.52, -0.36], [-0.04, 0.26], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.5,
+            rounding: 0.5,
         },
     ],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.49, 0.05, 1.0], foot: [0.05, 0.0, 0.72], horn: 1.6 },
             Cusp { tip: [-0.50, -0.10, 0.885], foot: [-0.08, -0.02, 0.70], horn: 0.9 },
@@ -127,43 +129,43 @@ pub const UPPER_FIRST: Form = Form {
         edge: 0.5,
     },
     enamel: Enamel { cusp: 2.0, fissure: 0.95, side: 1.0, full_at: 0.75, follows: 0.3 },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.16, [-0.52, 0.56], [-0.26, 0.26], 0.2, [0.0, 0.0]),
-                outline(0.16, [-0.54, 0.58], [-0.30, 0.30], 0.2, [0.0, 0.0]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.16, [-0.52, 0.56], [-0.26, 0.26], 0.2, [0.0, 0.0]),
+                section(0.16, [-0.54, 0.58], [-0.30, 0.30], 0.2, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.5,
+            rounding: 0.5,
         },
         horn_spread: 0.85,
         canals: &[
-            Canal { root: 0, at: [0.0, 0.0], orifice: [0.5, 0.4], end: 0.13, closed: 0.8 },
-            Canal { root: 1, at: [0.0, 0.0], orifice: [0.5, 0.4], end: 0.13, closed: 0.8 },
+            CanalForm { root: 0, at: [0.0, 0.0], orifice: [0.5, 0.4], end: 0.13, closed: 0.8 },
+            CanalForm { root: 1, at: [0.0, 0.0], orifice: [0.5, 0.4], end: 0.13, closed: 0.8 },
         ],
     },
-    sides: Sides::AlongNormals,
+    side_metric: SideMetric::AlongNormals,
     is_mirrored: false,
-    aged: None,
+    age_effects: None,
 };
 
-pub const UPPER_SECOND: Form = Form {
-    body: Limb {
-        outlines: &[
-            outline(-1.0, [-0.16, 0.18], [0.06, 0.36], 0.0, [0.0, 0.0]),
-            outline(-0.93, [-0.38, 0.40], [-0.20, 0.52], 0.05, [0.0, 0.0]),
-            outline(-0.75, [-0.66, 0.67], [-0.54, 0.68], 0.1, [0.0, 0.0]),
-            outline(-0.45, [-0.86, 0.87], [-0.82, 0.82], 0.15, [0.0, 0.0]),
-            outline(-0.18, [-0.97, 0.97], [-0.95, 0.94], 0.2, [0.0, 0.03]),
-            outline(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.2, [0.0, 0.04]),
-            outline(0.06, [-0.92, 0.92], [-0.725, 0.72], 0.2, [0.0, 0.05]),
-            outline(0.16, [-0.96, 0.98], [-0.77, 0.77], 0.20, [0.0, 0.05]),
-            outline(0.30, [-0.99, 1.0], [-0.86, 0.86], 0.22, [0.0, 0.05]),
-            outline(0.45, [-1.0, 0.98], [-0.94, 0.945], 0.22, [0.0, 0.05]),
-            outline(0.60, [-0.98, 0.92], [-0.99, 0.995], 0.22, [0.0, 0.05]),
-            outline(0.74, [-0.92, 0.83], [-0.965, 0.97], 0.22, [0.0, 0.05]),
-            outline(0.88, [-0.83, 0.73], [-0.89, 0.90], 0.22, [0.0, 0.05]),
-            outline(1.0, [-0.74, 0.64], [-0.80, 0.81], 0.22, [0.0, 0.05]),
+pub const UPPER_SECOND: ToothForm = ToothForm {
+    body: LoftForm {
+        sections: &[
+            section(-1.0, [-0.16, 0.18], [0.06, 0.36], 0.0, [0.0, 0.0]),
+            section(-0.93, [-0.38, 0.40], [-0.20, 0.52], 0.05, [0.0, 0.0]),
+            section(-0.75, [-0.66, 0.67], [-0.54, 0.68], 0.1, [0.0, 0.0]),
+            section(-0.45, [-0.86, 0.87], [-0.82, 0.82], 0.15, [0.0, 0.0]),
+            section(-0.18, [-0.97, 0.97], [-0.95, 0.94], 0.2, [0.0, 0.03]),
+            section(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.2, [0.0, 0.04]),
+            section(0.06, [-0.92, 0.92], [-0.725, 0.72], 0.2, [0.0, 0.05]),
+            section(0.16, [-0.96, 0.98], [-0.77, 0.77], 0.20, [0.0, 0.05]),
+            section(0.30, [-0.99, 1.0], [-0.86, 0.86], 0.22, [0.0, 0.05]),
+            section(0.45, [-1.0, 0.98], [-0.94, 0.945], 0.22, [0.0, 0.05]),
+            section(0.60, [-0.98, 0.92], [-0.99, 0.995], 0.22, [0.0, 0.05]),
+            section(0.74, [-0.92, 0.83], [-0.965, 0.97], 0.22, [0.0, 0.05]),
+            section(0.88, [-0.83, 0.73], [-0.89, 0.90], 0.22, [0.0, 0.05]),
+            section(1.0, [-0.74, 0.64], [-0.80, 0.81], 0.22, [0.0, 0.05]),
         ],
         furrows: &[
             &[
@@ -187,10 +189,10 @@ pub const UPPER_SECOND: Form = Form {
                 place([0.64, 0.50, 1.04], 0.16, 1.3),
             ],
         ],
-        round: 0.6,
+        rounding: 0.6,
     },
     roots: &[],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.49, -0.04, 1.0], foot: [0.05, 0.0, 0.745], horn: 1.2 },
             Cusp { tip: [-0.51, -0.10, 0.965], foot: [-0.05, -0.02, 0.74], horn: 1.0 },
@@ -226,41 +228,41 @@ pub const UPPER_SECOND: Form = Form {
         flanks: [1.0, 0.75],
         edge: 0.5,
     },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.45, [-0.20, 0.20], [-0.13, 0.13], 0.1, [0.0, 0.0]),
-                outline(-0.2, [-0.34, 0.35], [-0.18, 0.18], 0.1, [0.0, 0.0]),
-                outline(0.14, [-0.54, 0.57], [-0.28, 0.28], 0.2, [0.0, 0.0]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.45, [-0.20, 0.20], [-0.13, 0.13], 0.1, [0.0, 0.0]),
+                section(-0.2, [-0.34, 0.35], [-0.18, 0.18], 0.1, [0.0, 0.0]),
+                section(0.14, [-0.54, 0.57], [-0.28, 0.28], 0.2, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.4,
+            rounding: 0.4,
         },
         horn_spread: 0.85,
-        canals: &[Canal { root: 0, at: [0.0, 0.0], orifice: [0.6, 0.34], end: 0.14, closed: 0.8 }],
+        canals: &[CanalForm { root: 0, at: [0.0, 0.0], orifice: [0.6, 0.34], end: 0.14, closed: 0.8 }],
     },
     ..UPPER_FIRST
 };
 
-pub const LOWER_FIRST: Form = Form {
+pub const LOWER_FIRST: ToothForm = ToothForm {
     sizes: sizes([8.5, 14.0], [7.0, 5.0], [7.5, 6.5], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-1.0, [-0.14, 0.16], [0.08, 0.40], 0.0, [0.0, 0.0]),
-            outline(-0.93, [-0.36, 0.38], [-0.18, 0.54], 0.0, [0.0, 0.0]),
-            outline(-0.72, [-0.68, 0.69], [-0.58, 0.70], 0.05, [0.0, 0.06]),
-            outline(-0.42, [-0.88, 0.89], [-0.84, 0.84], 0.1, [0.0, 0.08]),
-            outline(-0.16, [-0.97, 0.98], [-0.96, 0.95], 0.1, [0.0, 0.10]),
-            outline(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.1, [0.0, 0.10]),
-            outline(0.06, [-0.90, 0.91], [-0.71, 0.705], 0.1, [0.0, 0.12]),
-            outline(0.16, [-0.93, 0.975], [-0.76, 0.76], 0.12, [0.0, 0.15]),
-            outline(0.28, [-0.96, 1.0], [-0.84, 0.85], 0.14, [0.0, 0.18]),
-            outline(0.42, [-0.99, 0.95], [-0.935, 0.945], 0.15, [0.0, 0.20]),
-            outline(0.54, [-1.0, 0.85], [-0.98, 0.99], 0.15, [0.0, 0.20]),
-            outline(0.66, [-0.98, 0.73], [-0.98, 1.0], 0.15, [0.0, 0.18]),
-            outline(0.80, [-0.90, 0.58], [-0.90, 0.93], 0.15, [0.0, 0.12]),
-            outline(0.92, [-0.80, 0.46], [-0.78, 0.82], 0.15, [0.0, 0.06]),
-            outline(1.04, [-0.70, 0.37], [-0.66, 0.70], 0.15, [0.0, 0.0]),
+    body: LoftForm {
+        sections: &[
+            section(-1.0, [-0.14, 0.16], [0.08, 0.40], 0.0, [0.0, 0.0]),
+            section(-0.93, [-0.36, 0.38], [-0.18, 0.54], 0.0, [0.0, 0.0]),
+            section(-0.72, [-0.68, 0.69], [-0.58, 0.70], 0.05, [0.0, 0.06]),
+            section(-0.42, [-0.88, 0.89], [-0.84, 0.84], 0.1, [0.0, 0.08]),
+            section(-0.16, [-0.97, 0.98], [-0.96, 0.95], 0.1, [0.0, 0.10]),
+            section(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.1, [0.0, 0.10]),
+            section(0.06, [-0.90, 0.91], [-0.71, 0.705], 0.1, [0.0, 0.12]),
+            section(0.16, [-0.93, 0.975], [-0.76, 0.76], 0.12, [0.0, 0.15]),
+            section(0.28, [-0.96, 1.0], [-0.84, 0.85], 0.14, [0.0, 0.18]),
+            section(0.42, [-0.99, 0.95], [-0.935, 0.945], 0.15, [0.0, 0.20]),
+            section(0.54, [-1.0, 0.85], [-0.98, 0.99], 0.15, [0.0, 0.20]),
+            section(0.66, [-0.98, 0.73], [-0.98, 1.0], 0.15, [0.0, 0.18]),
+            section(0.80, [-0.90, 0.58], [-0.90, 0.93], 0.15, [0.0, 0.12]),
+            section(0.92, [-0.80, 0.46], [-0.78, 0.82], 0.15, [0.0, 0.06]),
+            section(1.04, [-0.70, 0.37], [-0.66, 0.70], 0.15, [0.0, 0.0]),
         ],
         furrows: &[
             &[
@@ -290,10 +292,10 @@ pub const LOWER_FIRST: Form = Form {
                 place([0.48, 0.56, 1.04], 0.16, 1.3),
             ],
         ],
-        round: 0.55,
+        rounding: 0.55,
     },
     roots: &[],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.16, -0.06, 1.0], foot: [-0.34, -0.02, 0.69], horn: 1.4 },
             Cusp { tip: [-0.66, 0.04, 0.715], foot: [-0.36, 0.0, 0.68], horn: 0.0 },
@@ -341,40 +343,40 @@ pub const LOWER_FIRST: Form = Form {
         edge: 0.45,
     },
     enamel: Enamel { cusp: 1.7, fissure: 0.85, side: 0.95, full_at: 0.75, follows: 0.3 },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.4, [-0.22, 0.23], [-0.16, 0.16], 0.0, [0.0, 0.0]),
-                outline(0.0, [-0.34, 0.36], [-0.24, 0.24], 0.0, [0.0, 0.0]),
-                outline(0.28, [-0.26, 0.44], [-0.26, 0.26], 0.0, [0.0, 0.0]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.4, [-0.22, 0.23], [-0.16, 0.16], 0.0, [0.0, 0.0]),
+                section(0.0, [-0.34, 0.36], [-0.24, 0.24], 0.0, [0.0, 0.0]),
+                section(0.28, [-0.26, 0.44], [-0.26, 0.26], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.4,
+            rounding: 0.4,
         },
         horn_spread: 0.42,
-        canals: &[Canal { root: 0, at: [0.0, 0.0], orifice: [0.6, 0.36], end: 0.14, closed: 0.8 }],
+        canals: &[CanalForm { root: 0, at: [0.0, 0.0], orifice: [0.6, 0.36], end: 0.14, closed: 0.8 }],
     },
     ..UPPER_FIRST
 };
 
-pub const LOWER_SECOND: Form = Form {
+pub const LOWER_SECOND: ToothForm = ToothForm {
     sizes: sizes([8.0, 14.5], [7.0, 5.0], [8.0, 7.0], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-1.0, [-0.14, 0.16], [0.10, 0.42], 0.0, [0.0, 0.0]),
-            outline(-0.93, [-0.36, 0.38], [-0.16, 0.56], 0.0, [0.0, 0.0]),
-            outline(-0.72, [-0.68, 0.69], [-0.58, 0.70], 0.05, [0.0, 0.0]),
-            outline(-0.42, [-0.88, 0.89], [-0.84, 0.84], 0.1, [0.0, 0.03]),
-            outline(-0.16, [-0.97, 0.98], [-0.96, 0.95], 0.15, [0.0, 0.04]),
-            outline(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.2, [0.0, 0.04]),
-            outline(0.06, [-0.90, 0.91], [-0.71, 0.705], 0.25, [0.0, 0.03]),
-            outline(0.16, [-0.93, 0.97], [-0.78, 0.78], 0.30, [0.0, 0.02]),
-            outline(0.30, [-0.96, 1.0], [-0.87, 0.87], 0.36, [0.0, 0.0]),
-            outline(0.46, [-1.0, 0.96], [-0.95, 0.95], 0.40, [0.0, 0.0]),
-            outline(0.60, [-1.0, 0.88], [-1.0, 1.0], 0.40, [0.0, 0.0]),
-            outline(0.74, [-0.96, 0.77], [-0.975, 0.98], 0.40, [0.0, 0.0]),
-            outline(0.88, [-0.88, 0.65], [-0.90, 0.91], 0.40, [0.0, 0.0]),
-            outline(1.0, [-0.79, 0.54], [-0.81, 0.82], 0.40, [0.0, 0.0]),
+    body: LoftForm {
+        sections: &[
+            section(-1.0, [-0.14, 0.16], [0.10, 0.42], 0.0, [0.0, 0.0]),
+            section(-0.93, [-0.36, 0.38], [-0.16, 0.56], 0.0, [0.0, 0.0]),
+            section(-0.72, [-0.68, 0.69], [-0.58, 0.70], 0.05, [0.0, 0.0]),
+            section(-0.42, [-0.88, 0.89], [-0.84, 0.84], 0.1, [0.0, 0.03]),
+            section(-0.16, [-0.97, 0.98], [-0.96, 0.95], 0.15, [0.0, 0.04]),
+            section(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.2, [0.0, 0.04]),
+            section(0.06, [-0.90, 0.91], [-0.71, 0.705], 0.25, [0.0, 0.03]),
+            section(0.16, [-0.93, 0.97], [-0.78, 0.78], 0.30, [0.0, 0.02]),
+            section(0.30, [-0.96, 1.0], [-0.87, 0.87], 0.36, [0.0, 0.0]),
+            section(0.46, [-1.0, 0.96], [-0.95, 0.95], 0.40, [0.0, 0.0]),
+            section(0.60, [-1.0, 0.88], [-1.0, 1.0], 0.40, [0.0, 0.0]),
+            section(0.74, [-0.96, 0.77], [-0.975, 0.98], 0.40, [0.0, 0.0]),
+            section(0.88, [-0.88, 0.65], [-0.90, 0.91], 0.40, [0.0, 0.0]),
+            section(1.0, [-0.79, 0.54], [-0.81, 0.82], 0.40, [0.0, 0.0]),
         ],
         furrows: &[
             &[
@@ -399,9 +401,9 @@ pub const LOWER_SECOND: Form = Form {
                 place([0.60, 0.52, 1.04], 0.18, 1.3),
             ],
         ],
-        round: 0.55,
+        rounding: 0.55,
     },
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.38, -0.05, 1.0], foot: [-0.02, -0.02, 0.715], horn: 1.3 },
             Cusp { tip: [-0.57, -0.36, 0.93], foot: [-0.20, -0.22, 0.71], horn: 0.5 },
@@ -437,18 +439,18 @@ pub const LOWER_SECOND: Form = Form {
         edge: 0.5,
     },
     enamel: Enamel { cusp: 1.8, fissure: 0.9, side: 0.95, full_at: 0.75, follows: 0.3 },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.4, [-0.20, 0.22], [-0.16, 0.16], 0.0, [0.0, 0.0]),
-                outline(0.0, [-0.34, 0.37], [-0.25, 0.25], 0.0, [0.0, 0.0]),
-                outline(0.20, [-0.40, 0.46], [-0.30, 0.30], 0.1, [0.0, 0.0]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.4, [-0.20, 0.22], [-0.16, 0.16], 0.0, [0.0, 0.0]),
+                section(0.0, [-0.34, 0.37], [-0.25, 0.25], 0.0, [0.0, 0.0]),
+                section(0.20, [-0.40, 0.46], [-0.30, 0.30], 0.1, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.4,
+            rounding: 0.4,
         },
         horn_spread: 0.5,
-        canals: &[Canal { root: 0, at: [0.0, 0.0], orifice: [0.6, 0.36], end: 0.14, closed: 0.8 }],
+        canals: &[CanalForm { root: 0, at: [0.0, 0.0], orifice: [0.6, 0.36], end: 0.14, closed: 0.8 }],
     },
     ..LOWER_FIRST
 };

@@ -1,112 +1,118 @@
 //! The pulp: a chamber with horns, and canals that follow the roots.
 
-use super::blend::{common, joined, mix};
-use super::form::{self, Form};
-use super::section::{Limb, Lined, Section, THREAD};
+use crate::blend::{mix, smooth_intersection, smooth_union};
+use crate::form;
+use crate::form::ToothForm;
+use crate::loft::{Loft, LoftSection, MIN_PULP_HALF_WIDTH, SecondaryDentine};
 
 /// The pulp in mm.
 pub(super) struct Pulp {
-    chamber: Limb,
+    chamber: Loft,
     horns: Vec<Horn>,
     canals: Vec<Canal>,
 }
 
-/// A cone with round ends from the chamber toward a cusp.
+/// A cone with rounded ends from the chamber toward a cusp.
 struct Horn {
     base: [f32; 3],
     tip: [f32; 3],
-    /// Radius at its base and its tip.
-    wide: [f32; 2],
+    /// Radii at the base and the tip, mm.
+    radii: [f32; 2],
 }
 
 struct Canal {
-    form: form::Canal,
-    /// Heights of its end and its orifice.
+    form: form::CanalForm,
+    /// Heights of the apical end and the orifice, mm.
     end: f32,
     orifice: f32,
 }
 
-/// Radius of a horn where it leaves the chamber and at its tip, mm: young molars on CBCT, by eye.
-const HORN: [f32; 2] = [0.6, 0.2];
+/// Radii of a horn at the chamber and at its tip, mm: young molars on CBCT, estimated by eye.
+const HORN_RADII: [f32; 2] = [0.6, 0.2];
 
-/// Rounding where canals and horns meet the chamber, mm.
+/// Rounding of the junctions of canals and horns with the chamber, mm.
 const FUNNEL: f32 = 0.35;
 
-/// How far the canals reach up into the chamber, mm, so that both surely meet.
+/// Overlap of the canals with the chamber, mm, so that they are connected.
 const OVERLAP: f32 = 0.4;
 
-/// How much the floor of a chamber over a furcation rises until nothing of a pulp's shadow would be left, mm: most dentine is laid down
-/// on floor and roof, least on the walls (Philippas, *Influence of occlusal wear and age on formation of dentin and size of pulp
-/// chamber*, J Dent Res 40, 1961). The walls stay where they are written, for canals leave at their feet.
-const FLOOR: f32 = 0.5;
+/// Rise of the floor of a chamber above a furcation, extrapolated to a remaining share of 0, mm. Most secondary dentine
+/// is deposited on floor and roof, least on the walls (Philippas, *Influence of occlusal wear and age on formation of
+/// dentin and size of pulp chamber*, J Dent Res 40, 1961). The walls keep their positions, since canals begin at their
+/// base.
+const MAX_FLOOR_RISE: f32 = 0.5;
 
-/// What secondary dentine has left of a pulp, as shares of what is written.
-struct Left {
-    chamber: Lined,
+/// Remaining pulp after deposition of secondary dentine, as shares of the form.
+struct RemainingPulp {
+    chamber: SecondaryDentine,
     horn: f32,
     horn_width: f32,
-    /// How far from the axis horns leave a chamber that has come in: a thin one farther out would stand beside it.
+    /// Share of the distance from the axis at which horns leave the narrowed chamber; at the original distance, a thin
+    /// horn would lie beside it.
     spread: f32,
     canal: f32,
 }
 
-impl Left {
-    const ALL: Left = Left {
-        chamber: Lined { width: 1.0, height: 1.0, floor: 0.0 },
+impl RemainingPulp {
+    const UNCHANGED: RemainingPulp = RemainingPulp {
+        chamber: SecondaryDentine { width: 1.0, height: 1.0, floor: 0.0 },
         horn: 1.0,
         horn_width: 1.0,
         spread: 1.0,
         canal: 1.0,
     };
 
-    /// Of a pulp's shadow on an X-ray so much is left: above the neck its height falls with it, and its width by the rest. Horns go
-    /// first.
-    fn of(share: f32, has_floor: bool) -> Left {
+    /// Returns the remaining pulp for a share of its area on a radiograph. Above the neck the height decreases with the
+    /// share, and the width makes up the rest. Horns recede first.
+    fn of(share: f32, has_floor: bool) -> RemainingPulp {
         let width = 0.25 + 0.75 * share;
         let chamber = match has_floor {
-            true => Lined { width: 1.0, height: share, floor: FLOOR * (1.0 - share) },
-            false => Lined { width, height: share.min(1.0), floor: 0.0 },
+            true => SecondaryDentine { width: 1.0, height: share, floor: MAX_FLOOR_RISE * (1.0 - share) },
+            false => SecondaryDentine { width, height: share.min(1.0), floor: 0.0 },
         };
         let spread = chamber.width.min(1.0) * (1.0 - 0.4 * (1.0 - share.min(1.0)));
-        Left { chamber, horn: share * share, horn_width: share.min(1.0), spread, canal: width }
+        RemainingPulp { chamber, horn: share * share, horn_width: share.min(1.0), spread, canal: width }
     }
 }
 
 impl Pulp {
-    /// `roots` are what canals follow; `mm` turns shares x, y, z of the neck into mm.
-    pub(super) fn new(form: &Form, roots: &[Limb], mm: impl Fn([f32; 3]) -> [f32; 3], tips: &[[f32; 3]]) -> Pulp {
-        let left = form.aged.map_or(Left::ALL, |aged| Left::of(aged.pulp, !form.roots.is_empty()));
-        let chamber = Limb::new(&form.pulp.chamber, form.sides, mm).lined(form.aged.map(|_| left.chamber));
+    /// Makes the pulp of a form. Canals follow `roots`; `mm` converts shares x, y, z of the neck to mm.
+    pub(super) fn new(form: &ToothForm, roots: &[Loft], mm: impl Fn([f32; 3]) -> [f32; 3], tips: &[[f32; 3]]) -> Pulp {
+        let remaining = form
+            .age_effects
+            .map_or(RemainingPulp::UNCHANGED, |aged| RemainingPulp::of(aged.pulp_share, !form.roots.is_empty()));
+        let chamber = Loft::new(&form.pulp.chamber, form.side_metric, mm)
+            .with_secondary_dentine(form.age_effects.map(|_| remaining.chamber));
         let (floor, roof) = (chamber.lowest(), chamber.highest());
-        let wide = HORN.map(|radius| (radius * left.horn_width).max(THREAD));
+        let radii = HORN_RADII.map(|radius| (radius * remaining.horn_width).max(MIN_PULP_HALF_WIDTH));
         let horn = |(cusp, tip): (&form::Cusp, &[f32; 3])| {
-            let spread = form.pulp.horn_spread * left.spread;
-            let base = [tip[0] * spread, tip[1] * spread, roof - wide[0]];
-            let rise = (cusp.horn * left.horn + wide[0] - wide[1]) / (tip[2] - base[2]);
-            Horn { base, tip: std::array::from_fn(|a| mix(base[a], tip[a], rise)), wide }
+            let spread = form.pulp.horn_spread * remaining.spread;
+            let base = [tip[0] * spread, tip[1] * spread, roof - radii[0]];
+            let rise = (cusp.horn * remaining.horn + radii[0] - radii[1]) / (tip[2] - base[2]);
+            Horn { base, tip: std::array::from_fn(|a| mix(base[a], tip[a], rise)), radii }
         };
-        let canal = |canal: &form::Canal| {
+        let canal = |canal: &form::CanalForm| {
             let end = roots.get(canal.root).map_or(floor, |root| root.lowest() + canal.closed);
-            let narrowed = |half: f32| (half * left.canal).max(half.min(THREAD));
-            let form = form::Canal { orifice: canal.orifice.map(narrowed), end: narrowed(canal.end), ..*canal };
+            let narrowed = |half: f32| (half * remaining.canal).max(half.min(MIN_PULP_HALF_WIDTH));
+            let form = form::CanalForm { orifice: canal.orifice.map(narrowed), end: narrowed(canal.end), ..*canal };
             Canal { form, end, orifice: floor + OVERLAP }
         };
         Pulp {
-            horns: form.relief.cusps.iter().zip(tips).map(horn).collect(),
+            horns: form.occlusal.cusps.iter().zip(tips).map(horn).collect(),
             canals: form.pulp.canals.iter().map(canal).collect(),
             chamber,
         }
     }
 
-    /// `roots` are the roots cut at the same height.
-    pub(super) fn cut(&self, z: f32, roots: &[Section]) -> PulpSection<'_> {
-        let canals = self.canals.iter().filter_map(|canal| canal.cut(z, roots.get(canal.form.root)?));
-        PulpSection { z, chamber: self.chamber.cut(z), horns: &self.horns, canals: canals.collect() }
+    /// Returns the pulp at a height; `roots` are the roots at the same height.
+    pub(super) fn at_height(&self, z: f32, roots: &[LoftSection]) -> PulpSection<'_> {
+        let canals = self.canals.iter().filter_map(|canal| canal.at_height(z, roots.get(canal.form.root)?));
+        PulpSection { z, chamber: self.chamber.at_height(z), horns: &self.horns, canals: canals.collect() }
     }
 }
 
 impl Canal {
-    fn cut(&self, z: f32, root: &Section) -> Option<CanalSection> {
+    fn at_height(&self, z: f32, root: &LoftSection) -> Option<CanalSection> {
         let ends = (self.end - z).max(z - self.orifice);
         let share = ((z - self.end) / (self.orifice - self.end)).clamp(0.0, 1.0);
         let half = self.form.orifice.map(|wide| mix(self.form.end, wide, share));
@@ -114,10 +120,10 @@ impl Canal {
     }
 }
 
-/// One level of the pulp.
+/// The pulp at one height.
 pub(super) struct PulpSection<'a> {
     z: f32,
-    chamber: Section,
+    chamber: LoftSection,
     horns: &'a [Horn],
     canals: Vec<CanalSection>,
 }
@@ -129,11 +135,11 @@ struct CanalSection {
 }
 
 impl PulpSection<'_> {
-    /// Signed distance to the pulp.
+    /// Returns the signed distance from the pulp, mm.
     pub(super) fn distance(&self, at: [f32; 2]) -> f32 {
         let horns = self.horns.iter().map(|horn| horn.distance([at[0], at[1], self.z]));
         let canals = self.canals.iter().map(|canal| canal.distance(at));
-        horns.chain(canals).fold(self.chamber.distance(at), |a, b| joined(a, b, FUNNEL))
+        horns.chain(canals).fold(self.chamber.distance(at), |a, b| smooth_union(a, b, FUNNEL))
     }
 }
 
@@ -143,7 +149,7 @@ impl Horn {
         let from: [f32; 3] = std::array::from_fn(|a| at[a] - self.base[a]);
         let t = (dot(from, along) / dot(along, along)).clamp(0.0, 1.0);
         let beside: [f32; 3] = std::array::from_fn(|a| from[a] - t * along[a]);
-        dot(beside, beside).sqrt() - mix(self.wide[0], self.wide[1], t)
+        dot(beside, beside).sqrt() - mix(self.radii[0], self.radii[1], t)
     }
 }
 
@@ -154,7 +160,7 @@ impl CanalSection {
         let norm = (u * u + v * v).sqrt();
         let narrow = self.half[0].min(self.half[1]);
         let side = if norm < 1e-3 { -narrow } else { (dx * dx + dy * dy).sqrt() * (1.0 - 1.0 / norm) };
-        common(side, self.ends, narrow)
+        smooth_intersection(side, self.ends, narrow)
     }
 }
 

@@ -1,15 +1,15 @@
-//! The 32 permanent teeth by their numbers (ISO 3950, "FDI").
+//! The 32 permanent teeth by their numbers (ISO 3950, FDI).
 //!
-//! Buccal, distal and occlusal are a right-handed space in the upper right (11–18) and the lower left (31–38) of a mouth, and a
-//! left-handed one in the upper left and the lower right. Tooth space is right-handed everywhere: x is buccal and z occlusal in
-//! all four quadrants, y is distal in the first and third and mesial in the second and fourth.
+//! Buccal, distal and occlusal are a right-handed space in the upper right (11–18) and the lower left quadrant (31–38),
+//! and a left-handed one in the upper left and the lower right quadrant. Tooth space is right-handed everywhere: x is
+//! buccal and z occlusal in all four quadrants; y is distal in the first and third, mesial in the second and fourth.
 
-use super::age::Aged;
-use super::form::Form;
-use super::{canines, incisors, lower_molars, molar, premolars, upper_molars};
+use crate::age::AgeEffects;
+use crate::form::ToothForm;
+use crate::{canines, incisors, lower_first_molar, lower_molars, premolars, upper_molars};
 
-/// Upper teeth from the midline outward, as in the upper right.
-pub const UPPER: [Form; 8] = [
+/// Upper teeth from the midline outward, in the form of the upper right quadrant.
+pub const UPPER: [ToothForm; 8] = [
     incisors::UPPER_CENTRAL,
     incisors::UPPER_LATERAL,
     canines::UPPER,
@@ -20,20 +20,21 @@ pub const UPPER: [Form; 8] = [
     upper_molars::THIRD,
 ];
 
-/// Lower teeth from the midline outward, as in the lower left.
-pub const LOWER: [Form; 8] = [
+/// Lower teeth from the midline outward, in the form of the lower left quadrant.
+pub const LOWER: [ToothForm; 8] = [
     incisors::LOWER_CENTRAL,
     incisors::LOWER_LATERAL,
     canines::LOWER,
     premolars::LOWER_FIRST,
     premolars::LOWER_SECOND,
-    molar::LOWER_FIRST,
+    lower_first_molar::LOWER_FIRST,
     lower_molars::SECOND,
     lower_molars::THIRD,
 ];
 
-/// The form of a permanent tooth, mirrored where its side needs it; `None` for a number that no tooth has.
-pub fn tooth(fdi: u8) -> Option<Form> {
+/// Returns the form of a permanent tooth, mirrored if its side requires it; `None` for a number that is not an FDI
+/// tooth number.
+pub fn tooth(fdi: u8) -> Option<ToothForm> {
     let (quadrant, position) = (fdi / 10, usize::from(fdi % 10));
     let half = match quadrant {
         1 | 2 => &UPPER,
@@ -41,27 +42,27 @@ pub fn tooth(fdi: u8) -> Option<Form> {
         _ => return None,
     };
     let form = half.get(position.checked_sub(1)?)?;
-    Some(Form { is_mirrored: is_mirrored(fdi), ..*form })
+    Some(ToothForm { is_mirrored: is_mirrored(fdi), ..*form })
 }
 
-/// The same as it is in a mouth of so many years; as written without.
-pub fn tooth_of_age(fdi: u8, years: Option<f32>) -> Option<Form> {
-    let aged = years.and_then(|years| Aged::of(fdi, years));
-    tooth(fdi).map(|form| Form { aged, ..form })
+/// Returns the form of a permanent tooth at an age in years; without an age, the unworn form.
+pub fn tooth_of_age(fdi: u8, years: Option<f32>) -> Option<ToothForm> {
+    let aged = years.and_then(|years| AgeEffects::of(fdi, years));
+    tooth(fdi).map(|form| ToothForm { age_effects: aged, ..form })
 }
 
-/// All numbers, quadrant by quadrant, from the midline outward.
+/// Returns all tooth numbers, quadrant by quadrant, from the midline outward.
 pub fn numbers() -> impl Iterator<Item = u8> {
     (1..=4).flat_map(|quadrant| (1..=8).map(move |position| 10 * quadrant + position))
 }
 
-/// True in the upper left and the lower right: y is mesial in tooth space.
+/// Returns true for teeth of the upper left and the lower right quadrant, in which y is mesial in tooth space.
 pub fn is_mirrored(fdi: u8) -> bool {
     matches!(fdi / 10, 2 | 4)
 }
 
-/// Which way along y of tooth space is distal: 1 or −1.
-pub fn distal(fdi: u8) -> f32 {
+/// Returns the sign of the distal direction along y of tooth space: 1 or −1.
+pub fn distal_sign(fdi: u8) -> f32 {
     if is_mirrored(fdi) { -1.0 } else { 1.0 }
 }
 

@@ -1,21 +1,22 @@
-//! Upper molars, as written for the upper right.
+//! Upper molars, in the form of the upper right quadrant.
 //!
-//! Sizes: Wheeler's table (Ash & Nelson). Shape, by eye after the same book: a rhombic chewing surface with acute mesiobuccal and
-//! distolingual corners; the mesiolingual cusp the largest, tied to the distobuccal one by the oblique ridge; a central fossa
-//! before it and a smaller one behind; two buccal roots and a palatal one, the longest. From the first to the third the
-//! distolingual cusp shrinks until it is gone, and the roots come together. Chamber: Deutsch & Musikant 2004.
+//! Sizes: Wheeler's table (Ash & Nelson). Shape, estimated by eye after the same book: a rhomboid occlusal surface with
+//! acute mesiobuccal and distolingual corners; the mesiolingual cusp is the largest and is joined to the distobuccal
+//! cusp by the oblique ridge; the central fossa is mesial of the ridge, a smaller fossa distal of it; two buccal roots
+//! and a palatal root, the longest. From the first to the third molar the distolingual cusp decreases until it is
+//! absent, and the roots converge. Chamber: Deutsch & Musikant 2004.
 
-use super::form::{
-    Canal, Crest, Cusp, Enamel, Form, Furrow, Limb, Pulp, Relief, Sides, beside_ridge, groove, outline, place, sizes,
-    skewed,
+use crate::form::{
+    CanalForm, Crest, Cusp, Enamel, Furrow, LoftForm, OcclusalForm, PulpForm, SideMetric, ToothForm, beside_ridge,
+    groove, place, section, sizes, skewed,
 };
 
-pub const FIRST: Form = Form {
+pub const FIRST: ToothForm = ToothForm {
     sizes: sizes([7.5, 13.0], [10.0, 8.0], [11.0, 10.0], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-0.27, [-0.72, 0.72], [-0.66, 0.66], 0.4, [0.0, 0.0]),
-            outline(-0.14, [-0.90, 0.90], [-0.87, 0.86], 0.45, [-0.02, 0.02]),
+    body: LoftForm {
+        sections: &[
+            section(-0.27, [-0.72, 0.72], [-0.66, 0.66], 0.4, [0.0, 0.0]),
+            section(-0.14, [-0.90, 0.90], [-0.87, 0.86], 0.45, [-0.02, 0.02]),
             skewed(-0.05, [-0.97, 0.97], [-0.96, 0.95], 0.45, [-0.03, 0.02], -0.03),
             skewed(0.0, [-1.0, 1.0], [-1.0, 0.99], 0.45, [-0.04, 0.02], -0.04),
             skewed(0.08, [-0.93, 0.935], [-0.82, 0.82], 0.45, [-0.04, 0.0], -0.05),
@@ -51,18 +52,18 @@ pub const FIRST: Form = Form {
                 place([-0.16, 0.80, -0.29], 1.2, 2.0),
             ],
         ],
-        round: 0.8,
+        rounding: 0.8,
     },
     roots: &[
         // Mesiobuccal: broad and flat, its apex bent distally.
-        Limb {
-            outlines: &[
-                outline(-0.05, [0.02, 0.96], [-0.95, -0.03], 0.35, [0.0, 0.0]),
-                outline(-0.18, [0.06, 0.94], [-0.94, -0.10], 0.35, [0.0, 0.0]),
-                outline(-0.38, [0.20, 0.97], [-0.98, -0.28], 0.3, [0.0, 0.0]),
-                outline(-0.58, [0.33, 0.97], [-1.0, -0.42], 0.2, [0.0, 0.0]),
-                outline(-0.78, [0.46, 0.90], [-0.90, -0.44], 0.1, [0.0, 0.0]),
-                outline(-0.923, [0.56, 0.78], [-0.66, -0.36], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [0.02, 0.96], [-0.95, -0.03], 0.35, [0.0, 0.0]),
+                section(-0.18, [0.06, 0.94], [-0.94, -0.10], 0.35, [0.0, 0.0]),
+                section(-0.38, [0.20, 0.97], [-0.98, -0.28], 0.3, [0.0, 0.0]),
+                section(-0.58, [0.33, 0.97], [-1.0, -0.42], 0.2, [0.0, 0.0]),
+                section(-0.78, [0.46, 0.90], [-0.90, -0.44], 0.1, [0.0, 0.0]),
+                section(-0.923, [0.56, 0.78], [-0.66, -0.36], 0.0, [0.0, 0.0]),
             ],
             furrows: &[
                 &[
@@ -76,40 +77,40 @@ pub const FIRST: Form = Form {
                     place([0.68, -0.4, -0.8], 0.0, 1.0),
                 ],
             ],
-            round: 0.6,
+            rounding: 0.6,
         },
         // Distobuccal: smaller and rounder.
-        Limb {
-            outlines: &[
-                outline(-0.05, [0.10, 0.93], [0.03, 0.94], 0.35, [0.0, 0.0]),
-                outline(-0.18, [0.18, 0.91], [0.14, 0.92], 0.3, [0.0, 0.0]),
-                outline(-0.38, [0.32, 0.90], [0.34, 0.97], 0.2, [0.0, 0.0]),
-                outline(-0.58, [0.42, 0.88], [0.47, 1.0], 0.1, [0.0, 0.0]),
-                outline(-0.76, [0.50, 0.82], [0.55, 0.96], 0.05, [0.0, 0.0]),
-                outline(-0.90, [0.56, 0.74], [0.60, 0.84], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [0.10, 0.93], [0.03, 0.94], 0.35, [0.0, 0.0]),
+                section(-0.18, [0.18, 0.91], [0.14, 0.92], 0.3, [0.0, 0.0]),
+                section(-0.38, [0.32, 0.90], [0.34, 0.97], 0.2, [0.0, 0.0]),
+                section(-0.58, [0.42, 0.88], [0.47, 1.0], 0.1, [0.0, 0.0]),
+                section(-0.76, [0.50, 0.82], [0.55, 0.96], 0.05, [0.0, 0.0]),
+                section(-0.90, [0.56, 0.74], [0.60, 0.84], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.55,
+            rounding: 0.55,
         },
-        // Palatal: the longest, away from the others and a little back toward them.
-        Limb {
-            outlines: &[
-                outline(-0.05, [-0.97, -0.02], [-0.86, 0.88], 0.35, [0.0, 0.0]),
-                outline(-0.18, [-0.96, -0.12], [-0.74, 0.76], 0.3, [0.0, 0.0]),
-                outline(-0.38, [-1.06, -0.38], [-0.60, 0.62], 0.2, [0.0, 0.0]),
-                outline(-0.58, [-1.14, -0.60], [-0.50, 0.53], 0.1, [0.0, 0.0]),
-                outline(-0.80, [-1.12, -0.73], [-0.34, 0.40], 0.05, [0.0, 0.0]),
-                outline(-1.0, [-1.02, -0.82], [-0.14, 0.24], 0.0, [0.0, 0.0]),
+        // Palatal: the longest, diverging from the others and curving slightly back toward them.
+        LoftForm {
+            sections: &[
+                section(-0.05, [-0.97, -0.02], [-0.86, 0.88], 0.35, [0.0, 0.0]),
+                section(-0.18, [-0.96, -0.12], [-0.74, 0.76], 0.3, [0.0, 0.0]),
+                section(-0.38, [-1.06, -0.38], [-0.60, 0.62], 0.2, [0.0, 0.0]),
+                section(-0.58, [-1.14, -0.60], [-0.50, 0.53], 0.1, [0.0, 0.0]),
+                section(-0.80, [-1.12, -0.73], [-0.34, 0.40], 0.05, [0.0, 0.0]),
+                section(-1.0, [-1.02, -0.82], [-0.14, 0.24], 0.0, [0.0, 0.0]),
             ],
             furrows: &[&[
                 place([-1.0, 0.0, -0.14], 0.0, 1.2),
                 place([-1.14, 0.0, -0.45], 0.25, 1.3),
                 place([-1.1, 0.0, -0.85], 0.0, 1.0),
             ]],
-            round: 0.6,
+            rounding: 0.6,
         },
     ],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: MESIOBUCCAL, foot: [0.06, -0.22, 0.69], horn: 1.0 },
             Cusp { tip: DISTOBUCCAL, foot: [0.10, 0.14, 0.745], horn: 0.6 },
@@ -142,7 +143,7 @@ pub const FIRST: Form = Form {
                 0.36,
             ),
             groove(&[[0.02, -0.12, 1.0], [-0.03, -0.30, 0.8], [0.02, -0.46, 0.8], [-0.02, -0.62, 1.0]], 0.40, 0.34),
-            // Over the oblique ridge, hardly to be seen.
+            // Over the oblique ridge, very shallow.
             groove(&[[0.02, -0.12, 0.9], [-0.02, 0.08, 0.35], [-0.06, 0.28, 0.4], [-0.12, 0.50, 0.9]], 0.30, 0.32),
             // The distolingual groove, along the oblique ridge from the distal pit to the lingual side.
             groove(
@@ -164,9 +165,9 @@ pub const FIRST: Form = Form {
     },
     enamel: Enamel { cusp: 2.15, fissure: 1.1, side: 1.1, full_at: 0.8, follows: 0.0 },
     pulp: PULP,
-    sides: Sides::AlongNormals,
+    side_metric: SideMetric::AlongNormals,
     is_mirrored: false,
-    aged: None,
+    age_effects: None,
 };
 
 const MESIOBUCCAL: [f32; 3] = [0.56, -0.48, 0.98];
@@ -179,31 +180,31 @@ const OBLIQUE_RIDGE: Crest =
 const BUCCAL_GROOVE: Furrow =
     &[place([0.97, -0.09, 0.97], 0.5, 1.0), place([1.0, -0.08, 0.62], 0.3, 0.8), place([1.0, -0.07, 0.38], 0.0, 0.6)];
 
-/// Roof at the level of the neckline, floor 3 mm above the furcation.
-const PULP: Pulp = Pulp {
-    chamber: Limb {
-        outlines: &[
-            outline(-0.06, [-0.56, 0.62], [-0.60, 0.52], 0.3, [-0.15, 0.0]),
-            outline(0.14, [-0.54, 0.58], [-0.56, 0.48], 0.3, [-0.15, 0.0]),
+/// Pulp with its roof at the height of the cervical line and its floor 3 mm above the furcation.
+const PULP: PulpForm = PulpForm {
+    chamber: LoftForm {
+        sections: &[
+            section(-0.06, [-0.56, 0.62], [-0.60, 0.52], 0.3, [-0.15, 0.0]),
+            section(0.14, [-0.54, 0.58], [-0.56, 0.48], 0.3, [-0.15, 0.0]),
         ],
         furrows: &[],
-        round: 0.5,
+        rounding: 0.5,
     },
     horn_spread: 0.62,
     canals: &[
-        Canal { root: 0, at: [-0.14, 0.30], orifice: [0.45, 0.35], end: 0.15, closed: 0.8 },
-        Canal { root: 1, at: [-0.30, -0.36], orifice: [0.35, 0.35], end: 0.15, closed: 0.8 },
-        Canal { root: 2, at: [0.0, 0.0], orifice: [0.5, 0.55], end: 0.18, closed: 0.8 },
+        CanalForm { root: 0, at: [-0.14, 0.30], orifice: [0.45, 0.35], end: 0.15, closed: 0.8 },
+        CanalForm { root: 1, at: [-0.30, -0.36], orifice: [0.35, 0.35], end: 0.15, closed: 0.8 },
+        CanalForm { root: 2, at: [0.0, 0.0], orifice: [0.5, 0.55], end: 0.18, closed: 0.8 },
     ],
 };
 
-/// Its distolingual cusp is small, its roots stand closer and lean distally.
-pub const SECOND: Form = Form {
+/// Upper second molar. Its distolingual cusp is small; its roots are closer together and incline distally.
+pub const SECOND: ToothForm = ToothForm {
     sizes: sizes([7.0, 12.0], [9.0, 7.0], [11.0, 10.0], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-0.30, [-0.70, 0.70], [-0.66, 0.68], 0.4, [0.0, 0.0]),
-            outline(-0.15, [-0.90, 0.90], [-0.87, 0.87], 0.42, [-0.02, 0.03]),
+    body: LoftForm {
+        sections: &[
+            section(-0.30, [-0.70, 0.70], [-0.66, 0.68], 0.4, [0.0, 0.0]),
+            section(-0.15, [-0.90, 0.90], [-0.87, 0.87], 0.42, [-0.02, 0.03]),
             skewed(-0.05, [-0.97, 0.97], [-0.96, 0.95], 0.42, [-0.03, 0.03], -0.03),
             skewed(0.0, [-1.0, 1.0], [-1.0, 1.0], 0.42, [-0.04, 0.03], -0.04),
             skewed(0.08, [-0.925, 0.93], [-0.785, 0.785], 0.42, [-0.05, 0.02], -0.06),
@@ -237,51 +238,51 @@ pub const SECOND: Form = Form {
                 place([-0.16, 0.80, -0.34], 1.1, 1.8),
             ],
         ],
-        round: 0.8,
+        rounding: 0.8,
     },
     roots: &[
-        Limb {
-            outlines: &[
-                outline(-0.05, [0.02, 0.96], [-0.95, -0.02], 0.35, [0.0, 0.0]),
-                outline(-0.20, [0.04, 0.93], [-0.93, -0.06], 0.35, [0.0, 0.0]),
-                outline(-0.42, [0.14, 0.88], [-0.88, -0.16], 0.25, [0.0, 0.0]),
-                outline(-0.62, [0.26, 0.82], [-0.78, -0.20], 0.15, [0.0, 0.0]),
-                outline(-0.80, [0.38, 0.74], [-0.60, -0.16], 0.05, [0.0, 0.0]),
-                outline(-0.917, [0.46, 0.64], [-0.36, -0.06], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [0.02, 0.96], [-0.95, -0.02], 0.35, [0.0, 0.0]),
+                section(-0.20, [0.04, 0.93], [-0.93, -0.06], 0.35, [0.0, 0.0]),
+                section(-0.42, [0.14, 0.88], [-0.88, -0.16], 0.25, [0.0, 0.0]),
+                section(-0.62, [0.26, 0.82], [-0.78, -0.20], 0.15, [0.0, 0.0]),
+                section(-0.80, [0.38, 0.74], [-0.60, -0.16], 0.05, [0.0, 0.0]),
+                section(-0.917, [0.46, 0.64], [-0.36, -0.06], 0.0, [0.0, 0.0]),
             ],
             furrows: &[&[
                 place([0.50, -1.0, -0.14], 0.0, 1.0),
                 place([0.54, -0.94, -0.45], 0.22, 1.2),
                 place([0.58, -0.7, -0.8], 0.0, 0.9),
             ]],
-            round: 0.55,
+            rounding: 0.55,
         },
-        Limb {
-            outlines: &[
-                outline(-0.05, [0.10, 0.93], [0.02, 0.94], 0.35, [0.0, 0.0]),
-                outline(-0.20, [0.14, 0.89], [0.10, 0.93], 0.3, [0.0, 0.0]),
-                outline(-0.42, [0.26, 0.83], [0.28, 0.97], 0.2, [0.0, 0.0]),
-                outline(-0.62, [0.35, 0.77], [0.42, 0.99], 0.1, [0.0, 0.0]),
-                outline(-0.80, [0.42, 0.68], [0.54, 0.96], 0.05, [0.0, 0.0]),
-                outline(-0.90, [0.46, 0.62], [0.62, 0.90], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [0.10, 0.93], [0.02, 0.94], 0.35, [0.0, 0.0]),
+                section(-0.20, [0.14, 0.89], [0.10, 0.93], 0.3, [0.0, 0.0]),
+                section(-0.42, [0.26, 0.83], [0.28, 0.97], 0.2, [0.0, 0.0]),
+                section(-0.62, [0.35, 0.77], [0.42, 0.99], 0.1, [0.0, 0.0]),
+                section(-0.80, [0.42, 0.68], [0.54, 0.96], 0.05, [0.0, 0.0]),
+                section(-0.90, [0.46, 0.62], [0.62, 0.90], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.5,
+            rounding: 0.5,
         },
-        Limb {
-            outlines: &[
-                outline(-0.05, [-0.97, -0.02], [-0.84, 0.88], 0.35, [0.0, 0.0]),
-                outline(-0.20, [-0.93, -0.10], [-0.70, 0.78], 0.3, [0.0, 0.0]),
-                outline(-0.42, [-0.94, -0.30], [-0.52, 0.68], 0.2, [0.0, 0.0]),
-                outline(-0.62, [-0.95, -0.46], [-0.36, 0.62], 0.1, [0.0, 0.0]),
-                outline(-0.82, [-0.90, -0.56], [-0.14, 0.56], 0.05, [0.0, 0.0]),
-                outline(-1.0, [-0.80, -0.62], [0.10, 0.46], 0.0, [0.0, 0.0]),
+        LoftForm {
+            sections: &[
+                section(-0.05, [-0.97, -0.02], [-0.84, 0.88], 0.35, [0.0, 0.0]),
+                section(-0.20, [-0.93, -0.10], [-0.70, 0.78], 0.3, [0.0, 0.0]),
+                section(-0.42, [-0.94, -0.30], [-0.52, 0.68], 0.2, [0.0, 0.0]),
+                section(-0.62, [-0.95, -0.46], [-0.36, 0.62], 0.1, [0.0, 0.0]),
+                section(-0.82, [-0.90, -0.56], [-0.14, 0.56], 0.05, [0.0, 0.0]),
+                section(-1.0, [-0.80, -0.62], [0.10, 0.46], 0.0, [0.0, 0.0]),
             ],
             furrows: &[],
-            round: 0.55,
+            rounding: 0.55,
         },
     ],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.56, -0.46, 0.985], foot: [0.06, -0.20, 0.69], horn: 1.0 },
             Cusp { tip: [0.46, 0.28, 0.935], foot: [0.08, 0.14, 0.74], horn: 0.5 },
@@ -327,20 +328,20 @@ pub const SECOND: Form = Form {
             beside_ridge(&[[0.06, 0.24, 0.6], [0.20, 0.36, 0.9], [0.32, 0.48, 0.0]]),
         ],
         floor: 0.62,
-        ..FIRST.relief
+        ..FIRST.occlusal
     },
     ..FIRST
 };
 
-/// Three cusps around one fossa, a heart in outline, its roots grown together.
-pub const THIRD: Form = Form {
+/// Upper third molar: three cusps around one fossa, a heart-shaped outline, and fused roots.
+pub const THIRD: ToothForm = ToothForm {
     sizes: sizes([6.5, 11.0], [8.5, 6.5], [10.0, 9.5], [1.0, 0.0]),
-    body: Limb {
-        outlines: &[
-            outline(-1.0, [-0.14, 0.14], [0.42, 0.78], 0.0, [0.0, 0.0]),
-            outline(-0.92, [-0.38, 0.36], [0.04, 0.92], 0.05, [0.0, 0.05]),
-            outline(-0.72, [-0.64, 0.62], [-0.42, 0.96], 0.15, [0.0, 0.10]),
-            outline(-0.42, [-0.85, 0.83], [-0.78, 0.98], 0.3, [-0.02, 0.12]),
+    body: LoftForm {
+        sections: &[
+            section(-1.0, [-0.14, 0.14], [0.42, 0.78], 0.0, [0.0, 0.0]),
+            section(-0.92, [-0.38, 0.36], [0.04, 0.92], 0.05, [0.0, 0.05]),
+            section(-0.72, [-0.64, 0.62], [-0.42, 0.96], 0.15, [0.0, 0.10]),
+            section(-0.42, [-0.85, 0.83], [-0.78, 0.98], 0.3, [-0.02, 0.12]),
             skewed(-0.16, [-0.96, 0.95], [-0.95, 0.99], 0.35, [-0.04, 0.12], -0.02),
             skewed(0.0, [-1.0, 1.0], [-1.0, 1.0], 0.35, [-0.06, 0.12], -0.03),
             skewed(0.08, [-0.965, 0.97], [-0.78, 0.775], 0.35, [-0.08, 0.12], -0.04),
@@ -353,7 +354,7 @@ pub const THIRD: Form = Form {
         ],
         furrows: &[
             BUCCAL_GROOVE,
-            // Where the fused roots meet.
+            // Furrow between the fused roots.
             &[
                 place([1.0, 0.08, -0.12], 0.0, 1.2),
                 place([0.88, 0.16, -0.42], 0.5, 1.4),
@@ -372,10 +373,10 @@ pub const THIRD: Form = Form {
                 place([-0.16, 0.97, -0.8], 0.0, 1.0),
             ],
         ],
-        round: 0.7,
+        rounding: 0.7,
     },
     roots: &[],
-    relief: Relief {
+    occlusal: OcclusalForm {
         cusps: &[
             Cusp { tip: [0.54, -0.44, 1.02], foot: [0.06, -0.14, 0.71], horn: 0.7 },
             Cusp { tip: [0.46, 0.30, 0.93], foot: [0.06, 0.10, 0.72], horn: 0.3 },
@@ -411,18 +412,18 @@ pub const THIRD: Form = Form {
             beside_ridge(&[[-0.06, 0.04, 0.7], [-0.22, 0.08, 0.9], [-0.38, 0.10, 0.0]]),
         ],
         floor: 0.64,
-        ..FIRST.relief
+        ..FIRST.occlusal
     },
-    pulp: Pulp {
-        chamber: Limb {
-            outlines: &[
-                outline(-0.90, [-0.05, 0.05], [0.48, 0.62], 0.0, [0.0, 0.0]),
-                outline(-0.60, [-0.14, 0.14], [0.14, 0.40], 0.0, [0.0, 0.0]),
-                outline(-0.25, [-0.34, 0.36], [-0.30, 0.34], 0.1, [0.0, 0.0]),
-                outline(0.14, [-0.46, 0.50], [-0.46, 0.40], 0.2, [0.0, 0.05]),
+    pulp: PulpForm {
+        chamber: LoftForm {
+            sections: &[
+                section(-0.90, [-0.05, 0.05], [0.48, 0.62], 0.0, [0.0, 0.0]),
+                section(-0.60, [-0.14, 0.14], [0.14, 0.40], 0.0, [0.0, 0.0]),
+                section(-0.25, [-0.34, 0.36], [-0.30, 0.34], 0.1, [0.0, 0.0]),
+                section(0.14, [-0.46, 0.50], [-0.46, 0.40], 0.2, [0.0, 0.05]),
             ],
             furrows: &[],
-            round: 0.2,
+            rounding: 0.2,
         },
         horn_spread: 0.65,
         canals: &[],

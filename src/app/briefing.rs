@@ -1,21 +1,21 @@
-//! Before an exercise: what is asked, in how much time, and with what.
+//! The briefing before an exercise: the task, the time allowed and the instruments.
 
-use super::command::Command;
-use super::language::Words;
-use super::look;
-use crate::lesson;
-use crate::scenario::{Scenario, Stage};
+use super::command::AppCommand;
+use super::i18n::Translations;
+use super::theme;
 use eframe::egui;
+use typodont_exercise::scenario::{Scenario, Stage};
+use typodont_lesson as lesson;
 
-/// The exercise's instructions, and whose work it will be.
+/// Draws the exercise's instructions, and the field for the participant code.
 pub fn briefing_ui(
     ui: &mut egui::Ui,
     scenario: &Scenario,
     participant: &mut String,
-    words: &Words,
-    asked: &mut Vec<Command>,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
 ) {
-    look::column(ui, |ui| {
+    theme::centered_column(ui, |ui| {
         ui.heading(&scenario.title);
         ui.label(&scenario.summary);
         ui.add_space(16.0);
@@ -27,34 +27,40 @@ pub fn briefing_ui(
         });
         ui.add_space(16.0);
         ui.horizontal(|ui| {
-            let label = ui.label(words.of("briefing.participant")).id;
+            let label = ui.label(words.get("briefing.participant")).id;
             let edit = egui::TextEdit::singleline(participant).char_limit(64).desired_width(180.0);
-            ui.add(edit.hint_text(words.of("briefing.participant_hint"))).labelled_by(label);
+            ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
         });
-        if !lesson::is_code(participant) {
-            ui.colored_label(look::WRONG, words.of("briefing.participant_wrong"));
+        if !lesson::is_valid_participant_code(participant) {
+            ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
         }
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            if ui.add_enabled(lesson::is_code(participant), look::main_button(words.of("briefing.begin"))).clicked() {
-                asked.push(Command::Begin);
+            if ui
+                .add_enabled(
+                    lesson::is_valid_participant_code(participant),
+                    theme::primary_button(words.get("briefing.begin")),
+                )
+                .clicked()
+            {
+                commands.push(AppCommand::BeginLesson);
             }
-            if ui.button(words.of("briefing.back")).clicked() {
-                asked.push(Command::ToShelf);
+            if ui.button(words.get("briefing.back")).clicked() {
+                commands.push(AppCommand::BackToList);
             }
         });
     });
 }
 
-fn stage_ui(ui: &mut egui::Ui, scenario: &Scenario, stage: &Stage, number: usize, words: &Words) {
+fn stage_ui(ui: &mut egui::Ui, scenario: &Scenario, stage: &Stage, number: usize, words: &Translations) {
     egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(8).inner_margin(14).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.label(egui::RichText::new(format!("{number}. {}", stage.title)).strong().size(18.0));
         ui.label(&stage.instruction);
         let tray: Vec<&str> = stage.instruments.iter().map(|&i| scenario.instruments[i].title.as_str()).collect();
-        ui.weak(words.with("briefing.tray", tray.join(", ")));
+        ui.weak(words.format("briefing.tray", tray.join(", ")));
         if let Some(limit) = stage.time_limit {
-            ui.weak(words.with("briefing.limit", super::practice::clock(limit)));
+            ui.weak(words.format("briefing.limit", super::practice::format_time(limit)));
         }
     });
     ui.add_space(6.0);

@@ -1,99 +1,95 @@
-//! What screens ask for, as sentences, and which screens there are.
+//! Commands that screens send to the application.
 
-use super::author::{Ask, Authoring};
-use super::results::Results;
+use super::camera_preset::CameraPreset;
+use super::editor::EditorCommand;
+use super::lesson_scene::DisplayMode;
 use super::settings::Settings;
-use super::sitting::{Sitting, Way};
-use super::transfer::Curves;
-use super::views::View;
-use crate::session::{Answer, Sign};
-use crate::touch::Coefficient;
-use crate::volume::Label;
+use super::transfer_function_draft::TransferFunctionDraft;
 use eframe::egui;
 use std::path::PathBuf;
+use typodont_core::touch::Coefficient;
+use typodont_core::volume::Label;
+use typodont_exercise::session::{AnswerValue, ChartInput};
 
-/// What a screen asks for.
+/// A command of a screen.
 #[derive(Clone, Debug)]
-pub enum Command {
-    /// An exercise of the shelf, by place.
-    Choose(usize),
-    /// The one so many places further down.
-    ChooseNext(i32),
-    /// The chosen one's instructions.
-    Open,
-    LookInto(PathBuf),
-    ToShelf,
-    /// The lesson.
-    Begin,
-    /// A new one, to be written.
+pub enum AppCommand {
+    /// Selects an exercise by its index in the list.
+    SelectExercise(usize),
+    /// Moves the selection down the list by this many places; negative is up.
+    SelectNextExercise(i32),
+    /// Shows the instructions of the selected exercise.
+    OpenBriefing,
+    OpenFolder(PathBuf),
+    BackToList,
+    /// Begins the lesson.
+    BeginLesson,
+    /// Opens a new exercise at the author's screen.
     NewExercise,
-    /// The chosen one, to be changed.
+    /// Opens the selected exercise at the author's screen.
     EditExercise,
-    /// At the author's screen.
-    Author(Ask),
-    Take(usize),
-    Answer(String, Answer),
-    /// Into the periodontal chart, where the instrument is.
-    Chart(Sign),
-    Confirm,
+    /// A command of the author's screen.
+    Editor(EditorCommand),
+    /// A command of the practice screen; without effect on other screens.
+    Practice(PracticeCommand),
+    /// A movement of the camera, in a lesson or at the author's screen.
+    Camera(CameraCommand),
+    OpenReport,
+    ShowShortcuts(bool),
+    ShowSettings(bool),
+    ApplySettings(Box<Settings>),
+    /// Closes the window (asks first if work would be lost), or withdraws that request.
+    CloseWindow(bool),
+}
+
+/// A command of the practice screen, for the running lesson and its questionnaire.
+#[derive(Clone, Debug)]
+pub enum PracticeCommand {
+    SelectInstrument(usize),
+    AnswerQuestion(String, AnswerValue),
+    /// Records an entry in the periodontal chart, at the site of the instrument.
+    AddToChart(ChartInput),
+    ConfirmStage,
     Pause(bool),
-    /// Asks whether to give up, or takes that back.
-    GiveUp(bool),
+    /// Opens or closes the question before aborting the lesson.
+    AskToAbort(bool),
     Abort,
-    /// Another value for one of a tissue's coefficients.
-    Adjust(Label, Coefficient, f32),
-    Show(Way),
-    /// A transfer function of one's own.
-    Draw(Box<Curves>),
-    /// The pointer becomes the hand, or is freed.
-    HoldPointer(bool),
-    /// Brings the pointer back to a place of the window, in points.
+    /// Sets one coefficient of a tissue.
+    AdjustCoefficient(Label, Coefficient, f32),
+    SetDisplayMode(DisplayMode),
+    /// Sets a transfer function drawn by the user.
+    SetTransferFunction(Box<TransferFunctionDraft>),
+    /// Makes the pointer act as the device, or releases it.
+    CapturePointer(bool),
+    /// Moves the pointer back to a position in the window, points.
     CentrePointer(egui::Pos2),
-    /// In pixels of the mouse.
+    /// Moves the hand in the plane of the view, mouse counts.
     MoveHand {
         right: f32,
         down: f32,
     },
-    /// In steps of the wheel.
-    MoveDeeper(f32),
-    PressHandle {
+    /// Moves the hand in depth, steps of the mouse wheel.
+    MoveHandDepth(f32),
+    SetDeviceButton {
         bit: u32,
         is_down: bool,
     },
-    /// The mouth opens by so many degrees.
-    OpenMouth(f32),
-    Look(View),
-    /// The camera; rad.
-    Turn {
-        right: f32,
-        up: f32,
-    },
-    /// By a factor of the distance.
-    Nearer(f32),
-    /// In shares of the picture's height.
-    Shift {
-        right: f32,
-        up: f32,
-    },
-    Rate(String, u8),
-    NextStatement(i32),
-    /// Asks first while statements are open.
-    HandIn,
-    ShowReport,
-    ShowKeys(bool),
-    ShowSettings(bool),
-    Set(Box<Settings>),
-    /// The window is to be closed; asks first where something would be lost, or takes that back.
-    Close(bool),
+    /// Opens the mouth further by this angle, degrees; negative closes it.
+    AdjustMouthOpening(f32),
+    SetCamera(CameraPreset),
+    RateStatement(String, u8),
+    SelectNextStatement(i32),
+    /// Submits the questionnaire; asks first if statements are not rated.
+    SubmitQuestionnaire,
 }
 
-/// What is on the screen.
-pub enum Screen {
-    Shelf,
-    Briefing,
-    Author(Box<Authoring>),
-    Lesson(Box<Sitting>),
-    Results(Box<Results>),
-    /// Why there is no lesson or no bundle.
-    Failed(String),
+/// A movement of the camera.
+#[derive(Clone, Copy, Debug)]
+pub enum CameraCommand {
+    /// Rotates the camera around the tooth, rad.
+    Orbit { right: f32, up: f32 },
+    /// Multiplies the camera's distance by this factor.
+    Zoom(f32),
+    /// Shifts the camera, as shares of the image height.
+    Pan { right: f32, up: f32 },
 }

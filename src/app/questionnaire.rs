@@ -1,21 +1,21 @@
-//! After an exercise: how far the trainee agrees with each statement.
+//! The questionnaire after an exercise: the trainee rates each statement.
 
-use super::command::Command;
-use super::language::Words;
-use super::look;
-use super::sitting::Sitting;
+use super::command::{AppCommand, PracticeCommand};
+use super::i18n::Translations;
+use super::lesson_state::LessonState;
+use super::theme;
 use eframe::egui;
 
-/// Every statement with its scale.
-pub fn questionnaire_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, asked: &mut Vec<Command>) {
-    let Some(questionnaire) = &sitting.scenario.questionnaire else {
-        look::column(ui, |ui| {
-            ui.heading(words.of("questionnaire.scoring"));
-            look::waiting(ui);
+/// Draws all statements with their scales.
+pub fn questionnaire_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let Some(questionnaire) = &lesson.scenario.questionnaire else {
+        theme::centered_column(ui, |ui| {
+            ui.heading(words.get("questionnaire.scoring"));
+            theme::progress_dots(ui);
         });
         return;
     };
-    look::column(ui, |ui| {
+    theme::centered_column(ui, |ui| {
         ui.heading(&questionnaire.title);
         ui.label(&questionnaire.instruction);
         ui.weak(format!("1 = {}, {} = {}", questionnaire.lowest, questionnaire.steps, questionnaire.highest));
@@ -25,52 +25,52 @@ pub fn questionnaire_ui(ui: &mut egui::Ui, sitting: &Sitting, words: &Words, ask
             let mut place = 0;
             for category in &questionnaire.categories {
                 ui.add_space(8.0);
-                ui.label(egui::RichText::new(&category.title).strong().size(18.0).color(look::ACCENT));
+                ui.label(egui::RichText::new(&category.title).strong().size(18.0).color(theme::ACCENT));
                 for item in &category.items {
-                    let is_current = place == sitting.statement;
-                    let rating = sitting.ratings.get(&item.id).copied();
+                    let is_current = place == lesson.statement;
+                    let rating = lesson.ratings.get(&item.id).copied();
                     statement_ui(
                         ui,
                         &item.id,
                         &item.text,
-                        Scale {
+                        RatingScale {
                             steps: questionnaire.steps,
                             rating,
                             is_current,
-                            is_sought: is_current && sitting.is_statement_new,
+                            scroll_into_view: is_current && lesson.scroll_to_statement,
                         },
-                        asked,
+                        commands,
                     );
                     place += 1;
                 }
             }
         });
         ui.add_space(14.0);
-        let (given, all) = (sitting.ratings.len(), questionnaire.items().count());
+        let (given, all) = (lesson.ratings.len(), questionnaire.items().count());
         ui.horizontal(|ui| {
-            let key = if sitting.is_handing_in { "questionnaire.hand_in_so" } else { "questionnaire.hand_in" };
-            if ui.add(look::main_button(words.of(key))).clicked() {
-                asked.push(Command::HandIn);
+            let key = if lesson.is_confirming_submit { "questionnaire.hand_in_so" } else { "questionnaire.hand_in" };
+            if ui.add(theme::primary_button(words.get(key))).clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::SubmitQuestionnaire));
             }
-            ui.weak(format!("{given} / {all} {}", words.of("questionnaire.answered")));
+            ui.weak(format!("{given} / {all} {}", words.get("questionnaire.answered")));
         });
-        if sitting.is_handing_in {
-            ui.colored_label(look::CARE, words.with("questionnaire.open", sitting.open_statements()));
+        if lesson.is_confirming_submit {
+            ui.colored_label(theme::WARNING, words.format("questionnaire.open", lesson.unrated_statements()));
         }
     });
 }
 
-struct Scale {
+struct RatingScale {
     steps: u8,
     rating: Option<u8>,
-    /// A digit rates this one.
+    /// True for the statement that a digit key rates.
     is_current: bool,
-    /// To be brought into sight.
-    is_sought: bool,
+    /// True if the statement is to be scrolled into view.
+    scroll_into_view: bool,
 }
 
-fn statement_ui(ui: &mut egui::Ui, id: &str, text: &str, scale: Scale, asked: &mut Vec<Command>) {
-    let fill = if scale.is_current { look::ACCENT.gamma_multiply(0.12) } else { egui::Color32::WHITE };
+fn statement_ui(ui: &mut egui::Ui, id: &str, text: &str, scale: RatingScale, commands: &mut Vec<AppCommand>) {
+    let fill = if scale.is_current { theme::ACCENT.gamma_multiply(0.12) } else { egui::Color32::WHITE };
     let shown = egui::Frame::NONE.fill(fill).corner_radius(6).inner_margin(10).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.horizontal(|ui| {
@@ -89,12 +89,12 @@ fn statement_ui(ui: &mut egui::Ui, id: &str, text: &str, scale: Scale, asked: &m
                     egui::WidgetInfo::selected(egui::Role::RadioButton, true, scale.rating == Some(value), name)
                 });
                 if button.clicked() {
-                    asked.push(Command::Rate(id.to_string(), value));
+                    commands.push(AppCommand::Practice(PracticeCommand::RateStatement(id.to_string(), value)));
                 }
             }
         });
     });
-    if scale.is_sought && !ui.clip_rect().contains_rect(shown.response.rect) {
+    if scale.scroll_into_view && !ui.clip_rect().contains_rect(shown.response.rect) {
         shown.response.scroll_to_me(Some(egui::Align::Center));
     }
     ui.add_space(3.0);

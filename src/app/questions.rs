@@ -1,87 +1,86 @@
-//! What a stage asks, and the ways to answer.
+//! Questions of a stage, and the controls that answer them.
 
-use super::command::Command;
-use super::language::Words;
-use super::look;
-use super::sitting::Sitting;
-use crate::scenario::{Question, QuestionKind, Stage};
-use crate::session::Answer;
+use super::answer_draft::parse_draft;
+use super::command::{AppCommand, PracticeCommand};
+use super::i18n::Translations;
+use super::lesson_state::LessonState;
+use super::theme;
 use eframe::egui;
+use typodont_exercise::scenario::{Question, QuestionKind, Stage};
+use typodont_exercise::session::AnswerValue;
 
 /// Every question of a stage.
-pub fn questions_ui(ui: &mut egui::Ui, stage: &Stage, sitting: &mut Sitting, words: &Words, asked: &mut Vec<Command>) {
-    let teeth: Vec<(String, u8)> = sitting.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
+pub fn questions_ui(
+    ui: &mut egui::Ui,
+    stage: &Stage,
+    lesson: &mut LessonState,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
     for (place, question) in stage.ask.iter().enumerate() {
-        let is_answered = sitting.answered.get(place).copied().unwrap_or_default();
+        let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
         ui.add_space(10.0);
         ui.strong(&question.text);
-        let draft = sitting.drafts.entry(question.id.clone()).or_default();
-        let said = sitting.said.get(&question.id);
+        let draft = lesson.drafts.entry(question.id.clone()).or_default();
+        let current = lesson.answers.get(&question.id);
         ui.push_id(place, |ui| {
-            if let Some(answer) = (Asking { question, said, words }).answer_ui(ui, &teeth, draft) {
-                asked.push(Command::Answer(question.id.clone(), answer));
+            if let Some(answer) = (QuestionUi { question, current, words }).answer_ui(ui, &teeth, draft) {
+                commands.push(AppCommand::Practice(PracticeCommand::AnswerQuestion(question.id.clone(), answer)));
             }
         });
-        if written(question, draft).is_some_and(|answer| answer.is_none()) {
-            ui.colored_label(look::WRONG, words.of("questions.not_a_number"));
+        if parse_draft(question, draft).is_some_and(|answer| answer.is_none()) {
+            ui.colored_label(theme::ERROR, words.get("questions.not_a_number"));
         }
         if is_answered {
-            let noted = match said {
-                Some(Answer::Number(number)) => format!(": {number}"),
+            let noted = match current {
+                Some(AnswerValue::Number(number)) => format!(": {number}"),
                 _ => String::new(),
             };
-            ui.colored_label(look::GOOD, format!("{}{noted}", words.of("questions.noted")));
+            ui.colored_label(theme::SUCCESS, format!("{}{noted}", words.get("questions.noted")));
         }
     }
 }
 
-/// What a line that was typed answers: `None` where nothing is typed or the question is not answered by a line,
-/// `Some(None)` where a number is asked and this is none.
-pub fn written(question: &Question, draft: &str) -> Option<Option<Answer>> {
-    let line = draft.trim();
-    match &question.kind {
-        _ if line.is_empty() => None,
-        QuestionKind::Number { .. } => Some(line.replace(',', ".").parse().ok().map(Answer::Number)),
-        QuestionKind::Text => Some(Some(Answer::Word(line.to_string()))),
-        _ => None,
-    }
-}
-
-/// One question with what was last said to it.
-struct Asking<'a> {
+/// One question with its last submitted answer.
+struct QuestionUi<'a> {
     question: &'a Question,
-    said: Option<&'a Answer>,
-    words: &'a Words,
+    current: Option<&'a AnswerValue>,
+    words: &'a Translations,
 }
 
-impl Asking<'_> {
-    /// The ways to answer; what was answered now.
-    fn answer_ui(&self, ui: &mut egui::Ui, teeth: &[(String, u8)], draft: &mut String) -> Option<Answer> {
+impl QuestionUi<'_> {
+    /// Draws the controls of the question; returns the answer given in this frame, if any.
+    fn answer_ui(&self, ui: &mut egui::Ui, teeth: &[(String, u8)], draft: &mut String) -> Option<AnswerValue> {
         let words = self.words;
         match &self.question.kind {
             QuestionKind::ToothWith { .. } => {
-                let sides = [words.of("questions.left_tooth"), words.of("questions.right_tooth")];
+                let sides = [words.get("questions.left_tooth"), words.get("questions.right_tooth")];
                 let title = |place: usize, fdi: u8| match teeth.len() {
                     2 => format!("{} ({fdi})", sides[place.min(1)]),
                     _ => fdi.to_string(),
                 };
-                let options = teeth.iter().enumerate().map(|(i, (id, fdi))| (Answer::Word(id.clone()), title(i, *fdi)));
+                let options =
+                    teeth.iter().enumerate().map(|(i, (id, fdi))| (AnswerValue::Word(id.clone()), title(i, *fdi)));
                 self.buttons(ui, options)
             }
             QuestionKind::QuadrantOf { .. } => self.quadrants(ui),
             QuestionKind::Choice { options, .. } => {
-                self.buttons(ui, options.iter().map(|(id, title)| (Answer::Word(id.clone()), title.clone())))
+                self.buttons(ui, options.iter().map(|(id, title)| (AnswerValue::Word(id.clone()), title.clone())))
             }
             QuestionKind::YesNo { .. } => {
                 let options = [(true, "questions.yes"), (false, "questions.no")];
-                self.buttons(ui, options.into_iter().map(|(yes, key)| (Answer::YesNo(yes), words.of(key).to_string())))
+                self.buttons(
+                    ui,
+                    options.into_iter().map(|(yes, key)| (AnswerValue::YesNo(yes), words.get(key).to_string())),
+                )
             }
             QuestionKind::Number { unit, .. } => self.line(ui, draft, unit),
             QuestionKind::Text => self.line(ui, draft, ""),
         }
     }
 
-    fn buttons(&self, ui: &mut egui::Ui, options: impl Iterator<Item = (Answer, String)>) -> Option<Answer> {
+    fn buttons(&self, ui: &mut egui::Ui, options: impl Iterator<Item = (AnswerValue, String)>) -> Option<AnswerValue> {
         let mut chosen = None;
         ui.horizontal_wrapped(|ui| {
             for (answer, title) in options {
@@ -93,14 +92,14 @@ impl Asking<'_> {
         chosen
     }
 
-    /// Quarters as they lie when one looks from above: 1 and 2 away from the trainee.
-    fn quadrants(&self, ui: &mut egui::Ui) -> Option<Answer> {
+    /// Quarters in occlusal view: 1 and 2 are away from the trainee.
+    fn quadrants(&self, ui: &mut egui::Ui) -> Option<AnswerValue> {
         let mut chosen = None;
-        ui.weak(self.words.of("questions.from_above"));
+        ui.weak(self.words.get("questions.from_above"));
         egui::Grid::new("quadrants").spacing([6.0, 6.0]).show(ui, |ui| {
             for row in [[1u8, 2], [3, 4]] {
                 for quadrant in row {
-                    let answer = Answer::Quadrant(quadrant);
+                    let answer = AnswerValue::Quadrant(quadrant);
                     if self.button(ui, &answer, &quadrant.to_string(), egui::vec2(64.0, 44.0)) {
                         chosen = Some(answer);
                     }
@@ -111,27 +110,27 @@ impl Asking<'_> {
         chosen
     }
 
-    /// A button that stays marked while its answer is the one that was said; true when it is clicked.
-    fn button(&self, ui: &mut egui::Ui, answer: &Answer, title: &str, least: egui::Vec2) -> bool {
-        let is_said = self.said == Some(answer);
-        let button = ui.add(egui::Button::selectable(is_said, title).frame_when_inactive(true).min_size(least));
+    /// A button that is marked while its answer is the submitted one; returns true when clicked.
+    fn button(&self, ui: &mut egui::Ui, answer: &AnswerValue, title: &str, min_size: egui::Vec2) -> bool {
+        let is_current = self.current == Some(answer);
+        let button = ui.add(egui::Button::selectable(is_current, title).frame_when_inactive(true).min_size(min_size));
         button.widget_info(|| {
             let name = format!("{}: {title}", self.question.text);
-            egui::WidgetInfo::selected(egui::Role::RadioButton, true, is_said, name)
+            egui::WidgetInfo::selected(egui::Role::RadioButton, true, is_current, name)
         });
         button.clicked()
     }
 
-    /// A line to write on; what was written when it is said.
-    fn line(&self, ui: &mut egui::Ui, draft: &mut String, unit: &str) -> Option<Answer> {
-        let mut is_said = false;
+    /// A text field; returns its answer when the user submits it.
+    fn line(&self, ui: &mut egui::Ui, draft: &mut String, unit: &str) -> Option<AnswerValue> {
+        let mut is_submitted = false;
         ui.horizontal(|ui| {
             let line = ui.add(egui::TextEdit::singleline(draft).desired_width(150.0));
             line.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, &self.question.text));
             ui.label(unit);
             let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-            is_said = ui.button(self.words.of("questions.say")).clicked() || is_entered;
+            is_submitted = ui.button(self.words.get("questions.say")).clicked() || is_entered;
         });
-        written(self.question, draft).flatten().filter(|_| is_said)
+        parse_draft(self.question, draft).flatten().filter(|_| is_submitted)
     }
 }

@@ -1,44 +1,41 @@
-//! What a person sets once: kept in a file in the platform's configuration folder.
+//! The user's settings, kept in a file in the platform's configuration folder.
 
-use super::command::Command;
-use super::language::Words;
-use crate::device::DRIVERS;
-use crate::render::{Layout, Stereo};
 use directories::ProjectDirs;
-use eframe::egui;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::PathBuf;
+use typodont_render::{Stereo, StereoLayout};
 
-/// Usual distance between eyes for a mouth on a screen, mm: a tenth of people's, for the scene is that much larger than life.
+/// Default distance between the eyes for a mouth on a screen, mm: a tenth of the natural distance, because the scene is
+/// enlarged by that much.
 const EYE_DISTANCE: f32 = 6.0;
 
-/// Usual loudness: leaves room for a teacher's voice.
+/// Default volume, share of full scale: low enough for a teacher to be heard.
 const VOLUME: f32 = 0.6;
 
-/// Sizes of text that still fit the window, as shares of the usual.
-const FONT_SIZES: std::ops::RangeInclusive<f32> = 0.8..=1.6;
+/// Text sizes that fit the window, as multiples of the default size.
+pub const FONT_SIZES: std::ops::RangeInclusive<f32> = 0.8..=1.6;
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Settings {
-    /// A code of a language file.
+    /// Code of the language file.
     pub language: String,
-    /// What is in the hand: `mouse`, or as `--device` takes it.
+    /// Input device: `mouse`, or a device as in `--device`.
     pub device: String,
     pub stereo: StereoMode,
     pub eye_distance_mm: f32,
-    /// Whether edges are smoothed; unset as this machine can afford it.
+    /// True to smooth edges; without a value edges are smoothed if a graphics processor draws.
     pub smooth_edges: Option<bool>,
     /// Share of full scale, 0 to 1.
     pub volume: f32,
     pub high_contrast: bool,
     pub font_size: f32,
-    /// Another folder with exercises; empty for none.
+    /// A further folder with exercises; empty for none.
     pub exercises: PathBuf,
 }
 
-/// How two eyes see the tooth.
+/// Stereoscopic display of the tooth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StereoMode {
@@ -52,19 +49,10 @@ pub enum StereoMode {
     TwoWindows,
 }
 
-const STEREO_MODES: [(StereoMode, &str); 6] = [
-    (StereoMode::Off, "settings.stereo_off"),
-    (StereoMode::SideBySide, "settings.stereo_side"),
-    (StereoMode::TopBottom, "settings.stereo_top"),
-    (StereoMode::Rows, "settings.stereo_rows"),
-    (StereoMode::Anaglyph, "settings.stereo_anaglyph"),
-    (StereoMode::TwoWindows, "settings.stereo_two"),
-];
-
 impl Default for Settings {
     fn default() -> Settings {
         Settings {
-            language: super::language::of_system(),
+            language: super::i18n::system_language(),
             device: "mouse".into(),
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,
@@ -78,14 +66,14 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What was kept; the usual, with a complaint, where it cannot be read.
-    pub fn read() -> (Settings, Option<String>) {
-        let Some(path) = file() else { return (Settings::default(), None) };
+    /// Reads the settings file; the defaults, with a complaint, if it cannot be read.
+    pub fn load() -> (Settings, Option<String>) {
+        let Some(path) = settings_file() else { return (Settings::default(), None) };
         match fs::read_to_string(&path) {
             Ok(text) => match serde_json::from_str::<Settings>(&text) {
                 Ok(settings) => (settings.in_range(), None),
                 Err(error) => {
-                    let what = format!("{}: wrong-settings: {error}; the usual settings are used", path.display());
+                    let what = format!("{}: wrong-settings: {error}; the default settings are used", path.display());
                     (Settings::default(), Some(what))
                 }
             },
@@ -93,16 +81,18 @@ impl Settings {
         }
     }
 
-    /// Keeps them; a complaint where that fails.
-    pub fn keep(&self) -> Option<String> {
-        let path = file()?;
+    /// Writes the settings file; returns a complaint if that fails.
+    pub fn save(&self) -> Option<String> {
+        let path = settings_file()?;
         let folder = path.parent()?;
         let text = serde_json::to_string_pretty(self).ok()?;
-        let kept = fs::create_dir_all(folder).and_then(|()| fs::write(&path, text + "\n"));
-        kept.err().map(|e| format!("{}: unwritable-file: {e}; settings last until the window closes", path.display()))
+        let result = fs::create_dir_all(folder).and_then(|()| fs::write(&path, text + "\n"));
+        result.err().map(|e| {
+            format!("{}: unwritable-file: {e}; the settings will be lost when the window is closed", path.display())
+        })
     }
 
-    /// Numbers that somebody wrote by hand, brought to where they make a picture.
+    /// Limits values, which may have been edited in the file, to their valid ranges.
     fn in_range(mut self) -> Settings {
         self.eye_distance_mm = self.eye_distance_mm.clamp(0.0, 80.0);
         self.volume = self.volume.clamp(0.0, 1.0);
@@ -113,122 +103,33 @@ impl Settings {
     pub fn stereo(&self) -> Option<Stereo> {
         let layout = match self.stereo {
             StereoMode::Off => return None,
-            StereoMode::SideBySide => Layout::SideBySide,
-            StereoMode::TopBottom => Layout::TopBottom,
-            StereoMode::Rows => Layout::Rows,
-            StereoMode::Anaglyph => Layout::Anaglyph,
-            StereoMode::TwoWindows => Layout::Left,
+            StereoMode::SideBySide => StereoLayout::SideBySide,
+            StereoMode::TopBottom => StereoLayout::TopBottom,
+            StereoMode::Rows => StereoLayout::Rows,
+            StereoMode::Anaglyph => StereoLayout::Anaglyph,
+            StereoMode::TwoWindows => StereoLayout::Left,
         };
         Some(Stereo { layout, eye_distance: self.eye_distance_mm })
     }
 
-    /// Whether edges are smoothed. Where nobody has chosen, a graphics processor does it; in software it costs too much of
-    /// each picture.
+    /// True if edges are smoothed. Without a choice of the user they are smoothed only if a graphics processor draws;
+    /// in software, smoothing takes too large a part of each frame.
     pub fn is_smooth(&self, has_graphics: bool) -> bool {
         self.smooth_edges.unwrap_or(has_graphics)
     }
 
-    /// What the second window shows, if there is one.
+    /// Stereo view of the second window; `None` if there is only one window.
     pub fn second_eye(&self) -> Option<Stereo> {
         let has_two = self.stereo == StereoMode::TwoWindows;
-        has_two.then_some(Stereo { layout: Layout::Right, eye_distance: self.eye_distance_mm })
+        has_two.then_some(Stereo { layout: StereoLayout::Right, eye_distance: self.eye_distance_mm })
     }
 }
 
-/// Folder of the settings on this platform; `None` where there is no home.
-pub fn folder() -> Option<PathBuf> {
+/// Folder of the settings on this platform; `None` if the user has no home folder.
+pub fn config_folder() -> Option<PathBuf> {
     ProjectDirs::from("", "", "typodont").map(|dirs| dirs.config_dir().to_path_buf())
 }
 
-fn file() -> Option<PathBuf> {
-    folder().map(|folder| folder.join("settings.json"))
-}
-
-/// Everything that can be set. Asks for a change, never makes one.
-pub fn settings_ui(
-    ui: &mut egui::Ui,
-    settings: &Settings,
-    has_graphics: bool,
-    languages: &[Words],
-    words: &Words,
-    asked: &mut Vec<Command>,
-) {
-    let mut new = settings.clone();
-    egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
-        let label = ui.label(words.of("settings.language")).id;
-        let current = languages.iter().find(|w| w.code == new.language).map_or("English", |w| w.name());
-        egui::ComboBox::from_id_salt("language")
-            .selected_text(current)
-            .show_ui(ui, |ui| {
-                for language in languages {
-                    ui.selectable_value(&mut new.language, language.code.clone(), language.name());
-                }
-            })
-            .response
-            .labelled_by(label);
-        ui.end_row();
-
-        let label = ui.label(words.of("settings.device")).id;
-        egui::ComboBox::from_id_salt("device")
-            .selected_text(new.device.clone())
-            .show_ui(ui, |ui| {
-                for driver in DRIVERS {
-                    let name = driver.name().to_string();
-                    ui.selectable_value(&mut new.device, name.clone(), name).on_hover_text(driver.about());
-                }
-            })
-            .response
-            .labelled_by(label);
-        ui.end_row();
-
-        let label = ui.label(words.of("settings.stereo")).id;
-        let current = STEREO_MODES.iter().find(|(mode, _)| *mode == new.stereo).map_or("", |(_, key)| words.of(key));
-        egui::ComboBox::from_id_salt("stereo")
-            .selected_text(current)
-            .show_ui(ui, |ui| {
-                for (mode, key) in STEREO_MODES {
-                    ui.selectable_value(&mut new.stereo, mode, words.of(key));
-                }
-            })
-            .response
-            .labelled_by(label);
-        ui.end_row();
-
-        let label = ui.label(words.of("settings.eyes")).id;
-        let slider = egui::Slider::new(&mut new.eye_distance_mm, 0.0..=80.0).suffix(" mm").fixed_decimals(0);
-        ui.add_enabled(new.stereo != StereoMode::Off, slider).labelled_by(label);
-        ui.end_row();
-
-        let label = ui.label(words.of("settings.volume")).id;
-        let percent = |share: f64, _| format!("{:.0} %", 100.0 * share);
-        ui.add(egui::Slider::new(&mut new.volume, 0.0..=1.0).custom_formatter(percent)).labelled_by(label);
-        ui.end_row();
-
-        let label = ui.label(words.of("settings.font")).id;
-        let slider = egui::Slider::new(&mut new.font_size, FONT_SIZES).step_by(0.1).fixed_decimals(1);
-        ui.add(slider).labelled_by(label);
-        ui.end_row();
-
-        ui.label("");
-        let mut is_smooth = settings.is_smooth(has_graphics);
-        if ui.checkbox(&mut is_smooth, words.of("settings.smooth")).changed() {
-            new.smooth_edges = Some(is_smooth);
-        }
-        ui.end_row();
-
-        ui.label("");
-        ui.checkbox(&mut new.high_contrast, words.of("settings.contrast"));
-        ui.end_row();
-    });
-    if new != *settings {
-        asked.push(Command::Set(Box::new(new)));
-    }
-    ui.add_space(12.0);
-    if let Some(path) = file() {
-        ui.weak(words.with("settings.kept", path.display()));
-    }
-    ui.add_space(8.0);
-    if ui.button(words.of("settings.close")).clicked() {
-        asked.push(Command::ShowSettings(false));
-    }
+pub fn settings_file() -> Option<PathBuf> {
+    config_folder().map(|folder| folder.join("settings.json"))
 }

@@ -1,39 +1,39 @@
-//! Where the picture goes: a texture of the window's own device, as large as the view.
+//! Render target of the view: a texture of the window's own graphics device, as large as the view.
 
-use crate::render::{Error, Renderer, Scene, Stereo, Target, Viewpoint, Watch};
 use eframe::egui;
 use eframe::egui_wgpu::RenderState;
+use typodont_render::{DeviceErrorListener, RenderError, RenderScene, RenderTarget, Renderer, Stereo, Viewpoint};
 
-/// What egui expects of a picture that is not its own: colours as a screen shows them.
+/// Format that egui expects of a foreign texture: colours as a screen shows them (sRGB-encoded values).
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// True where a graphics processor draws. In software triangles are several times as fast as rays.
+/// True if a graphics processor draws. In software, drawing triangles is several times as fast as casting rays.
 pub fn has_graphics(state: &RenderState) -> bool {
     state.adapter.get_info().device_type != wgpu::DeviceType::Cpu
 }
 
-/// The second window's picture until its size is known, pixels.
-const SECOND_SIZE: [u32; 2] = [1024, 768];
+/// Size of the second window's image until the window's size is known, pixels.
+const SECOND_EYE_SIZE: [u32; 2] = [1024, 768];
 
 /// Draws scenes for the window.
 pub struct Viewport {
     state: RenderState,
     renderer: Renderer,
-    watch: Watch,
-    canvases: [Option<Canvas>; 2],
-    /// Pixels of the second window, as it was last seen.
-    second_size: [u32; 2],
+    error_listener: DeviceErrorListener,
+    textures: [Option<OffscreenTexture>; 2],
+    /// Last known size of the second window, pixels.
+    second_eye_size: [u32; 2],
 }
 
-/// The window that a picture is for.
+/// The window for which an image is rendered.
 #[derive(Clone, Copy)]
-pub enum Place {
+pub enum EyeWindow {
     Main,
-    /// The right eye's own, where each eye has a projector.
-    Second,
+    /// The window of the right eye, if each eye has its own projector.
+    SecondEye,
 }
 
-struct Canvas {
+struct OffscreenTexture {
     size: [u32; 2],
     view: wgpu::TextureView,
     id: egui::TextureId,
@@ -45,9 +45,9 @@ impl Viewport {
         Viewport {
             state: state.clone(),
             renderer,
-            watch: Watch::over(&state.device),
-            canvases: [None, None],
-            second_size: SECOND_SIZE,
+            error_listener: DeviceErrorListener::attach(&state.device),
+            textures: [None, None],
+            second_eye_size: SECOND_EYE_SIZE,
         }
     }
 
@@ -57,44 +57,44 @@ impl Viewport {
     }
 
     /// Pixels of the second window from now on.
-    pub fn size_second(&mut self, size: [u32; 2]) {
-        self.second_size = size;
+    pub fn set_second_eye_size(&mut self, size: [u32; 2]) {
+        self.second_eye_size = size;
     }
 
-    pub fn second_size(&self) -> [u32; 2] {
-        self.second_size
+    pub fn second_eye_size(&self) -> [u32; 2] {
+        self.second_eye_size
     }
 
-    /// The picture that was last drawn for the second window, if one was.
-    pub fn second(&self) -> Option<egui::TextureId> {
-        self.canvases[Place::Second as usize].as_ref().map(|canvas| canvas.id)
+    /// The last image of the second window, if there is one.
+    pub fn second_eye_texture(&self) -> Option<egui::TextureId> {
+        self.textures[EyeWindow::SecondEye as usize].as_ref().map(|canvas| canvas.id)
     }
 
     /// Draws a scene at a size in pixels; gives the picture for egui to place.
     pub fn draw(
         &mut self,
-        place: Place,
-        scene: &Scene,
+        window: EyeWindow,
+        scene: &RenderScene,
         viewpoint: &Viewpoint,
         stereo: Option<Stereo>,
         size: [u32; 2],
-    ) -> Result<egui::TextureId, Error> {
-        let known = self.canvases[place as usize].take();
-        let canvas = match known {
+    ) -> Result<egui::TextureId, RenderError> {
+        let known = self.textures[window as usize].take();
+        let texture = match known {
             Some(canvas) if canvas.size == size => canvas,
-            known => canvas(&self.state, size, known.map(|c| c.id)),
+            known => offscreen_texture(&self.state, size, known.map(|c| c.id)),
         };
-        let drawn = self.renderer.draw(scene, viewpoint, stereo, Target { view: &canvas.view, size });
-        let id = canvas.id;
-        self.canvases[place as usize] = Some(canvas);
+        let drawn = self.renderer.draw(scene, viewpoint, stereo, RenderTarget { view: &texture.view, size });
+        let id = texture.id;
+        self.textures[window as usize] = Some(texture);
         drawn?;
-        self.watch.check()?;
+        self.error_listener.check()?;
         Ok(id)
     }
 }
 
 /// A texture of a size, under the identity of the one it replaces.
-fn canvas(state: &RenderState, size: [u32; 2], known: Option<egui::TextureId>) -> Canvas {
+fn offscreen_texture(state: &RenderState, size: [u32; 2], known: Option<egui::TextureId>) -> OffscreenTexture {
     let texture = state.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("view"),
         size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
@@ -115,5 +115,5 @@ fn canvas(state: &RenderState, size: [u32; 2], known: Option<egui::TextureId>) -
         }
         None => egui_renderer.register_native_texture(&state.device, &view, filter),
     };
-    Canvas { size, view, id }
+    OffscreenTexture { size, view, id }
 }

@@ -1,45 +1,48 @@
-//! What the drill does, as far as it can be heard.
+//! The load on the working end, as far as it can be heard.
+//!
+//! Takes plain numbers and flags from the program. Gives them to the synthesiser, limited to their ranges. Never fails.
 
-/// What is in the hand.
+/// Kind of tool in the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Tool {
-    /// A handpiece driven by air: very fast, and slower under every load.
+    /// A handpiece driven by air: very fast, and slower under any load.
     #[default]
     AirTurbine,
     /// A speed-increasing contra-angle (1:5) on an electric motor, which keeps its speed.
     Electric,
     /// A contra-angle (1:1) for round burs in dentine.
     LowSpeed,
-    /// A probe, an excavator: nothing turns.
+    /// A probe or an excavator: nothing rotates.
     Hand,
 }
 
-/// The moment's load on the working end. The newest one counts.
+/// Momentary load on the working end. The newest one counts.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct DrillLoad {
     pub tool: Tool,
     pub is_running: bool,
-    /// Speed of the bur when nothing holds it, rpm, 0 to 500 000. What the load leaves of it is worked out here.
+    /// Speed of the bur without load, rpm, 0 to 500 000. The loss under load is computed here.
     pub speed: f32,
     pub is_touching: bool,
-    /// True while matter is taken away; a bur that only rubs is quieter.
+    /// True while tissue is removed; a bur that only rubs is quieter.
     pub is_cutting: bool,
     /// Force on the working end, N, 0 to 20.
     pub force: f32,
-    /// Speed of the working end's surface against the tissue, mm/s, 0 to 60 000: at a bur's circumference when nothing holds
-    /// it, at a hand instrument's tip along the surface.
+    /// Speed of the working end's surface relative to the tissue, mm/s, 0 to 60 000: at the circumference of a bur
+    /// without load, at the tip of a hand instrument along the surface.
     pub surface_speed: f32,
-    /// Vickers hardness of what is touched, HV, 0 to 1000: enamel about 300, dentine 60, decay 15; 0 for soft tissue.
+    /// Vickers hardness of the touched tissue, HV, 0 to 1000: enamel about 300, dentine 60, decay 15; 0 for soft
+    /// tissue.
     pub hardness: f32,
     pub is_suction_on: bool,
-    /// Water spray, which only a running handpiece gives.
+    /// Water spray, which requires a running handpiece.
     pub is_spray_on: bool,
 }
 
-/// How many words a load fills in a mailbox.
-pub(super) const WORDS: usize = 5;
+/// Number of words of a load in a mailbox.
+pub(super) const LOAD_WORDS: usize = 5;
 
-/// Where each answer stands in the first word; the tool is in its lowest two bits.
+/// Bits of the flags in the first word; its lowest two bits are the tool.
 const IS_RUNNING: u32 = 1 << 2;
 const IS_TOUCHING: u32 = 1 << 3;
 const IS_CUTTING: u32 = 1 << 4;
@@ -52,8 +55,9 @@ impl DrillLoad {
     pub const SURFACE_SPEED_MAX: f32 = 60_000.0;
     pub const HARDNESS_MAX: f32 = 1000.0;
 
-    /// The load with every number within its range; what is no number counts as zero. A sound is no place for a fault.
-    pub(super) fn within_ranges(self) -> DrillLoad {
+    /// Returns the load with each number limited to its range, and NaN as zero: invalid numbers are no error for a
+    /// sound.
+    pub(super) fn clamped(self) -> DrillLoad {
         let within = |value: f32, most: f32| if value.is_nan() { 0.0 } else { value.clamp(0.0, most) };
         DrillLoad {
             speed: within(self.speed, Self::SPEED_MAX),
@@ -64,7 +68,7 @@ impl DrillLoad {
         }
     }
 
-    pub(super) fn to_words(self) -> [u32; WORDS] {
+    pub(super) fn encode(self) -> [u32; LOAD_WORDS] {
         let flags = [
             (self.is_running, IS_RUNNING),
             (self.is_touching, IS_TOUCHING),
@@ -77,7 +81,7 @@ impl DrillLoad {
         [first, numbers[0], numbers[1], numbers[2], numbers[3]]
     }
 
-    pub(super) fn from_words(words: [u32; WORDS]) -> DrillLoad {
+    pub(super) fn decode(words: [u32; LOAD_WORDS]) -> DrillLoad {
         let [first, numbers @ ..] = words;
         let [speed, force, surface_speed, hardness] = numbers.map(f32::from_bits);
         let tool = [Tool::AirTurbine, Tool::Electric, Tool::LowSpeed, Tool::Hand][(first & 0b11) as usize];
@@ -101,8 +105,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_load_arrives_as_it_was_posted() {
-        // Aim: no field is lost or swapped on the way. Method: every tool, every flag alone, and numbers all different.
+    fn a_load_is_decoded_as_it_was_encoded() {
+        // Aim: no field is lost or swapped. Method: every tool, every flag alone, and numbers that all differ.
         let numbers = DrillLoad { speed: 1.0, force: 2.0, surface_speed: 3.0, hardness: 4.0, ..DrillLoad::default() };
         for tool in [Tool::AirTurbine, Tool::Electric, Tool::LowSpeed, Tool::Hand] {
             for flag in 0..5 {
@@ -115,15 +119,15 @@ mod tests {
                     is_spray_on: flag == 4,
                     ..numbers
                 };
-                assert_eq!(DrillLoad::from_words(load.to_words()), load);
+                assert_eq!(DrillLoad::decode(load.encode()), load);
             }
         }
     }
 
     #[test]
-    fn what_is_no_number_is_silent() {
-        let wild = DrillLoad { speed: f32::NAN, force: f32::INFINITY, surface_speed: -1.0, ..DrillLoad::default() };
-        let tame = wild.within_ranges();
-        assert_eq!((tame.speed, tame.force, tame.surface_speed), (0.0, DrillLoad::FORCE_MAX, 0.0));
+    fn numbers_out_of_range_are_limited() {
+        let invalid = DrillLoad { speed: f32::NAN, force: f32::INFINITY, surface_speed: -1.0, ..DrillLoad::default() };
+        let clamped = invalid.clamped();
+        assert_eq!((clamped.speed, clamped.force, clamped.surface_speed), (0.0, DrillLoad::FORCE_MAX, 0.0));
     }
 }

@@ -1,90 +1,100 @@
-//! One change to a text of JSON, and not a byte beside it.
+//! Single changes to a JSON text, which leave all other bytes unchanged.
 //!
-//! Comments, the order of keys and the way lines are broken stay, for only the changed value's own bytes are replaced. What is
-//! added is laid out as its neighbours are.
+//! Comments, the order of keys and line breaks are preserved, since only the bytes of the changed value are replaced.
+//! Added values are formatted like their neighbours.
 
-use super::layout::{Breaks, place_of, quoted, written};
-use crate::content::json::strict;
-use crate::content::pointer::{names, split, under};
+use super::json_format::{LineStyle, format_value, key_order, quote};
 use jsonc_parser::ast::{Array, Object, ObjectProp, Value};
 use jsonc_parser::common::Ranged;
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
 use serde_json::Value as Json;
 use std::fmt;
 use std::ops::Range;
+use typodont_formats::json::strict_parse_options;
+use typodont_formats::pointer::{child, split, tokens};
 
-/// Why a change does not fit a text.
+/// Reason for which a change cannot be applied to a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Unfit {
-    /// The text is not JSON: it must be mended by hand first.
+pub enum EditError {
+    /// The text is not JSON and must first be corrected by hand.
     NotJson,
-    /// Nothing of the right kind stands there.
+    /// There is no value of the required kind at this pointer.
     NoSuchPlace(String),
 }
 
-impl fmt::Display for Unfit {
+impl fmt::Display for EditError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Unfit::NotJson => f.write_str("the text is not JSON; mend it in the text first"),
-            Unfit::NoSuchPlace(pointer) => write!(f, "nothing that could be changed stands at {pointer}"),
+            EditError::NotJson => f.write_str("the text is not valid JSON; correct it in the text view first"),
+            EditError::NoSuchPlace(pointer) => write!(f, "there is no value to change at {pointer}"),
         }
     }
 }
 
-/// The pointer to the value that encloses a byte of the text, the innermost one.
-pub fn pointer_to(text: &str, byte: usize) -> Option<String> {
+impl std::error::Error for EditError {}
+
+/// Returns the pointer to the innermost value that contains a byte of the text; `None` if the text is not JSON.
+pub fn pointer_at(text: &str, byte: usize) -> Option<String> {
     fn within(value: &Value, byte: usize, pointer: String) -> String {
         let has = |range: Range<usize>| range.contains(&byte);
         match value {
-            Value::Object(object) => match object.properties.iter().find(|p| has(bytes(*p))) {
-                Some(property) => within(&property.value, byte, under(&pointer, name_of(property))),
+            Value::Object(object) => match object.properties.iter().find(|p| has(byte_range(*p))) {
+                Some(property) => within(&property.value, byte, child(&pointer, key_of(property))),
                 None => pointer,
             },
-            Value::Array(array) => match array.elements.iter().position(|e| has(bytes(e))) {
-                Some(index) => within(&array.elements[index], byte, under(&pointer, index)),
+            Value::Array(array) => match array.elements.iter().position(|e| has(byte_range(e))) {
+                Some(index) => within(&array.elements[index], byte, child(&pointer, index)),
                 None => pointer,
             },
             _ => pointer,
         }
     }
-    Some(within(&parsed(text).ok()?, byte, String::new()))
+    Some(within(&parse(text).ok()?, byte, String::new()))
 }
 
-/// What a text says, comments left out; `None` where it is not JSON.
-pub(super) fn value_of(text: &str) -> Option<Json> {
-    Some(json_of(&parsed(text).ok()?))
+/// Returns the value of a text, without comments; `None` if the text is not JSON.
+pub(super) fn parse_value(text: &str) -> Option<Json> {
+    Some(to_json(&parse(text).ok()?))
 }
 
-/// The text with another value at a pointer. A key that is missing is added where a person expects it, with the objects
-/// around it; an equal value changes nothing, however it is written.
-pub(super) fn set(text: &str, pointer: &str, value: &Json) -> Result<String, Unfit> {
-    let root = parsed(text)?;
+/// Returns the text with another value at a pointer. A missing key is added at its usual position, with the objects
+/// around it; an equal value changes nothing, regardless of its notation.
+///
+/// # Errors
+/// Returns an error if the text is not JSON, or if there is no place for the value.
+pub(super) fn set(text: &str, pointer: &str, value: &Json) -> Result<String, EditError> {
+    let root = parse(text)?;
     if let Some(old) = find(&root, pointer) {
-        if is_equal(&json_of(old), value) {
+        if is_equal(&to_json(old), value) {
             return Ok(text.to_string());
         }
-        let range = bytes(old);
-        let new = written(value, line_indent(text, range.start), Breaks::of(text));
-        return Ok(replaced(text, range, &new));
+        let range = byte_range(old);
+        let new = format_value(value, line_indent(text, range.start), LineStyle::detect(text));
+        return Ok(splice(text, range, &new));
     }
-    let (parent, key) = split(pointer).ok_or_else(|| Unfit::NoSuchPlace(pointer.into()))?;
+    let (parent, key) = split(pointer).ok_or_else(|| EditError::NoSuchPlace(pointer.into()))?;
     match find(&root, parent) {
-        Some(Value::Object(object)) => Ok(with_key(text, object, &key, value)),
-        Some(_) => Err(Unfit::NoSuchPlace(pointer.into())),
+        Some(Value::Object(object)) => Ok(insert_key(text, object, &key, value)),
+        Some(_) => Err(EditError::NoSuchPlace(pointer.into())),
         None => set(text, parent, &Json::Object([(key, value.clone())].into_iter().collect())),
     }
 }
 
-/// The text without a key or an entry of a list. What is not there is gone already.
-pub(super) fn remove(text: &str, pointer: &str) -> Result<String, Unfit> {
-    let root = parsed(text)?;
-    let (parent, key) = split(pointer).ok_or_else(|| Unfit::NoSuchPlace(pointer.into()))?;
+/// Returns the text without a key or an entry of a list. A missing one changes nothing.
+///
+/// # Errors
+/// Returns an error if the text is not JSON, or if the pointer is that of the whole text.
+pub(super) fn remove(text: &str, pointer: &str) -> Result<String, EditError> {
+    let root = parse(text)?;
+    let (parent, key) = split(pointer).ok_or_else(|| EditError::NoSuchPlace(pointer.into()))?;
     let (parts, at, inside) = match find(&root, parent) {
         Some(Value::Object(object)) => {
-            let at = object.properties.iter().position(|p| name_of(p) == key);
-            (object.properties.iter().map(bytes).collect::<Vec<_>>(), at, bytes(object))
+            let at = object.properties.iter().position(|p| key_of(p) == key);
+            (object.properties.iter().map(byte_range).collect::<Vec<_>>(), at, byte_range(object))
         }
-        Some(Value::Array(array)) => (array.elements.iter().map(bytes).collect(), key.parse().ok(), bytes(array)),
+        Some(Value::Array(array)) => {
+            (array.elements.iter().map(byte_range).collect(), key.parse().ok(), byte_range(array))
+        }
         _ => return Ok(text.to_string()),
     };
     let Some(at) = at.filter(|&at| at < parts.len()) else { return Ok(text.to_string()) };
@@ -100,23 +110,23 @@ pub(super) fn remove(text: &str, pointer: &str) -> Result<String, Unfit> {
         text[gap.clone()].to_string()
     };
     if !has_comment(&around) {
-        return Ok(replaced(text, gap.start.min(own.start)..gap.end.max(own.end), ""));
+        return Ok(splice(text, gap.start.min(own.start)..gap.end.max(own.end), ""));
     }
-    // Comments stay where they stand: the value goes, with the white space before it and one comma.
-    let value = own.start - before(text, own.start).len()..own.end;
+    // Comments keep their positions: the value is removed with the white space before it and one comma.
+    let value = own.start - whitespace_before(text, own.start).len()..own.end;
     Ok(match comma(text, gap).filter(|_| parts.len() > 1) {
-        Some(comma) if comma < value.start => replaced(&replaced(text, value, ""), comma..comma + 1, ""),
-        Some(comma) => replaced(&replaced(text, comma..comma + 1, ""), value, ""),
-        None => replaced(text, value, ""),
+        Some(comma) if comma < value.start => splice(&splice(text, value, ""), comma..comma + 1, ""),
+        Some(comma) => splice(&splice(text, comma..comma + 1, ""), value, ""),
+        None => splice(text, value, ""),
     })
 }
 
-/// True where anything stands between values but white space and commas.
+/// Returns true if the text between values contains a comment.
 fn has_comment(between: &str) -> bool {
     between.contains('/')
 }
 
-/// Where the comma between two values stands, past comments.
+/// Returns the position of the comma between two values, skipping comments.
 fn comma(text: &str, between: Range<usize>) -> Option<usize> {
     let mut at = between.start;
     while at < between.end {
@@ -131,70 +141,70 @@ fn comma(text: &str, between: Range<usize>) -> Option<usize> {
     None
 }
 
-/// The text with one more entry at the end of a list; the list is made where there is none.
-pub(super) fn push(text: &str, list: &str, value: &Json) -> Result<String, Unfit> {
-    let root = parsed(text)?;
+/// Returns the text with another entry at the end of a list; a missing list is created.
+pub(super) fn push(text: &str, list: &str, value: &Json) -> Result<String, EditError> {
+    let root = parse(text)?;
     match find(&root, list) {
         None => set(text, list, &Json::Array(vec![value.clone()])),
-        Some(Value::Array(array)) => Ok(with_entry(text, array, value)),
-        Some(_) => Err(Unfit::NoSuchPlace(list.into())),
+        Some(Value::Array(array)) => Ok(append_entry(text, array, value)),
+        Some(_) => Err(EditError::NoSuchPlace(list.into())),
     }
 }
 
-/// The text with two entries of a list in each other's place.
-pub(super) fn swap(text: &str, list: &str, a: usize, b: usize) -> Result<String, Unfit> {
-    let root = parsed(text)?;
-    let place = || Unfit::NoSuchPlace(list.into());
+/// Returns the text with two entries of a list exchanged.
+pub(super) fn swap(text: &str, list: &str, a: usize, b: usize) -> Result<String, EditError> {
+    let root = parse(text)?;
+    let place = || EditError::NoSuchPlace(list.into());
     let Some(Value::Array(array)) = find(&root, list) else { return Err(place()) };
     let (a, b) = (a.min(b), a.max(b));
     let (Some(first), Some(second)) = (array.elements.get(a), array.elements.get(b)) else { return Err(place()) };
-    let (first, second) = (bytes(first), bytes(second));
+    let (first, second) = (byte_range(first), byte_range(second));
     if a == b {
         return Ok(text.to_string());
     }
     let between = &text[first.end..second.start];
     let swapped = format!("{}{between}{}", &text[second.clone()], &text[first.clone()]);
-    Ok(replaced(text, first.start..second.end, &swapped))
+    Ok(splice(text, first.start..second.end, &swapped))
 }
 
-/// Comments are kept where somebody wrote them, though `check` does not take them.
-fn parsed(text: &str) -> Result<Value<'_>, Unfit> {
-    let options = ParseOptions { allow_comments: true, ..strict() };
-    let parsed = parse_to_ast(text, &CollectOptions::default(), &options).map_err(|_| Unfit::NotJson)?;
-    parsed.value.ok_or(Unfit::NotJson)
+/// Comments are accepted here so that they can be kept, although `check` refuses them.
+fn parse(text: &str) -> Result<Value<'_>, EditError> {
+    let options = ParseOptions { allow_comments: true, ..strict_parse_options() };
+    let parsed = parse_to_ast(text, &CollectOptions::default(), &options).map_err(|_| EditError::NotJson)?;
+    parsed.value.ok_or(EditError::NotJson)
 }
 
-fn bytes(part: &impl Ranged) -> Range<usize> {
+fn byte_range(part: &impl Ranged) -> Range<usize> {
     let range = part.range();
     range.start..range.end
 }
 
-fn name_of(property: &ObjectProp) -> String {
+fn key_of(property: &ObjectProp) -> String {
     property.name.as_str().to_string()
 }
 
 fn find<'v, 't>(root: &'v Value<'t>, pointer: &str) -> Option<&'v Value<'t>> {
-    names(pointer).try_fold(root, |value, name| match value {
-        Value::Object(object) => object.properties.iter().find(|p| name_of(p) == name).map(|p| &p.value),
+    tokens(pointer).try_fold(root, |value, name| match value {
+        Value::Object(object) => object.properties.iter().find(|p| key_of(p) == name).map(|p| &p.value),
         Value::Array(array) => array.elements.get(name.parse::<usize>().ok()?),
         _ => None,
     })
 }
 
-fn json_of(value: &Value) -> Json {
+fn to_json(value: &Value) -> Json {
     match value {
         Value::StringLit(text) => Json::String(text.value.to_string()),
         Value::NumberLit(number) => serde_json::from_str(number.value).unwrap_or(Json::Null),
         Value::BooleanLit(truth) => Json::Bool(truth.value),
         Value::NullKeyword(_) => Json::Null,
-        Value::Array(array) => array.elements.iter().map(json_of).collect(),
+        Value::Array(array) => array.elements.iter().map(to_json).collect(),
         Value::Object(object) => {
-            Json::Object(object.properties.iter().map(|p| (name_of(p), json_of(&p.value))).collect())
+            Json::Object(object.properties.iter().map(|p| (key_of(p), to_json(&p.value))).collect())
         }
     }
 }
 
-/// 1 and 1.0 are the same number to a reader.
+/// Returns true for equal values; 1 and 1.0 are equal numbers.
 fn is_equal(a: &Json, b: &Json) -> bool {
     match (a, b) {
         (Json::Number(a), Json::Number(b)) => a.as_f64() == b.as_f64(),
@@ -206,23 +216,24 @@ fn is_equal(a: &Json, b: &Json) -> bool {
     }
 }
 
-fn replaced(text: &str, range: Range<usize>, new: &str) -> String {
+fn splice(text: &str, range: Range<usize>, new: &str) -> String {
     format!("{}{new}{}", &text[..range.start], &text[range.end..])
 }
 
-/// Spaces at the beginning of the line of a byte.
+/// Returns the number of spaces at the beginning of the line that contains a byte.
 fn line_indent(text: &str, byte: usize) -> usize {
     let line = &text[text[..byte].rfind('\n').map_or(0, |i| i + 1)..];
     line.len() - line.trim_start_matches(' ').len()
 }
 
-/// The white space before a part of an object or a list.
-fn before(text: &str, byte: usize) -> &str {
+/// Returns the white space before a part of an object or a list.
+fn whitespace_before(text: &str, byte: usize) -> &str {
     let start = text[..byte].trim_end().len();
     &text[start..byte]
 }
 
-/// Spaces that the line begun by some white space stands in by; else those of the line it is in.
+/// Returns the indentation of the line that begins in some white space; without a line break in it, that of the line
+/// that contains a byte.
 fn indent_after(text: &str, white: &str, byte: usize) -> usize {
     match white.rsplit_once('\n') {
         Some((_, spaces)) => spaces.len(),
@@ -230,55 +241,55 @@ fn indent_after(text: &str, white: &str, byte: usize) -> usize {
     }
 }
 
-fn with_key(text: &str, object: &Object, key: &str, value: &Json) -> String {
-    let breaks = Breaks::of(text);
+fn insert_key(text: &str, object: &Object, key: &str, value: &Json) -> String {
+    let breaks = LineStyle::detect(text);
     let Some(first) = object.properties.first() else {
         let inside = object.range.start + 1;
         if has_comment(&text[inside..object.range.end - 1]) {
-            let new = written(value, line_indent(text, object.range.start), breaks);
-            return replaced(text, inside..inside, &format!(" {}: {new}", quoted(key)));
+            let new = format_value(value, line_indent(text, object.range.start), breaks);
+            return splice(text, inside..inside, &format!(" {}: {new}", quote(key)));
         }
         let indent = line_indent(text, object.range.start);
         let whole = Json::Object([(key.to_string(), value.clone())].into_iter().collect());
-        return replaced(text, bytes(object), &written(&whole, indent, breaks));
+        return splice(text, byte_range(object), &format_value(&whole, indent, breaks));
     };
-    let place = place_of(key);
-    let earlier = object.properties.iter().rfind(|p| place_of(&name_of(p)) <= place);
+    let place = key_order(key);
+    let earlier = object.properties.iter().rfind(|p| key_order(&key_of(p)) <= place);
     match earlier {
         Some(earlier) => {
-            let range = bytes(earlier);
-            let white = before(text, range.start);
-            let new = written(value, indent_after(text, white, range.start), breaks);
-            replaced(text, range.end..range.end, &format!(",{white}{}: {new}", quoted(key)))
+            let range = byte_range(earlier);
+            let white = whitespace_before(text, range.start);
+            let new = format_value(value, indent_after(text, white, range.start), breaks);
+            splice(text, range.end..range.end, &format!(",{white}{}: {new}", quote(key)))
         }
         None => {
-            let at = bytes(first).start;
-            let white = before(text, at);
-            let new = written(value, indent_after(text, white, at), breaks);
-            replaced(text, at..at, &format!("{}: {new},{white}", quoted(key)))
+            let at = byte_range(first).start;
+            let white = whitespace_before(text, at);
+            let new = format_value(value, indent_after(text, white, at), breaks);
+            splice(text, at..at, &format!("{}: {new},{white}", quote(key)))
         }
     }
 }
 
-fn with_entry(text: &str, array: &Array, value: &Json) -> String {
-    let breaks = Breaks::of(text);
+fn append_entry(text: &str, array: &Array, value: &Json) -> String {
+    let breaks = LineStyle::detect(text);
     let Some(last) = array.elements.last() else {
         let inside = array.range.start + 1;
         if has_comment(&text[inside..array.range.end - 1]) {
-            let new = written(value, line_indent(text, array.range.start), breaks);
-            return replaced(text, inside..inside, &new);
+            let new = format_value(value, line_indent(text, array.range.start), breaks);
+            return splice(text, inside..inside, &new);
         }
         let whole = Json::Array(vec![value.clone()]);
-        return replaced(text, bytes(array), &written(&whole, line_indent(text, array.range.start), breaks));
+        return splice(text, byte_range(array), &format_value(&whole, line_indent(text, array.range.start), breaks));
     };
-    let range = bytes(last);
-    let white = match before(text, range.start) {
-        // `["a"]`: the only entry has nothing before it.
+    let range = byte_range(last);
+    let white = match whitespace_before(text, range.start) {
+        // `["a"]`: the only entry has no white space before it.
         "" => " ",
         white => white,
     };
-    let new = written(value, indent_after(text, white, range.start), breaks);
-    replaced(text, range.end..range.end, &format!(",{white}{new}"))
+    let new = format_value(value, indent_after(text, white, range.start), breaks);
+    splice(text, range.end..range.end, &format!(",{white}{new}"))
 }
 
 #[cfg(test)]
@@ -289,7 +300,7 @@ mod tests {
     const TEXT: &str = "{\n  // who it is\n  \"id\":   \"a\", \"title\": \"A\",\n  \"list\": [\n    { \"id\": 1 }, // first\n    { \
                         \"id\": 2 }\n  ],\n  \"empty\": [], \"none\": {}\n}\n";
 
-    fn check(new: Result<String, Unfit>, old: &str, is: &str) {
+    fn check(new: Result<String, EditError>, old: &str, is: &str) {
         assert!(TEXT.contains(old), "{old}");
         assert_eq!(new.unwrap(), TEXT.replacen(old, is, 1));
     }
@@ -334,12 +345,12 @@ mod tests {
     fn entries_change_places_and_what_is_between_them_stays() {
         let swapped = "{ \"id\": 2 }, // first\n    { \"id\": 1 }";
         check(swap(TEXT, "/list", 1, 0), "{ \"id\": 1 }, // first\n    { \"id\": 2 }", swapped);
-        assert_eq!(swap(TEXT, "/list", 0, 2), Err(Unfit::NoSuchPlace("/list".into())));
+        assert_eq!(swap(TEXT, "/list", 0, 2), Err(EditError::NoSuchPlace("/list".into())));
     }
 
     #[test]
     fn a_text_that_is_not_json_is_left_alone() {
-        assert_eq!(set("{ \"id\": ", "/id", &json!(1)), Err(Unfit::NotJson));
-        assert_eq!(pointer_to(TEXT, TEXT.find("\"id\": 2").unwrap() + 6).as_deref(), Some("/list/1/id"));
+        assert_eq!(set("{ \"id\": ", "/id", &json!(1)), Err(EditError::NotJson));
+        assert_eq!(pointer_at(TEXT, TEXT.find("\"id\": 2").unwrap() + 6).as_deref(), Some("/list/1/id"));
     }
 }

@@ -1,58 +1,60 @@
-//! `typodont assist`: the instructor's hand, on another machine than the trainee's.
+//! `typodont assist`: connects the instructor's device, on another computer than the trainee's.
 
-use super::{Failure, live};
-use crate::device::Link;
-use crate::lesson;
-use crate::sim::Assist;
+use super::{CliError, live};
 use clap::Args;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::TryRecvError;
 use std::time::Duration;
+use typodont_devices::HandLink;
+use typodont_devices::servo::SecondHandServo;
+use typodont_lesson as lesson;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The device of the second hand; see `typodont devices`
+    /// Device of the instructor; see `typodont devices`
     #[arg(long, value_name = "NAME[:WHICH]")]
     device: String,
-    /// Where the trainee's program waits, as it said when it began
+    /// Address at which the trainee's program listens, as it printed at the start
     #[arg(long, value_name = "HOST:PORT")]
     to: String,
-    /// The key that the trainee's program was given
+    /// Key that was given to the trainee's program
     #[arg(long, value_name = "KEY")]
     key: String,
 }
 
-/// How often news are fetched.
+/// Poll interval for events.
 const LISTEN_EVERY: Duration = Duration::from_millis(10);
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { device, to, key } = arguments;
-    let held = lesson::open(device)?;
-    let link = Link::connect(to, key).map_err(|e| {
-        Failure::Wrong(format!("{to}: no-trainee: {e}; give the address that the trainee's program prints"))
+    let opened = lesson::open_device(device)?;
+    let link = HandLink::connect(to, key).map_err(|e| {
+        CliError::Wrong(format!("{to}: no-trainee: {e}; give the address that the trainee's program prints"))
     })?;
-    let mut assist = Assist::start(held.device, link).map_err(Failure::Wrong)?;
-    live::speak("second hand: follows the first one; hold the button to lead it, type end to leave");
+    let mut assist = SecondHandServo::start(opened.device, link).map_err(CliError::Wrong)?;
+    live::print_best_effort(
+        "second device: follows the trainee's device; hold the button to lead it, type end to leave",
+    );
     let lines = live::typed_lines();
-    let is_interrupted = live::interruptions();
+    let is_interrupted = live::interrupt_flag();
     while !assist.has_ended() {
         if is_interrupted.load(Ordering::Relaxed) {
             return Ok(());
         }
-        tell(&mut assist);
+        print_events(&mut assist);
         match lines.try_recv() {
             Ok(line) if line.trim() == "end" => return Ok(()),
-            // Without a terminal it stays until the device is gone or the program is stopped.
+            // Without a terminal the command runs until the device is disconnected or the program is stopped.
             Ok(_) | Err(TryRecvError::Disconnected | TryRecvError::Empty) => std::thread::sleep(LISTEN_EVERY),
         }
     }
-    tell(&mut assist);
-    Err(Failure::Told)
+    print_events(&mut assist);
+    Err(CliError::AlreadyReported)
 }
 
-/// Says what happened since last asked.
-fn tell(assist: &mut Assist) {
-    while let Some(news) = assist.next_news() {
-        live::tell_of_second(news);
+/// Prints all events since the last call.
+fn print_events(assist: &mut SecondHandServo) {
+    while let Some(event) = assist.next_event() {
+        live::print_assist_event(event);
     }
 }

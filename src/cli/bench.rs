@@ -1,150 +1,151 @@
-//! `typodont bench`: the product's own figures, measured here and now.
+//! `typodont bench`: measures the program's speed and memory on this computer.
 
-mod figures;
+mod percentiles;
 mod session;
 mod ticks;
-mod work;
+mod volumes;
 
-use super::{Failure, say};
-use crate::anatomy;
-use crate::content::{nrrd, scan};
-use crate::volume::Volume;
+use super::{CliError, print_line};
+
 use clap::Args;
-use figures::Figures;
+use percentiles::Percentiles;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use typodont_core::volume::Volume;
+use typodont_exercise::tooth_import;
+use typodont_formats::nrrd;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// A CT volume (NRRD) to measure on instead of the three sizes of the program's own tooth
+    /// CT volume (NRRD) to measure with, instead of the program's own tooth in three sizes
     #[arg(long, value_name = "FILE")]
     volume: Option<PathBuf>,
-    /// Distance between that volume's voxels, where its header lacks it
+    /// Voxel spacing of that volume, if its header does not state it
     #[arg(long, value_name = "MM", requires = "volume", value_parser = super::run::spacing)]
     tooth_spacing_mm: Option<f32>,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
-    /// Run one session of that size and print the most memory it held: what `peak_mib` is taken from
+    /// Run one session of this size and print its peak memory, which `peak_mib` reports
     #[arg(long, value_name = "DIMS", hide = true)]
     session_peak: Option<String>,
 }
 
-/// The sizes that every figure is given for.
+/// Volume sizes, voxels, for which every figure is measured.
 const DIMS: [[u32; 3]; 3] = [[128, 128, 80], [256, 256, 161], [512, 512, 322]];
 
-/// The size that a whole session's replay and score are measured on.
+/// Volume size, voxels, on which the replay and scoring of a whole session are measured.
 const SESSION_DIMS: [u32; 3] = DIMS[1];
 
-/// What is printed; times in the unit of their name, as `{p50, p99, max, n}`.
+/// Results as they are printed; times are in the unit of their name, as `{p50, p99, max, n}`.
 #[derive(Serialize, Default)]
-struct Results {
+struct BenchResults {
     version: &'static str,
     threads: usize,
     cpu: String,
-    tick_us: BTreeMap<String, BTreeMap<&'static str, Figures>>,
-    mesh_ms: BTreeMap<String, Figures>,
-    remesh_ms: BTreeMap<String, Figures>,
-    frame_ms: BTreeMap<String, work::Frames>,
-    edt_ms: BTreeMap<String, Figures>,
-    load_ms: BTreeMap<String, Figures>,
-    /// What the same path removes at each size, mm³.
+    tick_us: BTreeMap<String, BTreeMap<&'static str, Percentiles>>,
+    mesh_ms: BTreeMap<String, Percentiles>,
+    remesh_ms: BTreeMap<String, Percentiles>,
+    frame_ms: BTreeMap<String, volumes::FrameTimings>,
+    edt_ms: BTreeMap<String, Percentiles>,
+    load_ms: BTreeMap<String, Percentiles>,
+    /// Volume removed by the same path at each size, mm³.
     removed_mm3: BTreeMap<String, f64>,
-    /// Five minutes of work, turned again.
-    replay_s: Option<Figures>,
-    /// Every measure of those five minutes, after the last tick.
-    score_s: Option<Figures>,
-    startup_ms: Option<Figures>,
+    /// Replay of a session of five minutes, s.
+    replay_s: Option<Percentiles>,
+    /// Computation of all metrics of that session, after its last tick, s.
+    score_s: Option<Percentiles>,
+    startup_ms: Option<Percentiles>,
     peak_mib: BTreeMap<String, f64>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     if let Some(dims) = &arguments.session_peak {
-        return session::print_peak(dims).map_err(Failure::Wrong);
+        return session::print_peak(dims).map_err(CliError::Wrong);
     }
-    let mut results = Results {
+    let mut results = BenchResults {
         version: env!("CARGO_PKG_VERSION"),
         threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
         cpu: cpu(),
-        ..Results::default()
+        ..BenchResults::default()
     };
     let bar = super::run::spinner("measuring");
     let measured = measure(arguments, &mut results);
     bar.finish_and_clear();
-    measured.map_err(Failure::Wrong)?;
+    measured.map_err(CliError::Wrong)?;
     match arguments.json {
-        // The types hold nothing that JSON cannot say.
-        true => say(serde_json::to_string_pretty(&results).unwrap_or_default()),
-        false => say(results.table().trim_end()),
+        // The types contain only values that JSON can represent.
+        true => print_line(serde_json::to_string_pretty(&results).unwrap_or_default()),
+        false => print_line(results.table().trim_end()),
     }
 }
 
-fn measure(arguments: &Arguments, results: &mut Results) -> Result<(), String> {
+fn measure(arguments: &Arguments, results: &mut BenchResults) -> Result<(), String> {
     match &arguments.volume {
         Some(path) => {
             let image = nrrd::read(path).map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
             let spacing = arguments.tooth_spacing_mm.map(|mm| [mm; 3]);
-            let tooth = scan::segmented(&image, spacing, &work::tissues()?)
+            let tooth = tooth_import::segmented(&image, spacing, &volumes::tissues()?)
                 .map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
-            on(tooth, results)?;
+            measure_tooth(tooth, results)?;
         }
         None => {
             for dims in DIMS {
-                on(grown(dims)?, results)?;
+                measure_tooth(grow_tooth(dims)?, results)?;
                 let name = name_of(dims);
                 results.peak_mib.insert(name.clone(), session::peak_mib(&name)?);
             }
-            let five_minutes = session::five_minutes(grown(SESSION_DIMS)?)?;
+            let five_minutes = session::five_minutes(grow_tooth(SESSION_DIMS)?)?;
             results.replay_s = Some(five_minutes.replay_s);
             results.score_s = Some(five_minutes.score_s);
         }
     }
-    results.startup_ms = Some(work::startup_ms()?);
+    results.startup_ms = Some(volumes::startup_ms()?);
     Ok(())
 }
 
-/// Everything that is measured on one tooth.
-fn on(tooth: Volume, results: &mut Results) -> Result<(), String> {
+/// Takes all measurements on one tooth.
+fn measure_tooth(tooth: Volume, results: &mut BenchResults) -> Result<(), String> {
     let name = name_of(tooth.grid().dims);
-    let work = work::on(&tooth)?;
+    let work = volumes::measure(&tooth)?;
     results.mesh_ms.insert(name.clone(), work.mesh_ms);
     results.remesh_ms.insert(name.clone(), work.remesh_ms);
     results.frame_ms.insert(name.clone(), work.frames);
     results.edt_ms.insert(name.clone(), work.edt_ms);
     results.load_ms.insert(name.clone(), work.load_ms);
-    let ticks = ticks::on(tooth)?;
+    let ticks = ticks::measure(tooth)?;
     results.tick_us.insert(name.clone(), ticks.us);
     results.removed_mm3.insert(name, ticks.removed_mm3);
     Ok(())
 }
 
-/// The program's own molar in a grid of a size.
-fn grown(dims: [u32; 3]) -> Result<Volume, String> {
-    let form = &anatomy::molar::LOWER_FIRST;
-    Ok(anatomy::grow(form, anatomy::grid_fitting(form, dims), &work::tissues()?))
+/// Generates the program's own molar in a grid of this size, voxels.
+fn grow_tooth(dims: [u32; 3]) -> Result<Volume, String> {
+    let form = &typodont_anatomy::lower_first_molar::LOWER_FIRST;
+    Ok(typodont_anatomy::grow(form, typodont_anatomy::grid_fitting(form, dims), &volumes::tissues()?))
 }
 
 fn name_of(dims: [u32; 3]) -> String {
     dims.map(|n| n.to_string()).join("x")
 }
 
-/// The processor's name, where the system tells it.
+/// Name of the processor, if the system reports it.
 fn cpu() -> String {
-    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = told.lines().find_map(|l| l.strip_prefix("model name"));
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = cpuinfo.lines().find_map(|l| l.strip_prefix("model name"));
     model.and_then(|l| l.split_once(':')).map_or_else(|| std::env::consts::ARCH.into(), |(_, name)| name.trim().into())
 }
 
-impl Results {
-    /// The same for people, one line per figure.
+impl BenchResults {
+    /// The results as a text table, one line per figure.
     fn table(&self) -> String {
         let mut lines = vec![format!("typodont {} on {}, {} threads", self.version, self.cpu, self.threads)];
         if let Some(frames) = self.frame_ms.values().next() {
             lines.push(format!("pictures: {}", frames.adapter));
         }
         lines.push(format!("{:<34}{:>10}{:>10}{:>10}{:>9}", "", "p50", "p99", "max", "n"));
-        let mut line = |name: String, f: &Figures| {
+        let mut line = |name: String, f: &Percentiles| {
             lines.push(format!("{name:<34}{:>10.2}{:>10.2}{:>10.2}{:>9}", f.p50, f.p99, f.max, f.n));
         };
         for (dims, cases) in &self.tick_us {

@@ -1,19 +1,19 @@
-//! `typodont check`: every complaint about every file.
+//! `typodont check`: prints all complaints about scenario files.
 
-use super::{Failure, say};
-use crate::diagnostic::Diagnostic;
-use crate::lesson::{self, scenario_files};
-use crate::scenario::Forms;
+use super::{CliError, print_line};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use typodont_exercise::scenario::ResolveMode;
+use typodont_formats::diagnostic::Diagnostic;
+use typodont_lesson::{self as lesson, scenario_files};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Scenario files, or folders of them
+    /// Scenario files, or folders that contain them
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// How complaints are written
+    /// Output format of the problems found
     #[arg(long, value_enum, default_value_t = Format::Text)]
     format: Format,
 }
@@ -24,7 +24,7 @@ enum Format {
     Json,
 }
 
-/// A complaint as a program reads it; line and column are null for a complaint about a whole file.
+/// A complaint in JSON output; line and column are null for a complaint about a whole file.
 #[derive(Serialize)]
 struct ComplaintFile<'a> {
     file: &'a str,
@@ -36,7 +36,7 @@ struct ComplaintFile<'a> {
     help: Option<&'a str>,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let mut found = Vec::new();
     let mut checked = 0;
     for path in &arguments.files {
@@ -47,19 +47,19 @@ pub fn run(arguments: &Arguments) -> Result<(), Failure> {
         }
     }
     match arguments.format {
-        Format::Text if found.is_empty() => say(format!("{checked} files, no complaints"))?,
-        Format::Text => return Err(Failure::Complaints(found)),
-        Format::Json => say(as_json(&found))?,
+        Format::Text if found.is_empty() => print_line(format!("{checked} files checked, no problems found"))?,
+        Format::Text => return Err(CliError::Complaints(found)),
+        Format::Json => print_line(to_json(&found))?,
     }
-    if found.is_empty() { Ok(()) } else { Err(Failure::Told) }
+    if found.is_empty() { Ok(()) } else { Err(CliError::AlreadyReported) }
 }
 
 /// All complaints about one scenario.
 fn check(path: &Path) -> Vec<Diagnostic> {
-    lesson::read(path, Forms::Made).err().unwrap_or_default()
+    lesson::read_scenario(path, ResolveMode::MakeWorkpiece).err().unwrap_or_default()
 }
 
-fn as_json(found: &[Diagnostic]) -> String {
+fn to_json(found: &[Diagnostic]) -> String {
     let complaint = |d: &Diagnostic| {
         let (line, column) = d.line_and_column().unzip();
         serde_json::to_value(ComplaintFile {

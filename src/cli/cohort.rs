@@ -1,124 +1,163 @@
-//! `typodont cohort`: many bundles, compared.
+//! `typodont cohort`: compares many bundles.
 
-use super::school::Source;
-use super::{Failure, say, write};
-use crate::report::cohort::{Cohort, Rating, ratings};
-use crate::report::harmless;
+use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use typodont_report::cohort::{Cohort, ExaminerRating, read_ratings};
+use typodont_report::{Templates, sanitize_display};
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    source: Source,
-    /// One line per session, one column per measure
+    source: SessionSource,
+    /// Table to write: one line per session, one column per measure
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// A page for people: spreads, maps, learning curves, reliability, pass marks, the questionnaire
+    /// Page to write: distributions, maps, learning curves, reliability, pass marks, questionnaire
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// The same numbers for programs
+    /// Language of the page, by its code: en, tr, or one that the school added
+    #[arg(long, value_name = "CODE", default_value = DEFAULT_LANGUAGE, requires = "html")]
+    language: String,
+    /// File to write with the same figures as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Participants whom the others are compared with
+    /// Participants with whom the others are compared
     #[arg(long, value_name = "CODE[,CODE]", value_delimiter = ',')]
     expert: Vec<String>,
-    /// Examiners' judgements, for pass marks: a CSV with the columns participant, rating (1 to 5) and, if it matters, scenario
+    /// Examiners' global ratings, from which pass marks are derived: a CSV file with the columns participant, rating (1 to 5) and,
+    /// optionally, scenario
     #[arg(long, value_name = "FILE.csv")]
     ratings: Option<PathBuf>,
-    /// Folder for the maps of what share of people removed each voxel, as NRRD
+    /// Folder for NRRD maps of the proportion of participants who removed each voxel
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
 }
 
-/// Letters of a path or a reason that are told.
-const TOLD_MAX: usize = 300;
+/// Maximum length of a printed path or reason, characters.
+const PRINTED_MAX: usize = 300;
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+/// Page of a cohort that is to be written.
+pub struct PageRequest<'a> {
+    path: &'a Path,
+    templates: Templates,
+    /// Code of a language that the templates have.
+    language: &'a str,
+}
+
+impl<'a> PageRequest<'a> {
+    /// Loads the templates.
+    ///
+    /// # Errors
+    /// Fails if a template is not valid, or if there is no such language.
+    pub fn new(path: &'a Path, language: &'a str) -> Result<PageRequest<'a>, CliError> {
+        let templates = load_templates()?;
+        templates.languages().translator(language).map_err(CliError::misuse)?;
+        Ok(PageRequest { path, templates, language })
+    }
+}
+
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { csv, html, json, maps, .. } = arguments;
+    let page = html.as_deref().map(|path| PageRequest::new(path, &arguments.language)).transpose()?;
     let compares = csv.is_some() && !arguments.expert.is_empty();
-    let mut read = arguments.source.read(html.is_some() || json.is_some() || maps.is_some() || compares)?;
-    let mut cohort = std::mem::take(&mut read.cohort);
-    cohort.experts = experts(&cohort, &arguments.expert)?;
+    let mut sourced = arguments.source.read(html.is_some() || json.is_some() || maps.is_some() || compares)?;
+    let mut cohort = std::mem::take(&mut sourced.cohort);
+    cohort.experts = known_experts(&cohort, &arguments.expert)?;
     cohort.ratings =
-        arguments.ratings.as_deref().map(|path| judgements(&cohort, path)).transpose()?.unwrap_or_default();
-    let known = cohort.skipped.len();
+        arguments.ratings.as_deref().map(|path| load_ratings(&cohort, path)).transpose()?.unwrap_or_default();
+    let reported_count = cohort.skipped.len();
     if html.is_some() || json.is_some() || maps.is_some() || csv.is_some() && !cohort.experts.is_empty() {
         cohort.map_removals();
     }
-    tell_skipped(&cohort, known);
-    write_all(&cohort, html.as_deref(), csv.as_deref(), json.as_deref())?;
+    report_skipped(&cohort, reported_count);
+    write_all(&cohort, page.as_ref(), csv.as_deref(), json.as_deref())?;
     if let Some(folder) = maps {
         write_maps(&cohort, folder)?;
     }
-    say(cohort.text().trim_end())
+    print_line(cohort.text().trim_end())
 }
 
-/// The bundles below a folder; complains about what is none, and fails where there is none.
-pub fn read(folder: &Path) -> Result<Cohort, Failure> {
+/// Reads all bundles below a folder, and prints a complaint about each that is not valid.
+///
+/// # Errors
+/// A message if the folder does not exist or contains no valid bundle.
+pub fn read_folder(folder: &Path) -> Result<Cohort, CliError> {
     if !folder.is_dir() {
-        return Err(Failure::wrong(format!("{}: missing-folder: there is no such folder", folder.display())));
+        return Err(CliError::wrong(format!("{}: missing-folder: the folder does not exist", folder.display())));
     }
     let cohort = Cohort::read(folder);
-    tell_skipped(&cohort, 0);
+    report_skipped(&cohort, 0);
     if cohort.sessions.is_empty() {
-        return Err(Failure::Wrong(format!("{}: no-sessions: no bundle was found there", folder.display())));
+        return Err(CliError::Wrong(format!("{}: no-sessions: the folder contains no bundle", folder.display())));
     }
     Ok(cohort)
 }
 
-fn tell_skipped(cohort: &Cohort, known: usize) {
-    for (path, reason) in &cohort.skipped[known..] {
-        eprintln!("{}: skipped: {}", harmless(&path.display().to_string(), TOLD_MAX), harmless(reason, TOLD_MAX));
+fn report_skipped(cohort: &Cohort, reported_count: usize) {
+    for (path, reason) in &cohort.skipped[reported_count..] {
+        eprintln!(
+            "{}: skipped: {}",
+            sanitize_display(&path.display().to_string(), PRINTED_MAX),
+            sanitize_display(reason, PRINTED_MAX)
+        );
     }
 }
 
-fn experts(cohort: &Cohort, asked: &[String]) -> Result<Vec<String>, Failure> {
+fn known_experts(cohort: &Cohort, codes: &[String]) -> Result<Vec<String>, CliError> {
     let is_there = |code: &&String| cohort.sessions.iter().any(|(_, s)| s.participant == **code && !code.is_empty());
-    let missing: Vec<String> = asked.iter().filter(|code| !is_there(code)).map(|c| harmless(c, 40)).collect();
+    let missing: Vec<String> = codes.iter().filter(|code| !is_there(code)).map(|c| sanitize_display(c, 40)).collect();
     match missing.is_empty() {
-        true => Ok(asked.to_vec()),
+        true => Ok(codes.to_vec()),
         false => {
             let what = format!(
-                "unknown-expert: no session is by \"{}\"; codes are written as in session.json",
+                "unknown-expert: there is no session of participant \"{}\"; write codes exactly as in session.json",
                 missing.join("\", \"")
             );
-            Err(Failure::Wrong(what))
+            Err(CliError::Wrong(what))
         }
     }
 }
 
-fn judgements(cohort: &Cohort, path: &Path) -> Result<Vec<Rating>, Failure> {
-    let source = crate::content::read_text(path)?;
-    let found = ratings(&path.display().to_string(), &source.text).map_err(|e| Failure::Wrong(e.join("\n")))?;
+fn load_ratings(cohort: &Cohort, path: &Path) -> Result<Vec<ExaminerRating>, CliError> {
+    let source = typodont_formats::read_text(path)?;
+    let found = read_ratings(&path.display().to_string(), &source.text).map_err(|e| CliError::Wrong(e.join("\n")))?;
     for rating in &found {
         if !cohort.sessions.iter().any(|(_, s)| s.participant == rating.participant) {
-            let code = harmless(&rating.participant, 40);
-            eprintln!("{}: no-session: nobody is \"{code}\" here; that rating counts for nothing", path.display());
+            let code = sanitize_display(&rating.participant, 40);
+            eprintln!(
+                "{}: no-session: there is no session of participant \"{code}\"; the rating is ignored",
+                path.display()
+            );
         }
     }
     Ok(found)
 }
 
-/// Writes what was asked for.
-pub fn write_all(cohort: &Cohort, html: Option<&Path>, csv: Option<&Path>, json: Option<&Path>) -> Result<(), Failure> {
-    if let Some(path) = html {
-        write(path, cohort.html(&super::templates()?, path).map_err(Failure::wrong)?)?;
+/// Writes the outputs that the arguments name.
+pub fn write_all(
+    cohort: &Cohort,
+    page: Option<&PageRequest>,
+    csv: Option<&Path>,
+    json: Option<&Path>,
+) -> Result<(), CliError> {
+    if let Some(PageRequest { path, templates, language }) = page {
+        write_file(path, cohort.html(templates, path, language).map_err(CliError::wrong)?)?;
     }
     if let Some(path) = csv {
-        write(path, cohort.csv())?;
+        write_file(path, cohort.csv())?;
     }
     if let Some(path) = json {
-        write(path, cohort.json())?;
+        write_file(path, cohort.json())?;
     }
     Ok(())
 }
 
-fn write_maps(cohort: &Cohort, folder: &Path) -> Result<(), Failure> {
-    let unmade = |e: std::io::Error| Failure::wrong(format!("{}: unwritable-folder: {e}", folder.display()));
-    std::fs::create_dir_all(folder).map_err(unmade)?;
+fn write_maps(cohort: &Cohort, folder: &Path) -> Result<(), CliError> {
+    let unwritable = |e: std::io::Error| CliError::wrong(format!("{}: unwritable-folder: {e}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(unwritable)?;
     for removal in &cohort.removals {
-        write(&folder.join(removal.file_name()), removal.nrrd().map_err(Failure::wrong)?)?;
+        write_file(&folder.join(removal.file_name()), removal.nrrd().map_err(CliError::wrong)?)?;
     }
     Ok(())
 }

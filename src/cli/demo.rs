@@ -1,27 +1,28 @@
-//! `typodont demo`: the whole way, from the shipped exercises to a page about them.
+//! `typodont demo`: runs the shipped exercises with a scripted operator and writes a page about them.
 
-use super::run::{Player, Run, operator, perform};
-use super::{Failure, SESSIONS, cohort, say};
-use crate::content::Library;
-use crate::diagnostic::Source;
-use crate::report::cohort::Cohort;
-use crate::scenario::{self, Forms};
+use super::run::{RunRequest, SessionDriver, operator, run_session};
+use super::{CliError, DEFAULT_LANGUAGE, SESSIONS, cohort, print_line};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use typodont_exercise::scenario;
+use typodont_exercise::scenario::ResolveMode;
+use typodont_formats::Library;
+use typodont_formats::diagnostic::SourceText;
+use typodont_report::cohort::Cohort;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder in which the bundles and the page are made
+    /// Folder for the bundles and the page
     #[arg(long, value_name = "DIR", default_value_os_t = PathBuf::from(SESSIONS).join("demo"))]
     out: PathBuf,
-    /// Who plays the trainee: careful, expert, hasty, timid, or a file
+    /// Scripted operator in the place of a trainee: careful, expert, hasty, timid, or a file
     #[arg(long, value_name = "NAME|FILE.json", default_value = "careful")]
     operator: String,
 }
 
-/// The exercises of the thesis (8.1.1), as they ship.
+/// The exercises of the thesis (8.1.1), as shipped with the program.
 const EXERCISES: [(&str, &str); 5] = [
     ("scenarios/1-introduction.json", include_str!("../../scenarios/1-introduction.json")),
     ("scenarios/2-decay.json", include_str!("../../scenarios/2-decay.json")),
@@ -30,32 +31,32 @@ const EXERCISES: [(&str, &str); 5] = [
     ("scenarios/5-grinding.json", include_str!("../../scenarios/5-grinding.json")),
 ];
 
-/// The demo is the same every time.
+/// Seed of all random choices; fixed, so that the demo is the same every time.
 const SEED: u64 = 1;
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let library = Library::shipped();
     let operator = operator(&arguments.operator, &library)?;
     for (name, text) in EXERCISES {
-        let scenario = scenario::resolve(Source::new(name, text), &library, Forms::Made)?;
-        say(format!("{}: {}", scenario.id, scenario.title))?;
-        let run = Run {
+        let scenario = scenario::resolve(SourceText::new(name, text), &library, ResolveMode::MakeWorkpiece)?;
+        print_line(format!("{}: {}", scenario.id, scenario.title))?;
+        let run = RunRequest {
             scenario: Arc::new(scenario),
-            player: Player::Script(Box::new(operator.clone())),
+            driver: SessionDriver::Script(Box::new(operator.clone())),
             seed: SEED,
             participant: "demo",
             out: &arguments.out,
             digests: BTreeMap::new(),
         };
-        say(format!("  {}", perform(run)?.join("report.html").display()))?;
+        print_line(format!("  {}", run_session(run)?.join("report.html").display()))?;
     }
     let cohort = Cohort::read(&arguments.out);
     let page = arguments.out.join("cohort.html");
     cohort::write_all(
         &cohort,
-        Some(&page),
+        Some(&cohort::PageRequest::new(&page, DEFAULT_LANGUAGE)?),
         Some(&arguments.out.join("cohort.csv")),
         Some(&arguments.out.join("cohort.json")),
     )?;
-    say(page.display())
+    print_line(page.display())
 }

@@ -1,18 +1,18 @@
-//! `typodont finish`: what can be had of a session that was cut off.
+//! `typodont finish`: completes the bundle of an interrupted session.
 
-use super::{Failure, say};
-use crate::report::bundle::Unfinished;
+use super::{CliError, print_line};
 use clap::Args;
 use std::path::PathBuf;
+use typodont_report::bundle::PartialBundle;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The folder it left, whose name ends in .partial
+    /// Folder of the interrupted session, whose name ends in .partial
     partial: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let templates = super::templates()?;
-    let unfinished = Unfinished::resume(&arguments.partial).map_err(Failure::wrong)?;
-    say(unfinished.complete(&templates).map_err(Failure::wrong)?.display())
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let templates = super::load_templates()?;
+    let unfinished = PartialBundle::resume(&arguments.partial).map_err(CliError::wrong)?;
+    print_line(unfinished.complete(&templates).map_err(CliError::wrong)?.display())
 }

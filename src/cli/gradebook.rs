@@ -1,89 +1,93 @@
-//! `typodont gradebook`: grades as a table that a school's system imports.
+//! `typodont gradebook`: writes grades as a table that a school's system imports.
 
-use super::school::Source;
-use super::{Failure, say, write};
-use crate::handover::gradebook::{Students, System, Take, gradebook};
-use crate::handover::session_id;
-use crate::report::cohort::Cohort;
-use crate::review::{self, Told};
+use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
+use typodont_integrations::gradebook::{AttemptPolicy, GradebookOptions, Lms, StudentTable, gradebook};
+use typodont_integrations::session_id;
+use typodont_report::cohort::Cohort;
+use typodont_review::{self as review, LogSnapshot};
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    source: Source,
-    /// Whose gradebook
+    source: SessionSource,
+    /// System that will import the table
     #[arg(long = "for", value_name = "SYSTEM")]
-    system: Systems,
-    /// The table
+    system: LmsName,
+    /// Table to write
     #[arg(short, long, value_name = "FILE.csv")]
     output: PathBuf,
-    /// Which session of an exercise counts
+    /// Session that counts when a participant has several of one exercise
     #[arg(long, value_name = "WHICH", default_value = "last")]
-    take: Taken,
-    /// The school's names of people: a CSV with the column participant, and those that the system knows people by
+    take: AttemptPolicyName,
+    /// Students' identities: a CSV file with the column participant and the columns by which the system identifies students
     #[arg(long, value_name = "FILE.csv")]
     students: Option<PathBuf>,
-    /// Take the examiner's grade where one stands (see `typodont review`)
+    /// Language of the feedback in a table for Moodle, by its code: en, tr, or one that the school added
+    #[arg(long, value_name = "CODE", default_value = DEFAULT_LANGUAGE)]
+    language: String,
+    /// Use the examiner's grade where a grade was overridden (see `typodont review`)
     #[arg(long)]
     overrides: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Systems {
+enum LmsName {
     Moodle,
     Canvas,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum Taken {
+enum AttemptPolicyName {
     Last,
     Best,
     First,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let mut read = arguments.source.read(false)?;
-    let mut cohort = std::mem::take(&mut read.cohort);
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let templates = load_templates()?;
+    let translator = templates.languages().translator(&arguments.language).map_err(CliError::misuse)?;
+    let mut sourced = arguments.source.read(false)?;
+    let mut cohort = std::mem::take(&mut sourced.cohort);
     if arguments.overrides {
-        take_overrides(&mut cohort, &read.judgements()?);
+        apply_overrides(&mut cohort, &sourced.overrides()?);
     }
-    let students = arguments.students.as_ref().map(|path| -> Result<Students, Failure> {
-        let source = crate::content::read_text(path)?;
-        Students::read(&path.display().to_string(), &source.text).map_err(Failure::Wrong)
+    let students = arguments.students.as_ref().map(|path| -> Result<StudentTable, CliError> {
+        let source = typodont_formats::read_text(path)?;
+        StudentTable::read(&path.display().to_string(), &source.text).map_err(CliError::Wrong)
     });
     let students = students.transpose()?;
-    let system = match arguments.system {
-        Systems::Moodle => System::Moodle,
-        Systems::Canvas => System::Canvas,
+    let lms = match arguments.system {
+        LmsName::Moodle => Lms::Moodle,
+        LmsName::Canvas => Lms::Canvas,
     };
-    let take = match arguments.take {
-        Taken::Last => Take::Last,
-        Taken::Best => Take::Best,
-        Taken::First => Take::First,
+    let policy = match arguments.take {
+        AttemptPolicyName::Last => AttemptPolicy::Last,
+        AttemptPolicyName::Best => AttemptPolicy::Best,
+        AttemptPolicyName::First => AttemptPolicy::First,
     };
-    let made = gradebook(&cohort, system, take, students.as_ref());
-    for what in &made.left_out {
+    let made = gradebook(&cohort, &GradebookOptions { lms, policy, students: students.as_ref(), translator });
+    for what in &made.warnings {
         eprintln!("left out: {what}");
     }
     if made.students == 0 {
-        let what = "no-grades: nobody with a code has a grade here";
-        return Err(Failure::wrong(format!("{}: {what}", read.name)));
+        let what = "no-grades: no session with a participant code has a grade";
+        return Err(CliError::wrong(format!("{}: {what}", sourced.name)));
     }
-    write(&arguments.output, made.csv)?;
-    say(format!("{}: {} students", arguments.output.display(), made.students))
+    write_file(&arguments.output, made.csv)?;
+    print_line(format!("{}: {} students", arguments.output.display(), made.students))
 }
 
-/// Puts examiners' grades in place of the machine's, and says how many.
-fn take_overrides(cohort: &mut Cohort, told: &Told) {
+/// Replaces computed grades by those of examiners, and prints their number.
+fn apply_overrides(cohort: &mut Cohort, log: &LogSnapshot) {
     let mut count = 0;
     for (_, session) in &mut cohort.sessions {
         let id = session_id(session);
         if let Some(grade) = &mut session.grade {
-            let (taken, overrides) = review::applied(grade, &id, told);
+            let (taken, overrides) = review::with_overrides(grade, &id, log);
             (*grade, count) = (taken, count + usize::from(overrides > 0));
         }
     }
-    eprintln!("{count} grades are an examiner's");
+    eprintln!("{count} grades were overridden by an examiner");
 }

@@ -1,72 +1,79 @@
-//! An exercise with a device in somebody's hand, at a terminal: what is asked is printed, what is typed is an answer.
+//! An exercise with a device at a terminal: questions are printed, and answers are typed.
 //!
-//! Takes an open device and lines of text. Gives a recorded session. The window of the desktop program says the same things
-//! in pictures.
+//! Takes an open device and lines of text. Gives a recorded session. The window of the desktop application is the
+//! graphical alternative.
 
-use super::say;
-use crate::lesson::{Failed, Held, Lesson, Prepared, Recorded, SecondHand};
-use crate::scenario::{QuestionKind, Scenario};
-use crate::session::{Answer, Effect, Heard, Input, Live, Noted, Session, Sign};
-use crate::sim::{AssistNews, Command};
+use super::print_line;
 use std::fmt::Write;
 use std::io::BufRead;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, Instant};
+use typodont_core::sim::Command;
+use typodont_devices::servo::SecondHandEvent;
+use typodont_exercise::scenario::{QuestionKind, Scenario};
+use typodont_exercise::session::{AnswerValue, ChartEntry, ChartInput, Effect, Input, Session};
+use typodont_lesson::live::{LiveEvent, LiveSession};
+use typodont_lesson::{Lesson, LessonError, OpenDevice, PendingSecondHand, PreparedSession, RecordedSession};
 
-/// The device a person holds, and another hand if one joins.
+/// The trainee's device, and a second hand if one joins.
 pub struct Hands {
-    pub first: Held,
-    pub second: Option<SecondHand>,
+    pub first: OpenDevice,
+    pub second: Option<PendingSecondHand>,
 }
 
-/// How often letters are fetched: a person at a terminal sees nothing faster.
+/// Poll interval for events; nobody at a terminal sees faster changes.
 const LISTEN_EVERY: Duration = Duration::from_millis(4);
 
-/// How often a device that is gone is looked for.
-const LOOK_EVERY: Duration = Duration::from_millis(500);
+/// Interval between attempts to find a disconnected device.
+const RECONNECT_EVERY: Duration = Duration::from_millis(500);
 
-/// Plays a prepared lesson to its end.
-pub fn play(prepared: Prepared, hands: Hands) -> Result<Recorded, Failed> {
-    let Hands { first: Held { device, driver, argument, .. }, second } = hands;
-    if let Some(address) = second.as_ref().and_then(SecondHand::address) {
-        speak(format!("a second hand may join at {address}: typodont assist --device NAME --to {address} --key …"));
+/// Runs a prepared lesson to its end.
+///
+/// # Errors
+/// The lesson's error if it cannot begin, be recorded or be continued.
+pub fn play(prepared: PreparedSession, hands: Hands) -> Result<RecordedSession, LessonError> {
+    let Hands { first: OpenDevice { device, driver, argument, .. }, second } = hands;
+    if let Some(address) = second.as_ref().and_then(PendingSecondHand::address) {
+        print_best_effort(format!(
+            "a second device can join at {address}: typodont assist --device NAME --to {address} --key …"
+        ));
     }
     let lines = typed_lines();
-    let is_interrupted = interruptions();
-    let (mut lesson, heard) = prepared.begin(device, second)?;
-    tell(&heard, lesson.session());
-    let mut looked = Instant::now();
+    let is_interrupted = interrupt_flag();
+    let (mut lesson, events) = prepared.begin(device, second)?;
+    print_events(&events, lesson.session());
+    let mut last_attempt = Instant::now();
     let mut is_listening = true;
     while !lesson.session().is_complete() {
         std::thread::sleep(LISTEN_EVERY);
-        let heard = lesson.listen()?;
-        tell(&heard, lesson.session());
-        while let Some(news) = lesson.next_of_second() {
-            tell_of_second(news);
+        let events = lesson.poll()?;
+        print_events(&events, lesson.session());
+        while let Some(event) = lesson.next_assist_event() {
+            print_assist_event(event);
         }
-        if lesson.live().is_waiting() && looked.elapsed() > LOOK_EVERY {
-            looked = Instant::now();
+        if lesson.live().is_suspended() && last_attempt.elapsed() > RECONNECT_EVERY {
+            last_attempt = Instant::now();
             if let Ok(device) = driver.open(argument.as_deref()) {
-                speak(match lesson.go_on(device)? {
-                    true => "the device is back; take the instrument out of the tooth, then go on",
-                    false => "this is another device than the session began with; plug that one in again",
+                print_best_effort(match lesson.resume_with(device)? {
+                    true => "the device is connected again; move the instrument out of the tooth, then continue",
+                    false => "this is not the device with which the session began; plug that device in again",
                 });
             }
         }
         if is_interrupted.swap(false, Ordering::Relaxed) {
-            say_to(&mut lesson, &Input::Abort)?;
+            submit(&mut lesson, &Input::Abort)?;
             break;
         }
         match lines.try_recv() {
-            Ok(line) => match understood(&line, lesson.session(), lesson.live()) {
-                Said::Input(input) => say_to(&mut lesson, &input)?,
-                Said::Pause(is_paused) => lesson.pause(is_paused),
-                Said::End if lesson.session().are_stages_over() => break,
-                Said::End => speak("the exercise is not over; abort ends it before its time"),
-                Said::Show(text) => speak(text),
-                Said::Nothing => {}
+            Ok(line) => match parse_line(&line, lesson.session(), lesson.live()) {
+                TypedCommand::Input(input) => submit(&mut lesson, &input)?,
+                TypedCommand::Pause(is_paused) => lesson.set_paused(is_paused),
+                TypedCommand::End if lesson.session().are_stages_over() => break,
+                TypedCommand::End => print_best_effort("the exercise is not over; type abort to end it early"),
+                TypedCommand::Show(text) => print_best_effort(text),
+                TypedCommand::Nothing => {}
             },
             Err(TryRecvError::Disconnected) if is_listening => is_listening = false,
             Err(_) => {}
@@ -79,28 +86,28 @@ pub fn play(prepared: Prepared, hands: Hands) -> Result<Recorded, Failed> {
     lesson.end()
 }
 
-fn say_to(lesson: &mut Lesson, input: &Input) -> Result<(), Failed> {
-    let heard = lesson.say(input)?;
-    tell(&heard, lesson.session());
+fn submit(lesson: &mut Lesson, input: &Input) -> Result<(), LessonError> {
+    let events = lesson.submit(input)?;
+    print_events(&events, lesson.session());
     Ok(())
 }
 
-/// Whether somebody asked the program to stop (Ctrl-C, or the system's word for it): the session is aborted then, its hand
-/// let go and its bundle made.
-pub fn interruptions() -> Arc<AtomicBool> {
+/// Flag that becomes true when the program is asked to stop (Ctrl-C or a termination signal): the session is then
+/// aborted, the device's force is switched off and the bundle is written.
+pub fn interrupt_flag() -> Arc<AtomicBool> {
     let is_asked = Arc::new(AtomicBool::new(false));
     let asked = is_asked.clone();
-    // Where it cannot be caught, the program ends as it would have; the device lets go when no force comes any more.
+    // If the signal cannot be caught, it ends the program; the device switches its force off when commands stop.
     let _ = ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed));
     is_asked
 }
 
-/// Lines as they are typed; the channel closes when there will be no more.
+/// Lines as they are typed; the channel closes at the end of input.
 pub fn typed_lines() -> Receiver<String> {
-    let (post, lines) = mpsc::channel();
+    let (sender, lines) = mpsc::channel();
     std::thread::spawn(move || {
         for line in std::io::stdin().lock().lines().map_while(Result::ok) {
-            if post.send(line).is_err() {
+            if sender.send(line).is_err() {
                 break;
             }
         }
@@ -108,50 +115,58 @@ pub fn typed_lines() -> Receiver<String> {
     lines
 }
 
-/// Prints; a terminal that is gone does not end a session.
-pub fn speak(text: impl std::fmt::Display) {
-    let _ = say(text);
+/// Prints a line and ignores errors, so that a closed terminal does not end a session.
+pub fn print_best_effort(text: impl std::fmt::Display) {
+    let _ = print_line(text);
 }
 
-fn tell(heard: &[Heard], session: &Session) {
-    for one in heard {
-        match one {
-            Heard::Effect(Effect::StageStarted { stage }) => speak(stage_text(session.scenario(), *stage)),
-            Heard::Effect(Effect::StageEnded { .. }) => speak("this stage is over\n"),
-            Heard::Effect(Effect::StagesOver) => speak(questionnaire_text(session.scenario())),
-            Heard::Effect(Effect::Refused { why }) => speak(format!("not taken: {why}")),
-            Heard::Effect(Effect::Answered { .. }) => speak("noted"),
-            Heard::Effect(Effect::Charted { note, is_there, .. }) => speak(match note.what {
-                Noted::Depth { read, .. } => format!("{}: {read} mm", note.site.code()),
-                Noted::Calculus if *is_there => format!("{}: calculus", note.site.code()),
-                Noted::Calculus => format!("{}: no calculus", note.site.code()),
-            }),
-            Heard::Effect(Effect::Tell(Command::Take { instrument })) => {
-                speak(format!("in the hand: {}", session.scenario().instruments[*instrument].title));
+fn print_events(events: &[LiveEvent], session: &Session) {
+    for event in events {
+        match event {
+            LiveEvent::Effect(Effect::StageStarted { stage }) => {
+                print_best_effort(stage_text(session.scenario(), *stage))
             }
-            Heard::Effect(Effect::Tell(_) | Effect::StepStarted { .. }) => {}
-            Heard::Begun(priority) => speak(format!("the servo turns with {priority}")),
-            Heard::Device(state) if state.is_ready() => speak("the device is ready"),
-            Heard::Device(state) => speak(format!("time stands still: {state}")),
-            Heard::Gone(gone) => speak(format!("time stands still: {gone}; plug it in again and the session goes on")),
+            LiveEvent::Effect(Effect::StageEnded { .. }) => print_best_effort("this stage has ended\n"),
+            LiveEvent::Effect(Effect::StagesOver) => print_best_effort(questionnaire_text(session.scenario())),
+            LiveEvent::Effect(Effect::Refused { why }) => print_best_effort(format!("not accepted: {why}")),
+            LiveEvent::Effect(Effect::Answered { .. }) => print_best_effort("recorded"),
+            LiveEvent::Effect(Effect::Charted { record: note, is_present: is_there, .. }) => {
+                print_best_effort(match note.entry {
+                    ChartEntry::Depth { reading: read, .. } => format!("{}: {read} mm", note.site.code()),
+                    ChartEntry::Calculus if *is_there => format!("{}: calculus", note.site.code()),
+                    ChartEntry::Calculus => format!("{}: no calculus", note.site.code()),
+                })
+            }
+            LiveEvent::Effect(Effect::Command(Command::SelectInstrument { instrument })) => {
+                print_best_effort(format!("instrument: {}", session.scenario().instruments[*instrument].title));
+            }
+            LiveEvent::Effect(Effect::Command(_) | Effect::StepStarted { .. }) => {}
+            LiveEvent::ServoStarted(priority) => print_best_effort(format!("the servo thread runs at {priority}")),
+            LiveEvent::DeviceState(state) if state.is_ready() => print_best_effort("the device is ready"),
+            LiveEvent::DeviceState(state) => print_best_effort(format!("the session is suspended: {state}")),
+            LiveEvent::DeviceLost(gone) => {
+                print_best_effort(format!("the session is suspended: {gone}; plug the device in again to continue"))
+            }
         }
     }
 }
 
-/// Says what happened to the second hand.
-pub fn tell_of_second(news: AssistNews) {
-    let text = match news {
-        AssistNews::Device(state) => format!("the device is {state}"),
-        AssistNews::Gone(gone) => format!("{gone}; it stays away until the session is begun anew"),
-        AssistNews::First { is_there: true } => "the first hand is there; hold the button to lead it".to_string(),
-        AssistNews::First { is_there: false } => "the first hand has fallen silent".to_string(),
-        AssistNews::Leading(true) => "leads".to_string(),
-        AssistNews::Leading(false) => "follows".to_string(),
+/// Prints an event of the second hand.
+pub fn print_assist_event(event: SecondHandEvent) {
+    let text = match event {
+        SecondHandEvent::Device(state) => format!("device: {state}"),
+        SecondHandEvent::Gone(gone) => format!("{gone}; it cannot rejoin this session"),
+        SecondHandEvent::FirstHand { is_present: true } => {
+            "the trainee's device is connected; hold the button to lead it".to_string()
+        }
+        SecondHandEvent::FirstHand { is_present: false } => "the trainee's device no longer sends data".to_string(),
+        SecondHandEvent::Leading(true) => "leads".to_string(),
+        SecondHandEvent::Leading(false) => "follows".to_string(),
     };
-    speak(format!("second hand: {text}"));
+    print_best_effort(format!("second device: {text}"));
 }
 
-/// What a stage asks for, and the words that answer.
+/// Title, instruction and questions of a stage, with the commands that answer them.
 fn stage_text(scenario: &Scenario, stage: usize) -> String {
     let stage = &scenario.stages[stage];
     let mut text = format!("\n{}\n{}\n", stage.title, stage.instruction);
@@ -174,10 +189,10 @@ fn stage_text(scenario: &Scenario, stage: usize) -> String {
         let _ = writeln!(text, "  answer {} …     {} ({answer})", question.id, question.text);
     }
     if stage.chart.depths {
-        let _ = writeln!(text, "  read              notes the depth where the probe is");
+        let _ = writeln!(text, "  read              records the probing depth at the probe's position");
     }
     if stage.chart.calculus {
-        let _ = writeln!(text, "  calculus          notes calculus where the instrument is, or takes that back");
+        let _ = writeln!(text, "  calculus          marks calculus at the instrument's position, or removes the mark");
     }
     if stage.ends.confirmed {
         let _ = writeln!(text, "  done              ends this stage");
@@ -203,54 +218,54 @@ fn questionnaire_text(scenario: &Scenario) -> String {
     text
 }
 
-enum Said {
+enum TypedCommand {
     Input(Input),
     Pause(bool),
-    /// Leaves the rest of the questionnaire.
+    /// Ends the questionnaire; the remaining statements stay without a rating.
     End,
     Show(String),
     Nothing,
 }
 
-/// What a typed line means.
-fn understood(line: &str, session: &Session, live: &Live) -> Said {
+/// Parses a typed line.
+fn parse_line(line: &str, session: &Session, live: &LiveSession) -> TypedCommand {
     let mut words = line.split_whitespace();
     let scenario = session.scenario();
-    let unknown = || Said::Show(format!("not understood: \"{line}\""));
+    let unknown = || TypedCommand::Show(format!("unknown command: \"{line}\""));
     match (words.next(), words.next()) {
-        (None, _) => Said::Nothing,
-        (Some("read"), None) => Said::Input(Input::Chart(Sign::Depth)),
-        (Some("calculus"), None) => Said::Input(Input::Chart(Sign::Calculus)),
-        (Some("done"), None) => Said::Input(Input::Confirm),
-        (Some("abort"), None) => Said::Input(Input::Abort),
-        (Some("end"), None) => Said::End,
-        (Some("pause"), None) => Said::Pause(true),
-        (Some("resume"), None) => Said::Pause(false),
-        (Some("status"), None) => Said::Show(status(session, live)),
+        (None, _) => TypedCommand::Nothing,
+        (Some("read"), None) => TypedCommand::Input(Input::Chart(ChartInput::Depth)),
+        (Some("calculus"), None) => TypedCommand::Input(Input::Chart(ChartInput::Calculus)),
+        (Some("done"), None) => TypedCommand::Input(Input::Confirm),
+        (Some("abort"), None) => TypedCommand::Input(Input::Abort),
+        (Some("end"), None) => TypedCommand::End,
+        (Some("pause"), None) => TypedCommand::Pause(true),
+        (Some("resume"), None) => TypedCommand::Pause(false),
+        (Some("status"), None) => TypedCommand::Show(status(session, live)),
         (Some("take"), Some(name)) => match scenario.instruments.iter().position(|i| i.id == name) {
-            Some(instrument) => Said::Input(Input::Take { instrument }),
-            None => Said::Show(format!("no instrument is named \"{name}\"")),
+            Some(instrument) => TypedCommand::Input(Input::Take { instrument }),
+            None => TypedCommand::Show(format!("there is no instrument \"{name}\" in this exercise")),
         },
         (Some("rate"), Some(item)) => match words.next().and_then(|value| value.parse().ok()) {
-            Some(value) => Said::Input(Input::Rate { item: item.to_string(), value }),
+            Some(value) => TypedCommand::Input(Input::Rate { item: item.to_string(), value }),
             None => unknown(),
         },
         (Some("answer"), Some(question)) => {
             let value = words.collect::<Vec<_>>().join(" ");
             let asked = session.stage().and_then(|(_, stage)| stage.ask.iter().find(|q| q.id == question));
             let answer = match asked.map(|q| &q.kind) {
-                Some(QuestionKind::QuadrantOf { .. }) => value.parse().ok().map(Answer::Quadrant),
+                Some(QuestionKind::QuadrantOf { .. }) => value.parse().ok().map(AnswerValue::Quadrant),
                 Some(QuestionKind::YesNo { .. }) => match value.as_str() {
-                    "yes" => Some(Answer::YesNo(true)),
-                    "no" => Some(Answer::YesNo(false)),
+                    "yes" => Some(AnswerValue::YesNo(true)),
+                    "no" => Some(AnswerValue::YesNo(false)),
                     _ => None,
                 },
-                Some(QuestionKind::Number { .. }) => value.parse().ok().map(Answer::Number),
-                Some(_) => Some(Answer::Word(value)),
+                Some(QuestionKind::Number { .. }) => value.parse().ok().map(AnswerValue::Number),
+                Some(_) => Some(AnswerValue::Word(value)),
                 None => None,
             };
             match answer {
-                Some(value) => Said::Input(Input::Answer { question: question.to_string(), value }),
+                Some(value) => TypedCommand::Input(Input::Answer { question: question.to_string(), value }),
                 None => unknown(),
             }
         }
@@ -258,13 +273,13 @@ fn understood(line: &str, session: &Session, live: &Live) -> Said {
     }
 }
 
-/// Where the session stands, and how its beat is kept.
-fn status(session: &Session, live: &Live) -> String {
+/// Progress of the session, and timing of the servo, as text.
+fn status(session: &Session, live: &LiveSession) -> String {
     let mut text = match session.stage() {
         Some((_, stage)) => format!("{}: {:.0} s", stage.title, session.stage_seconds()),
-        None => "the stages are over".to_string(),
+        None => "all stages have ended".to_string(),
     };
-    if let Some(beats) = live.beats() {
+    if let Some(beats) = live.timing() {
         let us = |d: Duration| d.as_micros();
         let _ = write!(
             text,
@@ -274,10 +289,10 @@ fn status(session: &Session, live: &Live) -> String {
             us(beats.late_p99),
             us(beats.late_max),
             beats.missed,
-            beats.dropped
+            beats.dropped_events
         );
     }
-    if let Some(touch) = live.screen().and_then(|step| step.touch) {
+    if let Some(touch) = live.latest_step().and_then(|step| step.touch) {
         let _ = write!(text, "; {:.2} N on tissue {}", touch.spring, touch.label.0);
     }
     text

@@ -1,217 +1,330 @@
 //! The command line.
 //!
-//! Takes arguments. Gives files, lines and an exit status: 0 done, 1 the input is wrong or the check fails, 2 misuse. Never
-//! decides anything a library call could not.
+//! Takes arguments. Gives files, lines and an exit status: 0 success, 1 the input is wrong or a check fails, 2 wrong
+//! usage. Contains no logic that is not available as a library call.
 
 mod anatomy;
+#[cfg(feature = "devices")]
 mod assist;
 mod bench;
 mod check;
 mod cohort;
 mod demo;
+#[cfg(feature = "devices")]
 mod devices;
 mod finish;
+#[cfg(not(feature = "school"))]
+mod folder_source;
+#[cfg(feature = "integrations")]
 mod gradebook;
 mod import;
+#[cfg(feature = "devices")]
 mod live;
+#[cfg(feature = "integrations")]
 mod parquet;
+#[cfg(not(all(
+    feature = "desktop",
+    feature = "devices",
+    feature = "integrations",
+    feature = "review",
+    feature = "school"
+)))]
+mod missing_part;
 mod path;
 mod preview;
+#[cfg(feature = "review")]
 mod review;
 mod run;
+#[cfg(feature = "school")]
 mod school;
 mod score;
-mod trusted;
+#[cfg(feature = "integrations")]
+mod tls_roots;
 mod verify;
+#[cfg(feature = "integrations")]
 mod xapi;
 
-use crate::app;
-use crate::diagnostic::{Diagnostic, headlines};
-use crate::lesson::Failed;
 use clap::{Parser, Subcommand};
+#[cfg(not(feature = "school"))]
+pub(crate) use folder_source::FolderSource as SessionSource;
+#[cfg(not(all(feature = "devices", feature = "integrations", feature = "review", feature = "school")))]
+use missing_part::IgnoredArguments;
+#[cfg(feature = "school")]
+pub(crate) use school::SessionSource;
 use std::fmt;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+#[cfg(feature = "desktop")]
+use typodont_app as app;
+use typodont_formats::diagnostic::{Diagnostic, headlines};
+use typodont_lesson::LessonError;
 
 /// The open haptic simulator and assessment platform for dental training.
 #[derive(Parser)]
-#[command(version, after_help = "Without a command the desktop program opens its window.")]
+#[command(version, after_help = "Without a command, the desktop program opens.")]
 struct Arguments {
     #[command(subcommand)]
-    command: Option<Command>,
+    command: Option<CliCommand>,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum CliCommand {
     /// Run an exercise and write its bundle; prints the bundle's path last
     Run(run::Arguments),
-    /// Run the five shipped exercises by a scripted operator, then report on them
+    /// Run the five shipped exercises with a scripted operator and write their reports
     Demo(demo::Arguments),
-    /// Check scenario files and folders: every complaint with file, line and column
+    /// Check scenario files and folders, and list every problem with its file, line and column
     Check(check::Arguments),
     /// Print the JSON Schema of scenarios, for editors
     Schema,
-    /// Draw what the trainee of an exercise will see, decay marked
+    /// Render what the trainee will see, with the decay marked
     Preview(preview::Arguments),
-    /// Take a path or forces out of a session, for an exercise that guides the hand
+    /// Export the path or the forces of a session, for an exercise with haptic guidance
     Path(path::Arguments),
-    /// List the devices that can be used
+    /// List the devices that are connected and the drivers that can be used
+    #[cfg(feature = "devices")]
     Devices,
-    /// Join another machine's session as the instructor's hand
+    #[cfg(not(feature = "devices"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Devices(IgnoredArguments),
+    /// Join a session on another computer as the instructor, with a second device
+    #[cfg(feature = "devices")]
     Assist(assist::Arguments),
-    /// Turn a bundle's recording again and compare everything
+    #[cfg(not(feature = "devices"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Assist(IgnoredArguments),
+    /// Replay a bundle's recording and compare every result with it
     Verify(verify::Arguments),
-    /// Make the bundle of a session that was cut off
+    /// Complete the bundle of a session that was interrupted
     Finish(finish::Arguments),
-    /// Score a bundle again from its recording alone
+    /// Score a bundle again, from its recording alone
     Score(score::Arguments),
-    /// Compare many bundles: a table, a page, maps of what was removed
+    /// Compare many bundles: a table, a page, and maps of the tissue removed
     Cohort(cohort::Arguments),
-    /// Examiners list, compare and override sessions in a browser
+    /// Serve the pages on which examiners list and compare sessions and override grades
+    #[cfg(feature = "review")]
     Review(review::Arguments),
-    /// Grades as a table that Moodle or Canvas imports
+    #[cfg(not(feature = "review"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Review(IgnoredArguments),
+    /// Export grades as a table that Moodle or Canvas imports
+    #[cfg(feature = "integrations")]
     Gradebook(gradebook::Arguments),
-    /// Sessions as xAPI statements, spooled on disk and sent to a learning record store
+    #[cfg(not(feature = "integrations"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Gradebook(IgnoredArguments),
+    /// Export sessions as xAPI statements, spool them on disk and send them to a learning record store
+    #[cfg(feature = "integrations")]
     Xapi(xapi::Arguments),
-    /// Sessions, measures and events as Parquet, for analysis
+    #[cfg(not(feature = "integrations"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Xapi(IgnoredArguments),
+    /// Export sessions, measures and events as Parquet files for analysis
+    #[cfg(feature = "integrations")]
     Parquet(parquet::Arguments),
-    /// Records of many stations in one database: tables, classes, who may come in, erasing
+    #[cfg(not(feature = "integrations"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Parquet(IgnoredArguments),
+    /// Administer the database for the records of many stations: tables, classes, access, erasure
+    #[cfg(feature = "school")]
     School(school::Arguments),
-    /// Send finished bundles to the school; what is there already stays as it is
+    #[cfg(not(feature = "school"))]
+    #[command(hide = true, disable_help_flag = true)]
+    School(IgnoredArguments),
+    /// Send finished bundles to the school's database and store; sessions already stored are not changed
+    #[cfg(feature = "school")]
     Sync(school::sync::Arguments),
-    /// Ask workers to score the school's sessions
+    #[cfg(not(feature = "school"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Sync(IgnoredArguments),
+    /// Queue the school's sessions for scoring by workers
+    #[cfg(feature = "school")]
     Enqueue(school::enqueue::Arguments),
-    /// Score what was enqueued, until ended
+    #[cfg(not(feature = "school"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Enqueue(IgnoredArguments),
+    /// Score queued sessions until the program is stopped
+    #[cfg(feature = "school")]
     Worker(school::worker::Arguments),
-    /// Score many bundles again without a database, a share on each machine
+    #[cfg(not(feature = "school"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Worker(IgnoredArguments),
+    /// Score many bundles again without a database, divided among computers
+    #[cfg(feature = "school")]
     Rescore(school::rescore::Arguments),
-    /// Grow permanent teeth: label maps, surfaces, a table of sizes
+    #[cfg(not(feature = "school"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Rescore(IgnoredArguments),
+    /// Generate permanent teeth: label maps, surfaces and a table of sizes
     Anatomy(anatomy::Arguments),
-    /// Turn a scan into a labelled volume
+    /// Convert a scan into a labelled volume
     Import(import::Arguments),
     /// Measure the program's own speed and memory
     Bench(bench::Arguments),
 }
 
-/// Why a command failed.
+/// Error of a command.
 #[derive(Debug)]
-pub(crate) enum Failure {
-    /// Complaints about what a person wrote.
+pub(crate) enum CliError {
+    /// Complaints about files that people wrote.
     Complaints(Vec<Diagnostic>),
-    /// Anything else that is wrong with the input, as lines.
+    /// Any other problem with the input, as lines of text.
     Wrong(String),
-    /// The command itself is wrong.
+    /// The command line is wrong.
     Misuse(String),
-    /// It was said already; only the status is left.
-    Told,
+    /// The error was already printed; only the exit status remains.
+    AlreadyReported,
 }
 
-impl From<Vec<Diagnostic>> for Failure {
-    fn from(found: Vec<Diagnostic>) -> Failure {
-        Failure::Complaints(found)
+impl From<Vec<Diagnostic>> for CliError {
+    fn from(found: Vec<Diagnostic>) -> CliError {
+        CliError::Complaints(found)
     }
 }
 
-impl From<Diagnostic> for Failure {
-    fn from(found: Diagnostic) -> Failure {
-        Failure::Complaints(vec![found])
+impl From<Diagnostic> for CliError {
+    fn from(found: Diagnostic) -> CliError {
+        CliError::Complaints(vec![found])
     }
 }
 
-impl From<Failed> for Failure {
-    fn from(failed: Failed) -> Failure {
+impl From<LessonError> for CliError {
+    fn from(failed: LessonError) -> CliError {
         match failed {
-            Failed::UnknownDevice { .. } | Failed::SameDevice { .. } => Failure::misuse(failed),
-            Failed::Unreadable(found) => found.into(),
-            _ => Failure::wrong(failed),
+            LessonError::UnknownDevice { .. } | LessonError::SameDevice { .. } => CliError::misuse(failed),
+            LessonError::Unreadable(found) => found.into(),
+            _ => CliError::wrong(failed),
         }
     }
 }
 
-impl Failure {
-    fn misuse(what: impl fmt::Display) -> Failure {
-        Failure::Misuse(what.to_string())
+impl CliError {
+    fn misuse(what: impl fmt::Display) -> CliError {
+        CliError::Misuse(what.to_string())
     }
 
-    fn wrong(what: impl fmt::Display) -> Failure {
-        Failure::Wrong(what.to_string())
+    fn wrong(what: impl fmt::Display) -> CliError {
+        CliError::Wrong(what.to_string())
     }
 
-    /// What is wrong, a line for each complaint.
-    fn lines(&self) -> String {
+    /// Text of the error, a line for each complaint.
+    fn message(&self) -> String {
         match self {
-            Failure::Complaints(found) => headlines(found),
-            Failure::Wrong(what) | Failure::Misuse(what) => what.clone(),
-            Failure::Told => String::new(),
+            CliError::Complaints(found) => headlines(found),
+            CliError::Wrong(what) | CliError::Misuse(what) => what.clone(),
+            CliError::AlreadyReported => String::new(),
         }
     }
 
-    fn tell(&self) {
+    fn report(&self) {
         match self {
-            Failure::Complaints(found) => {
+            CliError::Complaints(found) => {
                 for diagnostic in found {
                     eprint!("{diagnostic}");
                 }
                 if found.len() > 1 {
-                    eprintln!("{} complaints", found.len());
+                    eprintln!("{} problems", found.len());
                 }
             }
-            Failure::Wrong(what) | Failure::Misuse(what) => eprintln!("{what}"),
-            Failure::Told => {}
+            CliError::Wrong(what) | CliError::Misuse(what) => eprintln!("{what}"),
+            CliError::AlreadyReported => {}
         }
     }
 }
 
-/// Parses the arguments, carries out the command, and says what went wrong.
+/// Parses the arguments, carries out the command, and prints its error.
 pub fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
-        None => templates().and_then(|templates| desktop(app::Options::at_shelf(at_home(), templates))),
-        Some(Command::Run(arguments)) => run::run(&arguments),
-        Some(Command::Demo(arguments)) => demo::run(&arguments),
-        Some(Command::Check(arguments)) => check::run(&arguments),
-        Some(Command::Schema) => say(crate::scenario::schema_text().trim_end()),
-        Some(Command::Preview(arguments)) => preview::run(&arguments),
-        Some(Command::Path(arguments)) => path::run(&arguments),
-        Some(Command::Devices) => devices::run(),
-        Some(Command::Assist(arguments)) => assist::run(&arguments),
-        Some(Command::Verify(arguments)) => verify::run(&arguments),
-        Some(Command::Finish(arguments)) => finish::run(&arguments),
-        Some(Command::Score(arguments)) => score::run(&arguments),
-        Some(Command::Cohort(arguments)) => cohort::run(&arguments),
-        Some(Command::Review(arguments)) => review::run(&arguments),
-        Some(Command::Gradebook(arguments)) => gradebook::run(&arguments),
-        Some(Command::Xapi(arguments)) => xapi::run(&arguments),
-        Some(Command::Parquet(arguments)) => parquet::run(&arguments),
-        Some(Command::School(arguments)) => school::run(&arguments),
-        Some(Command::Sync(arguments)) => school::sync::run(&arguments),
-        Some(Command::Enqueue(arguments)) => school::enqueue::run(&arguments),
-        Some(Command::Worker(arguments)) => school::worker::run(&arguments),
-        Some(Command::Rescore(arguments)) => school::rescore::run(&arguments),
-        Some(Command::Anatomy(arguments)) => anatomy::run(&arguments),
-        Some(Command::Import(arguments)) => import::run(&arguments),
-        Some(Command::Bench(arguments)) => bench::run(&arguments),
-    };
-    match result {
+    match execute(Arguments::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            failure.tell();
-            ExitCode::from(if matches!(failure, Failure::Misuse(_)) { 2 } else { 1 })
+            failure.report();
+            ExitCode::from(if matches!(failure, CliError::Misuse(_)) { 2 } else { 1 })
         }
     }
 }
 
-/// Opens the desktop program's window.
-fn desktop(options: app::Options) -> Result<(), Failure> {
-    app::open(options).map_err(Failure::Wrong)
+/// Carries out a command; without one, opens the window.
+fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
+    match command {
+        #[cfg(feature = "desktop")]
+        None => load_templates()
+            .and_then(|templates| open_window(app::AppOptions::at_exercise_list(default_output_folder(), templates))),
+        #[cfg(not(feature = "desktop"))]
+        None => Err(missing_part::error("the window", "desktop")),
+        Some(CliCommand::Run(arguments)) => run::run(&arguments),
+        Some(CliCommand::Demo(arguments)) => demo::run(&arguments),
+        Some(CliCommand::Check(arguments)) => check::run(&arguments),
+        Some(CliCommand::Schema) => print_line(typodont_exercise::scenario::schema_text().trim_end()),
+        Some(CliCommand::Preview(arguments)) => preview::run(&arguments),
+        Some(CliCommand::Path(arguments)) => path::run(&arguments),
+        #[cfg(feature = "devices")]
+        Some(CliCommand::Devices) => devices::run(),
+        #[cfg(not(feature = "devices"))]
+        Some(CliCommand::Devices(_)) => Err(missing_part::error("typodont devices", "devices")),
+        #[cfg(feature = "devices")]
+        Some(CliCommand::Assist(arguments)) => assist::run(&arguments),
+        #[cfg(not(feature = "devices"))]
+        Some(CliCommand::Assist(_)) => Err(missing_part::error("typodont assist", "devices")),
+        Some(CliCommand::Verify(arguments)) => verify::run(&arguments),
+        Some(CliCommand::Finish(arguments)) => finish::run(&arguments),
+        Some(CliCommand::Score(arguments)) => score::run(&arguments),
+        Some(CliCommand::Cohort(arguments)) => cohort::run(&arguments),
+        #[cfg(feature = "review")]
+        Some(CliCommand::Review(arguments)) => review::run(&arguments),
+        #[cfg(not(feature = "review"))]
+        Some(CliCommand::Review(_)) => Err(missing_part::error("typodont review", "review")),
+        #[cfg(feature = "integrations")]
+        Some(CliCommand::Gradebook(arguments)) => gradebook::run(&arguments),
+        #[cfg(not(feature = "integrations"))]
+        Some(CliCommand::Gradebook(_)) => Err(missing_part::error("typodont gradebook", "integrations")),
+        #[cfg(feature = "integrations")]
+        Some(CliCommand::Xapi(arguments)) => xapi::run(&arguments),
+        #[cfg(not(feature = "integrations"))]
+        Some(CliCommand::Xapi(_)) => Err(missing_part::error("typodont xapi", "integrations")),
+        #[cfg(feature = "integrations")]
+        Some(CliCommand::Parquet(arguments)) => parquet::run(&arguments),
+        #[cfg(not(feature = "integrations"))]
+        Some(CliCommand::Parquet(_)) => Err(missing_part::error("typodont parquet", "integrations")),
+        #[cfg(feature = "school")]
+        Some(CliCommand::School(arguments)) => school::run(&arguments),
+        #[cfg(not(feature = "school"))]
+        Some(CliCommand::School(_)) => Err(missing_part::error("typodont school", "school")),
+        #[cfg(feature = "school")]
+        Some(CliCommand::Sync(arguments)) => school::sync::run(&arguments),
+        #[cfg(not(feature = "school"))]
+        Some(CliCommand::Sync(_)) => Err(missing_part::error("typodont sync", "school")),
+        #[cfg(feature = "school")]
+        Some(CliCommand::Enqueue(arguments)) => school::enqueue::run(&arguments),
+        #[cfg(not(feature = "school"))]
+        Some(CliCommand::Enqueue(_)) => Err(missing_part::error("typodont enqueue", "school")),
+        #[cfg(feature = "school")]
+        Some(CliCommand::Worker(arguments)) => school::worker::run(&arguments),
+        #[cfg(not(feature = "school"))]
+        Some(CliCommand::Worker(_)) => Err(missing_part::error("typodont worker", "school")),
+        #[cfg(feature = "school")]
+        Some(CliCommand::Rescore(arguments)) => school::rescore::run(&arguments),
+        #[cfg(not(feature = "school"))]
+        Some(CliCommand::Rescore(_)) => Err(missing_part::error("typodont rescore", "school")),
+        Some(CliCommand::Anatomy(arguments)) => anatomy::run(&arguments),
+        Some(CliCommand::Import(arguments)) => import::run(&arguments),
+        Some(CliCommand::Bench(arguments)) => bench::run(&arguments),
+    }
 }
 
-/// Where finished bundles go unless told otherwise.
+/// Opens the window of the desktop application.
+#[cfg(feature = "desktop")]
+fn open_window(options: app::AppOptions) -> Result<(), CliError> {
+    app::open_window(options).map_err(CliError::Wrong)
+}
+
+/// Default folder of finished bundles.
 const SESSIONS: &str = "reports/sessions";
 
-/// Where they go when the program was opened by its icon, in whatever folder that is: here, if this folder has `reports`, else in
-/// the person's own.
-fn at_home() -> PathBuf {
+/// Folder of finished bundles if the program is started by its icon, in an arbitrary working folder: [`SESSIONS`] if
+/// the working folder contains `reports`, else a folder in the user's documents.
+#[cfg(feature = "desktop")]
+fn default_output_folder() -> PathBuf {
     match directories::UserDirs::new() {
         Some(dirs) if !Path::new("reports").is_dir() => {
             dirs.document_dir().unwrap_or(dirs.home_dir()).join("Typodont").join("sessions")
@@ -220,28 +333,46 @@ fn at_home() -> PathBuf {
     }
 }
 
-/// Templates of the folder `reports/templates` here, if there is one; otherwise those that ship with the program.
-fn templates() -> Result<crate::report::Templates, Failure> {
-    crate::report::Templates::in_folder(Path::new("reports/templates")).map_err(Failure::Wrong)
+/// Language of pages and tables that are written in one language, if none is asked for.
+const DEFAULT_LANGUAGE: &str = "en";
+
+/// Templates of the folder `reports/templates` in the working folder, if it exists; otherwise the built-in ones.
+fn load_templates() -> Result<typodont_report::Templates, CliError> {
+    typodont_report::Templates::in_folder(Path::new("reports/templates")).map_err(CliError::Wrong)
 }
 
-/// Prints a line. Who listens no more, as `head` after its last line, has heard enough.
-fn say(line: impl fmt::Display) -> Result<(), Failure> {
+/// Prints a line. A closed pipe, as of `head` after its last line, is not an error.
+fn print_line(line: impl fmt::Display) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{line}").and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::Wrong(format!("standard output: unwritable-file: {error}")))
+            Err(CliError::Wrong(format!("standard output: unwritable-file: {error}")))
         }
         _ => Ok(()),
     }
 }
 
-/// Writes a file, or says why not.
-fn write(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), Failure> {
-    std::fs::write(path, bytes).map_err(|e| Failure::wrong(format!("{}: unwritable-file: {e}", path.display())))
+/// Writes a file.
+///
+/// # Errors
+/// A message with the path and the reason if the file cannot be written.
+fn write_file(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), CliError> {
+    std::fs::write(path, bytes).map_err(|e| CliError::wrong(format!("{}: unwritable-file: {e}", path.display())))
 }
 
-/// The recording of a bundle, or a recording by itself.
-fn recording_in(bundle: &Path) -> PathBuf {
-    if bundle.is_dir() { bundle.join(crate::record::FILE_NAME) } else { bundle.to_path_buf() }
+/// Path of a bundle's recording; a path to a recording itself is returned unchanged.
+fn recording_path(bundle: &Path) -> PathBuf {
+    if bundle.is_dir() { bundle.join(typodont_exercise::record::FILE_NAME) } else { bundle.to_path_buf() }
+}
+
+/// The examiners' overrides beside the bundles of a folder; damaged entries are reported on standard error.
+#[cfg(feature = "integrations")]
+fn read_override_log(folder: &Path) -> Result<typodont_review::LogSnapshot, CliError> {
+    let path = folder.join(typodont_review::OVERRIDES);
+    let unreadable = |e| CliError::wrong(format!("{}: unreadable-file: {e}", path.display()));
+    let log = typodont_review::OverrideLog::of(folder).read(None).map_err(unreadable)?;
+    for issue in &log.issues {
+        eprintln!("{}: {issue}", path.display());
+    }
+    Ok(log)
 }

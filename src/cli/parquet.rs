@@ -1,32 +1,33 @@
-//! `typodont parquet`: sessions, measures and events for analysis.
+//! `typodont parquet`: exports sessions, metrics and events for analysis.
 
-use super::school::{self, Source};
-use super::{Failure, cohort, say, write};
-use crate::handover::tables;
+use super::{CliError, SessionSource, cohort, print_line, write_file};
 use clap::Args;
 use std::path::PathBuf;
+use typodont_integrations::parquet_tables;
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    source: Source,
-    /// Folder for sessions.parquet, metrics.parquet and events.parquet. Of a database: a folder for each class and month in it, and
-    /// a store's URL will do as well
+    source: SessionSource,
+    /// Output folder for sessions.parquet, metrics.parquet and events.parquet. With --database: for a subfolder per class and
+    /// month, and it may also be the URL of an object store
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { source, output } = arguments;
-    let Some(folder) = source.folder.as_ref().filter(|_| source.at.database.is_none()) else {
-        return school::write_partitions(source, output);
+    let Some(folder) = source.bundle_folder()? else {
+        #[cfg(feature = "school")]
+        return super::school::write_partitions(source, output);
+        #[cfg(not(feature = "school"))]
+        return Err(super::missing_part::error("--database", "school"));
     };
-    source.takes_all()?;
-    let cohort = cohort::read(folder)?;
-    let unmade = |e: std::io::Error| Failure::wrong(format!("{}: unwritable-folder: {e}", output.display()));
-    std::fs::create_dir_all(output).map_err(unmade)?;
-    for (name, bytes) in tables::all(&cohort).map_err(Failure::wrong)? {
-        write(&output.join(name), bytes)?;
+    let cohort = cohort::read_folder(folder)?;
+    let unwritable = |e: std::io::Error| CliError::wrong(format!("{}: unwritable-folder: {e}", output.display()));
+    std::fs::create_dir_all(output).map_err(unwritable)?;
+    for (name, bytes) in parquet_tables::all_tables(&cohort).map_err(CliError::wrong)? {
+        write_file(&output.join(name), bytes)?;
     }
-    say(format!("{}: {} sessions", output.display(), cohort.sessions.len()))
+    print_line(format!("{}: {} sessions", output.display(), cohort.sessions.len()))
 }

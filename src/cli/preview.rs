@@ -1,103 +1,110 @@
-//! `typodont preview`: what the trainee will see, once or anew whenever the exercise is changed.
+//! `typodont preview`: renders the trainee's first view, once or whenever the exercise is changed.
 
-use super::{Failure, at_home, desktop, templates};
-use crate::app;
-use crate::author;
-use crate::lesson;
-use crate::render::{Changes, Image, Lamp, Lights, Painter, Scene, Shown, Tooth};
-use crate::report::{SEEN, preview_png};
-use crate::scenario::{Forms, Layout, Scenario, Workpiece};
-use crate::scene::{self, Mouth};
+use super::CliError;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use typodont_author as author;
+use typodont_exercise::scenario::{ResolveMode, Scenario, SceneLayout, Workpiece};
+use typodont_lesson as lesson;
+use typodont_render::{Changes, Lamp, Lights, OffscreenRenderer, RenderMode, RenderScene, RgbaImage, VolumeInstance};
+use typodont_report::{PREVIEW_SIZE, preview_png};
+use typodont_scene::{self as scene, Mouth};
 
-/// How often a watched file is looked at.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// Poll interval of a watched file.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The exercise
+    /// Scenario file of the exercise
     scenario: PathBuf,
-    /// The picture
+    /// Image to write
     #[arg(short, long, value_name = "FILE.png", required_unless_present = "watch")]
     output: Option<PathBuf>,
-    /// Show it anew whenever the file is changed: in a window, or with -o as a picture
+    /// Update the preview whenever the file changes: in a window, or with -o in the image
     #[arg(long)]
     watch: bool,
-    /// Decides what the exercise leaves to chance
+    /// Seed of the random choices of the exercise
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Draw the mouth around the tooth, also where the exercise has none
+    /// Render the mouth around the tooth even if the exercise has none
     #[arg(long, conflicts_with = "no_jaw")]
     jaw: bool,
-    /// Draw only what can be touched
+    /// Render only what can be touched
     #[arg(long)]
     no_jaw: bool,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Some(output) = &arguments.output else { return window(&arguments.scenario) };
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let Some(output) = &arguments.output else { return open_editor(&arguments.scenario) };
     if output.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png")) {
-        return Err(Failure::misuse(format!("{}: the picture is a .png file", output.display())));
+        return Err(CliError::misuse(format!("{}: the name of the image must end in .png", output.display())));
     }
     if !arguments.watch {
-        return draw(arguments, output);
+        return draw_preview(arguments, output);
     }
-    // Until somebody stops it: what is wrong meanwhile is said, and looked at again.
-    let (_, mut stand) = author::read(&arguments.scenario)?;
+    // The loop runs until the program is stopped: errors are printed, and the file is checked again.
+    let (_, mut file_stamp) = author::read(&arguments.scenario)?;
     loop {
-        match draw(arguments, output) {
-            Ok(()) => super::say(output.display())?,
-            Err(failure) => failure.tell(),
+        match draw_preview(arguments, output) {
+            Ok(()) => super::print_line(output.display())?,
+            Err(failure) => failure.report(),
         }
-        while stand.changed(&arguments.scenario).is_none_or(|now| now.is_err()) {
-            std::thread::sleep(LOOK_EVERY);
+        while file_stamp.poll_change(&arguments.scenario).is_none_or(|now| now.is_err()) {
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 }
 
-/// The author's screen, which shows the file as an editor elsewhere changes it.
-fn window(scenario: &Path) -> Result<(), Failure> {
-    // A file that cannot be read is said here, where its name was given.
+/// Opens the author's screen, which shows the file while another program edits it.
+#[cfg(feature = "desktop")]
+fn open_editor(scenario: &Path) -> Result<(), CliError> {
+    use super::{default_output_folder, load_templates, open_window};
+    use typodont_app as app;
+    // An unreadable file is reported here, on the command line on which it was named.
     author::read(scenario)?;
-    let options = app::Options {
+    let options = app::AppOptions {
         exercise: Some(scenario.to_path_buf()),
-        author: Some(app::Watch::Only),
-        ..app::Options::at_shelf(at_home(), templates()?)
+        editor_mode: Some(app::OpenMode::ReadOnly),
+        ..app::AppOptions::at_exercise_list(default_output_folder(), load_templates()?)
     };
-    desktop(options)
+    open_window(options)
 }
 
-fn draw(arguments: &Arguments, output: &Path) -> Result<(), Failure> {
-    let scenario = lesson::read(&arguments.scenario, Forms::Made)?;
-    let workpiece = Workpiece::make(&scenario, arguments.seed).map_err(Failure::wrong)?;
-    let is_in_mouth = arguments.jaw || (!arguments.no_jaw && scenario.scene.layout == Layout::Jaw);
-    let seen = seen(&scenario, &workpiece, is_in_mouth)?;
-    super::write(output, preview_png(&scenario, &workpiece, &seen))
+#[cfg(not(feature = "desktop"))]
+fn open_editor(_: &Path) -> Result<(), CliError> {
+    Err(super::missing_part::error("the window; without it, give -o FILE.png", "desktop"))
 }
 
-/// What the trainee sees at the start, on an adapter or else by the processor.
-fn seen(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bool) -> Result<Image, Failure> {
-    let palette = scene::palette(&scenario.tissues, true);
+fn draw_preview(arguments: &Arguments, output: &Path) -> Result<(), CliError> {
+    let scenario = lesson::read_scenario(&arguments.scenario, ResolveMode::MakeWorkpiece)?;
+    let workpiece = Workpiece::make(&scenario, arguments.seed).map_err(CliError::wrong)?;
+    let is_in_mouth = arguments.jaw || (!arguments.no_jaw && scenario.scene.layout == SceneLayout::Jaw);
+    let first_view = render_first_view(&scenario, &workpiece, is_in_mouth)?;
+    super::write_file(output, preview_png(&scenario, &workpiece, &first_view))
+}
+
+/// Renders the trainee's first view, on a graphics adapter or else in software.
+fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bool) -> Result<RgbaImage, CliError> {
+    let palette = scene::tissue_palette(&scenario.tissues, true);
     let mouth = Mouth::around(workpiece, &scenario.tissues).filter(|_| is_in_mouth);
-    let around = || scene::around(workpiece, &scenario.tissues);
+    let around = || scene::surrounding_solids(workpiece, &scenario.tissues);
     let viewpoint = scene::work_view(workpiece).viewpoint();
-    let picture = Scene {
-        tooth: Some(Tooth {
+    let picture = RenderScene {
+        tooth: Some(VolumeInstance {
             volume: &workpiece.volume,
-            changes: Changes::Anew,
+            changes: Changes::All,
             world_from_tooth: workpiece.world_from_tooth,
             palette: &palette,
-            shown: Shown::Iso,
+            mode: RenderMode::Iso,
         }),
-        solids: mouth.map_or_else(around, |mouth| mouth.solids(scene::OPEN)),
+        solids: mouth.map_or_else(around, |mouth| mouth.solids(scene::WORKING_OPENING_DEG)),
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
-        ..Scene::empty()
+        ..RenderScene::empty()
     };
-    let (mut painter, _) = Painter::best();
-    // An adapter that fails costs time, not the picture.
-    let drawn = painter.draw(&picture, &viewpoint, None, SEEN);
-    let drawn = drawn.or_else(|_| Painter::cpu().draw(&picture, &viewpoint, None, SEEN));
-    drawn.map_err(|e| Failure::wrong(e.to_string()))
+    let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();
+    // If the adapter fails, the image is rendered in software, which only takes longer.
+    let drawn = painter.draw(&picture, &viewpoint, None, PREVIEW_SIZE);
+    let drawn = drawn.or_else(|_| OffscreenRenderer::cpu().draw(&picture, &viewpoint, None, PREVIEW_SIZE));
+    drawn.map_err(|e| CliError::wrong(e.to_string()))
 }

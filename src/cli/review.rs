@@ -1,112 +1,130 @@
-//! `typodont review`: an examiner's desk in a browser.
+//! `typodont review`: serves the examiners' review pages to a browser.
 
 mod server;
 
-use super::school::{self, At, Named};
-use super::{Failure, say, templates};
-use crate::report::harmless;
-use crate::review::{Desk, Lock, Look, Options, PASSWORD_MIN};
+#[cfg(not(feature = "school"))]
+use super::folder_source::SchoolArguments;
+#[cfg(feature = "school")]
+use super::school::{self, DatabaseArguments, StoreArguments};
+use super::{CliError, load_templates, print_line};
 use clap::Args;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+#[cfg(feature = "school")]
 use std::time::Duration;
+use typodont_report::sanitize_display;
+use typodont_review::{AuthMode, PASSWORD_MIN, PageRenderer, ReviewApp, ReviewOptions};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth; what examiners judge is written beside them. With --database, --store or --class the
-    /// bundles that you may read are fetched into it first
+    /// Folder that contains bundles, at any depth; examiners' overrides are written beside them. With --database, --store or
+    /// --class, the bundles that you may read are downloaded into it first
     folder: PathBuf,
+    #[cfg(feature = "school")]
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
+    #[cfg(feature = "school")]
     #[command(flatten)]
-    store: Named,
-    /// Of a database: sessions of this class only
+    store: StoreArguments,
+    /// With --database: only sessions of this class
+    #[cfg(feature = "school")]
     #[arg(long, value_name = "NAME")]
     class: Option<String>,
-    /// Port of the page; without it one that is free
+    #[cfg(not(feature = "school"))]
+    #[command(flatten)]
+    school: SchoolArguments,
+    /// Port of the page; 0 selects a free one
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
-    /// Address to listen on. Beyond this machine it takes a password
+    /// Address to listen on; any other than a loopback address requires a password
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     listen: IpAddr,
-    /// A name by which this machine or its HTTPS proxy is reached, beside its address; may stand several times
+    /// Host name of this computer or of its HTTPS proxy, in addition to its address; may be given several times
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
-    /// A file with the examiners' password; without it the password is taken from TYPODONT_REVIEW_PASSWORD, if it is there
+    /// File with the examiners' password; by default the password is taken from TYPODONT_REVIEW_PASSWORD, if that is set
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
-    /// Show participants as codes that nobody can guess
+    /// Replace participant codes by random codes
     #[arg(long)]
     anonymous: bool,
 }
 
-/// Between two exchanges of judgements with a database.
+/// Interval between two exchanges of overrides with a database.
+#[cfg(feature = "school")]
 const EXCHANGE_EVERY: Duration = Duration::from_secs(5);
 
 const PASSWORD: &str = "TYPODONT_REVIEW_PASSWORD";
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { folder, port, listen, name, anonymous, .. } = arguments;
     if !folder.is_dir() {
-        return Err(Failure::wrong(format!("{}: missing-folder: there is no such folder", folder.display())));
+        return Err(CliError::wrong(format!("{}: missing-folder: the folder does not exist", folder.display())));
     }
-    let Arguments { at, store, class, .. } = arguments;
-    if at.database.is_some() || store.store.is_some() || class.is_some() {
-        exchange(arguments)?;
+    #[cfg(not(feature = "school"))]
+    arguments.school.require_absent()?;
+    #[cfg(feature = "school")]
+    if arguments.at.database.is_some() || arguments.store.store.is_some() || arguments.class.is_some() {
+        start_override_exchange(arguments)?;
     }
-    let password = password(arguments)?;
+    let password = read_password(arguments)?;
     if password.is_none() && !listen.is_loopback() {
-        let what = "no-password: beyond this machine the page takes a password";
-        return Err(Failure::misuse(format!(
-            "{what}: give --password-file, or the password in the environment's {PASSWORD}"
+        let what = "no-password: a page that other computers can reach requires a password";
+        return Err(CliError::misuse(format!(
+            "{what}: give --password-file, or set the environment variable {PASSWORD}"
         )));
     }
-    let lock = password.map_or(Lock::Address, Lock::Password);
-    let has_password = matches!(lock, Lock::Password(_));
-    let look = Look::in_folder(Path::new("reports/templates"), &templates()?).map_err(Failure::Wrong)?;
-    let options = Options { folder: folder.clone(), lock, names: name.clone(), anonymous: *anonymous, look };
-    let (desk, token) = Desk::set_up(options).map_err(Failure::Wrong)?;
-    let (sessions, left_out, troubles) = desk.look_over().map_err(Failure::Wrong)?;
+    let auth_mode = password.map_or(AuthMode::OneTimeLink, AuthMode::Password);
+    let has_password = matches!(auth_mode, AuthMode::Password(_));
+    let renderer =
+        PageRenderer::in_folder(Path::new("reports/templates"), &load_templates()?).map_err(CliError::Wrong)?;
+    let options =
+        ReviewOptions { folder: folder.clone(), auth_mode, host_names: name.clone(), anonymous: *anonymous, renderer };
+    let (app, token) = ReviewApp::new(options).map_err(CliError::Wrong)?;
+    let (sessions, left_out, issues) = app.startup_summary().map_err(CliError::Wrong)?;
     let listener = TcpListener::bind((*listen, *port))
-        .map_err(|e| Failure::wrong(format!("{}: no-address: {e}", SocketAddr::new(*listen, *port))))?;
-    let at = listener.local_addr().map_err(|e| Failure::wrong(format!("no-address: {e}")))?;
-    eprintln!("{sessions} sessions, {left_out} files left out");
-    for trouble in troubles {
-        eprintln!("{}", harmless(&trouble, 300));
+        .map_err(|e| CliError::wrong(format!("{}: no-address: {e}", SocketAddr::new(*listen, *port))))?;
+    let at = listener.local_addr().map_err(|e| CliError::wrong(format!("no-address: {e}")))?;
+    eprintln!("{sessions} sessions, {left_out} files skipped");
+    for trouble in issues {
+        eprintln!("{}", sanitize_display(&trouble, 300));
     }
     if !listen.is_loopback() {
         eprintln!(
-            "plain-http: passwords and grades can be read on the way; put an HTTPS proxy or an SSH tunnel before it"
+            "plain-http: passwords and grades are transmitted without encryption; use an HTTPS proxy or an SSH tunnel"
         );
     }
     if listen.is_unspecified() {
-        eprintln!("{listen} stands for every address of this machine: open the page under one of them");
+        eprintln!("{listen} means every address of this computer; open the page at one of them");
     }
     if has_password {
-        say(format!("http://{at}/"))?;
+        print_line(format!("http://{at}/"))?;
     } else {
-        say(address(at, &token))?;
+        print_line(login_url(at, &token))?;
     }
-    server::serve(listener, Arc::new(desk)).map_err(|e| Failure::wrong(format!("{at}: the server failed: {e}")))
+    server::serve(listener, Arc::new(app)).map_err(|e| CliError::wrong(format!("{at}: the server stopped: {e}")))
 }
 
-/// Fetches bundles and judgements, and from then on carries judgements to and fro.
-fn exchange(arguments: &Arguments) -> Result<(), Failure> {
+/// Downloads bundles and overrides, and then exchanges overrides periodically.
+#[cfg(feature = "school")]
+fn start_override_exchange(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { folder, at, store, class, .. } = arguments;
-    let (fetched, failed) = school::fetch::bundles(at, store, class.as_deref(), folder)?;
-    eprintln!("{fetched} bundles fetched, {failed} failed");
-    let mut line = at.line()?;
-    school::fetch::exchange(&mut line, folder)?;
+    let (fetched, failed) = school::fetch::fetch_bundles(at, store, class.as_deref(), folder)?;
+    eprintln!("{fetched} bundles downloaded, {failed} failed");
+    let mut connection = at.connection()?;
+    school::fetch::exchange_overrides(&mut connection, folder)?;
     let folder = folder.clone();
     std::thread::spawn(move || {
         let mut before = String::new();
         loop {
             std::thread::sleep(EXCHANGE_EVERY);
-            // What is judged while the database is away is entered when it is back; it is said once.
-            let now = school::fetch::exchange(&mut line, &folder).err().map_or_else(String::new, |e| e.lines());
+            // Overrides made while the database is unavailable are uploaded later; the error is printed only once.
+            let now = school::fetch::exchange_overrides(&mut connection, &folder)
+                .err()
+                .map_or_else(String::new, |e| e.message());
             if !now.is_empty() && now != before {
-                eprintln!("{}", harmless(&now, 300));
+                eprintln!("{}", sanitize_display(&now, 300));
             }
             before = now;
         }
@@ -114,24 +132,25 @@ fn exchange(arguments: &Arguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What opens the door once.
-fn address(at: SocketAddr, token: &str) -> String {
+/// Address with a token that logs in once.
+fn login_url(at: SocketAddr, token: &str) -> String {
     format!("http://{at}/enter?token={token}")
 }
 
-/// The password, where one is given; it never stands in the command line, which every user of the machine can read.
-fn password(arguments: &Arguments) -> Result<Option<String>, Failure> {
+/// Reads the password, if there is one. It is never given on the command line, which every user of the computer can
+/// read.
+fn read_password(arguments: &Arguments) -> Result<Option<String>, CliError> {
     let given = match &arguments.password_file {
-        Some(path) => Some(crate::content::read_text(path)?.text.trim_end_matches(['\r', '\n']).to_string()),
+        Some(path) => Some(typodont_formats::read_text(path)?.text.trim_end_matches(['\r', '\n']).to_string()),
         None => match std::env::var(PASSWORD) {
             Ok(password) => Some(password),
             Err(std::env::VarError::NotPresent) => None,
-            Err(_) => return Err(Failure::misuse(format!("wrong-password: {PASSWORD} is not text"))),
+            Err(_) => return Err(CliError::misuse(format!("wrong-password: {PASSWORD} is not valid UTF-8 text"))),
         },
     };
     match given {
         Some(password) if password.chars().count() < PASSWORD_MIN => {
-            Err(Failure::misuse(format!("weak-password: it takes {PASSWORD_MIN} letters or more")))
+            Err(CliError::misuse(format!("weak-password: the password must have at least {PASSWORD_MIN} characters")))
         }
         given => Ok(given),
     }

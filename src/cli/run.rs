@@ -1,70 +1,75 @@
-//! `typodont run`: one exercise, one bundle.
+//! `typodont run`: runs one exercise and writes its bundle.
 
-use super::{Failure, SESSIONS, live, say};
-use crate::app;
-use crate::content::{self, Library};
-use crate::device::Spec;
-use crate::lesson::{self, Failed, Opening, Scan, SecondHand, second};
-use crate::scenario::{Forms, Scenario};
-use crate::session::OperatorFile;
-use crate::sim::Role;
+#[cfg(feature = "devices")]
+use super::live;
+#[cfg(not(all(feature = "desktop", feature = "devices")))]
+use super::missing_part;
+use super::{CliError, SESSIONS, print_line};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
+use typodont_core::device::DeviceSpec;
+#[cfg(feature = "devices")]
+use typodont_devices::servo::SecondHandRole;
+use typodont_exercise::scenario::{ResolveMode, Scenario};
+use typodont_exercise::session::OperatorFile;
+use typodont_formats::Library;
+use typodont_lesson::{self as lesson, LessonError, SessionConfig, ToothScan};
+#[cfg(feature = "devices")]
+use typodont_lesson::{PendingSecondHand, second_hand};
 
-/// The window's own pointer.
+/// Name of the window's own pointer as a device.
 const MOUSE: &str = "mouse";
 
-/// The device that no person holds.
+/// Name of the simulated device that a scripted operator moves.
 const SCRIPTED: &str = "scripted";
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The exercise
+    /// Scenario file of the exercise
     scenario: PathBuf,
-    /// Run without a window, as fast as the machine can
+    /// Run without a window, as fast as the computer allows
     #[arg(long)]
     headless: bool,
-    /// Who plays the trainee: careful, expert, hasty, timid, or a file
+    /// Scripted operator in the place of a trainee: careful, expert, hasty, timid, or a file
     #[arg(long, value_name = "NAME|FILE.json", default_value = "careful", requires = "headless")]
     operator: String,
-    /// The device a person holds; see `typodont devices`
+    /// Device of the trainee; see `typodont devices`
     #[arg(long, value_name = "NAME[:WHICH]", default_value = SCRIPTED)]
     device: String,
-    /// A second device here; see --second-role
+    /// Second device on this computer; see --second-role
     #[arg(long, value_name = "NAME[:WHICH]", conflicts_with = "second_at")]
     second: Option<String>,
-    /// Lets a second hand join from another machine, at this address of ours
+    /// Address on this computer at which a second device may join from another computer
     #[arg(long, value_name = "ADDRESS:PORT", requires = "second_key")]
     second_at: Option<String>,
-    /// What that machine must know: a word of at least 8 letters
+    /// Key that the other computer must give: at least 8 characters
     #[arg(long, value_name = "KEY", requires = "second_at", value_parser = key)]
     second_key: Option<String>,
-    /// What a second hand is there for
+    /// Purpose of the second device
     #[arg(long, value_enum, default_value_t)]
-    second_role: SecondRole,
-    /// Decides what the exercise leaves to chance; drawn from the clock if left out
+    second_role: SecondHandRoleName,
+    /// Seed of the random choices of the exercise; by default taken from the clock
     #[arg(long)]
     seed: Option<u64>,
-    /// A CT volume, or a map of its tissues as `typodont import` writes it (NRRD), to work on instead of the exercise's own tooth
+    /// CT volume, or label map as written by `typodont import` (NRRD), used instead of the exercise's own tooth
     #[arg(long, value_name = "VOLUME")]
     tooth: Option<PathBuf>,
-    /// Distance between that volume's voxels, where its header lacks it
+    /// Voxel spacing of that volume, if its header does not state it
     #[arg(long, value_name = "MM", requires = "tooth", value_parser = spacing)]
     tooth_spacing_mm: Option<f32>,
-    /// A code for the trainee; never a name
+    /// Participant code of the trainee; never a name
     #[arg(long, value_name = "CODE", default_value = "", value_parser = participant)]
     participant: String,
-    /// Folder in which the bundle is made
+    /// Folder for the bundle
     #[arg(long, value_name = "DIR", default_value = SESSIONS)]
     out: PathBuf,
-    /// Begin at once, without the instructions
+    /// Begin at once, without showing the instructions
     #[arg(long, conflicts_with = "headless")]
     begin: bool,
-    /// Draws a picture only this often: shows that a session does not wait for it
+    /// Delay of each rendered frame in ms, to show that a session does not wait for rendering
     #[arg(long, hide = true)]
     slow_picture_ms: Option<u64>,
 }
@@ -72,48 +77,53 @@ pub struct Arguments {
 pub fn spacing(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(mm) if (0.01..=2.0).contains(&mm) => Ok(mm),
-        _ => Err("a distance between voxels lies between 0.01 and 2 mm".into()),
+        _ => Err("the voxel spacing must be between 0.01 and 2 mm".into()),
     }
 }
 
 /// As the command line names a [`Role`].
 #[derive(Clone, Copy, Debug, Default, clap::ValueEnum)]
-enum SecondRole {
-    /// Follows the first hand, and leads it while its button is held
+enum SecondHandRoleName {
+    /// Follows the trainee's device, and leads it while the button is held
     #[default]
     Instructor,
-    /// Holds the suction, and feels the tooth with it
+    /// Holds the suction tube, which touches the tooth
     Suction,
 }
 
-impl From<SecondRole> for Role {
-    fn from(role: SecondRole) -> Role {
+#[cfg(feature = "devices")]
+impl From<SecondHandRoleName> for SecondHandRole {
+    fn from(role: SecondHandRoleName) -> SecondHandRole {
         match role {
-            SecondRole::Instructor => Role::Instructor,
-            SecondRole::Suction => Role::Suction,
+            SecondHandRoleName::Instructor => SecondHandRole::Instructor,
+            SecondHandRoleName::Suction => SecondHandRole::Suction,
         }
     }
 }
 
-/// Long enough not to be guessed by somebody who tries a thousand times a second.
+/// Parses a key; it must be long enough to resist a thousand guesses per second.
 fn key(text: &str) -> Result<String, String> {
     match text.len() >= 8 {
         true => Ok(text.to_string()),
-        false => Err("a key has at least 8 letters: it lets another machine push a person's hand".into()),
+        false => Err("the key must have at least 8 characters, because it lets another computer exert force on a \
+        person's hand"
+            .into()),
     }
 }
 
 fn participant(text: &str) -> Result<String, String> {
-    match lesson::is_code(text) {
+    match lesson::is_valid_participant_code(text) {
         true => Ok(text.to_string()),
-        false => Err("a code has up to 64 letters, digits, \"-\", \"_\" or \".\", and is never a name".into()),
+        false => Err("a participant code consists of up to 64 letters, digits, \"-\", \"_\" or \".\", and is never a \
+        name"
+            .into()),
     }
 }
 
-/// What a run needs, whoever asks for it.
-pub struct Run<'a> {
+/// Inputs of a run.
+pub struct RunRequest<'a> {
     pub scenario: Arc<Scenario>,
-    pub player: Player,
+    pub driver: SessionDriver,
     pub seed: u64,
     pub participant: &'a str,
     pub out: &'a Path,
@@ -121,116 +131,147 @@ pub struct Run<'a> {
     pub digests: BTreeMap<String, String>,
 }
 
-/// Who moves the hand.
-pub enum Player {
-    /// A script on a simulated device, as fast as the machine can.
+/// Source of the hand's movement.
+pub enum SessionDriver {
+    /// A scripted operator on a simulated device, as fast as the computer allows.
     Script(Box<OperatorFile>),
     /// A person with a device, in real time.
+    #[cfg(feature = "devices")]
     Person(Box<live::Hands>),
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let is_scripted = arguments.device == SCRIPTED;
     if !arguments.headless && (is_scripted || arguments.device == MOUSE) {
-        return window(arguments);
+        return open_in_window(arguments);
     }
     let library = lesson::library_for(&arguments.scenario);
-    let mut scenario = lesson::read(&arguments.scenario, Forms::Made)?;
+    let mut scenario = lesson::read_scenario(&arguments.scenario, ResolveMode::MakeWorkpiece)?;
     let mut digests = BTreeMap::new();
-    if let Some(scan) = tooth(arguments)? {
+    if let Some(scan) = read_tooth_scan(arguments)? {
         scan.replace_teeth(&mut scenario)?;
         digests.insert("tooth".to_string(), scan.digest().to_string());
     }
-    let player = match is_scripted {
-        true => Player::Script(Box::new(operator(&arguments.operator, &library)?)),
-        false => {
-            let first = lesson::open(&arguments.device)?;
-            let held = (first.name.as_str(), first.device.spec());
-            let second = second(arguments).map(|(from, role)| SecondHand::join(&from, role, held)).transpose()?;
-            Player::Person(Box::new(live::Hands { first, second }))
-        }
+    let driver = match is_scripted {
+        true => SessionDriver::Script(Box::new(operator(&arguments.operator, &library)?)),
+        false => open_devices(arguments)?,
     };
-    let run = Run {
+    let run = RunRequest {
         scenario: Arc::new(scenario),
-        player,
-        seed: arguments.seed.unwrap_or_else(|| lesson::seed_from(jiff::Timestamp::now())),
+        driver,
+        seed: arguments.seed.unwrap_or_else(|| lesson::seed_from_time(jiff::Timestamp::now())),
         participant: &arguments.participant,
         out: &arguments.out,
         digests,
     };
-    say(perform(run)?.display())
+    print_line(run_session(run)?.display())
 }
 
-/// The same exercise in the desktop program's window.
-fn window(arguments: &Arguments) -> Result<(), Failure> {
-    super::desktop(app::Options {
+/// Opens the devices of a person, and of a second one where it is asked for.
+#[cfg(feature = "devices")]
+fn open_devices(arguments: &Arguments) -> Result<SessionDriver, CliError> {
+    let first = lesson::open_device(&arguments.device)?;
+    let held = (first.name.as_str(), first.device.spec());
+    let second =
+        second_hand_source(arguments).map(|(from, role)| PendingSecondHand::join(&from, role, held)).transpose()?;
+    Ok(SessionDriver::Person(Box::new(live::Hands { first, second })))
+}
+
+#[cfg(not(feature = "devices"))]
+fn open_devices(_: &Arguments) -> Result<SessionDriver, CliError> {
+    Err(missing_part::error("haptic devices (--device)", "devices"))
+}
+
+/// Complains that this build has no window.
+#[cfg(not(feature = "desktop"))]
+fn open_in_window(_: &Arguments) -> Result<(), CliError> {
+    Err(missing_part::error("the window; without it, give --headless", "desktop"))
+}
+
+/// Opens the exercise in the window of the desktop application.
+#[cfg(feature = "desktop")]
+fn open_in_window(arguments: &Arguments) -> Result<(), CliError> {
+    super::open_window(typodont_app::AppOptions {
         exercise: Some(arguments.scenario.clone()),
-        tooth: tooth(arguments)?,
-        second: second(arguments),
-        begins: arguments.begin,
-        author: None,
+        tooth: read_tooth_scan(arguments)?,
+        second: second_hand_source(arguments),
+        begins_at_once: arguments.begin,
+        editor_mode: None,
         device: (arguments.device == MOUSE).then(|| MOUSE.into()),
         seed: arguments.seed,
         participant: arguments.participant.clone(),
         out: arguments.out.clone(),
-        templates: super::templates()?,
-        slow_picture: arguments.slow_picture_ms.map(Duration::from_millis),
+        templates: super::load_templates()?,
+        frame_delay: arguments.slow_picture_ms.map(std::time::Duration::from_millis),
     })
 }
 
-/// Who is to join, and as what.
-fn second(arguments: &Arguments) -> Option<(second::From, Role)> {
+/// Source and role of the second hand; `None` if none joins.
+#[cfg(feature = "devices")]
+fn second_hand_source(arguments: &Arguments) -> Option<(second_hand::SecondHandSource, SecondHandRole)> {
     let from = match (&arguments.second, arguments.second_at.clone().zip(arguments.second_key.clone())) {
-        (Some(name), _) => second::From::Device(name.clone()),
-        (None, Some((at, key))) => second::From::Network { at, key },
+        (Some(name), _) => second_hand::SecondHandSource::Device(name.clone()),
+        (None, Some((at, key))) => second_hand::SecondHandSource::Network { at, key },
         (None, None) => return None,
     };
     Some((from, arguments.second_role.into()))
 }
 
-/// The scan to work on.
-fn tooth(arguments: &Arguments) -> Result<Option<Scan>, Failed> {
-    arguments.tooth.as_ref().map(|path| Scan::read(path, arguments.tooth_spacing_mm)).transpose()
+/// Reads the scan that replaces the exercise's own tooth.
+fn read_tooth_scan(arguments: &Arguments) -> Result<Option<ToothScan>, LessonError> {
+    arguments.tooth.as_ref().map(|path| ToothScan::read(path, arguments.tooth_spacing_mm)).transpose()
 }
 
-/// An operator by name, or from a file.
-pub fn operator(name: &str, library: &Library) -> Result<OperatorFile, Failure> {
+/// Reads a scripted operator, by name or from a file.
+///
+/// # Errors
+/// A message if no operator has this name, or complaints if the file is not a valid operator.
+pub fn operator(name: &str, library: &Library) -> Result<OperatorFile, CliError> {
     match Path::new(name).extension() {
-        Some(_) => Ok(content::json::read::<OperatorFile>(content::read_text(Path::new(name))?)?.value),
-        None if library.bytes(&OperatorFile::file(name)).is_err() => {
-            let known =
-                library.held().filter_map(|(file, _)| file.strip_prefix("content/operators/")?.strip_suffix(".json"));
+        Some(_) => {
+            Ok(typodont_formats::json::read::<OperatorFile>(typodont_formats::read_text(Path::new(name))?)?.value)
+        }
+        None if library.bytes(&OperatorFile::file_name(name)).is_err() => {
+            let known = library
+                .files_in_memory()
+                .filter_map(|(file, _)| file.strip_prefix("content/operators/")?.strip_suffix(".json"));
             let known = known.collect::<Vec<_>>().join(", ");
-            Err(Failure::Wrong(format!("unknown-operator: no operator is named \"{name}\"; known: {known}, or a file")))
+            Err(CliError::Wrong(format!(
+                "unknown-operator: there is no operator \"{name}\"; known: {known}, or a file"
+            )))
         }
         None => Ok(OperatorFile::read(library, name)?),
     }
 }
 
-/// Runs, records, scores and reports; returns the bundle's path.
-pub fn perform(run: Run) -> Result<PathBuf, Failure> {
-    let Run { scenario, player, seed, participant, out, digests } = run;
-    // A page that cannot be made should be known before the work, not after.
-    let templates = super::templates()?;
+/// Runs, records, scores and reports a session; returns the path of its bundle.
+///
+/// # Errors
+/// A message if the templates are invalid, or the session cannot be run or its bundle written.
+pub fn run_session(run: RunRequest) -> Result<PathBuf, CliError> {
+    let RunRequest { scenario, driver, seed, participant, out, digests } = run;
+    // Invalid templates must be reported before the session, not after.
+    let templates = super::load_templates()?;
     let started = jiff::Timestamp::now();
-    let opening = Opening { scenario, seed, participant, out, digests, templates, started };
-    let workpiece = opening.make()?;
-    let recorded = match player {
-        Player::Script(operator) => {
-            opening.prepare(workpiece, Spec::phantom_omni(), Some(&operator))?.play(*operator)?
+    let config = SessionConfig { scenario, seed, participant, out, digests, templates, started };
+    let workpiece = config.make_workpiece()?;
+    let recorded = match driver {
+        SessionDriver::Script(operator) => {
+            config.prepare(workpiece, DeviceSpec::phantom_omni(), Some(&operator))?.run_script(*operator)?
         }
-        Player::Person(hands) => {
-            let prepared = opening.prepare(workpiece, hands.first.device.spec().clone(), None)?;
+        #[cfg(feature = "devices")]
+        SessionDriver::Person(hands) => {
+            let prepared = config.prepare(workpiece, hands.first.device.spec().clone(), None)?;
             live::play(prepared, *hands)?
         }
     };
-    let bar = spinner("scoring and drawing");
+    let bar = spinner("scoring and writing the report");
     let bundle = recorded.complete();
     bar.finish_and_clear();
     Ok(bundle?)
 }
 
-/// A sign of life on a terminal; silent elsewhere.
+/// A progress indicator on a terminal; hidden elsewhere.
 pub fn spinner(what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{spinner} {msg}").unwrap_or_else(|_| ProgressStyle::default_spinner());
     let bar = ProgressBar::new_spinner().with_style(style).with_message(what);

@@ -1,135 +1,139 @@
-//! `typodont school`, `sync`, `enqueue`, `worker`, `rescore`: for schools that outgrew one machine and a folder.
+//! `typodont school`, `sync`, `enqueue`, `worker`, `rescore`: for schools with many stations and a database.
 
 mod admit;
-mod asking;
+mod connection;
 mod database;
 pub mod enqueue;
 mod erase;
 mod export;
 pub mod fetch;
-mod http;
-mod mark;
+mod http_client;
+mod store_marker;
 mod metrics;
-mod patience;
+mod retry;
 pub mod rescore;
 mod source;
 mod store;
 pub mod sync;
 pub mod worker;
 
-use super::{Failure, say};
-use crate::report::harmless;
-use crate::school;
+use super::{CliError, print_line};
 use clap::{Args, Subcommand};
-pub use database::At;
+pub use database::DatabaseArguments;
 pub use export::write as write_partitions;
-pub use source::Source;
-pub use store::{Named, Store};
+pub use source::SessionSource;
+pub use store::ObjectStoreHandle;
+#[cfg(feature = "review")]
+pub use store::StoreArguments;
+use typodont_report::sanitize_display;
+use typodont_school as school;
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(subcommand)]
-    what: What,
+    what: SchoolCommand,
 }
 
 #[derive(Subcommand)]
-enum What {
-    /// Make or update the tables in a database; as its owner
-    Init(Init),
-    /// Make a class, or change for how long its sessions are kept
-    Class(Class),
-    /// Let a login in as a station, examiner, registrar or worker; as the database's owner
+enum SchoolCommand {
+    /// Create or update the tables of a database, as the database's owner
+    Init(InitArguments),
+    /// Create a class, or change its retention period
+    Class(ClassArguments),
+    /// Give a login the role of a station, examiner, registrar or worker, as the database's owner
     Admit(admit::Arguments),
-    /// Fetch the bundles of a class into a folder, each file checked by its digest
+    /// Download the bundles of a class into a folder; the digest of each file is checked
     Fetch(fetch::Arguments),
-    /// Enter what an examiner judged in a folder (see `typodont review`), and take over what others judged
-    Judgements(fetch::Judgements),
-    /// Forget a participant: records, bundles and exports
-    Erase(erase::Erase),
-    /// Erase sessions that their class no longer keeps
-    Retain(erase::Retain),
-    /// Print who did what, a line of JSON each
-    Audit(Audit),
+    /// Upload an examiner's overrides from a folder (see `typodont review`), and download those of others
+    Judgements(fetch::JudgementsArguments),
+    /// Erase a participant: records, bundles and exports
+    Erase(erase::EraseArguments),
+    /// Erase sessions whose retention period has expired
+    Retain(erase::RetainArguments),
+    /// Print the audit log, one JSON object per line
+    Audit(AuditArguments),
 }
 
 #[derive(Args)]
-struct Init {
+struct InitArguments {
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
 }
 
 #[derive(Args)]
-struct Class {
-    /// Letters, digits, dot, dash and underscore
+struct ClassArguments {
+    /// Name of the class: letters, digits, dot, dash and underscore
     name: String,
-    /// Sessions are kept for so many days after they began; without it, as they were kept before, at first for ever
+    /// Retention period of sessions, in days after they began; by default the present period is kept, which is unlimited for a new
+    /// class
     #[arg(long, value_name = "DAYS", value_parser = clap::value_parser!(i32).range(1..=36500))]
     keep_days: Option<i32>,
-    /// Sessions are kept for ever again
+    /// Remove the limit of the retention period
     #[arg(long, conflicts_with = "keep_days")]
     keep_always: bool,
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
 }
 
 #[derive(Args)]
-struct Audit {
+struct AuditArguments {
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     match &arguments.what {
-        What::Init(arguments) => init(arguments),
-        What::Class(arguments) => class(arguments),
-        What::Admit(arguments) => admit::run(arguments),
-        What::Fetch(arguments) => fetch::run(arguments),
-        What::Judgements(arguments) => fetch::judgements(arguments),
-        What::Erase(arguments) => erase::erase(arguments),
-        What::Retain(arguments) => erase::retain(arguments),
-        What::Audit(arguments) => audit(arguments),
+        SchoolCommand::Init(arguments) => init(arguments),
+        SchoolCommand::Class(arguments) => class(arguments),
+        SchoolCommand::Admit(arguments) => admit::run(arguments),
+        SchoolCommand::Fetch(arguments) => fetch::run(arguments),
+        SchoolCommand::Judgements(arguments) => fetch::run_judgements(arguments),
+        SchoolCommand::Erase(arguments) => erase::erase(arguments),
+        SchoolCommand::Retain(arguments) => erase::retain(arguments),
+        SchoolCommand::Audit(arguments) => audit(arguments),
     }
 }
 
-fn init(arguments: &Init) -> Result<(), Failure> {
-    let mut client = arguments.at.client()?;
-    let new = school::apply(&mut client).map_err(|e| Failure::wrong(format!("--database: {e}")))?;
+fn init(arguments: &InitArguments) -> Result<(), CliError> {
+    let mut client = arguments.at.connect()?;
+    let new = school::apply_migrations(&mut client).map_err(|e| CliError::wrong(format!("--database: {e}")))?;
     match new.is_empty() {
-        true => say("the schema is as it should be"),
-        false => say(format!("applied: {}", new.join(", "))),
+        true => print_line("the schema is up to date"),
+        false => print_line(format!("applied: {}", new.join(", "))),
     }
 }
 
-fn class(arguments: &Class) -> Result<(), Failure> {
+fn class(arguments: &ClassArguments) -> Result<(), CliError> {
     let fits = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     let name = &arguments.name;
     if name.is_empty() || name.len() > 64 || !name.chars().all(fits) || name.starts_with(['.', '_', '-']) {
-        return Err(Failure::misuse(format!(
-            "\"{}\": wrong-class: letters, digits, dot, dash and underscore, a letter or digit first; 64 at most",
-            harmless(name, 80)
+        return Err(CliError::misuse(format!(
+            "\"{}\": wrong-class: a class name consists of up to 64 letters, digits, dots, dashes and underscores, and \
+            begins with a letter or digit",
+            sanitize_display(name, 80)
         )));
     }
-    let mut line = arguments.at.line()?;
+    let mut connection = arguments.at.connection()?;
     let sql = "INSERT INTO typodont.class (name, keep_days) VALUES ($1, $2)
       ON CONFLICT (name) DO UPDATE
       SET keep_days = CASE WHEN $3 THEN NULL ELSE coalesce(excluded.keep_days, class.keep_days) END
       RETURNING keep_days";
     let values: &[&(dyn postgres::types::ToSql + Sync)] =
         &[&arguments.name, &arguments.keep_days, &arguments.keep_always];
-    let row = line.ask(|client| client.query_one(sql, values))?;
+    let row = connection.query_with_retry(|client| client.query_one(sql, values))?;
     match row.get::<_, Option<i32>>(0) {
-        Some(1) => say(format!("{}: sessions are kept for a day", arguments.name)),
-        Some(days) => say(format!("{}: sessions are kept for {days} days", arguments.name)),
-        None => say(format!("{}: sessions are kept", arguments.name)),
+        Some(1) => print_line(format!("{}: sessions are kept for 1 day", arguments.name)),
+        Some(days) => print_line(format!("{}: sessions are kept for {days} days", arguments.name)),
+        None => print_line(format!("{}: sessions are kept without limit", arguments.name)),
     }
 }
 
-fn audit(arguments: &Audit) -> Result<(), Failure> {
+fn audit(arguments: &AuditArguments) -> Result<(), CliError> {
     let sql =
         "SELECT json_build_object('number', id, 'at', at, 'login', login, 'action', action, 'session', session_id,
       'detail', detail)::text FROM typodont.audit ORDER BY id";
-    for row in arguments.at.line()?.ask(|client| client.query(sql, &[]))? {
-        say(row.get::<_, String>(0))?;
+    for row in arguments.at.connection()?.query_with_retry(|client| client.query(sql, &[]))? {
+        print_line(row.get::<_, String>(0))?;
     }
     Ok(())
 }

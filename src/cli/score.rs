@@ -1,27 +1,30 @@
-//! `typodont score`: the result again, from the recording alone.
+//! `typodont score`: computes a session's results again, from the recording alone.
 
-use super::{Failure, recording_in, say};
-use crate::record::{Recording, Watch};
-use crate::report::SessionFile;
-use crate::score;
+use super::{CliError, print_line, recording_path};
 use clap::Args;
 use std::path::PathBuf;
+use typodont_exercise::record::{Recording, ReplayCheck};
+use typodont_exercise::score;
+use typodont_report::SessionFile;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The bundle's folder, or a recording
+    /// Folder of the bundle, or a recording
     bundle: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let path = recording_in(&arguments.bundle);
-    let recording = Recording::read(&path).map_err(Failure::wrong)?;
-    let scored = score::score(&recording, Watch::Nothing)
-        .map_err(|e| Failure::wrong(format!("{}: damaged-recording: {e}", path.display())))?;
-    say(SessionFile::of(&recording, &scored).text().trim_end())?;
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let path = recording_path(&arguments.bundle);
+    let recording = Recording::read(&path).map_err(CliError::wrong)?;
+    let scored = score::score(&recording, ReplayCheck::Skip)
+        .map_err(|e| CliError::wrong(format!("{}: damaged-recording: {e}", path.display())))?;
+    print_line(SessionFile::of(&recording, &scored).to_json().trim_end())?;
     if recording.end.is_none() {
-        let seconds = recording.len() as f64 * crate::tick::TICK_S;
-        eprintln!("{}: the recording breaks off after {seconds:.3} s; this is the score up to there", path.display());
+        let seconds = recording.len() as f64 * typodont_core::tick::TICK_S;
+        eprintln!(
+            "{}: the recording is incomplete: it ends after {seconds:.3} s, and the score covers this part only",
+            path.display()
+        );
     }
     Ok(())
 }

@@ -1,29 +1,30 @@
-//! `typodont verify`: does the bundle hold?
+//! `typodont verify`: checks a bundle against its recording.
 
-use super::{Failure, say};
-use crate::report::bundle::{self, Judgement};
+use super::{CliError, print_line};
 use clap::Args;
 use std::path::PathBuf;
+use typodont_report::bundle;
+use typodont_report::bundle::Verification;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The bundle's folder, or a recording alone
+    /// Folder of the bundle, or a recording alone
     bundle: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let path = &arguments.bundle;
-    let judgement = match path.is_file() {
+    let verification = match path.is_file() {
         true => bundle::verify_recording(path),
-        false => bundle::verify(path, &super::templates()?),
+        false => bundle::verify(path, &super::load_templates()?),
     };
-    let Judgement { complaints, unjudged } = judgement.map_err(Failure::wrong)?;
+    let Verification { complaints, unverified: unjudged } = verification.map_err(CliError::wrong)?;
     for complaint in &complaints {
         eprintln!("{}: {complaint}", path.display());
     }
     match (complaints.is_empty(), unjudged.is_empty()) {
-        (false, _) => Err(Failure::Told),
-        (true, true) => say(format!("{}: holds", path.display())),
-        (true, false) => say(format!("{}: holds, but not judged: {}", path.display(), unjudged.join("; "))),
+        (false, _) => Err(CliError::AlreadyReported),
+        (true, true) => print_line(format!("{}: verified", path.display())),
+        (true, false) => print_line(format!("{}: verified, except: {}", path.display(), unjudged.join("; "))),
     }
 }

@@ -1,80 +1,81 @@
-//! `typodont xapi`: sessions for a learning record store, spooled on disk and sent when it can be reached.
+//! `typodont xapi`: exports sessions to a learning record store, by a spool on disk from which they are sent.
 
 mod lrs;
 mod sending;
 
-use super::{Failure, cohort, say};
-use crate::handover::spool::{Spool, Tally};
-use crate::handover::{Naming, Pseudonyms, session_id, statements};
-use crate::report::cohort::wording;
+use super::{CliError, cohort, print_line};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use typodont_integrations::spool::{Spool, SpoolCounts};
+use typodont_integrations::{Pseudonyms, XapiNaming, session_id, statements};
+use typodont_report::cohort::wording;
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(subcommand)]
-    what: What,
+    what: XapiCommand,
 }
 
 #[derive(Subcommand)]
-enum What {
-    /// Make statements of bundles and put them into a spool; what was put before is left
-    Make(Make),
-    /// Send a spool to a learning record store, again and again until it has everything
+enum XapiCommand {
+    /// Write the statements of bundles into a spool; sessions already in it are not changed
+    Make(MakeArguments),
+    /// Send a spool to a learning record store, and retry until everything is accepted
     Send(sending::Arguments),
-    /// Say how much of a spool waits, is sent, was refused
-    Status(Status),
+    /// Print how many sessions of a spool are waiting, sent and refused
+    Status(StatusArguments),
 }
 
 #[derive(Args)]
-struct Make {
-    /// Folder that holds bundles, at any depth
+struct MakeArguments {
+    /// Folder that contains bundles, at any depth
     folder: PathBuf,
-    /// Folder of the spool; it is made where there is none
+    /// Folder of the spool; it is created if necessary
     #[arg(long, value_name = "DIR")]
     spool: PathBuf,
-    /// The school's address, under which accounts and activities are named
+    /// Home page of the school, which identifies its accounts and activities
     #[arg(long, value_name = "URL")]
     home_page: String,
-    /// A file with a secret of 16 bytes or more: people are called by a keyed digest of their codes
+    /// File with a secret of at least 16 bytes; participants are then identified by a keyed digest of their codes
     #[arg(long, value_name = "FILE")]
     pseudonym_key: Option<PathBuf>,
-    /// What this station is called
+    /// Name of this station
     #[arg(long, value_name = "NAME")]
     platform: Option<String>,
 }
 
 #[derive(Args)]
-struct Status {
+struct StatusArguments {
     /// Folder of the spool
     spool: PathBuf,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     match &arguments.what {
-        What::Make(arguments) => make(arguments),
-        What::Send(arguments) => sending::run(arguments),
-        What::Status(arguments) => {
-            let spool = open(&arguments.spool)?;
-            say(in_words(spool.tally().map_err(|e| unusable(&arguments.spool, e))?))
+        XapiCommand::Make(arguments) => make_statements(arguments),
+        XapiCommand::Send(arguments) => sending::run(arguments),
+        XapiCommand::Status(arguments) => {
+            let spool = open_spool(&arguments.spool)?;
+            print_line(describe(spool.counts().map_err(|e| spool_error(&arguments.spool, e))?))
         }
     }
 }
 
-fn make(arguments: &Make) -> Result<(), Failure> {
-    let cohort = cohort::read(&arguments.folder)?;
-    let mut naming = Naming::at(&arguments.home_page).map_err(|e| Failure::misuse(format!("--home-page: {e}")))?;
+fn make_statements(arguments: &MakeArguments) -> Result<(), CliError> {
+    let cohort = cohort::read_folder(&arguments.folder)?;
+    let mut naming =
+        XapiNaming::with_home_page(&arguments.home_page).map_err(|e| CliError::misuse(format!("--home-page: {e}")))?;
     naming.platform.clone_from(&arguments.platform);
     if let Some(path) = &arguments.pseudonym_key {
-        let key = crate::content::read_file(path)?;
-        let wrong = |e| Failure::wrong(format!("{}: weak-key: {e}", path.display()));
+        let key = typodont_formats::read_file(path)?;
+        let wrong = |e| CliError::wrong(format!("{}: weak-key: {e}", path.display()));
         naming.pseudonyms = Pseudonyms::keyed(key.trim_ascii()).map_err(wrong)?;
     }
-    std::fs::create_dir_all(&arguments.spool).map_err(|e| unusable(&arguments.spool, e))?;
-    let spool = open(&arguments.spool)?;
+    std::fs::create_dir_all(&arguments.spool).map_err(|e| spool_error(&arguments.spool, e))?;
+    let spool = open_spool(&arguments.spool)?;
     let mut words = BTreeMap::new();
-    let (mut sessions, mut told) = (0, 0);
+    let (mut sessions, mut statement_count) = (0, 0);
     for (_, session) in &cohort.sessions {
         let questionnaire = session.questionnaire.as_ref().map(|q| q.id.as_str());
         if let Some(id) = questionnaire {
@@ -82,26 +83,26 @@ fn make(arguments: &Make) -> Result<(), Failure> {
         }
         let wording = questionnaire.and_then(|id| words[id].as_ref());
         let statements = statements(session, &naming, wording);
-        if spool.put(&session_id(session), &statements).map_err(|e| unusable(&arguments.spool, e))? {
+        if spool.put(&session_id(session), &statements).map_err(|e| spool_error(&arguments.spool, e))? {
             sessions += 1;
-            told += statements.len();
+            statement_count += statements.len();
         }
     }
-    say(format!("{}: {told} statements of {sessions} sessions", arguments.spool.display()))
+    print_line(format!("{}: {statement_count} statements of {sessions} sessions", arguments.spool.display()))
 }
 
-/// A spool that is there already.
-fn open(folder: &Path) -> Result<Spool, Failure> {
+/// Opens an existing spool.
+fn open_spool(folder: &Path) -> Result<Spool, CliError> {
     if !folder.is_dir() {
-        return Err(Failure::wrong(format!("{}: missing-folder: there is no such spool", folder.display())));
+        return Err(CliError::wrong(format!("{}: missing-folder: the spool does not exist", folder.display())));
     }
-    Spool::open(folder).map_err(|e| unusable(folder, e))
+    Spool::open(folder).map_err(|e| spool_error(folder, e))
 }
 
-fn unusable(folder: &Path, error: std::io::Error) -> Failure {
-    Failure::wrong(format!("{}: unusable-spool: {error}", folder.display()))
+fn spool_error(folder: &Path, error: std::io::Error) -> CliError {
+    CliError::wrong(format!("{}: unusable-spool: {error}", folder.display()))
 }
 
-fn in_words(Tally { waiting, sent, refused }: Tally) -> String {
-    format!("{waiting} sessions wait, {sent} are sent, {refused} were refused")
+fn describe(SpoolCounts { waiting, sent, refused }: SpoolCounts) -> String {
+    format!("{waiting} sessions waiting, {sent} sent, {refused} refused")
 }

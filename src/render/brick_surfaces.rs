@@ -1,30 +1,32 @@
-//! The tooth's triangles, brick by brick, in one buffer that one call draws.
+//! Triangles of the tooth's surface, brick by brick, in one buffer that is drawn with one call.
 //!
-//! Each brick has a slot with a little room to grow. What a slot does not fill is triangles without area. A brick that
-//! outgrows its slot takes a free one or the next at the end.
+//! Each brick has a slot with a little spare capacity, and degenerate triangles fill the unused part of a slot. A
+//! brick that outgrows its slot moves to a free one or to the end of the buffer.
 
-use super::scene::Palette;
+use super::scene::LabelPalette;
 use super::surface_mesh;
 use super::vertex::Vertex;
-use crate::volume::rows::each;
-use crate::volume::{Volume, surface};
 use std::ops::Range;
+use typodont_core::parallel::par_map;
+use typodont_core::volume::{Volume, surface};
 
-/// Slots are this many corners and triangles long, or a multiple: small cuts then seldom move a brick.
-const GRAIN: usize = 24;
+/// Slot sizes, in vertices and in triangles, are multiples of this, so that small cuts seldom move a brick.
+const SLOT_GRANULARITY: usize = 24;
 
-/// Room at the end for bricks that outgrow their slots, as a share of all: after that the buffers double.
-const SPARE: f32 = 0.25;
+/// Spare capacity at the end of a buffer for bricks that outgrow their slots, as a share of the initial length. When
+/// it is used up, the buffer doubles.
+const SPARE_SHARE: f32 = 0.25;
 
+/// Vertex and index buffers of the tooth's surface.
 pub struct BrickSurfaces {
-    vertices: Grown,
-    indices: Grown,
+    vertices: GrowableBuffer,
+    indices: GrowableBuffer,
     slots: Vec<Slot>,
     free: Vec<Slot>,
-    palette: Palette,
+    palette: LabelPalette,
 }
 
-/// Where a brick's corners and triangles (three indices each) lie.
+/// Ranges of a brick's vertices and triangles (three indices each) in the buffers.
 #[derive(Clone, Default)]
 struct Slot {
     vertices: Range<usize>,
@@ -32,25 +34,26 @@ struct Slot {
 }
 
 impl Slot {
-    fn holds(&self, part: &Part) -> bool {
+    fn fits(&self, part: &BrickMesh) -> bool {
         part.vertices.len() <= self.vertices.len() && part.triangles.len() <= self.triangles.len()
     }
 }
 
-/// One brick's surface.
-struct Part {
+/// Surface of one brick.
+struct BrickMesh {
     vertices: Vec<Vertex>,
     triangles: Vec<[u32; 3]>,
 }
 
-impl Part {
-    fn of(volume: &Volume, palette: &Palette, brick: usize) -> Part {
-        let mesh = surface::brick(volume, brick);
-        Part { vertices: surface_mesh::of_tooth(volume, palette, &mesh), triangles: mesh.triangles }
+impl BrickMesh {
+    fn extract(volume: &Volume, palette: &LabelPalette, brick: usize) -> BrickMesh {
+        let mesh = surface::extract_brick(volume, brick);
+        BrickMesh { vertices: surface_mesh::tooth_vertices(volume, palette, &mesh), triangles: mesh.triangles }
     }
 
-    /// Its triangles among all corners, filled up with some that have no area.
-    fn placed(&self, slot: &Slot) -> Vec<[u32; 3]> {
+    /// Returns the triangles with indices into the common vertex buffer, filled up with degenerate ones to the slot's
+    /// length.
+    fn indices_in(&self, slot: &Slot) -> Vec<[u32; 3]> {
         let first = slot.vertices.start as u32;
         let mut placed: Vec<[u32; 3]> = self.triangles.iter().map(|t| t.map(|i| first + i)).collect();
         placed.resize(slot.triangles.len(), [first; 3]);
@@ -59,38 +62,38 @@ impl Part {
 }
 
 impl BrickSurfaces {
-    /// Every brick of a volume.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, palette: &Palette) -> BrickSurfaces {
-        let parts = each(volume.bricks().len(), |brick| Part::of(volume, palette, brick));
+    /// Extracts and uploads the surfaces of all bricks of a volume.
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, palette: &LabelPalette) -> BrickSurfaces {
+        let parts = par_map(volume.bricks().len(), |brick| BrickMesh::extract(volume, palette, brick));
         let mut slots = Vec::with_capacity(parts.len());
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
         for part in &parts {
             let slot = slot_after(vertices.len(), triangles.len(), part);
             vertices.extend_from_slice(&part.vertices);
-            vertices.resize(slot.vertices.end, Vertex::NOWHERE);
-            triangles.extend(part.placed(&slot));
+            vertices.resize(slot.vertices.end, Vertex::PADDING);
+            triangles.extend(part.indices_in(&slot));
             slots.push(slot);
         }
         BrickSurfaces {
-            vertices: Grown::filled(device, queue, "corners", wgpu::BufferUsages::VERTEX, &vertices),
-            indices: Grown::filled(device, queue, "triangles", wgpu::BufferUsages::INDEX, &triangles),
+            vertices: GrowableBuffer::filled(device, queue, "corners", wgpu::BufferUsages::VERTEX, &vertices),
+            indices: GrowableBuffer::filled(device, queue, "triangles", wgpu::BufferUsages::INDEX, &triangles),
             slots,
             free: Vec::new(),
             palette: palette.clone(),
         }
     }
 
-    /// True when the corners have these colours.
-    pub fn has(&self, palette: &Palette) -> bool {
+    /// True when the vertices have the colours of this palette.
+    pub fn has_palette(&self, palette: &LabelPalette) -> bool {
         self.palette == *palette
     }
 
-    /// Makes the surfaces anew that changed bricks can have changed; gives their number.
+    /// Extracts again all surfaces that changed bricks can affect. Returns their number.
     pub fn update(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, changed: &[usize]) -> usize {
-        let affected = surface::affected(volume, changed);
+        let affected = surface::dirty_neighbourhood(volume, changed);
         for &brick in &affected {
-            let part = Part::of(volume, &self.palette, brick);
-            if !self.slots[brick].holds(&part) {
+            let part = BrickMesh::extract(volume, &self.palette, brick);
+            if !self.slots[brick].fits(&part) {
                 self.move_to_larger_slot(device, queue, brick, &part);
             }
             let slot = &self.slots[brick];
@@ -98,19 +101,19 @@ impl BrickSurfaces {
                 continue;
             }
             self.vertices.write(queue, slot.vertices.start, &part.vertices);
-            self.indices.write(queue, slot.triangles.start, &part.placed(slot));
+            self.indices.write(queue, slot.triangles.start, &part.indices_in(slot));
         }
         affected.len()
     }
 
-    fn move_to_larger_slot(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, brick: usize, part: &Part) {
-        let left = std::mem::take(&mut self.slots[brick]);
-        if !left.triangles.is_empty() {
-            let nothing = Part { vertices: Vec::new(), triangles: Vec::new() };
-            self.indices.write(queue, left.triangles.start, &nothing.placed(&left));
-            self.free.push(left);
+    fn move_to_larger_slot(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, brick: usize, part: &BrickMesh) {
+        let old_slot = std::mem::take(&mut self.slots[brick]);
+        if !old_slot.triangles.is_empty() {
+            let nothing = BrickMesh { vertices: Vec::new(), triangles: Vec::new() };
+            self.indices.write(queue, old_slot.triangles.start, &nothing.indices_in(&old_slot));
+            self.free.push(old_slot);
         }
-        let slot = match self.free.iter().position(|slot| slot.holds(part)) {
+        let slot = match self.free.iter().position(|slot| slot.fits(part)) {
             Some(found) => self.free.swap_remove(found),
             None => {
                 let slot = slot_after(self.vertices.used, self.indices.used, part);
@@ -122,7 +125,7 @@ impl BrickSurfaces {
         self.slots[brick] = slot;
     }
 
-    /// Draws all of it, with the pipeline and groups that are set.
+    /// Draws all surfaces with the pipeline and the bind groups that are set.
     pub fn draw(&self, pass: &mut wgpu::RenderPass) {
         if self.indices.used > 0 {
             pass.set_vertex_buffer(0, self.vertices.buffer.slice(..));
@@ -132,49 +135,50 @@ impl BrickSurfaces {
     }
 }
 
-fn slot_after(vertices: usize, triangles: usize, part: &Part) -> Slot {
-    let roomy = |count: usize| if count == 0 { 0 } else { (count + GRAIN / 4).next_multiple_of(GRAIN) };
+fn slot_after(vertices: usize, triangles: usize, part: &BrickMesh) -> Slot {
+    let roomy =
+        |count: usize| if count == 0 { 0 } else { (count + SLOT_GRANULARITY / 4).next_multiple_of(SLOT_GRANULARITY) };
     Slot {
         vertices: vertices..vertices + roomy(part.vertices.len()),
         triangles: triangles..triangles + roomy(part.triangles.len()),
     }
 }
 
-/// A buffer that doubles when it is full. Lengths are in items.
-struct Grown {
+/// A GPU buffer that at least doubles when it is full. Lengths are in items.
+struct GrowableBuffer {
     buffer: wgpu::Buffer,
     label: &'static str,
     usage: wgpu::BufferUsages,
-    item: usize,
+    item_size: usize,
     used: usize,
-    room: usize,
+    capacity: usize,
 }
 
-impl Grown {
+impl GrowableBuffer {
     fn filled<T: bytemuck::Pod>(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         label: &'static str,
         usage: wgpu::BufferUsages,
         items: &[T],
-    ) -> Grown {
+    ) -> GrowableBuffer {
         let usage = usage | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-        let room = items.len() + (items.len() as f32 * SPARE) as usize + 64 * GRAIN;
-        let buffer = buffer(device, label, usage, room * size_of::<T>());
+        let capacity = items.len() + (items.len() as f32 * SPARE_SHARE) as usize + 64 * SLOT_GRANULARITY;
+        let buffer = buffer(device, label, usage, capacity * size_of::<T>());
         queue.write_buffer(&buffer, 0, bytemuck::cast_slice(items));
-        Grown { buffer, label, usage, item: size_of::<T>(), used: items.len(), room }
+        GrowableBuffer { buffer, label, usage, item_size: size_of::<T>(), used: items.len(), capacity }
     }
 
     fn write<T: bytemuck::Pod>(&self, queue: &wgpu::Queue, first: usize, items: &[T]) {
-        queue.write_buffer(&self.buffer, (first * self.item) as u64, bytemuck::cast_slice(items));
+        queue.write_buffer(&self.buffer, (first * self.item_size) as u64, bytemuck::cast_slice(items));
     }
 
     fn reserve(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, used: usize) {
-        if used > self.room {
-            self.room = used.max(2 * self.room);
-            let larger = buffer(device, self.label, self.usage, self.room * self.item);
+        if used > self.capacity {
+            self.capacity = used.max(2 * self.capacity);
+            let larger = buffer(device, self.label, self.usage, self.capacity * self.item_size);
             let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-            encoder.copy_buffer_to_buffer(&self.buffer, 0, &larger, 0, Some((self.used * self.item) as u64));
+            encoder.copy_buffer_to_buffer(&self.buffer, 0, &larger, 0, Some((self.used * self.item_size) as u64));
             queue.submit([encoder.finish()]);
             self.buffer = larger;
         }

@@ -1,48 +1,49 @@
-//! Where a picture is seen from, and how a mouse or a key moves that place.
+//! Viewpoints, and the orbit, zoom and pan of a camera by mouse or keys.
 
-use super::eye::{Eye, Window};
-use crate::frame::{Quat, Vec3};
+use super::eye::{Eye, FrustumWindow};
+use typodont_core::frame::{Quat, Vec3};
 
 /// A perspective camera. World space, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Between the eyes.
+    /// Midpoint between the eyes.
     pub position: Vec3,
-    /// What is looked at. In stereo it lies on the focus plane, where both eyes' pictures agree.
+    /// Point that is looked at. In stereo the focus plane, on which both eyes' images agree, goes through it.
     pub focus: Vec3,
-    /// Upward in the picture; need not be across the direction of view, but not along it.
+    /// Up direction of the image; need not be perpendicular to the direction of view, but must not be parallel to it.
     pub up: Vec3,
-    /// From the picture's lower to its upper edge, rad.
+    /// Vertical field of view, rad.
     pub field_of_view: f32,
-    /// What is nearer or farther along the direction of view is not drawn, mm.
+    /// Clipping distances along the direction of view, mm. Nothing nearer or farther is drawn.
     pub near: f32,
     pub far: f32,
 }
 
 impl Viewpoint {
-    /// Looks from one place at another. Draws from a tenth of the way between to far behind.
-    pub fn looking(position: Vec3, focus: Vec3, up: Vec3) -> Viewpoint {
-        let way = (focus - position).length().max(1e-3);
-        Viewpoint { position, focus, up, field_of_view: FIELD_OF_VIEW, near: 0.1 * way, far: 20.0 * way }
+    /// Looks from `position` at `focus`. The clipping distances are 0.1 and 20 times the distance between the two.
+    pub fn look_at(position: Vec3, focus: Vec3, up: Vec3) -> Viewpoint {
+        let distance = (focus - position).length().max(1e-3);
+        Viewpoint { position, focus, up, field_of_view: FIELD_OF_VIEW, near: 0.1 * distance, far: 20.0 * distance }
     }
 
-    /// From the eyes to the focus plane, mm.
+    /// Returns the distance from the eyes to the focus plane, mm.
     pub fn focus_distance(&self) -> f32 {
         (self.focus - self.position).length()
     }
 
-    /// The middle eye; `ratio` is the picture's width by its height.
-    pub fn eye(&self, ratio: f32) -> Eye {
-        let ahead = (self.focus - self.position).normalize_or(Vec3::NEG_Z);
-        let right = ahead.cross(self.up).normalize_or(ahead.any_orthonormal_vector());
+    /// Returns the eye midway between both eyes; `aspect` is the image's width divided by its height.
+    pub fn eye(&self, aspect: f32) -> Eye {
+        let forward = (self.focus - self.position).normalize_or(Vec3::NEG_Z);
+        let right = forward.cross(self.up).normalize_or(forward.any_orthonormal_vector());
         let top = libm::tanf(0.5 * self.field_of_view);
-        let window = Window { left: -top * ratio, right: top * ratio, bottom: -top, top };
+        let window = FrustumWindow { left: -top * aspect, right: top * aspect, bottom: -top, top };
         let Viewpoint { position, near, far, .. } = *self;
-        Eye { position, right, up: right.cross(ahead), ahead, window, near, far }
+        Eye { position, right, up: right.cross(forward), forward, window, near, far }
     }
 
-    /// True when a picture can be made: finite numbers, 0 < near < far, a focus away from the eyes.
-    pub fn is_sound(&self) -> bool {
+    /// True when an image can be rendered: finite values, 0 < near < far, a focus away from the eyes, and a field of
+    /// view from 0.01 to 3 rad.
+    pub fn is_valid(&self) -> bool {
         let all = [self.position, self.focus, self.up];
         all.iter().all(|v| v.is_finite())
             && self.focus_distance() > 1e-3
@@ -53,65 +54,67 @@ impl Viewpoint {
     }
 }
 
-/// 28°: a screen 40 cm wide seen from 70 cm, so that nothing looks bent.
+/// Default vertical field of view, rad: 28°, as for a screen 40 cm wide seen from 70 cm, so that perspective looks
+/// natural.
 const FIELD_OF_VIEW: f32 = 0.49;
 
-/// Least and greatest distance of an orbit, mm: a fissure fills the picture, or a head does.
-const DISTANCES: [f32; 2] = [8.0, 600.0];
+/// Minimum and maximum distance of an orbit, mm: from a fissure that fills the image to a whole head.
+const DISTANCE_RANGE: [f32; 2] = [8.0, 600.0];
 
-/// Steepest look up or down, rad: straight down the picture's up would be lost.
-const TILT_MOST: f32 = 1.55;
+/// Maximum elevation up or down, rad: looking straight down, the up direction would be undefined.
+const MAX_ELEVATION: f32 = 1.55;
 
-/// A camera on a ball around a middle. Every movement gives a new one.
+/// A camera on a sphere around a centre. Every movement returns a new value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orbit {
-    /// World space, mm.
+    /// Centre of the sphere, world space, mm.
     pub middle: Vec3,
-    /// To the right around the world's y axis, rad; 0 looks from the user's side (+z).
-    pub turn: f32,
-    /// Upward, rad.
-    pub tilt: f32,
+    /// Angle to the right around the world's y axis, rad; 0 looks from the user's side (+z).
+    pub azimuth: f32,
+    /// Angle upward, rad.
+    pub elevation: f32,
     /// mm
     pub distance: f32,
 }
 
 impl Orbit {
-    /// Sees a ball whole.
+    /// Returns an orbit from which a whole ball is visible. World space, mm.
     pub fn around(middle: Vec3, radius: f32) -> Orbit {
         let distance = 1.08 * radius / libm::sinf(0.5 * FIELD_OF_VIEW);
-        Orbit { middle, turn: 0.35, tilt: 0.55, distance: distance.clamp(DISTANCES[0], DISTANCES[1]) }
+        Orbit { middle, azimuth: 0.35, elevation: 0.55, distance: distance.clamp(DISTANCE_RANGE[0], DISTANCE_RANGE[1]) }
     }
 
-    /// Turns around the middle; rad.
-    pub fn turned(self, right: f32, up: f32) -> Orbit {
-        let turn = (self.turn + right) % std::f32::consts::TAU;
-        Orbit { turn, tilt: (self.tilt + up).clamp(-TILT_MOST, TILT_MOST), ..self }
+    /// Rotates the camera around the centre, rad.
+    pub fn rotated(self, right: f32, up: f32) -> Orbit {
+        let azimuth = (self.azimuth + right) % std::f32::consts::TAU;
+        Orbit { azimuth, elevation: (self.elevation + up).clamp(-MAX_ELEVATION, MAX_ELEVATION), ..self }
     }
 
-    /// Comes nearer (factor below 1) or goes away.
+    /// Moves the camera closer (factor below 1) or away, within 8 to 600 mm.
     pub fn zoomed(self, factor: f32) -> Orbit {
-        Orbit { distance: (self.distance * factor).clamp(DISTANCES[0], DISTANCES[1]), ..self }
+        Orbit { distance: (self.distance * factor).clamp(DISTANCE_RANGE[0], DISTANCE_RANGE[1]), ..self }
     }
 
-    /// Moves the middle across the picture, as shares of the picture's height: what was grabbed stays under the mouse.
+    /// Moves the centre across the image, by shares of the image height, so that a grabbed point stays under the
+    /// mouse.
     pub fn panned(self, right: f32, up: f32) -> Orbit {
         let eye = self.viewpoint().eye(1.0);
         let high = 2.0 * self.distance * eye.window.top;
         Orbit { middle: self.middle - (eye.right * right + eye.up * up) * high, ..self }
     }
 
-    /// How the picture lies in the world: its right, its up, and out of it toward the eye.
+    /// Returns the orientation of the image in the world: its right, its up, and out of it toward the eye.
     pub fn world_from_view(&self) -> Quat {
-        Quat::from_rotation_y(self.turn) * Quat::from_rotation_x(-self.tilt)
+        Quat::from_rotation_y(self.azimuth) * Quat::from_rotation_x(-self.elevation)
     }
 
     pub fn viewpoint(&self) -> Viewpoint {
-        let turned = self.world_from_view();
-        Viewpoint::looking(self.middle + turned * Vec3::Z * self.distance, self.middle, turned * Vec3::Y)
+        let rotation = self.world_from_view();
+        Viewpoint::look_at(self.middle + rotation * Vec3::Z * self.distance, self.middle, rotation * Vec3::Y)
     }
 }
 
-/// A quarter of the teeth, from the patient's point of view.
+/// A quadrant of the dentition, from the patient's point of view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quadrant {
     UpperRight,
@@ -125,41 +128,41 @@ mod tests {
     use super::*;
 
     fn orbit() -> Orbit {
-        Orbit { middle: Vec3::new(2.0, 1.0, -3.0), turn: 0.4, tilt: 0.3, distance: 60.0 }
+        Orbit { middle: Vec3::new(2.0, 1.0, -3.0), azimuth: 0.4, elevation: 0.3, distance: 60.0 }
     }
 
     #[test]
-    fn the_middle_stays_in_the_middle_however_one_turns() {
+    fn the_centre_stays_in_the_middle_of_the_image_when_rotating() {
         for (right, up) in [(0.0, 0.0), (1.0, 0.4), (-9.0, 7.0), (3.0, -9.0)] {
-            let orbit = orbit().turned(right, up);
-            let ([x, y], depth) = orbit.viewpoint().eye(1.3).place(orbit.middle);
+            let orbit = orbit().rotated(right, up);
+            let ([x, y], depth) = orbit.viewpoint().eye(1.3).project(orbit.middle);
             assert!((x - 0.5).abs() < 1e-4 && (y - 0.5).abs() < 1e-4 && (depth - 60.0).abs() < 1e-3, "{x} {y} {depth}");
             assert!(orbit.viewpoint().eye(1.3).up.y > 0.0, "never upside down");
         }
     }
 
     #[test]
-    fn what_was_grabbed_stays_under_the_mouse() {
+    fn a_grabbed_point_stays_under_the_mouse() {
         let (before, after) = (orbit(), orbit().panned(0.2, -0.1));
-        let ([x, y], _) = after.viewpoint().eye(1.0).place(before.middle);
+        let ([x, y], _) = after.viewpoint().eye(1.0).project(before.middle);
         assert!((x - 0.7).abs() < 1e-3 && (y - 0.6).abs() < 1e-3, "{x} {y}");
     }
 
     #[test]
-    fn turning_right_moves_the_eye_right_and_zooming_has_ends() {
+    fn rotating_right_moves_the_eye_right_and_zooming_is_limited() {
         let right = orbit().viewpoint().eye(1.0).right;
-        let moved = orbit().turned(0.01, 0.0).viewpoint().position - orbit().viewpoint().position;
+        let moved = orbit().rotated(0.01, 0.0).viewpoint().position - orbit().viewpoint().position;
         assert!(moved.dot(right) > 0.0);
-        assert_eq!(orbit().zoomed(1e-9).distance, DISTANCES[0]);
-        assert_eq!(orbit().zoomed(1e9).distance, DISTANCES[1]);
+        assert_eq!(orbit().zoomed(1e-9).distance, DISTANCE_RANGE[0]);
+        assert_eq!(orbit().zoomed(1e9).distance, DISTANCE_RANGE[1]);
     }
 
     #[test]
-    fn a_ball_is_seen_whole() {
+    fn a_ball_is_entirely_visible() {
         let orbit = Orbit::around(Vec3::new(1.0, 2.0, 3.0), 10.0);
         let eye = orbit.viewpoint().eye(1.0);
-        for way in [eye.right, -eye.right, eye.up, -eye.up] {
-            let ([x, y], _) = eye.place(orbit.middle + way * 10.0);
+        for direction in [eye.right, -eye.right, eye.up, -eye.up] {
+            let ([x, y], _) = eye.project(orbit.middle + direction * 10.0);
             assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y), "{x} {y}");
         }
     }

@@ -1,11 +1,11 @@
-//! The surface of the carved tooth, met by a ray through each pixel.
+//! Traced isosurface of the carved tooth: one ray through each pixel.
 
-use super::passes::{self, Depth, Faces, Pass};
+use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
 
 pub const SOURCE: &str = include_str!("../../shaders/iso_pass.wgsl");
 
-/// Corners of the box of matter that the pass draws.
-pub const BOX: std::ops::Range<u32> = 0..36;
+/// Vertices of the box around all matter, which the pass draws.
+pub const BOX_VERTICES: std::ops::Range<u32> = 0..36;
 
 pub fn pipeline(
     device: &wgpu::Device,
@@ -13,18 +13,18 @@ pub fn pipeline(
     view: &wgpu::BindGroupLayout,
     tooth: &wgpu::BindGroupLayout,
 ) -> wgpu::RenderPipeline {
-    let module = passes::module(device, "iso_pass", &passes::source(SOURCE));
-    Pass {
+    let module = passes::shader_module(device, "iso_pass", &passes::full_source(SOURCE));
+    PipelineDesc {
         label: "iso_pass",
         module: &module,
         vertex: "box_vertex",
         fragment: "iso_fragment",
         groups: &[Some(view), Some(tooth)],
-        corners: &[],
-        faces: Faces::Far,
-        depth: Depth::Nearest,
+        vertex_buffers: &[],
+        faces: DrawnFaces::Back,
+        depth: DepthMode::ReadWrite,
         format,
         blend: None,
     }
-    .pipeline(device)
+    .build(device)
 }

@@ -1,53 +1,53 @@
-//! How a pass becomes a pipeline: its shaders, groups, target and depth.
+//! Construction of a pass's pipeline from its shaders, bind groups, target and depth mode.
 
 use super::{tooth, view};
 
 /// Format of every depth buffer.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// What one pipeline is made of.
-pub struct Pass<'a> {
+/// Description of a pipeline.
+pub struct PipelineDesc<'a> {
     pub label: &'static str,
     pub module: &'a wgpu::ShaderModule,
     pub vertex: &'static str,
     pub fragment: &'static str,
-    /// By group number; `None` where the pass uses none.
+    /// Bind group layouts by group number; `None` where the pass uses none.
     pub groups: &'a [Option<&'a wgpu::BindGroupLayout>],
-    pub corners: &'a [Option<wgpu::VertexBufferLayout<'a>>],
-    pub faces: Faces,
-    pub depth: Depth,
+    pub vertex_buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    pub faces: DrawnFaces,
+    pub depth: DepthMode,
     pub format: wgpu::TextureFormat,
     pub blend: Option<wgpu::BlendState>,
 }
 
-/// Which sides of triangles are drawn.
-pub enum Faces {
-    Near,
-    Far,
+/// Faces of triangles that are drawn.
+pub enum DrawnFaces {
+    Front,
+    Back,
 }
 
-/// What a pass has to do with the depth buffer.
-pub enum Depth {
+/// Use of the depth buffer by a pass.
+pub enum DepthMode {
     /// Not attached.
     None,
-    /// Attached and left alone.
-    Ignored,
-    /// Nearer wins and is written.
-    Nearest,
-    /// What is nearer is drawn and leaves the depth as it was.
-    Compared,
+    /// Attached, but neither tested nor written.
+    Disabled,
+    /// Tested and written: the nearer fragment wins.
+    ReadWrite,
+    /// Tested but not written.
+    ReadOnly,
 }
 
-impl Pass<'_> {
-    pub fn pipeline(&self, device: &wgpu::Device) -> wgpu::RenderPipeline {
+impl PipelineDesc<'_> {
+    pub fn build(&self, device: &wgpu::Device) -> wgpu::RenderPipeline {
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some(self.label),
             bind_group_layouts: self.groups,
             immediate_size: 0,
         });
         let cull_mode = match self.faces {
-            Faces::Near => Some(wgpu::Face::Back),
-            Faces::Far => Some(wgpu::Face::Front),
+            DrawnFaces::Front => Some(wgpu::Face::Back),
+            DrawnFaces::Back => Some(wgpu::Face::Front),
         };
         let depth = |write, compare| wgpu::DepthStencilState {
             format: DEPTH,
@@ -65,7 +65,7 @@ impl Pass<'_> {
                 module: self.module,
                 entry_point: Some(self.vertex),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: self.corners,
+                buffers: self.vertex_buffers,
             },
             fragment: Some(wgpu::FragmentState {
                 module: self.module,
@@ -75,10 +75,10 @@ impl Pass<'_> {
             }),
             primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
             depth_stencil: match self.depth {
-                Depth::None => None,
-                Depth::Ignored => Some(depth(false, wgpu::CompareFunction::Always)),
-                Depth::Nearest => Some(depth(true, wgpu::CompareFunction::Less)),
-                Depth::Compared => Some(depth(false, wgpu::CompareFunction::Less)),
+                DepthMode::None => None,
+                DepthMode::Disabled => Some(depth(false, wgpu::CompareFunction::Always)),
+                DepthMode::ReadWrite => Some(depth(true, wgpu::CompareFunction::Less)),
+                DepthMode::ReadOnly => Some(depth(false, wgpu::CompareFunction::Less)),
             },
             multisample: wgpu::MultisampleState::default(),
             multiview_mask: None,
@@ -87,12 +87,12 @@ impl Pass<'_> {
     }
 }
 
-/// A pass's shader with all that it builds on.
-pub fn source(own: &str) -> String {
+/// Returns the source of a pass's shader, preceded by the common sources that it builds on.
+pub fn full_source(own: &str) -> String {
     [view::SOURCE, tooth::SOURCE, own].concat()
 }
 
-pub fn module(device: &wgpu::Device, label: &str, source: &str) -> wgpu::ShaderModule {
+pub fn shader_module(device: &wgpu::Device, label: &str, source: &str) -> wgpu::ShaderModule {
     let source = wgpu::ShaderSource::Wgsl(source.into());
     device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
 }

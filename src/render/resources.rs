@@ -1,10 +1,11 @@
-//! Buffers, textures and layouts in the few shapes that the passes need.
+//! Buffers, textures and layouts in the few forms that the passes need.
 
-use crate::frame::{Pose, Vec3};
+use typodont_core::frame::{Pose, Vec3};
 
-/// The columns of `world_from_own * scale + offset`: from steps of a grid, or mm, to world space.
+/// Returns the columns of the matrix that maps p to `world_from_own * (p * scale + offset)`: from voxel coordinates,
+/// or mm, to world space.
 pub fn columns(world_from_own: Pose, scale: Vec3, offset: Vec3) -> [[f32; 4]; 4] {
-    let column = |axis: Vec3| world_from_own.turn(axis * scale).extend(0.0).to_array();
+    let column = |axis: Vec3| world_from_own.rotate(axis * scale).extend(0.0).to_array();
     [column(Vec3::X), column(Vec3::Y), column(Vec3::Z), (world_from_own * offset).extend(1.0).to_array()]
 }
 
@@ -20,7 +21,7 @@ pub fn texture(sample_type: wgpu::TextureSampleType, view_dimension: wgpu::Textu
     wgpu::BindingType::Texture { sample_type, view_dimension, multisampled: false }
 }
 
-/// Bindings 0, 1, 2 …, seen by both stages.
+/// Creates a layout with bindings 0, 1, 2 …, visible to the vertex and the fragment stage.
 pub fn layout(device: &wgpu::Device, label: &str, bindings: &[wgpu::BindingType]) -> wgpu::BindGroupLayout {
     let entry = |(binding, &ty): (usize, &wgpu::BindingType)| wgpu::BindGroupLayoutEntry {
         binding: binding as u32,
@@ -76,10 +77,16 @@ pub fn table_texture(
     [width, height]: [u32; 2],
     format: wgpu::TextureFormat,
 ) -> wgpu::Texture {
-    plane(device, label, [width, height], format, wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST)
+    texture_2d(
+        device,
+        label,
+        [width, height],
+        format,
+        wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+    )
 }
 
-/// A picture's plane that is drawn into and read afterwards.
+/// Creates a texture that is drawn into and read afterwards.
 pub fn target_texture(
     device: &wgpu::Device,
     label: &str,
@@ -90,10 +97,10 @@ pub fn target_texture(
     if !format.has_depth_aspect() {
         usage |= wgpu::TextureUsages::COPY_SRC;
     }
-    plane(device, label, size, format, usage)
+    texture_2d(device, label, size, format, usage)
 }
 
-fn plane(
+fn texture_2d(
     device: &wgpu::Device,
     label: &str,
     [width, height]: [u32; 2],
@@ -112,17 +119,17 @@ fn plane(
     })
 }
 
-/// Linear between texels, the border's value beyond it.
+/// Creates a sampler with linear interpolation that clamps to the border.
 pub fn sampler(device: &wgpu::Device) -> wgpu::Sampler {
     device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("between"),
+        label: Some("linear_sampler"),
         mag_filter: wgpu::FilterMode::Linear,
         min_filter: wgpu::FilterMode::Linear,
         ..Default::default()
     })
 }
 
-/// Writes a box of a volume's texture; the bytes lie x fastest.
+/// Writes a box of a volume texture; `bytes` are ordered x fastest.
 pub fn write_box(queue: &wgpu::Queue, texture: &wgpu::Texture, corner: [u32; 3], size: [u32; 3], bytes: &[u8]) {
     let per_texel = texture.format().block_copy_size(None).unwrap_or(1);
     let [x, y, z] = corner;

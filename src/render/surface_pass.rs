@@ -1,21 +1,21 @@
-//! Triangles with light per pixel: the background, solids, and the tooth's surface.
+//! Triangles with per-pixel lighting: the background, mesh instances, and the tooth's surface.
 
-use super::passes::{self, Depth, Faces, Pass};
+use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
 use super::resources;
-use super::scene::{Rgb, Solid};
+use super::scene::{MeshInstance, Rgb};
 use super::surface_mesh;
 use super::vertex::Vertex;
-use crate::frame::Vec3;
-use crate::mesh::Mesh;
 use std::sync::Arc;
+use typodont_core::frame::Vec3;
+use typodont_core::mesh::Mesh;
 
-/// In step with `surface_pass.wgsl`.
+/// Structs of `surface_pass.wgsl`; keep in step.
 pub mod gpu {
     use bytemuck::{Pod, Zeroable};
 
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
-    pub struct Solid {
+    pub struct SolidUniform {
         pub world_from_solid: [[f32; 4]; 4],
         pub finish: [f32; 4],
     }
@@ -28,24 +28,24 @@ pub struct SurfacePass {
     pub tooth: wgpu::RenderPipeline,
     solid: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
-    meshes: Vec<KeptMesh>,
-    /// One per solid of a scene, in its order.
-    placed: Vec<Placed>,
+    cached_meshes: Vec<CachedMesh>,
+    /// One entry per mesh instance of a scene, in its order.
+    draws: Vec<MeshDraw>,
 }
 
-/// A mesh where the adapter can see it, for as long as scenes name it.
-struct KeptMesh {
+/// An uploaded mesh, kept for as long as scenes refer to it.
+struct CachedMesh {
     mesh: Arc<Mesh>,
-    tints: Arc<Vec<Rgb>>,
+    vertex_colours: Arc<Vec<Rgb>>,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
-    is_named: bool,
+    is_used: bool,
 }
 
-struct Placed {
+struct MeshDraw {
     uniform: wgpu::Buffer,
     group: wgpu::BindGroup,
-    /// Which of the kept meshes.
+    /// Index of the cached mesh.
     mesh: usize,
 }
 
@@ -56,7 +56,7 @@ impl SurfacePass {
         view: &wgpu::BindGroupLayout,
         tooth: &wgpu::BindGroupLayout,
     ) -> SurfacePass {
-        let module = passes::module(device, "surface_pass", &passes::source(SOURCE));
+        let module = passes::shader_module(device, "surface_pass", &passes::full_source(SOURCE));
         let layout = resources::layout(device, "solid", &[resources::uniform()]);
         let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x4, 2 => Unorm8x4];
         let corners = [Some(wgpu::VertexBufferLayout {
@@ -65,56 +65,76 @@ impl SurfacePass {
             attributes: &attributes,
         })];
         let pass = |label, vertex, fragment, groups, corners, depth| {
-            let (module, faces, blend) = (&module, Faces::Near, None);
-            Pass { label, module, vertex, fragment, groups, corners, faces, depth, format, blend }.pipeline(device)
+            let (module, faces, blend) = (&module, DrawnFaces::Front, None);
+            PipelineDesc {
+                label,
+                module,
+                vertex,
+                fragment,
+                groups,
+                vertex_buffers: corners,
+                faces,
+                depth,
+                format,
+                blend,
+            }
+            .build(device)
         };
         let alone = [Some(view)];
         let (with_tooth, with_solid) = ([Some(view), Some(tooth)], [Some(view), None, Some(&layout)]);
         SurfacePass {
-            background: pass("background", "background_vertex", "background_fragment", &alone, &[], Depth::Ignored),
-            tooth: pass("tooth", "tooth_vertex", "tooth_fragment", &with_tooth, &corners, Depth::Nearest),
-            solid: pass("solid", "solid_vertex", "solid_fragment", &with_solid, &corners, Depth::Nearest),
+            background: pass(
+                "background",
+                "background_vertex",
+                "background_fragment",
+                &alone,
+                &[],
+                DepthMode::Disabled,
+            ),
+            tooth: pass("tooth", "tooth_vertex", "tooth_fragment", &with_tooth, &corners, DepthMode::ReadWrite),
+            solid: pass("solid", "solid_vertex", "solid_fragment", &with_solid, &corners, DepthMode::ReadWrite),
             layout,
-            meshes: Vec::new(),
-            placed: Vec::new(),
+            cached_meshes: Vec::new(),
+            draws: Vec::new(),
         }
     }
 
-    /// Brings solids that are new to the adapter and forgets those that are gone.
-    pub fn prepare(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, solids: &[Solid]) {
-        self.meshes.iter_mut().for_each(|kept| kept.is_named = false);
-        let named: Vec<Named> = solids.iter().map(|solid| self.keep(device, queue, solid)).collect();
-        let mut place = 0;
-        // Where each kept mesh lies after the forgotten ones are gone.
-        let places: Vec<usize> = self
-            .meshes
+    /// Uploads new meshes and drops those that the scene no longer contains.
+    pub fn prepare(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, solids: &[MeshInstance]) {
+        self.cached_meshes.iter_mut().for_each(|cached| cached.is_used = false);
+        let cache_indices: Vec<CacheIndex> = solids.iter().map(|solid| self.cache_mesh(device, queue, solid)).collect();
+        let mut used_count = 0;
+        // Index of each cached mesh after the unused ones are removed.
+        let new_indices: Vec<usize> = self
+            .cached_meshes
             .iter()
-            .map(|kept| {
-                place += usize::from(kept.is_named);
-                place.saturating_sub(1)
+            .map(|cached| {
+                used_count += usize::from(cached.is_used);
+                used_count.saturating_sub(1)
             })
             .collect();
-        self.meshes.retain(|kept| kept.is_named);
-        self.placed.truncate(solids.len());
-        for (i, (solid, Named(mesh))) in solids.iter().zip(named).enumerate() {
-            if i == self.placed.len() {
-                let uniform = resources::uniform_buffer(device, "solid", size_of::<gpu::Solid>());
+        self.cached_meshes.retain(|cached| cached.is_used);
+        self.draws.truncate(solids.len());
+        for (i, (solid, CacheIndex(mesh))) in solids.iter().zip(cache_indices).enumerate() {
+            if i == self.draws.len() {
+                let uniform = resources::uniform_buffer(device, "solid", size_of::<gpu::SolidUniform>());
                 let group = resources::group(device, &self.layout, [uniform.as_entire_binding()]);
-                self.placed.push(Placed { uniform, group, mesh });
+                self.draws.push(MeshDraw { uniform, group, mesh });
             }
-            self.placed[i].mesh = places[mesh];
-            let [r, g, b] = solid.finish.colour;
-            let uniform = gpu::Solid {
+            self.draws[i].mesh = new_indices[mesh];
+            let [r, g, b] = solid.appearance.colour;
+            let uniform = gpu::SolidUniform {
                 world_from_solid: resources::columns(solid.world_from_solid, Vec3::ONE, Vec3::ZERO),
-                finish: [r, g, b, solid.finish.gloss],
+                finish: [r, g, b, solid.appearance.gloss],
             };
-            queue.write_buffer(&self.placed[i].uniform, 0, bytemuck::bytes_of(&uniform));
+            queue.write_buffer(&self.draws[i].uniform, 0, bytemuck::bytes_of(&uniform));
         }
     }
 
-    fn keep(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, solid: &Solid) -> Named {
-        let is_same = |k: &KeptMesh| Arc::ptr_eq(&k.mesh, &solid.mesh) && Arc::ptr_eq(&k.tints, &solid.tints);
-        let found = self.meshes.iter().position(is_same).unwrap_or_else(|| {
+    fn cache_mesh(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, solid: &MeshInstance) -> CacheIndex {
+        let is_same =
+            |k: &CachedMesh| Arc::ptr_eq(&k.mesh, &solid.mesh) && Arc::ptr_eq(&k.vertex_colours, &solid.vertex_colours);
+        let found = self.cached_meshes.iter().position(is_same).unwrap_or_else(|| {
             let filled = |label, usage, bytes: &[u8]| {
                 let usage = usage | wgpu::BufferUsages::COPY_DST;
                 let size = bytes.len().max(4) as u64;
@@ -123,33 +143,33 @@ impl SurfacePass {
                 queue.write_buffer(&buffer, 0, bytes);
                 buffer
             };
-            let vertices = surface_mesh::of_solid(solid);
+            let vertices = surface_mesh::instance_vertices(solid);
             let vertices = filled("corners", wgpu::BufferUsages::VERTEX, bytemuck::cast_slice(&vertices));
             let indices = bytemuck::cast_slice(&solid.mesh.triangles);
             let indices = filled("triangles", wgpu::BufferUsages::INDEX, indices);
-            let (mesh, tints) = (solid.mesh.clone(), solid.tints.clone());
-            self.meshes.push(KeptMesh { mesh, tints, vertices, indices, is_named: true });
-            self.meshes.len() - 1
+            let (mesh, vertex_colours) = (solid.mesh.clone(), solid.vertex_colours.clone());
+            self.cached_meshes.push(CachedMesh { mesh, vertex_colours, vertices, indices, is_used: true });
+            self.cached_meshes.len() - 1
         });
-        self.meshes[found].is_named = true;
-        Named(found)
+        self.cached_meshes[found].is_used = true;
+        CacheIndex(found)
     }
 
-    /// Draws all prepared solids; the view's group is set.
+    /// Draws all prepared mesh instances; the view's bind group must be set.
     pub fn draw_solids(&self, pass: &mut wgpu::RenderPass) {
         pass.set_pipeline(&self.solid);
-        for placed in &self.placed {
-            let kept = &self.meshes[placed.mesh];
-            if kept.mesh.is_empty() {
+        for draw in &self.draws {
+            let cached = &self.cached_meshes[draw.mesh];
+            if cached.mesh.is_empty() {
                 continue;
             }
-            pass.set_bind_group(2, &placed.group, &[]);
-            pass.set_vertex_buffer(0, kept.vertices.slice(..));
-            pass.set_index_buffer(kept.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..3 * kept.mesh.triangles.len() as u32, 0, 0..1);
+            pass.set_bind_group(2, &draw.group, &[]);
+            pass.set_vertex_buffer(0, cached.vertices.slice(..));
+            pass.set_index_buffer(cached.indices.slice(..), wgpu::IndexFormat::Uint32);
+            pass.draw_indexed(0..3 * cached.mesh.triangles.len() as u32, 0, 0..1);
         }
     }
 }
 
-/// A kept mesh's place before others are forgotten.
-struct Named(usize);
+/// Index of a cached mesh before the unused ones are removed.
+struct CacheIndex(usize);

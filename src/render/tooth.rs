@@ -1,21 +1,21 @@
-//! The carved tooth where the adapter can see it: textures that follow the volume brick by brick.
+//! Textures of the carved tooth, which are updated brick by brick.
 
-use super::empty::Empty;
-use super::hollow::Hollow;
-use super::scene::{Changes, Palette, Shown, Tooth};
-use super::transfer::TransferFunction;
-use super::{blending_step, matter_box, resources};
-use crate::frame::{Pose, Vec3};
-use crate::volume::{BRICK, Volume};
+use super::ambient_occlusion::OcclusionVolume;
+use super::empty_space::EmptySpaceMap;
+use super::scene::{Changes, LabelPalette, RenderMode, VolumeInstance};
+use super::transfer_function::TransferFunction;
+use super::{bounds_of_matter, integration_step, resources};
 use std::sync::Arc;
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::volume::{BRICK, Volume};
 
-/// In step with `tooth.wgsl`.
+/// Structs of `tooth.wgsl`; keep in step.
 pub mod gpu {
     use bytemuck::{Pod, Zeroable};
 
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
-    pub struct Tooth {
+    pub struct ToothUniform {
         pub world_from_voxel: [[f32; 4]; 4],
         pub voxel_from_world: [[f32; 4]; 4],
         pub world_from_tooth: [[f32; 4]; 4],
@@ -29,38 +29,38 @@ pub mod gpu {
 
 pub const SOURCE: &str = include_str!("../../shaders/tooth.wgsl");
 
-/// What was brought to the adapter for one picture.
+/// Data uploaded to the GPU for one image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Uploads {
-    /// True when the whole volume was.
-    pub whole: bool,
-    /// Bricks of voxels, if not.
+    /// True when the whole volume was uploaded.
+    pub is_full_volume: bool,
+    /// Number of bricks of voxels that were uploaded otherwise.
     pub bricks: usize,
-    /// Bricks whose triangles were made anew, if not.
+    /// Number of bricks whose triangles were rebuilt otherwise.
     pub surfaces: usize,
-    /// Voxels joined along each axis because this adapter's textures are too small for the volume: 1 when all are shown, 0
-    /// without a volume. Above 1 whoever looks should be told that the picture is coarser than the tooth.
-    pub joined: u32,
+    /// Number of voxels averaged along each axis because this GPU's textures are too small for the volume: 1 at full
+    /// resolution, 0 without a volume. Above 1 the user should be told that the image is coarser than the tooth.
+    pub downsampling: u32,
 }
 
 /// Textures of one volume.
 pub struct ToothTextures {
     dims: [u32; 3],
-    /// The box of all matter when the volume was taken, in voxel steps. Carving only empties it.
-    matter: [Vec3; 2],
-    empty_map: Empty,
-    hollow_map: Hollow,
+    /// Box around all matter at the time of the upload, in voxel coordinates. Carving only empties it.
+    bounds: [Vec3; 2],
+    empty_space: EmptySpaceMap,
+    occlusion: OcclusionVolume,
     function: Option<Arc<TransferFunction>>,
     uniform: wgpu::Buffer,
     voxels: wgpu::Texture,
-    empty: wgpu::Texture,
-    hollow: wgpu::Texture,
-    transfer: wgpu::Texture,
+    empty_texture: wgpu::Texture,
+    occlusion_texture: wgpu::Texture,
+    transfer_texture: wgpu::Texture,
     pub group: wgpu::BindGroup,
 }
 
 impl ToothTextures {
-    /// How the group's bindings lie.
+    /// Returns the layout of the bind group.
     pub fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
         let float = wgpu::TextureSampleType::Float { filterable: true };
         let volume = |sample| resources::texture(sample, wgpu::TextureViewDimension::D3);
@@ -81,67 +81,79 @@ impl ToothTextures {
         )
     }
 
-    /// Takes a volume whole; it must fit the adapter's textures.
+    /// Uploads a whole volume, which must fit the GPU's textures.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         layout: &wgpu::BindGroupLayout,
-        tooth: &Tooth,
+        tooth: &VolumeInstance,
     ) -> ToothTextures {
         let volume = tooth.volume;
         let dims = volume.grid().dims;
-        let empty_map = Empty::of(volume, &tooth.shown);
-        let hollow_map = Hollow::of(volume);
+        let empty_space = EmptySpaceMap::new(volume, &tooth.mode);
+        let occlusion = OcclusionVolume::new(volume);
         use wgpu::TextureFormat as Format;
         let space = |label, dims, format| resources::volume_texture(device, label, dims, format);
         let voxels = space("voxels", dims, Format::Rg8Unorm);
-        let empty = space("empty", empty_map.dims(), Format::R8Uint);
-        let hollow = space("hollow", hollow_map.dims(), Format::R8Unorm);
-        let transfer = resources::table_texture(device, "transfer", [256, 256], Format::Rgba8Unorm);
-        let uniform = resources::uniform_buffer(device, "tooth", size_of::<gpu::Tooth>());
-        let between = resources::sampler(device);
+        let empty_texture = space("empty", empty_space.dims(), Format::R8Uint);
+        let occlusion_texture = space("occlusion", occlusion.dims(), Format::R8Unorm);
+        let transfer_texture = resources::table_texture(device, "transfer", [256, 256], Format::Rgba8Unorm);
+        let uniform = resources::uniform_buffer(device, "tooth", size_of::<gpu::ToothUniform>());
+        let linear_sampler = resources::sampler(device);
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let views = [view(&voxels), view(&empty), view(&hollow), view(&transfer)];
+        let views = [view(&voxels), view(&empty_texture), view(&occlusion_texture), view(&transfer_texture)];
         let group = resources::group(
             device,
             layout,
             [
                 uniform.as_entire_binding(),
                 wgpu::BindingResource::TextureView(&views[0]),
-                wgpu::BindingResource::Sampler(&between),
+                wgpu::BindingResource::Sampler(&linear_sampler),
                 wgpu::BindingResource::TextureView(&views[1]),
                 wgpu::BindingResource::TextureView(&views[2]),
                 wgpu::BindingResource::TextureView(&views[3]),
             ],
         );
-        let matter = matter_box(volume);
+        let bounds = bounds_of_matter(volume);
         let function = None;
-        let made = ToothTextures {
+        let textures = ToothTextures {
             dims,
-            matter,
-            empty_map,
-            hollow_map,
+            bounds,
+            empty_space,
+            occlusion,
             function,
             uniform,
             voxels,
-            empty,
-            hollow,
-            transfer,
+            empty_texture,
+            occlusion_texture,
+            transfer_texture,
             group,
         };
-        resources::write_box(queue, &made.voxels, [0; 3], dims, &interleaved(volume, [0; 3], dims));
-        resources::write_box(queue, &made.empty, [0; 3], made.empty_map.dims(), made.empty_map.entries());
-        resources::write_box(queue, &made.hollow, [0; 3], made.hollow_map.dims(), made.hollow_map.mean());
-        made
+        resources::write_box(queue, &textures.voxels, [0; 3], dims, &interleaved(volume, [0; 3], dims));
+        resources::write_box(
+            queue,
+            &textures.empty_texture,
+            [0; 3],
+            textures.empty_space.dims(),
+            textures.empty_space.entries(),
+        );
+        resources::write_box(
+            queue,
+            &textures.occlusion_texture,
+            [0; 3],
+            textures.occlusion.dims(),
+            textures.occlusion.means(),
+        );
+        textures
     }
 
-    /// True when these textures can follow a volume's changes.
-    pub fn fits(&self, tooth: &Tooth) -> bool {
-        self.dims == tooth.volume.grid().dims && tooth.changes != Changes::Anew
+    /// True when these textures can be updated with a volume's changes.
+    pub fn fits(&self, tooth: &VolumeInstance) -> bool {
+        self.dims == tooth.volume.grid().dims && tooth.changes != Changes::All
     }
 
-    /// Takes over changed bricks and the way the tooth is shown; gives the number of bricks brought over.
-    pub fn follow(&mut self, queue: &wgpu::Queue, tooth: &Tooth) -> usize {
+    /// Uploads changed bricks and applies the render mode. Returns the number of uploaded bricks.
+    pub fn update(&mut self, queue: &wgpu::Queue, tooth: &VolumeInstance) -> usize {
         let Changes::Bricks(changed) = tooth.changes else { return 0 };
         for &brick in changed {
             let corner = tooth.volume.bricks().corner(brick);
@@ -149,46 +161,58 @@ impl ToothTextures {
             resources::write_box(queue, &self.voxels, corner, size, &interleaved(tooth.volume, corner, size));
         }
         if !changed.is_empty() {
-            self.matter = grown(self.matter, tooth.volume, changed);
+            self.bounds = extended_bounds(self.bounds, tooth.volume, changed);
         }
-        let differing = self.empty_map.update(tooth.volume, changed);
-        if self.empty_map.show(&tooth.shown) {
-            resources::write_box(queue, &self.empty, [0; 3], self.empty_map.dims(), self.empty_map.entries());
+        let differing = self.empty_space.update(tooth.volume, changed);
+        if self.empty_space.set_mode(&tooth.mode) {
+            resources::write_box(
+                queue,
+                &self.empty_texture,
+                [0; 3],
+                self.empty_space.dims(),
+                self.empty_space.entries(),
+            );
         } else {
             for brick in differing {
                 let place = tooth.volume.bricks().corner(brick).map(|c| c / BRICK);
-                resources::write_box(queue, &self.empty, place, [1; 3], &self.empty_map.entries()[brick..=brick]);
+                resources::write_box(
+                    queue,
+                    &self.empty_texture,
+                    place,
+                    [1; 3],
+                    &self.empty_space.entries()[brick..=brick],
+                );
             }
         }
-        for cube in self.hollow_map.update(tooth.volume, changed) {
-            let place = self.hollow_map.cube(cube);
-            resources::write_box(queue, &self.hollow, place, [1; 3], &self.hollow_map.mean()[cube..=cube]);
+        for cube in self.occlusion.update(tooth.volume, changed) {
+            let place = self.occlusion.cube_at(cube);
+            resources::write_box(queue, &self.occlusion_texture, place, [1; 3], &self.occlusion.means()[cube..=cube]);
         }
         changed.len()
     }
 
-    /// Where the tooth is and how it looks in this picture.
-    pub fn pose(&mut self, queue: &wgpu::Queue, tooth: &Tooth) {
+    /// Writes the pose and the appearance of the tooth for this image.
+    pub fn write_uniform(&mut self, queue: &wgpu::Queue, tooth: &VolumeInstance) {
         let mut light = 0.0;
-        if let Shown::Volume(function) = &tooth.shown {
-            light = function.light;
+        if let RenderMode::Volume(function) = &tooth.mode {
+            light = function.shading;
             let is_known = self.function.as_ref().is_some_and(|known| **known == **function);
             if !is_known {
-                let tables = function.stepped(blending_step(tooth.volume));
+                let tables = function.per_step(integration_step(tooth.volume));
                 let rows: Vec<u8> = tables.iter().flatten().flatten().copied().collect();
-                resources::write_table(queue, &self.transfer, [256, 256], &rows);
+                resources::write_table(queue, &self.transfer_texture, [256, 256], &rows);
                 self.function = Some(function.clone());
             }
         }
         let grid = tooth.volume.grid();
-        let edge = self.hollow_map.edge() as f32;
-        let [low, high] = self.matter;
-        let uniform = gpu::Tooth {
+        let edge = self.occlusion.cube_voxels() as f32;
+        let [low, high] = self.bounds;
+        let uniform = gpu::ToothUniform {
             world_from_voxel: resources::columns(tooth.world_from_tooth, grid.spacing, grid.origin),
             voxel_from_world: voxel_from_world(tooth),
             world_from_tooth: resources::columns(tooth.world_from_tooth, Vec3::ONE, Vec3::ZERO),
             dims: Vec3::from(grid.dims.map(|n| n as f32)).extend(edge).to_array(),
-            low: low.extend(blending_step(tooth.volume)).to_array(),
+            low: low.extend(integration_step(tooth.volume)).to_array(),
             high: high.extend(light).to_array(),
             spacing: grid.spacing.extend(0.0).to_array(),
             palette: colours(tooth.palette),
@@ -197,11 +221,11 @@ impl ToothTextures {
     }
 }
 
-fn colours(palette: &Palette) -> [[f32; 4]; 256] {
-    palette.0.map(|finish| [finish.colour[0], finish.colour[1], finish.colour[2], finish.gloss])
+fn colours(palette: &LabelPalette) -> [[f32; 4]; 256] {
+    palette.0.map(|appearance| [appearance.colour[0], appearance.colour[1], appearance.colour[2], appearance.gloss])
 }
 
-fn voxel_from_world(tooth: &Tooth) -> [[f32; 4]; 4] {
+fn voxel_from_world(tooth: &VolumeInstance) -> [[f32; 4]; 4] {
     let grid = tooth.volume.grid();
     let Pose { position, orientation } = tooth.world_from_tooth.inverse();
     let column = |axis: Vec3| (orientation * axis / grid.spacing).extend(0.0).to_array();
@@ -209,8 +233,8 @@ fn voxel_from_world(tooth: &Tooth) -> [[f32; 4]; 4] {
     [column(Vec3::X), column(Vec3::Y), column(Vec3::Z), last]
 }
 
-/// The box of matter, made larger where a changed brick lies outside: a restoration may be put there.
-fn grown([low, high]: [Vec3; 2], volume: &Volume, changed: &[usize]) -> [Vec3; 2] {
+/// Returns the box of matter, extended by changed bricks with matter outside it: a restoration may be placed there.
+fn extended_bounds([low, high]: [Vec3; 2], volume: &Volume, changed: &[usize]) -> [Vec3; 2] {
     let occupied = changed
         .iter()
         .map(|&b| volume.bricks().corner(b))
@@ -223,7 +247,7 @@ fn grown([low, high]: [Vec3; 2], volume: &Volume, changed: &[usize]) -> [Vec3; 2
     })
 }
 
-/// Density and label of each voxel of a box, x fastest.
+/// Returns density and label of each voxel of a box, x fastest.
 fn interleaved(volume: &Volume, corner: [u32; 3], size: [u32; 3]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(2 * size.iter().map(|&n| n as usize).product::<usize>());
     for z in corner[2]..corner[2] + size[2] {

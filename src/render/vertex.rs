@@ -1,28 +1,29 @@
-//! One corner of a triangle as it lies in memory, for the shader and for its twin.
+//! Memory layout of one vertex, for the shader and for its CPU twin.
 
-use super::scene::{Finish, Rgb};
-use crate::frame::Vec3;
-use bytemuck::{Pod, Zeroable};
+use super::scene::{Appearance, Rgb};
+use typodont_core::frame::Vec3;
 
-/// In step with `surface_pass.wgsl`.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+/// Vertex layout that matches `surface_pass.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[repr(C)]
 pub struct Vertex {
     /// mm, in the solid's own space.
     position: [f32; 3],
-    /// Unit normal and gloss, each of 32767.
+    /// Unit normal and gloss, each scaled by 32767.
     normal: [i16; 4],
-    /// Colour of 255; the fourth is unused.
+    /// Colour scaled by 255; the fourth component is unused.
     colour: [u8; 4],
 }
 
 const _: () = assert!(size_of::<Vertex>() == 24);
 
 impl Vertex {
-    /// What fills a buffer's gaps; no triangle has it for a corner.
-    pub const NOWHERE: Vertex = Vertex { position: [0.0; 3], normal: [0; 4], colour: [0; 4] };
+    /// Filler for gaps in a buffer; no triangle uses it.
+    #[cfg(feature = "gpu")]
+    pub const PADDING: Vertex = Vertex { position: [0.0; 3], normal: [0; 4], colour: [0; 4] };
 
-    pub fn new(position: Vec3, normal: Vec3, finish: Finish) -> Vertex {
+    pub fn new(position: Vec3, normal: Vec3, finish: Appearance) -> Vertex {
         let short = |v: f32| (v.clamp(-1.0, 1.0) * 32767.0).round() as i16;
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
         let [r, g, b] = finish.colour.map(byte);

@@ -1,6 +1,6 @@
 //! Colours and opacities by density, blended along each ray in front of what is already drawn.
 
-use super::passes::{self, Depth, Faces, Pass};
+use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
 use super::resources;
 
 pub const SOURCE: &str = include_str!("../../shaders/volume_pass.wgsl");
@@ -17,22 +17,22 @@ impl VolumePass {
         view: &wgpu::BindGroupLayout,
         tooth: &wgpu::BindGroupLayout,
     ) -> VolumePass {
-        let module = passes::module(device, "volume_pass", &passes::source(SOURCE));
+        let module = passes::shader_module(device, "volume_pass", &passes::full_source(SOURCE));
         let depth = resources::texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
         let layout = resources::layout(device, "scene depth", &[depth]);
-        let pass = Pass {
+        let pass = PipelineDesc {
             label: "volume_pass",
             module: &module,
             vertex: "box_vertex",
             fragment: "volume_fragment",
             groups: &[Some(view), Some(tooth), Some(&layout)],
-            corners: &[],
-            faces: Faces::Far,
-            depth: Depth::None,
+            vertex_buffers: &[],
+            faces: DrawnFaces::Back,
+            depth: DepthMode::None,
             format,
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         };
-        VolumePass { pipeline: pass.pipeline(device), layout }
+        VolumePass { pipeline: pass.build(device), layout }
     }
 
     /// The depths that end the rays.

@@ -1,44 +1,47 @@
 //! Tables as text, RFC 4180: written so that a spreadsheet runs nothing in them, read as spreadsheets write them.
 
-/// What begins a formula: in Excel, LibreOffice and Google Sheets, and as full-width signs where those are typed.
-const FORMULA: [char; 8] = ['=', '+', '-', '@', '＝', '＋', '－', '＠'];
+/// Characters that begin a formula in Excel, LibreOffice and Google Sheets, with their full-width forms.
+const FORMULA_STARTS: [char; 8] = ['=', '+', '-', '@', '＝', '＋', '－', '＠'];
 
-/// What ends a cell somewhere: elsewhere the comma is the decimal sign, and a file is split at semicolons or tabs.
+/// Characters that end a cell in some locale: where the comma is the decimal sign, a file is split at semicolons or
+/// tabs.
 const SEPARATORS: [char; 6] = [',', ';', '\t', '\r', '\n', '"'];
 
-/// A line of a table, with its end.
-pub fn line(cells: &[String]) -> String {
-    cells.iter().map(|c| cell(c)).collect::<Vec<_>>().join(",") + "\r\n"
+/// A row of a table, with its line end (CR LF).
+pub fn format_row(cells: &[String]) -> String {
+    cells.iter().map(|c| format_cell(c)).collect::<Vec<_>>().join(",") + "\r\n"
 }
 
-/// A cell: quoted where it must be. Where a spreadsheet would begin to calculate stands an apostrophe first, at the beginning
-/// and behind everything that it might take for the beginning. Numbers stay numbers.
-pub fn cell(text: &str) -> String {
-    let text = if text.parse::<f64>().is_ok() { text.to_string() } else { defused(text) };
+/// A cell, quoted if necessary. An apostrophe precedes every character at which a spreadsheet would begin a formula: at
+/// the beginning, and after every character that might end a cell. Numbers stay numbers.
+pub fn format_cell(text: &str) -> String {
+    let text = if text.parse::<f64>().is_ok() { text.to_string() } else { escape_formula(text) };
     match text.contains([',', ';', '\t', '"', '\r', '\n']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
         false => text,
     }
 }
 
-fn defused(text: &str) -> String {
+fn escape_formula(text: &str) -> String {
     let mut safe = String::with_capacity(text.len() + 2);
-    let mut begins = true;
+    let mut is_at_start = true;
     for letter in text.chars().filter(|c| !matches!(c, '\0'..='\x08' | '\x0b' | '\x0c' | '\x0e'..='\x1f' | '\x7f')) {
-        if begins && FORMULA.contains(&letter) {
+        if is_at_start && FORMULA_STARTS.contains(&letter) {
             safe.push('\'');
         }
-        begins = SEPARATORS.contains(&letter) || begins && letter.is_whitespace();
+        is_at_start = SEPARATORS.contains(&letter) || is_at_start && letter.is_whitespace();
         safe.push(letter);
     }
     safe
 }
 
-/// The cells of a table, line by line; empty lines are left out. The separator is whichever of comma, semicolon and tab the
-/// first line has most of; a byte order mark is passed over.
+/// The cells of a table, row by row; empty lines are left out. The separator is the one of comma, semicolon and tab
+/// that is most frequent in the first line; a byte order mark is skipped.
 ///
-/// `Err` says in which line a quotation begins that never ends.
-pub fn rows(text: &str) -> Result<Vec<Vec<String>>, String> {
+/// # Errors
+///
+/// When a quotation never ends; the text names the line in which it begins.
+pub fn parse_rows(text: &str) -> Result<Vec<Vec<String>>, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let first = text.lines().next().unwrap_or_default();
     let separator = [',', ';', '\t'].into_iter().rev().max_by_key(|s| first.matches(*s).count()).unwrap_or(',');
@@ -66,7 +69,7 @@ pub fn rows(text: &str) -> Result<Vec<Vec<String>>, String> {
         }
     }
     if let Some(line) = quoted_since {
-        return Err(format!("line {line}: a quotation mark opens and never closes"));
+        return Err(format!("line {line}: a quotation mark is not closed"));
     }
     row.push(cell);
     rows.push(row);
@@ -93,15 +96,15 @@ mod tests {
             ("3-4", "3-4"),
             ("\x1b]0;x\x07", "\"]0;x\""),
         ] {
-            assert_eq!(cell(text), expected);
+            assert_eq!(format_cell(text), expected);
         }
     }
 
     #[test]
     fn what_is_written_is_read() {
         let cells: Vec<String> = ["plain", "a, b", "say \"no\"", "two\nlines", "", "ü"].map(String::from).to_vec();
-        assert_eq!(rows(&(line(&cells) + &line(&cells))).unwrap(), [cells.clone(), cells]);
-        assert_eq!(rows("\u{feff}a;b,c;d\r\n1;2;3\r\n\r\n").unwrap(), [["a", "b,c", "d"], ["1", "2", "3"]]);
-        assert_eq!(rows("a,b\n\"1,2\n").unwrap_err(), "line 2: a quotation mark opens and never closes");
+        assert_eq!(parse_rows(&(format_row(&cells) + &format_row(&cells))).unwrap(), [cells.clone(), cells]);
+        assert_eq!(parse_rows("\u{feff}a;b,c;d\r\n1;2;3\r\n\r\n").unwrap(), [["a", "b,c", "d"], ["1", "2", "3"]]);
+        assert_eq!(parse_rows("a,b\n\"1,2\n").unwrap_err(), "line 2: a quotation mark is not closed");
     }
 }

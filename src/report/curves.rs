@@ -1,19 +1,19 @@
 //! Force, speed and progress over time, as one SVG.
 
-use super::language::{Languages, Said, escaped};
-use super::words;
-use crate::score::Trace;
+use super::display_format;
+use super::language::{Languages, Message, escape_html};
 use std::fmt::Write;
+use typodont_exercise::score::Trace;
 
 /// A stage's name and its start and end, s.
-pub struct Span<'a> {
+pub struct StageSpan<'a> {
     pub title: &'a str,
     pub from: f64,
     pub to: f64,
 }
 
 /// A moment that cost points: its number, when it was worst, and from when to when it lasted, s.
-pub struct Mark {
+pub struct EventFlag {
     pub number: usize,
     pub at: f64,
     pub span: Option<[f64; 2]>,
@@ -26,40 +26,55 @@ const BAND_HEIGHT: f64 = 90.0;
 const BAND_GAP: f64 = 26.0;
 const TOP: f64 = 66.0;
 
-/// Where marks stand, in how many rows so that near ones do not hide each other, and how wide one is.
-const MARKS_TOP: f64 = 27.0;
-const MARK_ROWS: usize = 2;
-const MARK_WIDTH: f64 = 19.0;
+/// Position of the flags; number of rows, so that neighbouring flags do not hide each other; and width of a flag. In
+/// units of the SVG.
+const FLAGS_TOP: f64 = 27.0;
+const FLAG_ROWS: usize = 2;
+const FLAG_WIDTH: f64 = 19.0;
 
-/// One curve: what it is called, its unit, and its values.
-struct Curve<'a> {
-    /// Its key among the languages' texts.
+/// One curve: its title, unit and values.
+struct PlottedCurve<'a> {
+    /// Language key of its title.
     key: &'a str,
     unit: &'a str,
     values: Vec<f64>,
     /// Top of the scale.
-    full: f64,
+    scale_max: f64,
     color: &'a str,
 }
 
-/// The curves of a session, with its stages and marks; empty for a session without a tick.
+/// The curves of a session, with its stages and flags; empty for a session without a tick.
 ///
-/// Without decay there is none to clear.
+/// Without decay, the curve of cleared decay is left out.
 ///
-/// `data-seconds`, `data-left` and `data-right` say which second stands where, for the page's script.
-pub fn svg(trace: &Trace, has_decay: bool, stages: &[Span], marks: &[Mark], languages: &Languages) -> String {
+/// The attributes `data-seconds`, `data-left` and `data-right` give the time scale to the page's script.
+pub fn svg(trace: &Trace, has_decay: bool, stages: &[StageSpan], flags: &[EventFlag], languages: &Languages) -> String {
     let Some(last) = trace.samples.last() else { return String::new() };
     let seconds = last.at.seconds();
-    let value = |f: fn(&crate::score::Sample) -> f32| trace.samples.iter().map(|s| f64::from(f(s))).collect::<Vec<_>>();
+    let value = |f: fn(&typodont_exercise::score::TraceSample) -> f32| {
+        trace.samples.iter().map(|s| f64::from(f(s))).collect::<Vec<_>>()
+    };
     let highest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let (force, speed) = (value(|s| s.force), value(|s| if s.touched { s.speed } else { 0.0 }));
     let mut curves = vec![
-        Curve { key: "curve.force", unit: "N", full: nice(highest(&force)), values: force, color: "#b04a00" },
-        Curve { key: "curve.speed", unit: "mm/s", full: nice(highest(&speed)), values: speed, color: "#0b6ea8" },
+        PlottedCurve {
+            key: "curve.force",
+            unit: "N",
+            scale_max: nice_ceiling(highest(&force)),
+            values: force,
+            color: "#b04a00",
+        },
+        PlottedCurve {
+            key: "curve.speed",
+            unit: "mm/s",
+            scale_max: nice_ceiling(highest(&speed)),
+            values: speed,
+            color: "#0b6ea8",
+        },
     ];
     if has_decay {
         let values = value(|s| s.cleared);
-        curves.push(Curve { key: "curve.cleared", unit: "%", full: 100.0, values, color: "#22794f" });
+        curves.push(PlottedCurve { key: "curve.cleared", unit: "%", scale_max: 100.0, values, color: "#22794f" });
     }
     let height = TOP + curves.len() as f64 * (BAND_HEIGHT + BAND_GAP) + 14.0;
     let x = |s: f64| LEFT + (WIDTH - LEFT - RIGHT) * s / seconds.max(1e-9);
@@ -77,16 +92,16 @@ pub fn svg(trace: &Trace, has_decay: bool, stages: &[Span], marks: &[Mark], lang
             "<line x1=\"{from:.1}\" x2=\"{from:.1}\" y1=\"14\" y2=\"{bottom:.1}\" stroke=\"#999\" stroke-dasharray=\"3 3\"/>"
         );
         if to - from > 60.0 {
-            let title = escaped(&shortened(stage.title, ((to - from) / 6.5) as usize));
+            let title = escape_html(&truncate(stage.title, ((to - from) / 6.5) as usize));
             let _ = write!(svg, "<text x=\"{:.1}\" y=\"11\" fill=\"#444\">{title}</text>", from + 4.0);
         }
     }
     for (index, curve) in curves.iter().enumerate() {
         let top = TOP + index as f64 * (BAND_HEIGHT + BAND_GAP);
-        draw(&mut svg, curve, top, &|i| x(trace.samples[i].at.seconds()), languages);
+        draw_curve(&mut svg, curve, top, &|i| x(trace.samples[i].at.seconds()), languages);
     }
-    draw_marks(&mut svg, marks, bottom, &x);
-    for moment in round_moments(seconds) {
+    draw_flags(&mut svg, flags, bottom, &x);
+    for moment in time_ticks(seconds) {
         let at = x(moment);
         let label = if seconds < 60.0 {
             format!("{moment:.0} s")
@@ -103,19 +118,19 @@ pub fn svg(trace: &Trace, has_decay: bool, stages: &[Span], marks: &[Mark], lang
 }
 
 /// A numbered flag over each moment that cost points, and a bar as long as it lasted.
-fn draw_marks(svg: &mut String, marks: &[Mark], bottom: f64, x: &dyn Fn(f64) -> f64) {
-    let mut taken = [f64::NEG_INFINITY; MARK_ROWS];
-    let mut in_time: Vec<&Mark> = marks.iter().collect();
+fn draw_flags(svg: &mut String, flags: &[EventFlag], bottom: f64, x: &dyn Fn(f64) -> f64) {
+    let mut taken = [f64::NEG_INFINITY; FLAG_ROWS];
+    let mut in_time: Vec<&EventFlag> = flags.iter().collect();
     in_time.sort_by(|a, b| a.at.total_cmp(&b.at));
-    for Mark { number, at, span } in in_time {
+    for EventFlag { number, at, span } in in_time {
         let middle = x(*at);
-        let row = (0..MARK_ROWS).find(|&row| middle - taken[row] >= MARK_WIDTH).unwrap_or(0);
+        let row = (0..FLAG_ROWS).find(|&row| middle - taken[row] >= FLAG_WIDTH).unwrap_or(0);
         taken[row] = middle;
-        let y = MARKS_TOP + row as f64 * MARK_WIDTH * 0.95;
+        let y = FLAGS_TOP + row as f64 * FLAG_WIDTH * 0.95;
         let _ = write!(
             svg,
             "<g class=\"mark\" role=\"button\" tabindex=\"0\" data-mark=\"{number}\" aria-label=\"{number}: {}\">",
-            words::duration(*at)
+            display_format::duration(*at)
         );
         if let Some([from, to]) = span {
             let (from, to) = (x(*from), x(*to));
@@ -137,17 +152,17 @@ fn draw_marks(svg: &mut String, marks: &[Mark], bottom: f64, x: &dyn Fn(f64) -> 
     }
 }
 
-fn draw(svg: &mut String, curve: &Curve, top: f64, x: &dyn Fn(usize) -> f64, languages: &Languages) {
+fn draw_curve(svg: &mut String, curve: &PlottedCurve, top: f64, x: &dyn Fn(usize) -> f64, languages: &Languages) {
     let bottom = top + BAND_HEIGHT;
-    let y = |v: f64| bottom - BAND_HEIGHT * (v / curve.full).clamp(0.0, 1.0);
-    let full = words::number(curve.full).trim_end_matches('0').trim_end_matches('.').to_string();
+    let y = |v: f64| bottom - BAND_HEIGHT * (v / curve.scale_max).clamp(0.0, 1.0);
+    let full = display_format::number(curve.scale_max).trim_end_matches('0').trim_end_matches('.').to_string();
     let _ = write!(
         svg,
         "<text x=\"4\" y=\"{:.1}\" fill=\"#222\" font-weight=\"bold\">{}</text>",
         top - 9.0,
-        languages.svg(&Said::text(curve.key, &[]))
+        languages.svg(&Message::text(curve.key, &[]))
     );
-    for (value, label) in [(0.0, "0".to_string()), (curve.full, format!("{full} {}", curve.unit))] {
+    for (value, label) in [(0.0, "0".to_string()), (curve.scale_max, format!("{full} {}", curve.unit))] {
         let at = y(value);
         let _ = write!(
             svg,
@@ -158,14 +173,14 @@ fn draw(svg: &mut String, curve: &Curve, top: f64, x: &dyn Fn(usize) -> f64, lan
             at + 4.0
         );
     }
-    let points = thin(&curve.values).into_iter().map(|(i, v)| format!("{:.1},{:.1}", x(i), y(v)));
+    let points = downsample_max(&curve.values).into_iter().map(|(i, v)| format!("{:.1},{:.1}", x(i), y(v)));
     let points = points.collect::<Vec<_>>().join(" ");
     let _ =
         write!(svg, "<polyline fill=\"none\" stroke=\"{}\" stroke-width=\"1.3\" points=\"{points}\"/>", curve.color);
 }
 
 /// At most 800 points: of each group its highest, so that no peak is lost.
-fn thin(values: &[f64]) -> Vec<(usize, f64)> {
+fn downsample_max(values: &[f64]) -> Vec<(usize, f64)> {
     let group = values.len().div_ceil(800).max(1);
     let highest = |(g, chunk): (usize, &[f64])| {
         let (i, v) =
@@ -176,7 +191,7 @@ fn thin(values: &[f64]) -> Vec<(usize, f64)> {
 }
 
 /// The next of 1, 2, 5, 10 … above a value.
-fn nice(value: f64) -> f64 {
+fn nice_ceiling(value: f64) -> f64 {
     if value <= 0.0 {
         return 1.0;
     }
@@ -185,13 +200,13 @@ fn nice(value: f64) -> f64 {
 }
 
 /// Five to ten round moments.
-fn round_moments(seconds: f64) -> Vec<f64> {
+fn time_ticks(seconds: f64) -> Vec<f64> {
     let steps = [1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0];
     let step = steps.into_iter().find(|s| seconds / s <= 10.0).unwrap_or(3600.0);
     (0..=(seconds / step) as u32).map(|i| f64::from(i) * step).collect()
 }
 
-fn shortened(text: &str, most: usize) -> String {
+fn truncate(text: &str, most: usize) -> String {
     match text.chars().count() > most {
         true => text.chars().take(most.saturating_sub(1)).chain(['…']).collect(),
         false => text.to_string(),

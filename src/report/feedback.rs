@@ -1,61 +1,64 @@
-//! What to do better next time, in sentences.
+//! Feedback in sentences: the causes of lost points and advice for the next attempt.
 //!
-//! Takes a session's grade, its measures and its lapses, and rules that a school may edit. Gives for each line that cost
-//! points what happened, where, when and under which force; the most costly first. Every sentence names its measure.
+//! Takes a session's grade, its measures, its error episodes ("lapses") and rules that a school may edit. Gives for
+//! each rubric item that lost points the events with their place, time and force, the most costly item first. Every
+//! sentence refers to the measure that it explains.
 
 use super::SessionFile;
-use super::language::{Said, Texts, With, names_in};
-use super::words;
-use crate::content::{TissueTable, json};
-use crate::diagnostic::{Diagnostic, Source, headlines};
-use crate::score::{Lapse, Mistake, Way};
-use crate::tick::Tick;
+use super::display_format;
+use super::language::{Message, MessageArgs, Texts, placeholders};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeSet;
+use typodont_core::tick::Tick;
+use typodont_exercise::catalog::TissueTable;
+use typodont_exercise::score::{AnatomicalDirection, EpisodeKind, ErrorEpisode};
+use typodont_formats::diagnostic::{Diagnostic, SourceText, headlines};
+use typodont_formats::json;
 
-/// Lapses told for one line of a rubric: more are not kept in mind.
-const LAPSES_TOLD: usize = 2;
+/// Most lapses described for one item of a rubric: a trainee does not remember more.
+const LAPSES_PER_ITEM_MAX: usize = 2;
 
-/// Points below which nothing was lost.
-const POINTS_LEAST: f64 = 0.05;
+/// Smallest loss that is reported, points.
+const LOST_POINTS_MIN: f64 = 0.05;
 
-/// A lapse shorter than this happened at one moment, s.
-const MOMENT_S: f64 = 1.0;
+/// A lapse shorter than this is reported with one time instead of a span, s.
+const SINGLE_MOMENT_S: f64 = 1.0;
 
-/// The name under which a rule speaks of every measure that has none of its own.
-const ANY: &str = "*";
+/// Measure name of the rule that applies to every measure without a rule of its own.
+const ANY_METRIC: &str = "*";
 
 /// `feedback.json` as written.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct RulesFile {
-    /// The first rule of a measure holds.
+struct FeedbackRulesFile {
+    /// Rules, in order. The first rule that names a measure applies to it.
     #[schemars(length(min = 1, max = 200))]
-    rules: Vec<Rule>,
+    rules: Vec<FeedbackRule>,
 }
 
-/// What to say of one measure. Texts are given by language ("en" is a must) and may hold names in braces.
+/// Feedback on one measure. Texts are given by language ("en" is required) and may contain names in braces.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct Rule {
-    /// The measure whose value this explains, without brackets; "*" for all that have no rule.
+struct FeedbackRule {
+    /// Measure that the rule explains, without its argument in brackets; "*" for all measures without a rule.
     metric: String,
-    /// The kind of mistake that is told with its place and time.
+    /// Kind of mistake that is described with its place and time.
     #[serde(default)]
     lapse: Option<MistakeName>,
-    /// What makes one mistake worse than another; how much tissue suffered unless told otherwise.
+    /// Order of severity among the mistakes: by the volume of tissue concerned (the default) or by depth.
     #[serde(default)]
     worst_by: Option<Severity>,
-    /// Said of each of the worst such mistakes: {depth} {volume} {tissue} {where} {when} {force} {seconds} {value} {goal}.
+    /// Sentence for each of the worst such mistakes: {depth} {volume} {tissue} {where} {when} {force} {seconds} {value}
+    /// {goal}.
     #[serde(default)]
     say: Option<Texts>,
-    /// Said instead where the measure itself knows its moment: {when} {value} {goal} {title}.
+    /// Sentence used instead if the measure itself has a time: {when} {value} {goal} {title}.
     #[serde(default)]
     seen: Option<Texts>,
-    /// Said where neither is known: {value} {goal} {title}.
+    /// Sentence used if neither is known: {value} {goal} {title}.
     otherwise: Texts,
-    /// What to do about it.
+    /// Advice for the next attempt.
     #[serde(default)]
     advice: Option<Texts>,
 }
@@ -78,67 +81,81 @@ enum Severity {
     Depth,
 }
 
-impl From<MistakeName> for Mistake {
-    fn from(name: MistakeName) -> Mistake {
+impl From<MistakeName> for EpisodeKind {
+    fn from(name: MistakeName) -> EpisodeKind {
         match name {
-            MistakeName::Overcut => Mistake::Overcut,
-            MistakeName::Vulnerable => Mistake::Vulnerable,
-            MistakeName::Left => Mistake::Left,
-            MistakeName::Force => Mistake::Force,
-            MistakeName::Neighbour => Mistake::Neighbour,
-            MistakeName::Soft => Mistake::Soft,
+            MistakeName::Overcut => EpisodeKind::Overcut,
+            MistakeName::Vulnerable => EpisodeKind::Vulnerable,
+            MistakeName::Left => EpisodeKind::Left,
+            MistakeName::Force => EpisodeKind::Force,
+            MistakeName::Neighbour => EpisodeKind::Neighbour,
+            MistakeName::Soft => EpisodeKind::Soft,
         }
     }
 }
 
-const IN_SAY: [&str; 9] = ["depth", "volume", "tissue", "where", "when", "force", "seconds", "value", "goal"];
-const IN_SEEN: [&str; 4] = ["when", "value", "goal", "title"];
-const IN_OTHERWISE: [&str; 3] = ["value", "goal", "title"];
+const SAY_PLACEHOLDERS: [&str; 9] = ["depth", "volume", "tissue", "where", "when", "force", "seconds", "value", "goal"];
+const SEEN_PLACEHOLDERS: [&str; 4] = ["when", "value", "goal", "title"];
+const OTHERWISE_PLACEHOLDERS: [&str; 3] = ["value", "goal", "title"];
 
-/// The rules by which sentences are made.
+/// Rules by which the sentences are made; always with a rule for measures that no other rule names.
 #[derive(Clone, Debug)]
-pub struct Rules(Vec<Rule>);
+pub struct FeedbackRules(Vec<FeedbackRule>);
 
-impl Rules {
-    /// Reads `feedback.json`; `name` is used in complaints. `Err` with all that is wrong with it.
-    pub fn read(name: &str, text: &str) -> Result<Rules, String> {
-        let read = json::read::<RulesFile>(Source::new(name, text)).map_err(|found| headlines(&found))?;
+impl FeedbackRules {
+    /// Reads `feedback.json`; `name` is used in complaints.
+    ///
+    /// # Errors
+    ///
+    /// Every fault of the text, a line each.
+    pub fn read(name: &str, text: &str) -> Result<FeedbackRules, String> {
+        let read = json::read::<FeedbackRulesFile>(SourceText::new(name, text)).map_err(|found| headlines(&found))?;
         let mut found = Vec::new();
         for (index, rule) in read.value.rules.iter().enumerate() {
-            found.extend(complaints(rule, &read.places, &format!("/rules/{index}")));
+            found.extend(validate_rule(rule, &read.source_map, &format!("/rules/{index}")));
         }
-        if !read.value.rules.iter().any(|r| r.metric == ANY) {
+        if !read.value.rules.iter().any(|r| r.metric == ANY_METRIC) {
             let help = "add {\"metric\": \"*\", \"otherwise\": {…}}".to_string();
-            found.push(read.places.complain("/rules", "missing-rule", "no rule for \"*\"".into(), Some(help)));
+            found.push(read.source_map.complain(
+                "/rules",
+                "missing-rule",
+                "there is no rule for \"*\"".into(),
+                Some(help),
+            ));
         }
-        if found.is_empty() { Ok(Rules(read.value.rules)) } else { Err(headlines(&found)) }
+        if found.is_empty() { Ok(FeedbackRules(read.value.rules)) } else { Err(headlines(&found)) }
     }
 
-    /// Of a zone that was to be removed nobody says that it must not be touched.
-    fn of(&self, metric: &str, is_less_wanted: bool) -> Option<&Rule> {
+    /// Rule for a measure. A rule about touched vulnerable tissue is skipped where a higher value is better: such a
+    /// zone was to be removed.
+    fn rule_for(&self, metric: &str, is_lower_better: bool) -> Option<&FeedbackRule> {
         let name = metric.split('(').next().unwrap_or(metric);
-        let fits = |rule: &Rule| is_less_wanted || rule.lapse.map(Mistake::from) != Some(Mistake::Vulnerable);
-        self.0.iter().find(|r| r.metric == name && fits(r)).or_else(|| self.0.iter().find(|r| r.metric == ANY))
+        let is_applicable =
+            |rule: &FeedbackRule| is_lower_better || rule.lapse.map(EpisodeKind::from) != Some(EpisodeKind::Vulnerable);
+        self.0
+            .iter()
+            .find(|r| r.metric == name && is_applicable(r))
+            .or_else(|| self.0.iter().find(|r| r.metric == ANY_METRIC))
     }
 }
 
-fn complaints(rule: &Rule, places: &json::Places, path: &str) -> Vec<Diagnostic> {
+fn validate_rule(rule: &FeedbackRule, places: &json::SourceMap, path: &str) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let mut complain = |key: &str, code, message: String, help: String| {
         found.push(places.complain(&format!("{path}/{key}"), code, message, Some(help)));
     };
-    if rule.metric != ANY && !crate::scenario::metric::names().any(|n| n == rule.metric) {
-        let message = format!("no measure named \"{}\"", rule.metric);
-        complain("metric", "unknown-metric", message, "a report lists them under \"All measures\"".into());
+    if rule.metric != ANY_METRIC && !typodont_exercise::scenario::metric::names().any(|n| n == rule.metric) {
+        let message = format!("there is no measure \"{}\"", rule.metric);
+        complain("metric", "unknown-metric", message, "every report lists the measures under \"All measures\"".into());
     }
     if rule.lapse.is_some() != rule.say.is_some() {
         let help = "give both \"lapse\" and \"say\", or neither".to_string();
-        complain("metric", "half-rule", "a mistake and what is said of it belong together".into(), help);
+        complain("metric", "half-rule", "\"lapse\" and \"say\" require each other".into(), help);
     }
     let texts = [
-        ("say", rule.say.as_ref(), &IN_SAY[..]),
-        ("seen", rule.seen.as_ref(), &IN_SEEN),
-        ("otherwise", Some(&rule.otherwise), &IN_OTHERWISE),
+        ("say", rule.say.as_ref(), &SAY_PLACEHOLDERS[..]),
+        ("seen", rule.seen.as_ref(), &SEEN_PLACEHOLDERS),
+        ("otherwise", Some(&rule.otherwise), &OTHERWISE_PLACEHOLDERS),
         ("advice", rule.advice.as_ref(), &[]),
     ];
     for (key, texts, known) in texts.into_iter().filter_map(|(key, texts, known)| Some((key, texts?, known))) {
@@ -146,220 +163,229 @@ fn complaints(rule: &Rule, places: &json::Places, path: &str) -> Vec<Diagnostic>
             complain(
                 key,
                 "missing-text",
-                "no English text".into(),
-                "add \"en\": it stands in for other languages".into(),
+                "the English text is missing".into(),
+                "add \"en\", which is used where another language is missing".into(),
             );
         }
-        let names: BTreeSet<&str> = texts.values().flat_map(|t| names_in(t)).filter(|n| !known.contains(n)).collect();
+        let names: BTreeSet<&str> =
+            texts.values().flat_map(|t| placeholders(t)).filter(|n| !known.contains(n)).collect();
         for name in names {
             let known = known.iter().map(|n| format!("{{{n}}}")).collect::<Vec<_>>().join(" ");
             let help =
-                if known.is_empty() { "nothing can be filled in here".into() } else { format!("known: {known}") };
-            complain(key, "unknown-name", format!("nothing is known as {{{name}}}"), help);
+                if known.is_empty() { "this text takes no placeholders".into() } else { format!("known: {known}") };
+            complain(key, "unknown-name", format!("there is no placeholder {{{name}}}"), help);
         }
     }
     found
 }
 
-/// A moment that cost points, numbered as the page marks it.
+/// An event that cost points, with the number that marks it on the page.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Moment {
+pub struct FeedbackMoment {
     pub number: usize,
-    /// Where it is marked, s; `None` for what was never done.
+    /// Time of the mark, s; `None` for work that was never done.
     pub at: Option<f64>,
-    /// First and last second.
+    /// Begin and end, s.
     pub span: Option<[f64; 2]>,
-    /// Tooth space, mm.
+    /// Place in tooth space, mm.
     pub place: [f64; 3],
 }
 
-/// One sentence, with the moment it speaks of.
+/// One sentence, with the number of the moment to which it refers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sentence {
-    pub said: Said,
+pub struct FeedbackSentence {
+    pub message: Message,
     pub moment: Option<usize>,
 }
 
-/// One line that cost points, in words.
+/// One item of the rubric that lost points, or one critical error, in words.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Finding {
+pub struct FeedbackFinding {
     pub metric: String,
     pub title: String,
-    /// Points lost; `None` for what fails outright.
+    /// Points lost; `None` for a critical error.
     pub lost: Option<f64>,
-    pub sentences: Vec<Sentence>,
-    pub advice: Option<Said>,
+    pub sentences: Vec<FeedbackSentence>,
+    pub advice: Option<Message>,
 }
 
-/// What a session's feedback consists of.
+/// Feedback on one session.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Feedback {
-    /// What fails outright first, then what cost most.
-    pub findings: Vec<Finding>,
-    /// In the order in which sentences mention them; numbered from 1.
-    pub moments: Vec<Moment>,
-    /// Titles of what earned all its points.
-    pub kept: Vec<String>,
+    /// Critical errors first, then items by points lost, most first.
+    pub findings: Vec<FeedbackFinding>,
+    /// Moments in the order in which sentences mention them, numbered from 1.
+    pub moments: Vec<FeedbackMoment>,
+    /// Titles of the items with full marks.
+    pub full_marks: Vec<String>,
 }
 
-/// What is to be said of a graded session; nothing of one without a grade.
-pub fn of(session: &SessionFile, lapses: &[Lapse], rules: &Rules, tissues: &TissueTable) -> Feedback {
+/// Feedback on a graded session; empty for a session without a grade.
+pub fn build(session: &SessionFile, lapses: &[ErrorEpisode], rules: &FeedbackRules, tissues: &TissueTable) -> Feedback {
     let mut feedback = Feedback::default();
     let Some(grade) = &session.grade else { return feedback };
-    let mut teller = Teller { session, lapses, rules, tissues, mentioned: Vec::new(), moments: Vec::new() };
-    let mut told: BTreeSet<&str> = BTreeSet::new();
+    let mut builder =
+        SentenceBuilder { session, lapses, rules, tissues, numbered_lapses: Vec::new(), moments: Vec::new() };
+    let mut explained_metrics: BTreeSet<&str> = BTreeSet::new();
     for fail in grade.hard_fail_checks.iter().filter(|f| f.failed) {
-        if told.insert(&fail.metric) {
+        if explained_metrics.insert(&fail.metric) {
             let goal = fail.above.or(fail.below);
-            feedback.findings.push(teller.tell(&fail.metric, &fail.title, fail.value, goal, None, true));
+            feedback.findings.push(builder.finding(&fail.metric, &fail.title, fail.value, goal, None, true));
         }
     }
-    let mut items: Vec<_> = grade.items.iter().filter(|i| i.max_points - i.points >= POINTS_LEAST).collect();
+    let mut items: Vec<_> = grade.items.iter().filter(|i| i.max_points - i.points >= LOST_POINTS_MIN).collect();
     items.sort_by(|a, b| (b.max_points - b.points).total_cmp(&(a.max_points - a.points)));
     for item in items {
-        if told.insert(&item.metric) {
+        if explained_metrics.insert(&item.metric) {
             let lost = item.max_points - item.points;
-            let (goal, is_less_wanted) = (Some(item.full_at), item.full_at < item.zero_at);
-            let found = teller.tell(&item.metric, &item.title, item.value, goal, Some(lost), is_less_wanted);
-            feedback.findings.push(found);
+            let (goal, is_lower_better) = (Some(item.full_at), item.full_at < item.zero_at);
+            let finding = builder.finding(&item.metric, &item.title, item.value, goal, Some(lost), is_lower_better);
+            feedback.findings.push(finding);
         }
     }
-    let is_kept = |i: &&super::ItemFile| i.max_points - i.points < POINTS_LEAST;
-    feedback.kept = grade.items.iter().filter(is_kept).map(|i| i.title.clone()).collect();
-    feedback.moments = teller.moments;
+    let has_full_marks = |i: &&super::ItemResultFile| i.max_points - i.points < LOST_POINTS_MIN;
+    feedback.full_marks = grade.items.iter().filter(has_full_marks).map(|i| i.title.clone()).collect();
+    feedback.moments = builder.moments;
     feedback
 }
 
-/// Makes sentences and numbers what they mention.
-struct Teller<'a> {
+/// Makes sentences and numbers the moments that they mention.
+struct SentenceBuilder<'a> {
     session: &'a SessionFile,
-    lapses: &'a [Lapse],
-    rules: &'a Rules,
+    lapses: &'a [ErrorEpisode],
+    rules: &'a FeedbackRules,
     tissues: &'a TissueTable,
     /// Lapses that have a moment, by index, with its number.
-    mentioned: Vec<(usize, usize)>,
-    moments: Vec<Moment>,
+    numbered_lapses: Vec<(usize, usize)>,
+    moments: Vec<FeedbackMoment>,
 }
 
-impl Teller<'_> {
-    /// `is_less_wanted`: points are lost by more of what is measured.
-    fn tell(
+impl SentenceBuilder<'_> {
+    /// Finding for one measure. `is_lower_better`: a higher value costs points.
+    fn finding(
         &mut self,
         metric: &str,
         title: &str,
         value: Option<f64>,
         goal: Option<f64>,
         lost: Option<f64>,
-        is_less_wanted: bool,
-    ) -> Finding {
+        is_lower_better: bool,
+    ) -> FeedbackFinding {
         let rules = self.rules;
         let mut finding =
-            Finding { metric: metric.into(), title: title.into(), lost, sentences: Vec::new(), advice: None };
-        let Some(rule) = rules.of(metric, is_less_wanted) else { return finding };
-        let measured = |value: Option<f64>| {
-            let text = words::measure(metric, value);
-            Said::word(format!("value.{text}"), together(text))
+            FeedbackFinding { metric: metric.into(), title: title.into(), lost, sentences: Vec::new(), advice: None };
+        let Some(rule) = rules.rule_for(metric, is_lower_better) else { return finding };
+        let formatted = |value: Option<f64>| {
+            let text = display_format::measure(metric, value);
+            Message::text_or(format!("value.{text}"), non_breaking(text))
         };
-        let known: With = [("value", measured(value)), ("goal", measured(goal)), ("title", Said::plain(title))]
-            .map(|(name, said)| (name.to_string(), said))
-            .into();
-        if let (Some(mistake), Some(texts)) = (rule.lapse.map(Mistake::from), &rule.say) {
-            for index in self.worst(mistake, rule.worst_by) {
-                finding.sentences.extend(self.sentence(index, texts, &known));
+        let args: MessageArgs =
+            [("value", formatted(value)), ("goal", formatted(goal)), ("title", Message::plain(title))]
+                .map(|(name, said)| (name.to_string(), said))
+                .into();
+        if let (Some(mistake), Some(texts)) = (rule.lapse.map(EpisodeKind::from), &rule.say) {
+            for index in self.worst_lapses(mistake, rule.worst_by) {
+                finding.sentences.extend(self.sentence(index, texts, &args));
             }
         }
         if finding.sentences.is_empty() {
-            finding.sentences.push(self.without_lapse(metric, rule, known));
+            finding.sentences.push(self.sentence_without_lapse(metric, rule, args));
         }
-        finding.advice = rule.advice.clone().map(|texts| Said::Each { texts, with: Vec::new() });
+        finding.advice = rule.advice.clone().map(|texts| Message::PerLanguage { texts, args: Vec::new() });
         finding
     }
 
-    /// Which lapses of a kind are told, by index.
-    fn worst(&self, mistake: Mistake, by: Option<Severity>) -> Vec<usize> {
-        let meant = self.lapses.iter().enumerate().filter(|(_, l)| l.mistake == mistake);
+    /// Indices of the lapses of a kind that are described: the worst first, at most [`LAPSES_PER_ITEM_MAX`].
+    fn worst_lapses(&self, mistake: EpisodeKind, by: Option<Severity>) -> Vec<usize> {
+        let meant = self.lapses.iter().enumerate().filter(|(_, l)| l.kind == mistake);
         let mut meant: Vec<usize> = meant.map(|(index, _)| index).collect();
         if by == Some(Severity::Depth) {
             let depth = |index: &usize| self.lapses[*index].depth.unwrap_or(0.0);
             meant.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
         }
-        meant.truncate(LAPSES_TOLD);
+        meant.truncate(LAPSES_PER_ITEM_MAX);
         meant
     }
 
-    /// A sentence about a lapse; `None` where it asks for what this lapse does not have.
-    fn sentence(&mut self, index: usize, texts: &Texts, known: &With) -> Option<Sentence> {
+    /// A sentence about a lapse; `None` if the text has a placeholder for which this lapse has no value.
+    fn sentence(&mut self, index: usize, texts: &Texts, args: &MessageArgs) -> Option<FeedbackSentence> {
         let lapse = &self.lapses[index];
-        let mut with = known.clone();
-        with.extend(words_of(lapse, self.tissues));
-        let names: BTreeSet<&str> = texts.values().flat_map(|t| names_in(t)).collect();
-        if names.iter().any(|name| !with.iter().any(|(n, _)| n == name)) {
+        let mut all_args = args.clone();
+        all_args.extend(lapse_args(lapse, self.tissues));
+        let names: BTreeSet<&str> = texts.values().flat_map(|t| placeholders(t)).collect();
+        if names.iter().any(|name| !all_args.iter().any(|(n, _)| n == name)) {
             return None;
         }
-        let moment = self.moment_of(index);
-        Some(Sentence { said: Said::Each { texts: texts.clone(), with }, moment: Some(moment) })
+        let moment = self.moment_of_lapse(index);
+        Some(FeedbackSentence {
+            message: Message::PerLanguage { texts: texts.clone(), args: all_args },
+            moment: Some(moment),
+        })
     }
 
-    fn moment_of(&mut self, index: usize) -> usize {
-        if let Some((_, number)) = self.mentioned.iter().find(|(i, _)| *i == index) {
+    fn moment_of_lapse(&mut self, index: usize) -> usize {
+        if let Some((_, number)) = self.numbered_lapses.iter().find(|(i, _)| *i == index) {
             return *number;
         }
         let lapse = &self.lapses[index];
         let span = lapse.span.map(|span| span.map(Tick::seconds));
-        let number = self.mark(lapse.worst.map(Tick::seconds), span, lapse.place.to_array().map(f64::from));
-        self.mentioned.push((index, number));
+        let number = self.add_moment(lapse.worst.map(Tick::seconds), span, lapse.place.to_array().map(f64::from));
+        self.numbered_lapses.push((index, number));
         number
     }
 
-    fn mark(&mut self, at: Option<f64>, span: Option<[f64; 2]>, place: [f64; 3]) -> usize {
+    fn add_moment(&mut self, at: Option<f64>, span: Option<[f64; 2]>, place: [f64; 3]) -> usize {
         let number = self.moments.len() + 1;
-        self.moments.push(Moment { number, at, span, place });
+        self.moments.push(FeedbackMoment { number, at, span, place });
         number
     }
 
-    fn without_lapse(&mut self, metric: &str, rule: &Rule, known: With) -> Sentence {
+    fn sentence_without_lapse(&mut self, metric: &str, rule: &FeedbackRule, args: MessageArgs) -> FeedbackSentence {
         let evidence = self.session.evidence.get(metric);
         if let (Some(texts), Some(evidence)) = (&rule.seen, evidence)
             && let Some(at) = evidence.at_s
         {
-            let number = self.mark(Some(at), None, evidence.place_mm);
-            let with = [known, vec![("when".to_string(), at_moment(at))]].concat();
-            return Sentence { said: Said::Each { texts: texts.clone(), with }, moment: Some(number) };
+            let number = self.add_moment(Some(at), None, evidence.place_mm);
+            let args_with_time = [args, vec![("when".to_string(), at_time(at))]].concat();
+            return FeedbackSentence {
+                message: Message::PerLanguage { texts: texts.clone(), args: args_with_time },
+                moment: Some(number),
+            };
         }
-        Sentence { said: Said::Each { texts: rule.otherwise.clone(), with: known }, moment: None }
+        FeedbackSentence { message: Message::PerLanguage { texts: rule.otherwise.clone(), args }, moment: None }
     }
 }
 
-/// A number and its unit, which stay on one line.
-fn together(text: String) -> String {
+/// A number and its unit with non-breaking spaces, so that they stay on one line.
+fn non_breaking(text: String) -> String {
     text.replace(' ', "\u{a0}")
 }
 
-fn at_moment(seconds: f64) -> Said {
-    Said::text("when.at", &[("at", Said::plain(together(words::duration(seconds))))])
+fn at_time(seconds: f64) -> Message {
+    Message::text("when.at", &[("at", Message::plain(non_breaking(display_format::duration(seconds))))])
 }
 
-/// What can be said of a lapse; a name is missing where it has none.
-fn words_of(lapse: &Lapse, tissues: &TissueTable) -> With {
+/// Values of the placeholders for a lapse; a name without a value is left out.
+fn lapse_args(lapse: &ErrorEpisode, tissues: &TissueTable) -> MessageArgs {
     let mut known = vec![
-        ("volume", Said::plain(together(format!("{} mm³", words::number(lapse.volume))))),
-        ("force", Said::plain(together(format!("{:.1} N", lapse.force)))),
-        ("seconds", Said::plain(together(words::duration(lapse.seconds)))),
+        ("volume", Message::plain(non_breaking(format!("{} mm³", display_format::number(lapse.volume))))),
+        ("force", Message::plain(non_breaking(format!("{:.1} N", lapse.force)))),
+        ("seconds", Message::plain(non_breaking(display_format::duration(lapse.seconds)))),
     ];
-    known.extend(lapse.depth.map(|mm| ("depth", Said::plain(together(format!("{mm:.1} mm"))))));
-    known.extend(lapse.way.map(|way| ("where", Said::text(format!("where.{}", way_name(way)), &[]))));
+    known.extend(lapse.depth.map(|mm| ("depth", Message::plain(non_breaking(format!("{mm:.1} mm"))))));
+    known.extend(lapse.direction.map(|way| ("where", Message::text(format!("where.{}", direction_key(way)), &[]))));
     known.extend(
         tissues
             .by_label(lapse.tissue)
-            .map(|t| ("tissue", Said::word(format!("tissue.{}", t.name), t.title.to_lowercase()))),
+            .map(|t| ("tissue", Message::text_or(format!("tissue.{}", t.name), t.title.to_lowercase()))),
     );
     known.extend(lapse.span.map(|[from, to]| {
         let [from, to] = [from, to].map(Tick::seconds);
         let when = match lapse.worst {
-            Some(worst) if to - from < MOMENT_S => at_moment(worst.seconds()),
+            Some(worst) if to - from < SINGLE_MOMENT_S => at_time(worst.seconds()),
             _ => {
-                let [from, to] = [from, to].map(|s| Said::plain(together(words::duration(s))));
-                Said::text("when.between", &[("from", from), ("to", to)])
+                let [from, to] = [from, to].map(|s| Message::plain(non_breaking(display_format::duration(s))));
+                Message::text("when.between", &[("from", from), ("to", to)])
             }
         };
         ("when", when)
@@ -367,38 +393,38 @@ fn words_of(lapse: &Lapse, tissues: &TissueTable) -> With {
     known.into_iter().map(|(name, said)| (name.to_string(), said)).collect()
 }
 
-/// The last part of the keys of places.
-fn way_name(way: Way) -> &'static str {
-    match way {
-        Way::Buccal => "buccal",
-        Way::Lingual => "lingual",
-        Way::Mesial => "mesial",
-        Way::Distal => "distal",
-        Way::Occlusal => "occlusal",
-        Way::Apical => "apical",
+/// Last part of the language key of a direction (`where.…`).
+fn direction_key(direction: AnatomicalDirection) -> &'static str {
+    match direction {
+        AnatomicalDirection::Buccal => "buccal",
+        AnatomicalDirection::Lingual => "lingual",
+        AnatomicalDirection::Mesial => "mesial",
+        AnatomicalDirection::Distal => "distal",
+        AnatomicalDirection::Occlusal => "occlusal",
+        AnatomicalDirection::Apical => "apical",
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::html::Templates;
+    use super::super::templates::Templates;
     use super::*;
-    use crate::score;
+    use typodont_exercise::score;
 
     #[test]
     fn the_most_costly_line_is_told_first_and_every_sentence_has_its_measure() {
-        let (recording, scored) = crate::report::example();
+        let (recording, scored) = crate::example();
         let session = SessionFile::of(&recording, &scored);
-        let lapses = score::lapses(&recording, &scored);
+        let lapses = score::error_episodes(&recording, &scored);
         let templates = Templates::shipped();
-        let feedback = of(&session, &lapses, templates.rules(), &recording.scenario.tissues);
+        let feedback = build(&session, &lapses, templates.rules(), &recording.scenario.tissues);
         let lost: Vec<f64> = feedback.findings.iter().filter_map(|f| f.lost).collect();
         assert!(lost.len() >= 3 && lost.is_sorted_by(|a, b| a >= b), "{lost:?}");
         for finding in &feedback.findings {
             assert!(session.metrics.contains_key(&finding.metric), "{}", finding.metric);
             assert!(!finding.sentences.is_empty(), "{}", finding.metric);
             for sentence in &finding.sentences {
-                for (code, text) in templates.languages().each(&sentence.said) {
+                for (code, text) in templates.languages().in_each_language(&sentence.message) {
                     assert!(!text.contains(['{', '}']), "{code}: {text}");
                 }
             }
@@ -406,43 +432,56 @@ mod tests {
         let numbers: Vec<usize> = feedback.moments.iter().map(|m| m.number).collect();
         assert_eq!(numbers, (1..=numbers.len()).collect::<Vec<_>>());
         let deepest = feedback.findings.iter().find(|f| f.metric == "overcut_depth_max_mm").unwrap();
-        let english = templates.languages().each(&deepest.sentences[0].said)["en"].replace('\u{a0}', " ");
-        let depth = lapses.iter().filter(|l| l.mistake == Mistake::Overcut).filter_map(|l| l.depth).fold(0.0, f32::max);
-        assert!(english.starts_with(&format!("{depth:.1} mm of sound ")) && english.ends_with(" N."), "{english}");
+        let english =
+            templates.languages().in_each_language(&deepest.sentences[0].message)["en"].replace('\u{a0}', " ");
+        let depth =
+            lapses.iter().filter(|l| l.kind == EpisodeKind::Overcut).filter_map(|l| l.depth).fold(0.0, f32::max);
+        assert!(english.contains(&format!("to a depth of {depth:.1} mm")) && english.ends_with(" N."), "{english}");
     }
 
     #[test]
     fn a_lapse_lies_where_its_mistake_was_made() {
         // Aim: no sentence sends a trainee to the wrong place. Method: the verdict at each lapse's place, and its time.
-        let (recording, scored) = crate::report::example();
+        let (recording, scored) = crate::example();
         let grid = scored.replay.workpiece.volume.grid();
-        let lapses = score::lapses(&recording, &scored);
-        let of = |mistake: Mistake| lapses.iter().filter(move |l| l.mistake == mistake);
-        assert!(of(Mistake::Overcut).count() > 0 && of(Mistake::Left).count() > 0 && of(Mistake::Force).count() > 0);
-        let verdict = |l: &Lapse| scored.verdicts[grid.index(grid.nearest(l.place).unwrap())];
-        for lapse in of(Mistake::Overcut) {
+        let lapses = score::error_episodes(&recording, &scored);
+        let of = |mistake: EpisodeKind| lapses.iter().filter(move |l| l.kind == mistake);
+        assert!(
+            of(EpisodeKind::Overcut).count() > 0
+                && of(EpisodeKind::Left).count() > 0
+                && of(EpisodeKind::Force).count() > 0
+        );
+        let verdict = |l: &ErrorEpisode| scored.verdicts[grid.index(grid.nearest(l.place).unwrap())];
+        for lapse in of(EpisodeKind::Overcut) {
             assert_eq!(verdict(lapse), score::Verdict::Overcut);
-            let fall = scored.falls.at(grid.index(grid.nearest(lapse.place).unwrap()));
+            let fall = scored.removals.at(grid.index(grid.nearest(lapse.place).unwrap()));
             let [from, to] = lapse.span.unwrap();
             assert!(fall == lapse.worst && fall.is_some_and(|t| from <= t && t <= to));
         }
         let count = scored.verdicts.iter().filter(|v| **v == score::Verdict::Overcut).count();
-        let told: f64 = of(Mistake::Overcut).map(|l| l.volume).sum();
+        let told: f64 = of(EpisodeKind::Overcut).map(|l| l.volume).sum();
         assert!(told <= count as f64 * grid.voxel_mm3() + 1e-6);
-        assert!(of(Mistake::Left).all(|l| verdict(l) == score::Verdict::Left && l.span.is_none()));
-        let highest = of(Mistake::Force).map(|l| l.force).fold(0.0, f32::max);
+        assert!(of(EpisodeKind::Left).all(|l| verdict(l) == score::Verdict::Left && l.span.is_none()));
+        let highest = of(EpisodeKind::Force).map(|l| l.force).fold(0.0, f32::max);
         assert_eq!(Some(highest), scored.measures.value("force_max_n").map(|v| v as f32));
     }
 
     #[test]
     fn a_schools_rules_are_held_against_what_can_be_said() {
         let check = |text: &str, expected: &[&str]| {
-            let error = Rules::read("feedback.json", text).map(drop).unwrap_err();
+            let error = FeedbackRules::read("feedback.json", text).map(drop).unwrap_err();
             assert!(expected.iter().all(|e| error.contains(e)), "{error}");
         };
         check(
             r#"{"rules": [{"metric": "dise", "otherwise": {"tr": "{deph}"}}]}"#,
-            &["unknown-metric", "no measure named \"dise\"", "missing-text", "unknown-name", "{deph}", "missing-rule"],
+            &[
+                "unknown-metric",
+                "there is no measure \"dise\"",
+                "missing-text",
+                "unknown-name",
+                "{deph}",
+                "missing-rule",
+            ],
         );
         check(r#"{"rules": [{"metric": "*", "say": {"en": "x"}, "otherwise": {"en": "x"}}]}"#, &["half-rule"]);
         check(r#"{"rules": [{"metric": "*"}]}"#, &["feedback.json:1:", "otherwise"]);

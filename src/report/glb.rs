@@ -1,41 +1,45 @@
 //! Surfaces as one glTF 2.0 binary file, coloured per vertex.
 
-use super::pictures::linear;
-use crate::mesh::Mesh;
+use super::pictures::srgb_to_linear;
 use gltf_json as json;
 use json::validation::{Checked, USize64, Validate};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use typodont_core::mesh::Mesh;
 
 /// A surface with a name and a colour per vertex.
-pub struct Part {
+pub struct SurfacePart {
     pub name: String,
     pub mesh: Mesh,
     /// Linear red, green, blue in 0–1, one per position.
     pub colors: Vec<[f32; 3]>,
 }
 
-impl Part {
-    /// A surface with a colour at each corner, given as screens take it.
-    pub fn coloured(name: &str, mesh: Mesh, rgb: &[[f32; 3]]) -> Part {
-        let colors = rgb.iter().map(|c| linear(*c)).collect();
-        Part { name: name.into(), mesh, colors }
+impl SurfacePart {
+    /// A surface with an sRGB colour (0 to 1) per position.
+    pub fn coloured(name: &str, mesh: Mesh, rgb: &[[f32; 3]]) -> SurfacePart {
+        let colors = rgb.iter().map(|c| srgb_to_linear(*c)).collect();
+        SurfacePart { name: name.into(), mesh, colors }
     }
 
-    /// A surface of one colour, given as screens take it.
-    pub fn plain(name: &str, mesh: Mesh, rgb: [f32; 3]) -> Part {
-        let colors = vec![linear(rgb); mesh.positions.len()];
-        Part { name: name.into(), mesh, colors }
+    /// A surface of one sRGB colour (0 to 1).
+    pub fn plain(name: &str, mesh: Mesh, rgb: [f32; 3]) -> SurfacePart {
+        let colors = vec![srgb_to_linear(rgb); mesh.positions.len()];
+        SurfacePart { name: name.into(), mesh, colors }
     }
 }
 
-/// Millimetres become the metres that glTF asks for, and z up becomes y up.
+/// Converts millimetres to the metres of glTF, and z up to y up.
 const NODE_FROM_TOOTH: [f32; 16] =
     [0.0, 0.0, 0.001, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 
-/// The file's bytes; empty parts are left out.
-pub fn bytes(parts: &[Part]) -> Result<Vec<u8>, String> {
-    let mut file = Builder::default();
+/// Encodes the parts as one glTF 2.0 binary file; empty parts are left out.
+///
+/// # Errors
+///
+/// When the glTF document is not valid or cannot be written.
+pub fn encode(parts: &[SurfacePart]) -> Result<Vec<u8>, String> {
+    let mut file = GlbBuilder::default();
     for part in parts.iter().filter(|p| !p.mesh.is_empty()) {
         file.add(part);
     }
@@ -43,7 +47,7 @@ pub fn bytes(parts: &[Part]) -> Result<Vec<u8>, String> {
 }
 
 #[derive(Default)]
-struct Builder {
+struct GlbBuilder {
     data: Vec<u8>,
     views: Vec<json::buffer::View>,
     accessors: Vec<json::Accessor>,
@@ -51,15 +55,15 @@ struct Builder {
     nodes: Vec<json::Node>,
 }
 
-impl Builder {
-    fn add(&mut self, part: &Part) {
+impl GlbBuilder {
+    fn add(&mut self, part: &SurfacePart) {
         let mesh = &part.mesh;
         let low = mesh.positions.iter().copied().reduce(|a, b| a.min(b)).unwrap_or_default();
         let high = mesh.positions.iter().copied().reduce(|a, b| a.max(b)).unwrap_or_default();
         let positions = mesh.positions.iter().flat_map(|p| p.to_array()).flat_map(f32::to_le_bytes);
         let positions =
             self.vertices(positions.collect(), mesh.positions.len(), Some((low.to_array(), high.to_array())));
-        let unit = |n: &crate::frame::Vec3| n.try_normalize().unwrap_or(crate::frame::Vec3::Z);
+        let unit = |n: &typodont_core::frame::Vec3| n.try_normalize().unwrap_or(typodont_core::frame::Vec3::Z);
         let normals = mesh.normals.iter().flat_map(|n| unit(n).to_array()).flat_map(f32::to_le_bytes);
         let normals = self.vertices(normals.collect(), mesh.normals.len(), None);
         let colors = part.colors.iter().flatten().flat_map(|c| c.to_le_bytes());
@@ -159,7 +163,7 @@ impl Builder {
     }
 
     fn finish(self) -> Result<Vec<u8>, String> {
-        let Builder { data, views, accessors, meshes, nodes } = self;
+        let GlbBuilder { data, views, accessors, meshes, nodes } = self;
         let material = json::Material {
             double_sided: true,
             pbr_metallic_roughness: json::material::PbrMetallicRoughness {
@@ -199,18 +203,20 @@ impl Builder {
             nodes,
             ..Default::default()
         };
-        let mut faults = Vec::new();
-        root.validate(&root, json::Path::new, &mut |path, error| faults.push(format!("{}: {error}", path())));
-        if !faults.is_empty() {
-            return Err(format!("writing glTF — {}", faults.join("; ")));
+        let mut validation_errors = Vec::new();
+        root.validate(&root, json::Path::new, &mut |path, error| {
+            validation_errors.push(format!("{}: {error}", path()))
+        });
+        if !validation_errors.is_empty() {
+            return Err(format!("writing glTF — {}", validation_errors.join("; ")));
         }
         let text = json::serialize::to_string(&root).map_err(|e| format!("writing glTF — {e}"))?;
-        Ok(container(text.as_bytes(), &data))
+        Ok(glb_container(text.as_bytes(), &data))
     }
 }
 
 /// The binary container: a header, a chunk of JSON padded with spaces, a chunk of data padded with zeros.
-fn container(text: &[u8], data: &[u8]) -> Vec<u8> {
+fn glb_container(text: &[u8], data: &[u8]) -> Vec<u8> {
     let pad = |bytes: &[u8], with: u8| {
         let mut padded = Cow::Borrowed(bytes).into_owned();
         padded.resize(bytes.len().next_multiple_of(4), with);

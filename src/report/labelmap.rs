@@ -1,16 +1,21 @@
 //! Label maps that other programs open: tissues before and after, and the performance map.
 
-use crate::content::TissueTable;
-use crate::content::nrrd;
-use crate::content::nrrd::segmentation::{self, Segment, Segmentation};
-use crate::content::nrrd::{Encoding, Geometry, Image, Samples, Space};
-use crate::score::{Falls, Verdict};
-use crate::volume::{Grid, Volume};
+use typodont_core::volume::{Grid, Volume};
+use typodont_exercise::catalog::TissueTable;
+use typodont_exercise::score::{Verdict, VoxelRemovals};
+use typodont_formats::nrrd;
+use typodont_formats::nrrd::segmentation;
+use typodont_formats::nrrd::segmentation::{NamedSegment, Segmentation};
+use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
 
-/// The tissues of a volume as `.seg.nrrd`.
+/// Encodes the tissues of a volume as `.seg.nrrd`.
+///
+/// # Errors
+///
+/// When the file cannot be encoded.
 pub fn tissues(volume: &Volume, table: &TissueTable) -> Result<Vec<u8>, String> {
     let labels: Vec<u8> = volume.tissues().map(|l| l.0).collect();
-    let segments = table.entries().iter().map(|e| Segment {
+    let segments = table.entries().iter().map(|e| NamedSegment {
         id: e.name.clone(),
         name: e.title.clone(),
         label_value: e.id,
@@ -19,10 +24,14 @@ pub fn tissues(volume: &Volume, table: &TissueTable) -> Result<Vec<u8>, String> 
     encode(volume.grid(), labels, segments.collect())
 }
 
-/// The verdicts as `.seg.nrrd`.
+/// Encodes the verdicts, one per voxel of the grid, as `.seg.nrrd`.
+///
+/// # Errors
+///
+/// When the file cannot be encoded.
 pub fn performance(grid: &Grid, verdicts: &[Verdict]) -> Result<Vec<u8>, String> {
     let labels = verdicts.iter().map(|v| *v as u8).collect();
-    let segments = Verdict::SEEN.iter().chain(&Verdict::OF_FILLINGS).map(|v| Segment {
+    let segments = Verdict::VISIBLE.iter().chain(&Verdict::OF_FILLINGS).map(|v| NamedSegment {
         id: v.id().into(),
         name: v.title().into(),
         label_value: *v as u8,
@@ -31,19 +40,24 @@ pub fn performance(grid: &Grid, verdicts: &[Verdict]) -> Result<Vec<u8>, String>
     encode(grid, labels, segments.collect())
 }
 
-fn encode(grid: &Grid, labels: Vec<u8>, segments: Vec<Segment>) -> Result<Vec<u8>, String> {
-    let geometry = Geometry::of(grid, Space::LeftPosteriorSuperior);
-    let segments: Vec<Segment> = segments.into_iter().filter(|s| labels.contains(&s.label_value)).collect();
+fn encode(grid: &Grid, labels: Vec<u8>, segments: Vec<NamedSegment>) -> Result<Vec<u8>, String> {
+    let geometry = Geometry::of(grid, CoordinateSystem::LeftPosteriorSuperior);
+    let segments: Vec<NamedSegment> = segments.into_iter().filter(|s| labels.contains(&s.label_value)).collect();
     segmentation::bytes(&Segmentation { geometry, labels, segments }).map_err(|e| e.to_string())
 }
 
-/// When each voxel fell, s; NaN for those that never did. The box holds no more than what fell.
-pub fn removal_times(grid: &Grid, falls: &Falls) -> Result<Vec<u8>, String> {
-    let fallen = || falls.iter().map(|(voxel, _)| grid.cell(voxel));
-    let (low, high) = fallen().fold(([u32::MAX; 3], [0; 3]), |(low, high): ([u32; 3], [u32; 3]), cell| {
+/// Encodes the time of removal of each voxel, s, as NRRD; NaN for voxels that were not removed. The image is cropped to
+/// the removed voxels.
+///
+/// # Errors
+///
+/// When the file cannot be encoded.
+pub fn removal_times(grid: &Grid, falls: &VoxelRemovals) -> Result<Vec<u8>, String> {
+    let removed_cells = || falls.iter().map(|(voxel, _)| grid.cell(voxel));
+    let (low, high) = removed_cells().fold(([u32::MAX; 3], [0; 3]), |(low, high): ([u32; 3], [u32; 3]), cell| {
         (std::array::from_fn(|a| low[a].min(cell[a])), std::array::from_fn(|a| high[a].max(cell[a])))
     });
-    // Nothing fell: one voxel says so.
+    // If no voxel was removed, the image has one voxel with NaN.
     let (low, high) = if low[0] == u32::MAX { ([0; 3], [0; 3]) } else { (low, high) };
     let dims = std::array::from_fn(|a| high[a] - low[a] + 1);
     let part = Grid { dims, spacing: grid.spacing, origin: grid.centre(low) };
@@ -52,11 +66,12 @@ pub fn removal_times(grid: &Grid, falls: &Falls) -> Result<Vec<u8>, String> {
         let cell = grid.cell(voxel);
         seconds[part.index(std::array::from_fn(|a| cell[a] - low[a]))] = fall.at.seconds() as f32;
     }
-    let geometry = Geometry::of(&part, Space::LeftPosteriorSuperior);
+    let geometry = Geometry::of(&part, CoordinateSystem::LeftPosteriorSuperior);
     let keys = vec![
         ("typodont_quantity".to_string(), "removal time".to_string()),
         ("typodont_unit".to_string(), "s".to_string()),
         ("typodont_never_removed".to_string(), "NaN".to_string()),
     ];
-    nrrd::bytes(&Image { geometry, samples: Samples::F32(seconds), keys }, Encoding::Gzip).map_err(|e| e.to_string())
+    nrrd::bytes(&VoxelImage { geometry, samples: Samples::F32(seconds), keys }, Encoding::Gzip)
+        .map_err(|e| e.to_string())
 }

@@ -1,20 +1,20 @@
 //! `session.json`: the result of a session as other programs read it. Its names are a contract.
 
-use crate::content::CoefficientName;
-use crate::device::Spec;
-use crate::record::{Recording, ServoFile, SpecFile, ended_by_name};
-use crate::scenario::{Limit, QuestionKind, Questionnaire};
-use crate::score::{Grade, SCORER_VERSION, Scored, SiteResult};
-use crate::session::{Answer, Given};
-use crate::tick::Tick;
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
+use typodont_core::device::DeviceSpec;
+use typodont_core::tick::Tick;
+use typodont_exercise::catalog::CoefficientName;
+use typodont_exercise::record::{DeviceSpecFile, Recording, ServoStatsFile, ended_by_name};
+use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire};
+use typodont_exercise::score::{Grade, SCORER_VERSION, Scored, SiteResult};
+use typodont_exercise::session::{AnswerRecord, AnswerValue};
 
 /// Version of this file's format.
 pub const VERSION: u32 = 1;
 
-pub type DeviceFile = SpecFile;
+pub type DeviceFile = DeviceSpecFile;
 
 /// A session's result. Sessions entered by hand may leave out all but the scenario and the metrics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,7 +36,7 @@ pub struct SessionFile {
     /// "complete", or why the session ended before its time.
     #[serde(default)]
     pub ended_because: String,
-    /// Who moved the hand, if it was a script.
+    /// Name of the scripted operator, if a script performed the session.
     #[serde(default)]
     pub operator: Option<String>,
     #[serde(default)]
@@ -45,12 +45,12 @@ pub struct SessionFile {
     #[serde(default)]
     pub tooth_fdi: Option<u8>,
     #[serde(default)]
-    pub stages: Vec<StageFile>,
+    pub stages: Vec<StageResultFile>,
     /// The periodontal chart; left out where none was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub chart: Vec<SiteFile>,
+    pub chart: Vec<SiteReadingFile>,
     pub metrics: BTreeMap<String, Option<f64>>,
-    /// Where and when some of the metrics arose.
+    /// Place and time at which some of the metrics arose.
     #[serde(default)]
     pub evidence: BTreeMap<String, EvidenceFile>,
     /// Absent without a rubric.
@@ -60,7 +60,7 @@ pub struct SessionFile {
     #[serde(default)]
     pub questionnaire: Option<QuestionnaireFile>,
     #[serde(default)]
-    pub servo: ServoFile,
+    pub servo: ServoStatsFile,
     /// SHA-256 of the templates that the page was made from.
     #[serde(default)]
     pub template_sha256: String,
@@ -79,39 +79,39 @@ pub struct ScenarioRef {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StageFile {
+pub struct StageResultFile {
     pub id: String,
     #[serde(default)]
     pub title: String,
     pub started_s: f64,
     pub ended_s: f64,
     pub ended_by: String,
-    /// The exercise led the trainee's hand; left out where it did not.
+    /// True if the exercise guided the trainee's device; left out where it did not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub guided: bool,
-    /// For how long another person's hand led the trainee's, s; left out where none did.
+    /// Time for which another person's device led the trainee's, s; left out if none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub led_s: Option<f64>,
-    /// What the trainee changed of how tissues feel, each as "tissue coefficient"; left out where nothing was.
+    /// Haptic coefficients that the trainee changed, each as "tissue coefficient"; left out if none was changed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub adjusted: Vec<String>,
-    pub answers: Vec<AnswerFile>,
+    pub answers: Vec<AnswerResultFile>,
 }
 
 /// One site of a periodontal chart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SiteFile {
+pub struct SiteReadingFile {
     /// MB, B, DB, ML, L or DL.
     pub site: String,
-    /// As read off the probe; null where it was not.
+    /// Probing depth as read by the trainee, mm; null if the site was not read.
     pub read_mm: Option<u8>,
     pub true_mm: f64,
-    /// How far the gum's margin has gone back below the neckline; negative where it covers enamel.
+    /// Recession of the gingival margin below the cementoenamel junction, mm; negative where the gingiva covers enamel.
     pub recession_mm: f64,
-    /// How hard the probe was pressed then.
+    /// Probing force at the reading, N.
     pub force_n: Option<f64>,
     pub at_s: Option<f64>,
-    /// Whether calculus was marked; null where it was not asked for.
+    /// True if the trainee marked calculus; null if it was not asked for.
     #[serde(default)]
     pub calculus_marked: Option<bool>,
     #[serde(default)]
@@ -119,19 +119,19 @@ pub struct SiteFile {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AnswerFile {
+pub struct AnswerResultFile {
     pub question: String,
     #[serde(default)]
     pub text: String,
     /// A text, a number or true/false.
     pub value: Json,
     pub at_s: f64,
-    /// Whether it was right; null where nothing is right or wrong.
+    /// True if the answer was correct; null if the question has no correct answer.
     pub right: Option<bool>,
-    /// The right answer, where there is one.
+    /// The correct answer; null if there is none.
     #[serde(default)]
     pub truth: Json,
-    /// Stiffness coefficient in force, where the stage has steps.
+    /// Stiffness coefficient at the time of the answer, if the stage lowers it in steps.
     #[serde(default)]
     pub level: Option<f64>,
 }
@@ -140,7 +140,8 @@ pub struct AnswerFile {
 pub struct EvidenceFile {
     /// When it arose, s.
     pub at_s: Option<f64>,
-    /// Where, in tooth space, mm: buccal, distal (mesial for 21–28 and 41–48), occlusal from the crown's middle at the neck.
+    /// Position in tooth space, mm from the centre of the crown at the neck: buccal, distal (mesial for 21–28 and
+    /// 41–48), occlusal.
     pub place_mm: [f64; 3],
 }
 
@@ -149,21 +150,21 @@ pub struct GradeFile {
     pub points: f64,
     pub max_points: f64,
     pub pass_points: f64,
-    /// False for a session that was given up or cut off: it cannot be passed.
+    /// False for a session that was abandoned or interrupted: such a session cannot be passed.
     #[serde(default = "yes")]
     pub finished: bool,
     pub passed: bool,
-    /// Titles of what failed the session outright.
+    /// Titles of the critical errors that occurred.
     pub hard_fails: Vec<String>,
     #[serde(default)]
-    pub items: Vec<ItemFile>,
-    /// Everything that could fail it, with its value.
+    pub items: Vec<ItemResultFile>,
+    /// Every critical error that was checked, with its value.
     #[serde(default)]
-    pub hard_fail_checks: Vec<HardFailFile>,
+    pub hard_fail_checks: Vec<CriticalErrorFile>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ItemFile {
+pub struct ItemResultFile {
     pub title: String,
     pub metric: String,
     pub value: Option<f64>,
@@ -174,7 +175,7 @@ pub struct ItemFile {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HardFailFile {
+pub struct CriticalErrorFile {
     pub title: String,
     pub metric: String,
     pub value: Option<f64>,
@@ -208,17 +209,17 @@ impl SessionFile {
     pub fn of(recording: &Recording, scored: &Scored) -> SessionFile {
         let head = &recording.head;
         let scenario = &recording.scenario;
-        let metrics = scored.measures.all.iter().map(|m| (m.metric.name(), m.value.map(tidy)));
+        let metrics = scored.measures.all.iter().map(|m| (m.metric.name(), m.value.map(round_to_nine_decimals)));
         let evidence = scored.measures.all.iter().filter_map(|m| {
             let evidence = m.evidence?;
-            let place_mm = evidence.place.to_array().map(|v| tidy(f64::from(v)));
+            let place_mm = evidence.place.to_array().map(|v| round_to_nine_decimals(f64::from(v)));
             Some((m.metric.name(), EvidenceFile { at_s: evidence.at.map(|t| t.seconds()), place_mm }))
         });
         let ended = match &recording.end {
             Some(end) => end.reason.clone(),
             None => "the recording breaks off".to_string(),
         };
-        let ticks = ServoFile { ticks: recording.len() as u64, ..ServoFile::default() };
+        let ticks = ServoStatsFile { ticks: recording.len() as u64, ..ServoStatsFile::default() };
         SessionFile {
             version: VERSION,
             typodont_version: head.typodont_version.clone(),
@@ -233,7 +234,7 @@ impl SessionFile {
             started: head.started.clone(),
             ended_because: ended,
             operator: head.operator.clone(),
-            device: Some(DeviceFile::from(&Spec::from(&head.device))),
+            device: Some(DeviceFile::from(&DeviceSpec::from(&head.device))),
             tooth_fdi: scenario.scene.teeth.first().map(|tooth| tooth.fdi),
             stages: stages(recording, scored),
             chart: scored.chart.iter().flatten().map(site).collect(),
@@ -248,7 +249,7 @@ impl SessionFile {
     }
 
     /// The file's text.
-    pub fn text(&self) -> String {
+    pub fn to_json(&self) -> String {
         // Numbers are finite and keys are texts: writing cannot fail.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
@@ -259,21 +260,21 @@ impl SessionFile {
     }
 }
 
-fn site(result: &SiteResult) -> SiteFile {
-    SiteFile {
+fn site(result: &SiteResult) -> SiteReadingFile {
+    SiteReadingFile {
         site: result.site.code().to_string(),
-        read_mm: result.reading.map(|r| r.read),
-        true_mm: hundredths(result.true_depth),
-        recession_mm: hundredths(result.recession),
-        force_n: result.reading.map(|r| hundredths(f64::from(r.force))),
+        read_mm: result.reading.map(|r| r.depth_mm),
+        true_mm: round_to_hundredths(result.true_depth),
+        recession_mm: round_to_hundredths(result.recession),
+        force_n: result.reading.map(|r| round_to_hundredths(f64::from(r.force))),
         at_s: result.reading.map(|r| r.at.seconds()),
         calculus_marked: result.calculus_marked,
         calculus: result.has_calculus,
     }
 }
 
-/// A length or a force as finely as anybody means it.
-fn hundredths(value: f64) -> f64 {
+/// Rounds a length or a force to hundredths.
+fn round_to_hundredths(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
 }
 
@@ -281,18 +282,21 @@ fn yes() -> bool {
     true
 }
 
-/// Nine decimals: below what any measure means, above what rounding leaves.
-fn tidy(value: f64) -> f64 {
+/// Rounds to nine decimals: finer than any measure is meaningful, coarser than rounding errors.
+fn round_to_nine_decimals(value: f64) -> f64 {
     let rounded = (value * 1e9).round() / 1e9;
     if rounded.is_finite() { rounded + 0.0 } else { value }
 }
 
-fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
+fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
     let results = recording.scenario.stages.iter().zip(&scored.replay.outcome.stages).zip(&scored.led_ticks);
-    let stage = |((stage, result), &led): ((&crate::scenario::Stage, &crate::session::StageResult), &u64)| {
+    let stage = |((stage, result), &led): (
+        (&typodont_exercise::scenario::Stage, &typodont_exercise::session::StageResult),
+        &u64,
+    )| {
         let answers = stage.ask.iter().zip(&result.answers).filter_map(|(question, given)| {
-            let Given { value, at, right, step } = given.as_ref()?;
-            Some(AnswerFile {
+            let AnswerRecord { value, at, correct: right, step } = given.as_ref()?;
+            Some(AnswerResultFile {
                 question: question.id.clone(),
                 text: question.text.clone(),
                 value: answer_value(value),
@@ -306,7 +310,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
             let tissue = recording.scenario.tissues.by_label(label)?;
             Some(format!("{} {}", tissue.name, CoefficientName::from(coefficient)))
         });
-        StageFile {
+        StageResultFile {
             id: stage.id.clone(),
             title: stage.title.clone(),
             started_s: result.started.seconds(),
@@ -321,12 +325,12 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageFile> {
     results.map(stage).collect()
 }
 
-fn answer_value(value: &Answer) -> Json {
+fn answer_value(value: &AnswerValue) -> Json {
     match value {
-        Answer::Word(word) => Json::from(word.as_str()),
-        Answer::Quadrant(quadrant) => Json::from(*quadrant),
-        Answer::YesNo(yes) => Json::from(*yes),
-        Answer::Number(number) => Json::from(*number),
+        AnswerValue::Word(word) => Json::from(word.as_str()),
+        AnswerValue::Quadrant(quadrant) => Json::from(*quadrant),
+        AnswerValue::YesNo(yes) => Json::from(*yes),
+        AnswerValue::Number(number) => Json::from(*number),
     }
 }
 
@@ -347,8 +351,8 @@ fn truth(kind: &QuestionKind, scored: &Scored) -> Json {
 
 fn grade(grade: &Grade) -> GradeFile {
     GradeFile {
-        points: tidy(grade.points),
-        max_points: tidy(grade.max_points),
+        points: round_to_nine_decimals(grade.points),
+        max_points: round_to_nine_decimals(grade.max_points),
         pass_points: grade.pass_points,
         finished: grade.finished,
         passed: grade.passed,
@@ -356,11 +360,11 @@ fn grade(grade: &Grade) -> GradeFile {
         items: grade
             .items
             .iter()
-            .map(|item| ItemFile {
+            .map(|item| ItemResultFile {
                 title: item.title.clone(),
                 metric: item.metric.clone(),
-                value: item.value.map(tidy),
-                points: tidy(item.points),
+                value: item.value.map(round_to_nine_decimals),
+                points: round_to_nine_decimals(item.points),
                 max_points: item.max_points,
                 full_at: item.full_at,
                 zero_at: item.zero_at,
@@ -375,7 +379,14 @@ fn grade(grade: &Grade) -> GradeFile {
                     Limit::Below(limit) => (None, Some(limit)),
                 };
                 let (title, metric) = (fail.title.clone(), fail.metric.clone());
-                HardFailFile { title, metric, value: fail.value.map(tidy), above, below, failed: fail.failed }
+                CriticalErrorFile {
+                    title,
+                    metric,
+                    value: fail.value.map(round_to_nine_decimals),
+                    above,
+                    below,
+                    failed: fail.failed,
+                }
             })
             .collect(),
     }
@@ -389,11 +400,12 @@ fn questionnaire(questionnaire: &Questionnaire, ratings: &[Option<u8>]) -> Quest
             id: item.id.clone(),
             category: category.id.clone(),
             value: rating.map(f64::from),
-            counted: rating.map(|r| f64::from(questionnaire.counted(item, r))),
+            counted: rating.map(|r| f64::from(questionnaire.scored_answer(item, r))),
         })
         .collect();
     let mean = |category: &str| mean(items.iter().filter(|i| i.category == category).filter_map(|i| i.counted));
-    let categories = questionnaire.categories.iter().map(|c| (c.id.clone(), mean(&c.id).map(tidy))).collect();
+    let categories =
+        questionnaire.categories.iter().map(|c| (c.id.clone(), mean(&c.id).map(round_to_nine_decimals))).collect();
     QuestionnaireFile { id: questionnaire.id.clone(), items, categories }
 }
 

@@ -1,27 +1,28 @@
 //! The page of one session.
 //!
-//! Takes what was scored, the pictures and the voxels. Gives one file that opens from a disk, without a network: what it shows
-//! follows from the recording and the templates alone.
+//! Takes the scored recording, the pictures and the voxels. Gives one HTML file that opens from a disk without a
+//! network; its contents follow from the recording and the templates alone.
 
 use super::SessionFile;
-use super::curves::{self, Mark};
-use super::feedback::{self, Feedback, Finding, Moment};
-use super::html::Templates;
-use super::language::{Languages, Said};
-use super::pictures::{Picture, Shows};
-use super::said;
-use super::voxels::{self, About};
-use super::words;
-use crate::record::Recording;
-use crate::scenario::{Metric, Rubric, Scenario};
-use crate::score::{self, Scored, Verdict};
+use super::curves::{self, EventFlag};
+use super::display_format;
+use super::feedback::{self, Feedback, FeedbackFinding, FeedbackMoment};
+use super::language::{Languages, Message};
+use super::phrases;
+use super::pictures::{EncodedPicture, ViewKind};
+use super::templates::Templates;
+use super::voxels::{self, VoxelHeader};
 use base64::Engine;
 use minijinja::value::Value;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use typodont_exercise::record::Recording;
+use typodont_exercise::scenario::{Metric, Rubric, Scenario};
+use typodont_exercise::score;
+use typodont_exercise::score::{Scored, Verdict};
 
-/// What the template of a session's page can use.
+/// Values for the template of a session's page.
 #[derive(Serialize)]
 struct SessionPage<'a> {
     session: &'a SessionFile,
@@ -31,68 +32,68 @@ struct SessionPage<'a> {
     points: Option<String>,
     max_points: Option<String>,
     pass_points: Option<String>,
-    items: Vec<ItemLine>,
-    fails: Vec<FailLine>,
-    legend: Vec<LegendEntry>,
-    maps: Vec<Figure>,
-    slices: Vec<Figure>,
-    plain: Vec<Figure>,
+    items: Vec<ReportItem>,
+    fails: Vec<ReportCriticalError>,
+    legend: Vec<ReportLegendEntry>,
+    maps: Vec<ReportFigure>,
+    slices: Vec<ReportFigure>,
+    plain: Vec<ReportFigure>,
     curves: Value,
-    /// A flag on the curves stands for each moment that cost points.
+    /// True if the curves have a flag for at least one moment that cost points.
     has_flags: bool,
-    /// Key of what is said of the maps.
+    /// Language key of the text about the maps.
     maps_about: &'static str,
     is_filling: bool,
-    stages: Vec<StageLine>,
-    /// The periodontal chart, cheek's side and tongue's.
-    chart: Vec<SiteLine>,
-    measures: Vec<MeasureLine>,
-    questionnaire: Option<QuestionnaireLines>,
-    feedback: FeedbackLines,
-    languages: Vec<LanguageLine>,
-    /// How the page looks, and what it does: they go into it as they are.
+    stages: Vec<ReportStage>,
+    /// The periodontal chart, buccal and lingual sites.
+    chart: Vec<ReportSite>,
+    measures: Vec<ReportMeasure>,
+    questionnaire: Option<ReportQuestionnaire>,
+    feedback: ReportFeedback,
+    languages: Vec<ReportLanguage>,
+    /// Style sheet, script and shader, which are inserted unescaped.
     style: Value,
     script: Value,
     shader: Value,
-    /// What may run in the page: our script and nothing else.
+    /// Content security policy: only the page's own script may run.
     policy: Value,
-    /// What the script works with, as JSON; and the packed voxels, empty where there is no matter.
+    /// Data of the script, as JSON; and the packed voxels, empty if there is no matter.
     data: Value,
     voxels: Value,
 }
 
 #[derive(Serialize)]
-struct LanguageLine {
+struct ReportLanguage {
     code: String,
     name: String,
 }
 
 #[derive(Serialize)]
-struct FeedbackLines {
-    findings: Vec<FindingLine>,
+struct ReportFeedback {
+    findings: Vec<ReportFinding>,
     kept: Vec<String>,
 }
 
 #[derive(Serialize)]
-struct FindingLine {
+struct ReportFinding {
     title: String,
     metric: String,
-    /// Points lost; none for what fails outright.
+    /// Points lost; `None` for a critical error.
     lost: Option<String>,
-    sentences: Vec<SentenceLine>,
+    sentences: Vec<ReportSentence>,
     advice: Option<Value>,
 }
 
 #[derive(Serialize)]
-struct SentenceLine {
+struct ReportSentence {
     text: Value,
-    /// The number of the moment it speaks of.
+    /// Number of the moment to which the sentence refers.
     mark: Option<usize>,
 }
 
-/// Where and when something arose, for a button that shows it.
+/// Place and time of an event, for a button that shows it.
 #[derive(Serialize)]
-struct Spot {
+struct ReportPlace {
     at: Option<f64>,
     x: f64,
     y: f64,
@@ -100,12 +101,12 @@ struct Spot {
 }
 
 #[derive(Serialize)]
-struct ItemLine {
+struct ReportItem {
     title: String,
     formula: Value,
     value: Value,
     r#where: Value,
-    spot: Option<Spot>,
+    spot: Option<ReportPlace>,
     full_at: Value,
     zero_at: Value,
     points: String,
@@ -114,7 +115,7 @@ struct ItemLine {
 }
 
 #[derive(Serialize)]
-struct FailLine {
+struct ReportCriticalError {
     title: String,
     formula: Value,
     limit: Value,
@@ -123,17 +124,17 @@ struct FailLine {
 }
 
 #[derive(Serialize)]
-struct MeasureLine {
+struct ReportMeasure {
     name: String,
     title: Value,
     formula: Value,
     value: Value,
     r#where: Value,
-    spot: Option<Spot>,
+    spot: Option<ReportPlace>,
 }
 
 #[derive(Serialize)]
-struct LegendEntry {
+struct ReportLegendEntry {
     title: Value,
     color: String,
     ink: &'static str,
@@ -142,8 +143,8 @@ struct LegendEntry {
 }
 
 #[derive(Serialize)]
-struct Figure {
-    /// Names the picture within the page.
+struct ReportFigure {
+    /// Identifier of the picture within the page.
     id: String,
     title: Value,
     alt: String,
@@ -151,38 +152,38 @@ struct Figure {
 }
 
 #[derive(Serialize)]
-struct StageLine {
+struct ReportStage {
     title: String,
     began: String,
     took: String,
     ended_by: Value,
-    /// The exercise led the trainee's hand.
+    /// True if the exercise guided the trainee's device.
     guided: bool,
-    /// For how long another person's hand did.
+    /// Time for which another person's device led the trainee's.
     led: Option<String>,
-    /// What the trainee changed of how tissues feel, where anything was.
+    /// Haptic coefficients that the trainee changed, if any.
     adjusted: Option<String>,
     asked: bool,
-    answers: Vec<AnswerLine>,
+    answers: Vec<ReportAnswer>,
 }
 
 #[derive(Serialize)]
-struct SiteLine {
+struct ReportSite {
     site: String,
     title: Value,
     read: String,
     truth: String,
     difference: String,
-    /// Within a millimetre.
+    /// True if the reading is within a millimetre of the true depth.
     is_right: bool,
     force: String,
-    /// What was said of calculus, and whether that is so; none where it was not asked for.
+    /// Answer on calculus and whether it is correct; `None` if it was not asked for.
     calculus: Option<Value>,
     is_calculus_right: bool,
 }
 
 #[derive(Serialize)]
-struct AnswerLine {
+struct ReportAnswer {
     text: String,
     value: Value,
     judgement: Option<Value>,
@@ -190,38 +191,45 @@ struct AnswerLine {
     level: Option<f64>,
 }
 
-/// The page of one session.
+/// Renders the page of one session.
+///
+/// # Errors
+///
+/// When the template fails.
 pub fn render(
     templates: &Templates,
     recording: &Recording,
     scored: &Scored,
     session: &SessionFile,
-    pictures: &[Picture],
+    pictures: &[EncodedPicture],
 ) -> Result<String, String> {
-    let in_all = Speaker { languages: templates.languages(), session };
+    let localizer = ReportLocalizer { languages: templates.languages(), session };
     let grade = session.grade.as_ref();
-    let figures =
-        |shows: fn(&Shows) -> bool| pictures.iter().filter(|p| shows(&p.shows)).map(|p| in_all.figure(p)).collect();
-    let lapses = score::lapses(recording, scored);
-    let feedback = feedback::of(session, &lapses, templates.rules(), &recording.scenario.tissues);
+    let figures_of = |shows: fn(&ViewKind) -> bool| {
+        pictures.iter().filter(|p| shows(&p.kind)).map(|p| localizer.figure(p)).collect()
+    };
+    let lapses = score::error_episodes(recording, scored);
+    let feedback = feedback::build(session, &lapses, templates.rules(), &recording.scenario.tissues);
     let script = templates.script();
-    let packed = voxels::pack(scored);
-    let data = data(templates, recording, scored, session, &feedback, packed.as_ref().map(|v| &v.about));
+    let packed_voxels = voxels::pack(scored);
+    let data = script_data(templates, recording, scored, session, &feedback, packed_voxels.as_ref().map(|v| &v.header));
     let page = SessionPage {
         session,
         summary: &recording.scenario.summary,
         started: session.started.replace('T', " ").replace('Z', " UTC"),
-        length: words::duration(session.servo.ticks as f64 * crate::tick::TICK_S),
-        points: grade.map(|g| words::number(g.points)),
-        max_points: grade.map(|g| words::plain(g.max_points)),
-        pass_points: grade.map(|g| words::plain(g.pass_points)),
-        items: grade.map(|g| g.items.iter().map(|i| in_all.item(i)).collect()).unwrap_or_default(),
-        fails: grade.map(|g| g.hard_fail_checks.iter().map(|f| in_all.fail(f)).collect()).unwrap_or_default(),
-        legend: in_all.legend(scored),
-        maps: figures(|s| *s == Shows::Map),
-        slices: figures(|s| *s == Shows::MapSlice),
-        plain: figures(|s| !matches!(s, Shows::Map | Shows::MapSlice)),
-        curves: Value::from_safe_string(drawn(scored, session, &feedback, templates.languages())),
+        length: display_format::duration(session.servo.ticks as f64 * typodont_core::tick::TICK_S),
+        points: grade.map(|g| display_format::number(g.points)),
+        max_points: grade.map(|g| display_format::plain_number(g.max_points)),
+        pass_points: grade.map(|g| display_format::plain_number(g.pass_points)),
+        items: grade.map(|g| g.items.iter().map(|i| localizer.item(i)).collect()).unwrap_or_default(),
+        fails: grade
+            .map(|g| g.hard_fail_checks.iter().map(|f| localizer.critical_error(f)).collect())
+            .unwrap_or_default(),
+        legend: localizer.legend(scored),
+        maps: figures_of(|s| *s == ViewKind::Map),
+        slices: figures_of(|s| *s == ViewKind::MapSlice),
+        plain: figures_of(|s| !matches!(s, ViewKind::Map | ViewKind::MapSlice)),
+        curves: Value::from_safe_string(time_plot(scored, session, &feedback, templates.languages())),
         has_flags: feedback.moments.iter().any(|moment| moment.at.is_some()),
         maps_about: match (&scored.restoration, recording.scenario.stages.iter().any(|stage| stage.cutting)) {
             (Some(_), _) => "maps.filling",
@@ -229,25 +237,25 @@ pub fn render(
             (None, false) => "maps.whole",
         },
         is_filling: scored.restoration.is_some(),
-        stages: in_all.stages(recording),
-        chart: session.chart.iter().map(|site| in_all.site(site)).collect(),
-        measures: in_all.measures(&recording.scenario, scored),
-        questionnaire: questionnaire_lines(recording, session),
-        feedback: in_all.feedback(&feedback),
+        stages: localizer.stages(recording),
+        chart: session.chart.iter().map(|site| localizer.site(site)).collect(),
+        measures: localizer.measures(&recording.scenario, scored),
+        questionnaire: questionnaire(recording, session),
+        feedback: localizer.feedback(&feedback),
         languages: languages(templates),
-        style: Value::from_safe_string(templates.part("report.css").into()),
-        policy: Value::from_safe_string(policy(&script)),
+        style: Value::from_safe_string(templates.session_file("report.css").into()),
+        policy: Value::from_safe_string(content_security_policy(&script)),
         script: Value::from_safe_string(script),
-        shader: Value::from_safe_string(templates.part("solid.glsl").into()),
+        shader: Value::from_safe_string(templates.session_file("solid.glsl").into()),
         data: Value::from_safe_string(data),
-        voxels: Value::from_safe_string(packed.map(|v| v.packed).unwrap_or_default()),
+        voxels: Value::from_safe_string(packed_voxels.map(|v| v.packed).unwrap_or_default()),
     };
     templates.render_session(&page)
 }
 
-/// What a browser lets the page do: show its own pictures, look as it says and run its own script, by digest; nothing from
-/// a network, and no script that stands in what a person wrote.
-fn policy(script: &str) -> String {
+/// Content security policy of the page: its own pictures, styles and (by digest) its own script are allowed; nothing
+/// from a network, and no script within a text that a person wrote.
+fn content_security_policy(script: &str) -> String {
     let digest = base64::engine::general_purpose::STANDARD.encode(Sha256::digest(script));
     format!(
         "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; \
@@ -255,218 +263,222 @@ fn policy(script: &str) -> String {
     )
 }
 
-fn languages(templates: &Templates) -> Vec<LanguageLine> {
-    let line = |(code, name): (&str, &str)| LanguageLine { code: code.into(), name: name.into() };
+fn languages(templates: &Templates) -> Vec<ReportLanguage> {
+    let line = |(code, name): (&str, &str)| ReportLanguage { code: code.into(), name: name.into() };
     templates.languages().names().into_iter().map(line).collect()
 }
 
-fn drawn(scored: &Scored, session: &SessionFile, feedback: &Feedback, languages: &Languages) -> String {
-    let spans: Vec<curves::Span> =
-        session.stages.iter().map(|s| curves::Span { title: &s.title, from: s.started_s, to: s.ended_s }).collect();
-    let mark = |m: &Moment| Some(Mark { number: m.number, at: m.at?, span: m.span });
-    let marks: Vec<Mark> = feedback.moments.iter().filter_map(mark).collect();
+fn time_plot(scored: &Scored, session: &SessionFile, feedback: &Feedback, languages: &Languages) -> String {
+    let spans: Vec<curves::StageSpan> = session
+        .stages
+        .iter()
+        .map(|s| curves::StageSpan { title: &s.title, from: s.started_s, to: s.ended_s })
+        .collect();
+    let flag_of = |m: &FeedbackMoment| Some(EventFlag { number: m.number, at: m.at?, span: m.span });
+    let flags: Vec<EventFlag> = feedback.moments.iter().filter_map(flag_of).collect();
     let has_decay = !scored.replay.workpiece.lesions.is_empty();
-    curves::svg(&scored.trace, has_decay, &spans, &marks, languages)
+    curves::svg(&scored.trace, has_decay, &spans, &flags, languages)
 }
 
-/// What the page's script works with.
+/// Data of the page's script.
 #[derive(Serialize)]
-struct PageData<'a> {
-    /// Length of the session.
+struct ScriptData<'a> {
+    /// Length of the session, s.
     seconds: f64,
-    voxels: Option<&'a About>,
-    tissues: Vec<Named>,
-    verdicts: Vec<Named>,
+    voxels: Option<&'a VoxelHeader>,
+    tissues: Vec<LabelRow>,
+    verdicts: Vec<LabelRow>,
     tools: Vec<&'a str>,
-    moments: Vec<MomentData>,
+    moments: Vec<ScriptMoment>,
     /// Texts of the script by language and key.
     words: BTreeMap<&'a str, BTreeMap<&'a str, &'a str>>,
 }
 
 /// A tissue or a verdict by its number in label maps.
 #[derive(Serialize)]
-struct Named {
+struct LabelRow {
     id: u8,
     /// By language.
     title: BTreeMap<String, String>,
     /// Red, green, blue in 0–1.
     color: [f32; 3],
     sign: &'static str,
-    /// Decay: what is to be removed while it is there.
+    /// True for decay, which is to be removed.
     decay: bool,
 }
 
 #[derive(Serialize)]
-struct MomentData {
+struct ScriptMoment {
     number: usize,
     at: Option<f64>,
     place: [f64; 3],
 }
 
 /// The script's data as JSON that can stand in a page: nothing in it ends the element.
-fn data(
+fn script_data(
     templates: &Templates,
     recording: &Recording,
     scored: &Scored,
     session: &SessionFile,
     feedback: &Feedback,
-    voxels: Option<&About>,
+    voxels: Option<&VoxelHeader>,
 ) -> String {
     let languages = templates.languages();
-    let tissue = |t: &crate::content::TissueEntry| Named {
+    let tissue = |t: &typodont_exercise::catalog::TissueEntry| LabelRow {
         id: t.id,
-        title: languages.each(&Said::word(format!("tissues.{}", t.name), &t.title)),
+        title: languages.in_each_language(&Message::text_or(format!("tissues.{}", t.name), &t.title)),
         color: t.rgb(),
         sign: "",
-        decay: t.role == crate::content::Role::Decay,
+        decay: t.role == typodont_exercise::catalog::TissueRole::Decay,
     };
-    let verdict = |v: &Verdict| Named {
+    let verdict = |v: &Verdict| LabelRow {
         id: *v as u8,
-        title: languages.each(&Said::word(format!("verdict.{}", v.id()), v.title())),
+        title: languages.in_each_language(&Message::text_or(format!("verdict.{}", v.id()), v.title())),
         color: v.color(),
         sign: v.sign(),
         decay: false,
     };
-    let moment = |m: &Moment| MomentData { number: m.number, at: m.at, place: m.place };
-    let data = PageData {
-        seconds: session.servo.ticks as f64 * crate::tick::TICK_S,
+    let moment = |m: &FeedbackMoment| ScriptMoment { number: m.number, at: m.at, place: m.place };
+    let data = ScriptData {
+        seconds: session.servo.ticks as f64 * typodont_core::tick::TICK_S,
         voxels,
         tissues: recording.scenario.tissues.entries().iter().map(tissue).collect(),
-        verdicts: seen(scored).map(verdict).collect(),
+        verdicts: shown_verdicts(scored).map(verdict).collect(),
         tools: recording.scenario.instruments.iter().map(|i| i.title.as_str()).collect(),
         moments: feedback.moments.iter().map(moment).collect(),
-        words: languages.beginning("script."),
+        words: languages.with_prefix("script."),
     };
     // Numbers are finite and keys are texts: writing cannot fail.
     serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c")
 }
 
 /// The verdicts that a session's maps may show.
-fn seen(scored: &Scored) -> impl Iterator<Item = &'static Verdict> + use<> {
+fn shown_verdicts(scored: &Scored) -> impl Iterator<Item = &'static Verdict> + use<> {
     let of_fillings: &[Verdict] = if scored.restoration.is_some() { &Verdict::OF_FILLINGS } else { &[] };
-    Verdict::SEEN.iter().chain(of_fillings)
+    Verdict::VISIBLE.iter().chain(of_fillings)
 }
 
-/// Says in all languages what a session's numbers mean.
-struct Speaker<'a> {
+/// Turns a session's results into texts in all languages.
+struct ReportLocalizer<'a> {
     languages: &'a Languages,
     session: &'a SessionFile,
 }
 
-impl Speaker<'_> {
-    fn html(&self, said: &Said) -> Value {
-        self.languages.html(said)
+impl ReportLocalizer<'_> {
+    fn html(&self, message: &Message) -> Value {
+        self.languages.html(message)
     }
 
-    fn word(&self, key: impl Into<String>, otherwise: &str) -> Value {
-        self.html(&Said::word(key, otherwise))
+    fn word(&self, key: impl Into<String>, fallback: &str) -> Value {
+        self.html(&Message::text_or(key, fallback))
     }
 
-    fn figure(&self, picture: &Picture) -> Figure {
+    fn figure(&self, picture: &EncodedPicture) -> ReportFigure {
         let data = base64::engine::general_purpose::STANDARD.encode(&picture.png);
         let (when, what) = picture.name.split_once('-').unwrap_or(("", &picture.name));
-        let what = Said::text(format!("side.{what}"), &[]);
-        Figure {
+        let what = Message::text(format!("side.{what}"), &[]);
+        ReportFigure {
             id: picture.name.clone(),
-            title: self.html(&Said::text(format!("picture.{when}"), &[("what", what)])),
+            title: self.html(&Message::text(format!("picture.{when}"), &[("what", what)])),
             alt: picture.title.clone(),
             data: format!("data:image/png;base64,{data}"),
         }
     }
 
     fn value(&self, metric: &str, value: Option<f64>) -> Value {
-        self.html(&said::value(metric, value))
+        self.html(&phrases::value(metric, value))
     }
 
     fn formula(&self, metric: &str) -> Value {
-        self.html(&said::formula(metric))
+        self.html(&phrases::formula(metric))
     }
 
-    /// Where and when a measure arose, in words.
+    /// Place and time at which a measure arose, in words.
     fn place(&self, metric: &str) -> Value {
         let tooth = self.session.tooth_fdi;
-        self.session.evidence.get(metric).map_or(Value::from(""), |e| self.html(&said::place(e, tooth)))
+        self.session.evidence.get(metric).map_or(Value::from(""), |e| self.html(&phrases::place(e, tooth)))
     }
 
-    fn spot(&self, metric: &str) -> Option<Spot> {
+    fn evidence_place(&self, metric: &str) -> Option<ReportPlace> {
         let evidence = self.session.evidence.get(metric)?;
         let [x, y, z] = evidence.place_mm;
-        Some(Spot { at: evidence.at_s, x, y, z })
+        Some(ReportPlace { at: evidence.at_s, x, y, z })
     }
 
-    fn item(&self, item: &super::ItemFile) -> ItemLine {
+    fn item(&self, item: &super::ItemResultFile) -> ReportItem {
         let value = |v: f64| self.value(&item.metric, Some(v));
-        ItemLine {
+        ReportItem {
             title: item.title.clone(),
             formula: self.formula(&item.metric),
             value: self.value(&item.metric, item.value),
             r#where: self.place(&item.metric),
-            spot: self.spot(&item.metric),
+            spot: self.evidence_place(&item.metric),
             full_at: value(item.full_at),
             zero_at: value(item.zero_at),
-            points: words::number(item.points),
-            max_points: words::plain(item.max_points),
+            points: display_format::number(item.points),
+            max_points: display_format::plain_number(item.max_points),
             percent: (100.0 * item.points / item.max_points).round().clamp(0.0, 100.0) as u32,
         }
     }
 
-    fn fail(&self, fail: &super::HardFailFile) -> FailLine {
-        FailLine {
+    fn critical_error(&self, fail: &super::CriticalErrorFile) -> ReportCriticalError {
+        ReportCriticalError {
             title: fail.title.clone(),
             formula: self.formula(&fail.metric),
-            limit: self.html(&said::limit(fail)),
+            limit: self.html(&phrases::limit(fail)),
             value: self.value(&fail.metric, fail.value),
             failed: fail.failed,
         }
     }
 
-    /// Those that say something, and whatever the rubric asks for.
-    fn measures(&self, scenario: &Scenario, scored: &Scored) -> Vec<MeasureLine> {
+    /// Measures that apply to the session, and all measures of the rubric.
+    fn measures(&self, scenario: &Scenario, scored: &Scored) -> Vec<ReportMeasure> {
         let has_target = scenario.has_target();
-        let asked: Vec<&Metric> = scenario.rubric.iter().flat_map(Rubric::metrics).collect();
-        let is_told = |m: &&score::Measure| has_target || !m.metric.about.is_of_target() || asked.contains(&&m.metric);
+        let rubric_metrics: Vec<&Metric> = scenario.rubric.iter().flat_map(Rubric::metrics).collect();
+        let is_shown =
+            |m: &&score::Measure| has_target || !m.metric.info.is_of_target() || rubric_metrics.contains(&&m.metric);
         let line = |m: &score::Measure| {
             let name = m.metric.name();
-            MeasureLine {
-                title: self.html(&said::measure(&m.metric)),
+            ReportMeasure {
+                title: self.html(&phrases::measure(&m.metric)),
                 formula: self.formula(&name),
                 value: self.value(&name, m.value),
                 r#where: self.place(&name),
-                spot: self.spot(&name),
+                spot: self.evidence_place(&name),
                 name,
             }
         };
-        scored.measures.all.iter().filter(is_told).map(line).collect()
+        scored.measures.all.iter().filter(is_shown).map(line).collect()
     }
 
     /// The signs are a second cue beside the colours.
-    fn legend(&self, scored: &Scored) -> Vec<LegendEntry> {
+    fn legend(&self, scored: &Scored) -> Vec<ReportLegendEntry> {
         let voxel = scored.replay.workpiece.volume.grid().voxel_mm3();
         let entry = |verdict: &Verdict| {
             let count = scored.verdicts.iter().filter(|v| *v == verdict).count();
             let [r, g, b] = verdict.color();
             let is_dark = 0.3 * r + 0.59 * g + 0.11 * b < 0.5;
             let [r, g, b] = [r, g, b].map(|c| (c * 255.0).round() as u8);
-            LegendEntry {
+            ReportLegendEntry {
                 title: self.word(format!("verdict.{}", verdict.id()), verdict.title()),
                 color: format!("#{r:02x}{g:02x}{b:02x}"),
                 ink: if is_dark { "#fff" } else { "#000" },
                 sign: verdict.sign(),
-                amount: format!("{} mm³", words::number(count as f64 * voxel)),
+                amount: format!("{} mm³", display_format::number(count as f64 * voxel)),
             }
         };
-        seen(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
+        shown_verdicts(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
     }
 
-    fn stages(&self, recording: &Recording) -> Vec<StageLine> {
+    fn stages(&self, recording: &Recording) -> Vec<ReportStage> {
         let stages = self.session.stages.iter().zip(&recording.scenario.stages);
-        let line = |(result, stage): (&super::StageFile, &crate::scenario::Stage)| StageLine {
+        let line = |(result, stage): (&super::StageResultFile, &typodont_exercise::scenario::Stage)| ReportStage {
             title: result.title.clone(),
-            began: words::duration(result.started_s),
-            took: words::duration(result.ended_s - result.started_s),
-            ended_by: self.html(&said::ended_by(&result.ended_by)),
+            began: display_format::duration(result.started_s),
+            took: display_format::duration(result.ended_s - result.started_s),
+            ended_by: self.html(&phrases::ended_by(&result.ended_by)),
             guided: result.guided,
-            led: result.led_s.map(words::duration),
+            led: result.led_s.map(display_format::duration),
             adjusted: (!result.adjusted.is_empty()).then(|| result.adjusted.join(", ")),
             asked: !stage.ask.is_empty(),
             answers: result.answers.iter().map(|a| self.answer(a, result.started_s)).collect(),
@@ -474,8 +486,8 @@ impl Speaker<'_> {
         stages.map(line).collect()
     }
 
-    fn site(&self, site: &super::SiteFile) -> SiteLine {
-        let off = site.read_mm.map(|read| f64::from(read) - site.true_mm);
+    fn site(&self, site: &super::SiteReadingFile) -> ReportSite {
+        let deviation = site.read_mm.map(|read| f64::from(read) - site.true_mm);
         let none = || "–".to_string();
         let calculus = site.calculus_marked.map(|marked| {
             let key = match (marked, site.calculus) {
@@ -484,88 +496,88 @@ impl Speaker<'_> {
                 (false, true) => "chart.missed",
                 (false, false) => "chart.none",
             };
-            self.html(&Said::text(key, &[]))
+            self.html(&Message::text(key, &[]))
         });
-        SiteLine {
-            title: self.html(&Said::text(format!("chart.site_{}", site.site.to_lowercase()), &[])),
+        ReportSite {
+            title: self.html(&Message::text(format!("chart.site_{}", site.site.to_lowercase()), &[])),
             site: site.site.clone(),
             read: site.read_mm.map_or_else(none, |mm| mm.to_string()),
             truth: format!("{:.1}", site.true_mm),
-            difference: off.map_or_else(none, |mm| format!("{mm:+.1}")),
-            is_right: off.is_some_and(|mm| mm.abs() <= 1.0),
+            difference: deviation.map_or_else(none, |mm| format!("{mm:+.1}")),
+            is_right: deviation.is_some_and(|mm| mm.abs() <= 1.0),
             force: site.force_n.map_or_else(none, |force| format!("{force:.2}")),
             is_calculus_right: site.calculus_marked == Some(site.calculus),
             calculus,
         }
     }
 
-    fn answer(&self, answer: &super::AnswerFile, stage_started: f64) -> AnswerLine {
-        AnswerLine {
+    fn answer(&self, answer: &super::AnswerResultFile, stage_started: f64) -> ReportAnswer {
+        ReportAnswer {
             text: answer.text.clone(),
-            value: self.html(&said::answer(&answer.value)),
-            judgement: said::judgement(answer).map(|said| self.html(&said)),
-            after: words::duration(answer.at_s - stage_started),
+            value: self.html(&phrases::answer(&answer.value)),
+            judgement: phrases::correctness(answer).map(|said| self.html(&said)),
+            after: display_format::duration(answer.at_s - stage_started),
             level: answer.level,
         }
     }
 
-    fn feedback(&self, feedback: &Feedback) -> FeedbackLines {
-        let sentence = |s: &feedback::Sentence| SentenceLine { text: self.html(&s.said), mark: s.moment };
-        let line = |finding: &Finding| FindingLine {
+    fn feedback(&self, feedback: &Feedback) -> ReportFeedback {
+        let sentence = |s: &feedback::FeedbackSentence| ReportSentence { text: self.html(&s.message), mark: s.moment };
+        let line = |finding: &FeedbackFinding| ReportFinding {
             title: finding.title.clone(),
             metric: finding.metric.clone(),
             lost: finding.lost.map(|points| format!("{points:.1}")),
             sentences: finding.sentences.iter().map(sentence).collect(),
             advice: finding.advice.as_ref().map(|said| self.html(said)),
         };
-        FeedbackLines { findings: feedback.findings.iter().map(line).collect(), kept: feedback.kept.clone() }
+        ReportFeedback { findings: feedback.findings.iter().map(line).collect(), kept: feedback.full_marks.clone() }
     }
 }
 
 #[derive(Serialize)]
-struct QuestionnaireLines {
+struct ReportQuestionnaire {
     title: String,
     lowest: String,
     highest: String,
     steps: u8,
-    categories: Vec<CategoryLines>,
+    categories: Vec<ReportCategory>,
 }
 
 #[derive(Serialize)]
-struct CategoryLines {
+struct ReportCategory {
     title: String,
     mean: String,
     /// Not "items": in a template that is a mapping's own method.
-    entries: Vec<RatingLine>,
+    entries: Vec<ReportRating>,
 }
 
 #[derive(Serialize)]
-struct RatingLine {
+struct ReportRating {
     text: String,
     value: String,
     counted: String,
 }
 
-fn questionnaire_lines(recording: &Recording, session: &SessionFile) -> Option<QuestionnaireLines> {
-    let (asked, given) = (recording.scenario.questionnaire.as_ref()?, session.questionnaire.as_ref()?);
-    let shown = |v: Option<f64>| v.map_or("–".to_string(), words::plain);
-    let categories = asked.categories.iter().map(|category| {
+fn questionnaire(recording: &Recording, session: &SessionFile) -> Option<ReportQuestionnaire> {
+    let (definition, answers) = (recording.scenario.questionnaire.as_ref()?, session.questionnaire.as_ref()?);
+    let shown = |v: Option<f64>| v.map_or("–".to_string(), display_format::plain_number);
+    let categories = definition.categories.iter().map(|category| {
         let items = category.items.iter().filter_map(|item| {
-            let rating = given.items.iter().find(|r| r.id == item.id)?;
-            Some(RatingLine { text: item.text.clone(), value: shown(rating.value), counted: shown(rating.counted) })
+            let rating = answers.items.iter().find(|r| r.id == item.id)?;
+            Some(ReportRating { text: item.text.clone(), value: shown(rating.value), counted: shown(rating.counted) })
         });
-        let mean = given.categories.get(&category.id).copied().flatten();
-        CategoryLines {
+        let mean = answers.categories.get(&category.id).copied().flatten();
+        ReportCategory {
             title: category.title.clone(),
             mean: mean.map_or("–".to_string(), |m| format!("{m:.2}")),
             entries: items.collect(),
         }
     });
-    Some(QuestionnaireLines {
-        title: asked.title.clone(),
-        lowest: asked.lowest.clone(),
-        highest: asked.highest.clone(),
-        steps: asked.steps,
+    Some(ReportQuestionnaire {
+        title: definition.title.clone(),
+        lowest: definition.lowest.clone(),
+        highest: definition.highest.clone(),
+        steps: definition.steps,
         categories: categories.collect(),
     })
 }
@@ -573,7 +585,7 @@ fn questionnaire_lines(recording: &Recording, session: &SessionFile) -> Option<Q
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::language::{escaped, names_in};
+    use crate::language::{escape_html, placeholders};
     use std::collections::BTreeSet;
     use std::sync::Arc;
 
@@ -586,7 +598,7 @@ mod tests {
     fn what_a_person_wrote_never_becomes_markup() {
         // Aim: a code, a title or a note does no harm, however hostile, long or foreign. Method: write it everywhere a person
         // can, and look for elements that the page without it does not have.
-        let (recording, scored) = crate::report::example();
+        let (recording, scored) = crate::example();
         let elements = |page: &str| page.matches("<script").count() + page.matches("</script").count();
         let plain = page_of(&recording, &scored);
         let long = "x".repeat(10_000);
@@ -610,13 +622,13 @@ mod tests {
             let page = page_of(&recording, &scored);
             assert_eq!(elements(&page), elements(&plain), "{hostile}");
             assert!(!page.contains("<img src=x") && !page.contains("<script>alert"), "{hostile}");
-            assert!(page.contains(&format!("<bdi>{}</bdi>", escaped(hostile).replace('/', "&#x2f;"))), "{hostile}");
+            assert!(page.contains(&format!("<bdi>{}</bdi>", escape_html(hostile).replace('/', "&#x2f;"))), "{hostile}");
         }
     }
 
     #[test]
     fn a_page_asks_nothing_of_a_network() {
-        let (recording, scored) = crate::report::example();
+        let (recording, scored) = crate::example();
         let page = page_of(&recording, &scored);
         assert!(page.contains("default-src 'none'"));
         for outside in ["src=\"http", "href=\"http", "url(http", "@import", "fetch(", "XMLHttpRequest"] {
@@ -627,32 +639,50 @@ mod tests {
     #[test]
     fn every_language_has_every_text_of_the_page() {
         // Aim: no reader meets a bare key or half a sentence. Method: the shipped languages beside each other, and every key
-        // that the page and its script ask for.
+        // that the page and its script, the cohort's page and the gradebook ask for.
         let templates = Templates::shipped();
         let texts = |code: &str| -> BTreeMap<String, String> {
-            let path = format!("{}/reports/templates/languages/{code}.json", env!("CARGO_MANIFEST_DIR"));
+            let path = format!("{}/../../reports/templates/languages/{code}.json", env!("CARGO_MANIFEST_DIR"));
             serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
         };
         let (english, turkish) = (texts("en"), texts("tr"));
         for (key, text) in &english {
             let other = turkish.get(key).unwrap_or_else(|| panic!("tr.json lacks {key}"));
-            let names = |text| names_in(text).map(str::to_string).collect::<BTreeSet<_>>();
+            let names = |text| placeholders(text).map(str::to_string).collect::<BTreeSet<_>>();
             assert_eq!(names(text), names(other), "{key}");
         }
         let asked = regex_lite::Regex::new(r#"\bt\("([a-z_.]+[a-z_])""#).unwrap();
         let said = regex_lite::Regex::new(r#"'(script\.[a-z_]+)'"#).unwrap();
-        let (page, script) = (templates.part("report.html"), templates.script());
+        let (page, script) = (templates.session_file("report.html"), templates.script());
         let keys = asked.captures_iter(page).chain(said.captures_iter(&script)).map(|c| c[1].to_string());
         for key in keys {
             assert!(english.contains_key(&key), "en.json lacks {key}");
         }
-        for about in crate::scenario::metric::every() {
+        // The cohort's page and the gradebook: every key asked for, in both languages, and no text that nothing asks for.
+        let quoted = regex_lite::Regex::new(r#""((?:cohort|gradebook)\.[a-z_]+)""#).unwrap();
+        let users = [
+            "reports/templates/cohort.html",
+            "src/report/cohort/page.rs",
+            "src/report/cohort/summary.rs",
+            "src/integrations/gradebook.rs",
+        ];
+        let users = users.map(|path| std::fs::read_to_string(format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"))));
+        let used: BTreeSet<String> = users
+            .iter()
+            .flat_map(|text| quoted.captures_iter(text.as_ref().unwrap()).map(|c| c[1].to_string()))
+            .collect();
+        for texts in [&english, &turkish] {
+            let keys = texts.keys().filter(|key| key.starts_with("cohort.") || key.starts_with("gradebook."));
+            let keys: BTreeSet<String> = keys.map(|key| key.strip_suffix(".one").unwrap_or(key).to_string()).collect();
+            assert_eq!(used, keys);
+        }
+        for about in typodont_exercise::scenario::metric::all() {
             for kind in ["measure", "formula"] {
                 assert!(turkish.contains_key(&format!("{kind}.{}", about.name)), "tr.json lacks {kind}.{}", about.name);
             }
         }
         assert!(
-            Verdict::SEEN
+            Verdict::VISIBLE
                 .iter()
                 .chain(&Verdict::OF_FILLINGS)
                 .all(|v| turkish.contains_key(&format!("verdict.{}", v.id())))

@@ -1,14 +1,14 @@
-//! A bundle's files: these, by these names, and nothing that lies elsewhere.
+//! Access to the files of a bundle, restricted to known names within the bundle's folder.
 
-use crate::report::SessionFile;
-use crate::report::cohort::read_session;
-use crate::scenario::hex;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use typodont_exercise::scenario::hex;
+use typodont_report::SessionFile;
+use typodont_report::cohort::read_session;
 
-/// Sides and sections that are pictured, in the order in which they are shown.
+/// Views and sections of the tooth for which a bundle has images, in display order.
 pub const VIEWS: [&str; 9] = [
     "occlusal",
     "buccal",
@@ -21,62 +21,72 @@ pub const VIEWS: [&str; 9] = [
     "slice-horizontal",
 ];
 
-/// What each is a picture of.
-const MOMENTS: [&str; 3] = ["before", "after", "map"];
+/// Kinds of image of each view.
+const PICTURE_KINDS: [&str; 3] = ["before", "after", "map"];
 
-/// Bytes of a file that is handed on; a session's page has up to 6 MB.
-const HANDED_MAX: u64 = 64 << 20;
+/// Maximum size of a file that is served, bytes. A session's report has up to 6 MB.
+const FILE_BYTES_MAX: u64 = 64 << 20;
 
+/// File name of a bundle's report.
 pub const REPORT: &str = "report.html";
 
-/// Whether a bundle has a picture of this stem: `map-occlusal`.
+/// Returns true if `stem` is the stem of one of a bundle's images, such as `map-occlusal`.
 pub fn is_picture(stem: &str) -> bool {
-    stem.split_once('-').is_some_and(|(moment, view)| MOMENTS.contains(&moment) && VIEWS.contains(&view))
+    stem.split_once('-').is_some_and(|(moment, view)| PICTURE_KINDS.contains(&moment) && VIEWS.contains(&view))
 }
 
-/// Where a picture lies within its bundle.
-pub fn picture(stem: &str) -> String {
+/// Returns the path of an image within its bundle.
+pub fn picture_path(stem: &str) -> String {
     format!("views/{stem}.png")
 }
 
-/// The path of a file of a bundle, if it is one and lies within it, and the bundle within the folder. `folder` is canonical.
+/// Returns the canonical path of a bundle's file. `folder` is canonical.
 ///
-/// `Err` says what is wrong: a link that leads out of the bundle is as good as no file.
+/// # Errors
+///
+/// Returns a message when the file does not exist, is not a regular file, or lies outside the bundle, or the bundle
+/// outside the folder, because of a symbolic link.
 pub fn file_within(folder: &Path, bundle: &Path, name: &str) -> Result<PathBuf, String> {
     let canonical = |path: &Path| fs::canonicalize(path).map_err(|e| format!("unreadable-file: {e}"));
     let own = canonical(&folder.join(bundle))?;
     let real = canonical(&own.join(name))?;
     match own.starts_with(folder) && real.starts_with(&own) && real.is_file() {
         true => Ok(real),
-        false => Err("outside-folder: it is a link that leads out of the bundle, or no file".into()),
+        false => Err("outside-folder: the path is not a regular file, or a link leads out of the bundle".into()),
     }
 }
 
-/// What a bundle's `session.json` says now.
-pub fn session(folder: &Path, bundle: &Path) -> Result<SessionFile, String> {
+/// Reads a bundle's `session.json`.
+///
+/// # Errors
+///
+/// Returns a message when the file cannot be read or is not a session.
+pub fn read_bundle_session(folder: &Path, bundle: &Path) -> Result<SessionFile, String> {
     file_within(folder, bundle, "session.json").and_then(|path| read_session(&path))
 }
 
-/// A file's bytes, to be handed on.
-fn read(folder: &Path, bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
+/// Reads a file of a bundle, up to [`FILE_BYTES_MAX`].
+fn read_limited(folder: &Path, bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
     let file = File::open(file_within(folder, bundle, name)?).map_err(|e| format!("unreadable-file: {e}"))?;
     let mut bytes = Vec::new();
-    file.take(HANDED_MAX + 1).read_to_end(&mut bytes).map_err(|e| format!("unreadable-file: {e}"))?;
-    match bytes.len() as u64 > HANDED_MAX {
-        true => Err(format!("unreadable-file: it has more than {} MiB", HANDED_MAX >> 20)),
+    file.take(FILE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(|e| format!("unreadable-file: {e}"))?;
+    match bytes.len() as u64 > FILE_BYTES_MAX {
+        true => Err(format!("unreadable-file: the file has more than {} MiB", FILE_BYTES_MAX >> 20)),
         false => Ok(bytes),
     }
 }
 
-/// A file that `session.json` names by its digest, if it is the one that is named.
+/// Reads a file and verifies it against its digest in `session.json`.
 ///
-/// `Err` says why it is not shown.
-pub fn read_named(folder: &Path, bundle: &Path, name: &str, session: &SessionFile) -> Result<Vec<u8>, String> {
-    let bytes = read(folder, bundle, name)?;
+/// # Errors
+///
+/// Returns a message when the file cannot be read, has no digest in `session.json`, or differs from it.
+pub fn read_verified(folder: &Path, bundle: &Path, name: &str, session: &SessionFile) -> Result<Vec<u8>, String> {
+    let bytes = read_limited(folder, bundle, name)?;
     match session.digests.get(name) {
         Some(named) if *named == hex(&Sha256::digest(&bytes)) => Ok(bytes),
         _ => Err(format!(
-            "changed-file: {name} is not the one that session.json names; typodont verify says what else differs"
+            "changed-file: {name} does not have the digest stated in session.json; typodont verify lists all differences"
         )),
     }
 }

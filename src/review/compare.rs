@@ -1,35 +1,35 @@
-//! Two sessions side by side.
+//! Page that compares two sessions side by side.
 
+use super::app::{LoadedSession, RequestContext, ReviewApp};
 use super::bundle::{self, VIEWS};
-use super::desk::{Case, Desk, Visit};
-use super::exchange::Response;
-use super::route::is_id;
-use super::sitting::{Colour, Facts, View, facts, legend, measure_title, view};
-use super::standing::{Standing, standing};
-use crate::report::words;
-use crate::report::{ItemFile, Said, SessionFile, harmless, said};
+use super::effective_grade::{EffectiveGrade, effective_grade};
+use super::http::Response;
+use super::router::is_session_id;
+use super::session_page::{LegendColour, MapView, SessionFacts, facts, legend, map_view, measure_title};
 use serde::Serialize;
+use typodont_report::display_format;
+use typodont_report::{ItemResultFile, Message, SessionFile, phrases, sanitize_display};
 
 #[derive(Serialize)]
-struct Comparison {
-    sides: [Side; 2],
-    items: Vec<ItemRow>,
-    stages: Vec<Row>,
-    measures: Vec<Row>,
-    views: Vec<Pair>,
-    legend: Vec<Colour>,
-    /// They are not of the same exercise.
+struct ComparePage {
+    sides: [ComparedSession; 2],
+    items: Vec<ComparedItemRow>,
+    stages: Vec<ComparedRow>,
+    measures: Vec<ComparedRow>,
+    views: Vec<ComparedView>,
+    legend: Vec<LegendColour>,
+    /// True if the sessions are of different exercises.
     differ: bool,
 }
 
 #[derive(Serialize)]
-struct Side {
-    facts: Facts,
-    grade: Option<GradeCell>,
+struct ComparedSession {
+    facts: SessionFacts,
+    grade: Option<ComparedGrade>,
 }
 
 #[derive(Serialize)]
-struct GradeCell {
+struct ComparedGrade {
     points: String,
     max_points: String,
     passed: bool,
@@ -40,112 +40,127 @@ struct GradeCell {
 }
 
 #[derive(Serialize)]
-struct ItemRow {
+struct ComparedItemRow {
     title: String,
-    cells: [Option<ItemCell>; 2],
+    cells: [Option<ComparedItemCell>; 2],
 }
 
 #[derive(Serialize)]
-struct ItemCell {
+struct ComparedItemCell {
     value: String,
     points: String,
     max_points: String,
-    /// The examiner's, where one stands.
+    /// Examiner's points, if the item is overridden.
     judged: Option<String>,
 }
 
-/// What is measured in both, and the second less the first.
+/// Row of values of both sessions, with the second minus the first in `more`.
 #[derive(Serialize)]
-struct Row {
+struct ComparedRow {
     title: String,
     cells: [String; 2],
     more: String,
 }
 
-/// A picture of both; whether each has it.
+/// View of the tooth, and whether each session has an image of it.
 #[derive(Serialize)]
-struct Pair {
-    view: View,
+struct ComparedView {
+    view: MapView,
     has: [bool; 2],
 }
 
-pub fn page(desk: &Desk, visit: &Visit) -> Response {
-    let asked = visit.request.asked();
+pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
+    let query = context.request.query_pairs();
     let mut ids: Vec<&str> =
-        asked.iter().filter(|(name, id)| name == "session" && is_id(id)).map(|(_, id)| id.as_str()).collect();
+        query.iter().filter(|(name, id)| name == "session" && is_session_id(id)).map(|(_, id)| id.as_str()).collect();
     ids.dedup();
     let [first, second] = ids.as_slice() else {
-        return desk.complain(visit, 422, &[Said::text("complaint.two", &[])]);
+        return app.error_page(context, 422, &[Message::text("complaint.two", &[])]);
     };
-    let cases = desk.case(visit, first).and_then(|a| Ok([a, desk.case(visit, second)?]));
+    let cases = app.load_session(context, first).and_then(|a| Ok([a, app.load_session(context, second)?]));
     let cases = match cases {
         Ok(cases) => cases,
         Err(response) => return *response,
     };
     let sessions = [&cases[0].session, &cases[1].session];
-    let standings = cases.each_ref().map(|case| {
+    let effective_grades = cases.each_ref().map(|case| {
         let grade = case.session.grade.as_ref()?;
-        Some(standing(grade, &case.listed.id, &case.told))
+        Some(effective_grade(grade, &case.indexed.id, &case.log))
     });
     let pictures = VIEWS.iter().map(|name| {
-        let file = bundle::picture(&format!("map-{name}"));
-        let has = cases.each_ref().map(|case| bundle::file_within(&desk.folder, &case.listed.path, &file).is_ok());
-        Pair { view: view(desk, visit, name), has }
+        let file = bundle::picture_path(&format!("map-{name}"));
+        let has = cases.each_ref().map(|case| bundle::file_within(&app.folder, &case.indexed.path, &file).is_ok());
+        ComparedView { view: map_view(app, context, name), has }
     });
-    let body = Comparison {
-        sides: [side(desk, visit, &cases[0], &standings[0]), side(desk, visit, &cases[1], &standings[1])],
-        items: items(desk, visit, sessions, &standings),
+    let body = ComparePage {
+        sides: [
+            side(app, context, &cases[0], &effective_grades[0]),
+            side(app, context, &cases[1], &effective_grades[1]),
+        ],
+        items: items(app, context, sessions, &effective_grades),
         stages: stages(sessions),
-        measures: measures(desk, visit, sessions),
+        measures: measures(app, context, sessions),
         views: pictures.filter(|pair| pair.has != [false; 2]).collect(),
-        legend: legend(desk, visit),
+        legend: legend(app, context),
         differ: sessions[0].scenario.id != sessions[1].scenario.id,
     };
-    desk.page(visit, &cases[1].told, "compare.html", body)
+    app.page(context, &cases[1].log, "compare.html", body)
 }
 
-fn side(desk: &Desk, visit: &Visit, case: &Case, now: &Option<Standing>) -> Side {
-    let grade = case.session.grade.as_ref().zip(now.as_ref()).map(|(grade, now)| GradeCell {
-        points: words::number(grade.points),
-        max_points: words::plain(grade.max_points),
+fn side(
+    app: &ReviewApp,
+    context: &RequestContext,
+    case: &LoadedSession,
+    effective: &Option<EffectiveGrade>,
+) -> ComparedSession {
+    let grade = case.session.grade.as_ref().zip(effective.as_ref()).map(|(grade, now)| ComparedGrade {
+        points: display_format::number(grade.points),
+        max_points: display_format::plain_number(grade.max_points),
         passed: grade.passed,
-        hard_fails: grade.hard_fails.iter().map(|title| harmless(title, 200)).collect(),
+        hard_fails: grade.hard_fails.iter().map(|title| sanitize_display(title, 200)).collect(),
         judged: now.overrides() > 0,
-        stands: words::number(now.points),
+        stands: display_format::number(now.points),
         stands_passed: now.passed,
     });
-    Side { facts: facts(desk, visit, &case.listed, &case.session), grade }
+    ComparedSession { facts: facts(app, context, &case.indexed, &case.session), grade }
 }
 
-/// Items of both in the first one's order, matched by measure and title; each of a twin pair stands once.
-fn items(desk: &Desk, visit: &Visit, sessions: [&SessionFile; 2], standings: &[Option<Standing>; 2]) -> Vec<ItemRow> {
+/// Builds the rows of rubric items: those of the first session in its order, matched to the second's by metric and
+/// title, then the second's unmatched items.
+fn items(
+    app: &ReviewApp,
+    context: &RequestContext,
+    sessions: [&SessionFile; 2],
+    effective_grades: &[Option<EffectiveGrade>; 2],
+) -> Vec<ComparedItemRow> {
     let of = |side: usize| sessions[side].grade.as_ref().map_or(&[][..], |grade| grade.items.as_slice());
     let cell = |side: usize, index: usize| {
         let item = &of(side)[index];
-        let entry = standings[side].as_ref().and_then(|now| now.items[index]);
-        ItemCell {
-            value: desk.say(visit, &said::value(&item.metric, item.value)),
-            points: words::number(item.points),
-            max_points: words::plain(item.max_points),
-            judged: entry.and_then(|e| e.draft.examiner).map(|judged| words::number(judged.points)),
+        let entry = effective_grades[side].as_ref().and_then(|now| now.items[index]);
+        ComparedItemCell {
+            value: app.translate(context, &phrases::value(&item.metric, item.value)),
+            points: display_format::number(item.points),
+            max_points: display_format::plain_number(item.max_points),
+            judged: entry.and_then(|e| e.draft.examiner).map(|judged| display_format::number(judged.points)),
         }
     };
-    let is_like = |a: &ItemFile, b: &ItemFile| a.metric == b.metric && a.title == b.title;
-    let mut left: Vec<usize> = (0..of(1).len()).collect();
+    let is_like = |a: &ItemResultFile, b: &ItemResultFile| a.metric == b.metric && a.title == b.title;
+    let mut unmatched: Vec<usize> = (0..of(1).len()).collect();
     let mut rows = Vec::new();
     for (index, item) in of(0).iter().enumerate() {
-        let twin = left.iter().position(|other| is_like(item, &of(1)[*other])).map(|place| left.remove(place));
-        let cells = [Some(cell(0, index)), twin.map(|other| cell(1, other))];
-        rows.push(ItemRow { title: harmless(&item.title, 200), cells });
+        let match_index =
+            unmatched.iter().position(|other| is_like(item, &of(1)[*other])).map(|place| unmatched.remove(place));
+        let cells = [Some(cell(0, index)), match_index.map(|other| cell(1, other))];
+        rows.push(ComparedItemRow { title: sanitize_display(&item.title, 200), cells });
     }
-    rows.extend(left.into_iter().map(|other| {
-        let title = harmless(&of(1)[other].title, 200);
-        ItemRow { title, cells: [None, Some(cell(1, other))] }
+    rows.extend(unmatched.into_iter().map(|other| {
+        let title = sanitize_display(&of(1)[other].title, 200);
+        ComparedItemRow { title, cells: [None, Some(cell(1, other))] }
     }));
     rows
 }
 
-fn stages(sessions: [&SessionFile; 2]) -> Vec<Row> {
+fn stages(sessions: [&SessionFile; 2]) -> Vec<ComparedRow> {
     let took = |session: &SessionFile, id: &str| {
         session.stages.iter().find(|stage| stage.id == id).map(|stage| stage.ended_s - stage.started_s)
     };
@@ -158,35 +173,36 @@ fn stages(sessions: [&SessionFile; 2]) -> Vec<Row> {
     }
     let row = |(id, title): (&str, &str)| {
         let both = sessions.map(|session| took(session, id));
-        let shown = both.map(|time| time.map_or_else(|| "—".to_string(), words::duration));
+        let shown = both.map(|time| time.map_or_else(|| "—".to_string(), display_format::duration));
         let more = match both {
-            [Some(a), Some(b)] => signed(b - a, &words::duration((b - a).abs())),
+            [Some(a), Some(b)] => signed(b - a, &display_format::duration((b - a).abs())),
             _ => String::new(),
         };
-        Row { title: harmless(title, 200), cells: shown, more }
+        ComparedRow { title: sanitize_display(title, 200), cells: shown, more }
     };
     ids.into_iter().map(row).collect()
 }
 
-fn measures(desk: &Desk, visit: &Visit, sessions: [&SessionFile; 2]) -> Vec<Row> {
+fn measures(app: &ReviewApp, context: &RequestContext, sessions: [&SessionFile; 2]) -> Vec<ComparedRow> {
     let mut names: Vec<&String> = sessions.iter().flat_map(|s| s.metrics.keys()).collect();
     names.sort();
     names.dedup();
     let row = |name: &String| {
         let both = sessions.map(|session| session.metric(name));
-        let said = both.map(|value| desk.say(visit, &said::value(name, value)));
-        // What is right or wrong, yes or no, has no difference.
+        let texts = both.map(|value| app.translate(context, &phrases::value(name, value)));
+        // Metrics with a yes/no value have no difference.
         let is_word = matches!(name.as_str(), "pulp_exposed" | "detect_tooth" | "detect_quadrant");
         let more = match both {
-            [Some(a), Some(b)] if !is_word => signed(b - a, &words::measure(name, Some((b - a).abs()))),
+            [Some(a), Some(b)] if !is_word => signed(b - a, &display_format::measure(name, Some((b - a).abs()))),
             _ => String::new(),
         };
-        Row { title: harmless(&desk.say(visit, &measure_title(name)), 200), cells: said, more }
+        ComparedRow { title: sanitize_display(&app.translate(context, &measure_title(name)), 200), cells: texts, more }
     };
-    // What neither session has is no difference between them.
+    // Metrics that neither session has are omitted.
     names.into_iter().filter(|name| sessions.iter().any(|s| s.metric(name).is_some())).map(row).collect()
 }
 
+/// Puts the sign of a difference before its formatted magnitude.
 fn signed(difference: f64, size: &str) -> String {
     match difference {
         d if d > 0.0 => format!("+{size}"),

@@ -1,29 +1,30 @@
-//! What leaves the desk: the list as a table and as JSON, with everything that was judged.
+//! Exports of the session list as CSV and JSON, with all overrides.
 
-use super::desk::{Desk, Visit};
-use super::exchange::{NOTHING, Response};
-use super::index::Listed;
-use super::overrides::{Entry, Told};
+use super::app::{RequestContext, ReviewApp};
+use super::http::{CSP_NONE, Response};
+use super::index::IndexedSession;
+use super::overrides::{LogSnapshot, OverrideEntry};
 use super::query::Query;
-use crate::report::{csv, harmless};
 use serde::Serialize;
+use typodont_report::{csv, sanitize_display};
 
-/// Version of the JSON file's form.
+/// Version of the JSON format.
 const VERSION: u32 = 1;
 
-/// Letters of a cell: more than a reason has, less than spreadsheets cut off.
+/// Maximum length of a CSV cell, characters: longer than any reason, shorter than the length at which spreadsheets
+/// truncate.
 const CELL_MAX: usize = 8000;
 
-/// Sessions of an export: all there are.
-const ALL: usize = 1_000_000;
+/// Page length that includes every session.
+const ALL_SESSIONS: usize = 1_000_000;
 
-/// A line per session. Of anonymous marking it says codes, and not who.
-pub fn csv(desk: &Desk, visit: &Visit) -> Response {
-    let (rows, told) = match all(desk, visit) {
+/// Exports one row per session. In anonymous mode, rows contain codes instead of participants.
+pub fn csv(app: &ReviewApp, context: &RequestContext) -> Response {
+    let (rows, log) = match query_all(app, context) {
         Ok(found) => found,
         Err(response) => return *response,
     };
-    let who: &[&str] = if desk.anonymous { &["code"] } else { &["participant", "code"] };
+    let who: &[&str] = if app.anonymous { &["code"] } else { &["participant", "code"] };
     let head = ["session", "exercise", "title"].iter().chain(who).chain(&[
         "began",
         "machine_points",
@@ -35,22 +36,22 @@ pub fn csv(desk: &Desk, visit: &Visit) -> Response {
         "overrides",
         "reasons",
     ]);
-    let mut table = csv::line(&head.map(|c| c.to_string()).collect::<Vec<_>>());
+    let mut table = csv::format_row(&head.map(|c| c.to_string()).collect::<Vec<_>>());
     for listed in &rows {
-        table += &csv::line(&line(desk, listed, &told));
+        table += &csv::format_row(&line(app, listed, &log));
     }
-    file(visit, "sessions.csv", "text/csv; charset=utf-8", table)
+    download(context, "sessions.csv", "text/csv; charset=utf-8", table)
 }
 
-fn line(desk: &Desk, listed: &Listed, told: &Told) -> Vec<String> {
-    let shown = |text: &str| harmless(text, CELL_MAX);
-    let mut cells = vec![listed.id.clone(), shown(&listed.exercise), shown(&listed.title)];
-    if !desk.anonymous {
-        cells.push(shown(&listed.participant));
+fn line(app: &ReviewApp, indexed: &IndexedSession, log: &LogSnapshot) -> Vec<String> {
+    let shown = |text: &str| sanitize_display(text, CELL_MAX);
+    let mut cells = vec![indexed.id.clone(), shown(&indexed.exercise), shown(&indexed.title)];
+    if !app.anonymous {
+        cells.push(shown(&indexed.participant));
     }
-    cells.extend([listed.code.clone(), desk.began(listed)]);
+    cells.extend([indexed.code.clone(), app.display_start(indexed)]);
     let result = |passed: bool| if passed { "passed" } else { "not passed" }.to_string();
-    match &listed.grade {
+    match &indexed.grade {
         None => cells.extend(std::iter::repeat_n(String::new(), 8)),
         Some(grade) => {
             let machine = &grade.machine;
@@ -60,23 +61,26 @@ fn line(desk: &Desk, listed: &Listed, told: &Told) -> Vec<String> {
             cells.push(if is_judged { grade.points.to_string() } else { String::new() });
             cells.push(if is_judged { result(grade.passed) } else { String::new() });
             cells.push(grade.overrides.to_string());
-            cells.push(shown(&standing_of(listed, told).map(reason).collect::<Vec<_>>().join("; ")));
+            cells.push(shown(&effective_overrides(indexed, log).map(reason).collect::<Vec<_>>().join("; ")));
         }
     }
     cells
 }
 
-/// Every judgement of a session that stands now.
-fn standing_of<'a>(listed: &'a Listed, told: &'a Told) -> impl Iterator<Item = &'a Entry> {
-    let own = told.counting().filter(|entry| entry.draft.session == listed.id && entry.draft.examiner.is_some());
+/// Returns the overrides of a session that are in effect.
+fn effective_overrides<'a>(
+    indexed: &'a IndexedSession,
+    log: &'a LogSnapshot,
+) -> impl Iterator<Item = &'a OverrideEntry> {
+    let own = log.valid_entries().filter(|entry| entry.draft.session == indexed.id && entry.draft.examiner.is_some());
     own.filter(|entry| {
         let item = entry.draft.item.as_ref().map(|item| item.index);
-        told.last_of(&listed.id, item).is_some_and(|last| last.number == entry.number)
+        log.latest_for(&indexed.id, item).is_some_and(|last| last.number == entry.number)
     })
 }
 
-/// "Decay removed: 25 → 30, the wall was sound (Dr. Öz, 2026-11-22)".
-fn reason(entry: &Entry) -> String {
+/// Formats an override: "Decay removed: 25 → 30, the wall was sound (Dr. Öz, 2026-11-22)".
+fn reason(entry: &OverrideEntry) -> String {
     let draft = &entry.draft;
     let of = draft.item.as_ref().map_or("grade", |item| item.title.as_str());
     let examiner = draft.examiner.map_or_else(String::new, |judged| judged.points.to_string());
@@ -86,16 +90,16 @@ fn reason(entry: &Entry) -> String {
 }
 
 #[derive(Serialize)]
-struct Export<'a> {
+struct ExportFile<'a> {
     version: u32,
     typodont_version: &'static str,
     exported: String,
     anonymous: bool,
     log: LogState<'a>,
-    sessions: Vec<Session<'a>>,
+    sessions: Vec<ExportedSession<'a>>,
 }
 
-/// How far the log goes: whoever keeps this digest finds out when the log is rewritten.
+/// Length of the log and digest of its last line. A copy of the digest reveals whether the log is rewritten later.
 #[derive(Serialize)]
 struct LogState<'a> {
     lines: u64,
@@ -104,7 +108,7 @@ struct LogState<'a> {
 }
 
 #[derive(Serialize)]
-struct Session<'a> {
+struct ExportedSession<'a> {
     id: &'a str,
     exercise: &'a str,
     title: &'a str,
@@ -113,77 +117,78 @@ struct Session<'a> {
     #[serde(skip_serializing_if = "str::is_empty")]
     code: &'a str,
     began: String,
-    machine: Option<Grade>,
-    /// None where nothing was judged.
-    examiner: Option<Grade>,
-    /// All that was ever judged of it, withdrawn or not, in order.
-    history: Vec<&'a Entry>,
+    machine: Option<ExportedGrade>,
+    /// `None` without overrides.
+    examiner: Option<ExportedGrade>,
+    /// All overrides of the session ever made, including withdrawn ones, in order.
+    history: Vec<&'a OverrideEntry>,
 }
 
 #[derive(Serialize)]
-struct Grade {
+struct ExportedGrade {
     points: f64,
     max_points: f64,
     pass_points: f64,
     passed: bool,
 }
 
-pub fn json(desk: &Desk, visit: &Visit) -> Response {
-    let (rows, told) = match all(desk, visit) {
+/// Exports the sessions, their grades and the history of their overrides.
+pub fn json(app: &ReviewApp, context: &RequestContext) -> Response {
+    let (rows, log) = match query_all(app, context) {
         Ok(found) => found,
         Err(response) => return *response,
     };
-    let export = Export {
+    let export = ExportFile {
         version: VERSION,
         typodont_version: env!("CARGO_PKG_VERSION"),
-        exported: visit.request.now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
-        anonymous: desk.anonymous,
+        exported: context.request.now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(),
+        anonymous: app.anonymous,
         log: LogState {
-            lines: told.head.lines,
-            sha256: &told.head.sha256,
-            troubles: told.troubles.iter().map(ToString::to_string).collect(),
+            lines: log.head.lines,
+            sha256: &log.head.sha256,
+            troubles: log.issues.iter().map(ToString::to_string).collect(),
         },
-        sessions: rows.iter().map(|listed| session(desk, listed, &told)).collect(),
+        sessions: rows.iter().map(|listed| session(app, listed, &log)).collect(),
     };
-    // Numbers are finite and keys are texts: writing cannot fail.
+    // Numbers are finite and keys are strings, so serialization cannot fail.
     let text = serde_json::to_string_pretty(&export).unwrap_or_default() + "\n";
-    file(visit, "sessions.json", "application/json", text)
+    download(context, "sessions.json", "application/json", text)
 }
 
-fn session<'a>(desk: &Desk, listed: &'a Listed, told: &'a Told) -> Session<'a> {
-    let of = |points: f64, passed: bool, machine: &crate::report::GradeFile| Grade {
+fn session<'a>(app: &ReviewApp, indexed: &'a IndexedSession, log: &'a LogSnapshot) -> ExportedSession<'a> {
+    let of = |points: f64, passed: bool, machine: &typodont_report::GradeFile| ExportedGrade {
         points,
         max_points: machine.max_points,
         pass_points: machine.pass_points,
         passed,
     };
-    let grade = listed.grade.as_ref();
-    Session {
-        id: &listed.id,
-        exercise: &listed.exercise,
-        title: &listed.title,
-        participant: (!desk.anonymous).then_some(listed.participant.as_str()),
-        code: &listed.code,
-        began: desk.began(listed),
+    let grade = indexed.grade.as_ref();
+    ExportedSession {
+        id: &indexed.id,
+        exercise: &indexed.exercise,
+        title: &indexed.title,
+        participant: (!app.anonymous).then_some(indexed.participant.as_str()),
+        code: &indexed.code,
+        began: app.display_start(indexed),
         machine: grade.map(|g| of(g.machine.points, g.machine.passed, &g.machine)),
         examiner: grade.filter(|g| g.overrides > 0).map(|g| of(g.points, g.passed, &g.machine)),
-        history: told.counting().filter(|entry| entry.draft.session == listed.id).collect(),
+        history: log.valid_entries().filter(|entry| entry.draft.session == indexed.id).collect(),
     }
 }
 
-fn all(desk: &Desk, visit: &Visit) -> Result<(Vec<Listed>, Told), Box<Response>> {
-    let query = Query { page: 1, length: ALL, ..Query::of(&visit.request.asked()) };
-    let (state, told) = desk.look_again(visit)?;
-    let found = state.index.page(&query, desk.anonymous);
+fn query_all(app: &ReviewApp, context: &RequestContext) -> Result<(Vec<IndexedSession>, LogSnapshot), Box<Response>> {
+    let query = Query { page: 1, length: ALL_SESSIONS, ..Query::parse(&context.request.query_pairs()) };
+    let (state, log) = app.refresh(context)?;
+    let found = state.index.query_sessions(&query, app.anonymous);
     drop(state);
     match found {
-        Ok((rows, _)) => Ok((rows, told)),
-        Err(_) => Err(Box::new(desk.lost(visit))),
+        Ok((rows, _)) => Ok((rows, log)),
+        Err(_) => Err(Box::new(app.index_failure(context))),
     }
 }
 
-fn file(visit: &Visit, name: &str, kind: &str, text: String) -> Response {
-    let day = visit.request.now.strftime("%Y-%m-%d");
-    let kept = format!("attachment; filename=\"{day}-{name}\"");
-    Response::new(200, kind, NOTHING, text).with("content-disposition", kept)
+fn download(context: &RequestContext, name: &str, kind: &str, text: String) -> Response {
+    let day = context.request.now.strftime("%Y-%m-%d");
+    let disposition = format!("attachment; filename=\"{day}-{name}\"");
+    Response::new(200, kind, CSP_NONE, text).with_header("content-disposition", disposition)
 }

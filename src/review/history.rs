@@ -1,91 +1,93 @@
-//! What examiners judged, line by line, as the log has it.
+//! Page that lists all lines of the override log.
 
-use super::desk::{Desk, SHOWN_MAX, Visit};
-use super::exchange::Response;
-use super::overrides::{Judged, Line};
-use crate::report::harmless;
-use crate::report::words;
+use super::app::{RequestContext, ReviewApp, SHOWN_MAX};
+use super::http::Response;
+use super::overrides::{GivenPoints, LogLine};
 use serde::Serialize;
+use typodont_report::display_format;
+use typodont_report::sanitize_display;
 
-/// A line of the log in words.
+/// Displayed line of the log.
 #[derive(Serialize)]
-pub(super) struct Told {
+pub(super) struct HistoryRow {
     pub number: u64,
     pub at: String,
     pub session: String,
-    /// The item's title; empty for the whole grade.
+    /// Title of the item; empty for the whole grade.
     pub item: String,
-    pub machine: Given,
-    /// None where a judgement was withdrawn.
-    pub examiner: Option<Given>,
+    pub machine: HistoryPoints,
+    /// `None` where the line withdraws an override.
+    pub examiner: Option<HistoryPoints>,
     pub reason: String,
     pub name: String,
     pub doubtful: bool,
 }
 
 #[derive(Serialize)]
-pub(super) struct Given {
+pub(super) struct HistoryPoints {
     pub points: String,
     pub passed: Option<bool>,
 }
 
 #[derive(Serialize)]
-struct History {
-    history: Vec<Named>,
+struct HistoryPage {
+    history: Vec<HistoryEntry>,
 }
 
-/// A line with the session it is about; empty where that is no longer in the folder.
+/// Line of the log with the exercise and participant of its session, both empty if the session is no longer in the
+/// folder.
 #[derive(Serialize)]
-struct Named {
+struct HistoryEntry {
     #[serde(flatten)]
-    told: Told,
+    told: HistoryRow,
     exercise: String,
     who: String,
 }
 
-/// The last first.
-pub fn page(desk: &Desk, visit: &Visit) -> Response {
-    let (state, told) = match desk.look_again(visit) {
+/// Renders the page, with the latest line first.
+pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
+    let (state, log) = match app.refresh(context) {
         Ok(now) => now,
         Err(response) => return *response,
     };
-    let named = |told: Told| {
-        let listed = state.index.session(&told.session).ok().flatten();
-        let exercise = listed.as_ref().map_or_else(String::new, |l| harmless(&l.title, SHOWN_MAX));
-        Named { exercise, who: listed.as_ref().map_or_else(String::new, |l| desk.called(l)), told }
+    let named = |row: HistoryRow| {
+        let listed = state.index.session(&row.session).ok().flatten();
+        let exercise = listed.as_ref().map_or_else(String::new, |l| sanitize_display(&l.title, SHOWN_MAX));
+        HistoryEntry { exercise, who: listed.as_ref().map_or_else(String::new, |l| app.display_name(l)), told: row }
     };
-    let history: Vec<Named> = of(told.lines.iter()).into_iter().rev().map(named).collect();
+    let history: Vec<HistoryEntry> = rows(log.lines.iter()).into_iter().rev().map(named).collect();
     drop(state);
-    desk.page(visit, &told, "history.html", History { history })
+    app.page(context, &log, "history.html", HistoryPage { history })
 }
 
-pub(super) fn of<'a>(lines: impl Iterator<Item = &'a Line>) -> Vec<Told> {
-    lines.map(told).collect()
+pub(super) fn rows<'a>(lines: impl Iterator<Item = &'a LogLine>) -> Vec<HistoryRow> {
+    lines.map(history_row).collect()
 }
 
-fn told(line: &Line) -> Told {
+fn history_row(line: &LogLine) -> HistoryRow {
     let draft = &line.entry.draft;
-    let given = |judged: &Judged| Given { points: words::number(judged.points), passed: judged.passed };
-    Told {
+    let points =
+        |judged: &GivenPoints| HistoryPoints { points: display_format::number(judged.points), passed: judged.passed };
+    HistoryRow {
         number: line.entry.number,
-        at: when(&line.entry.at),
+        at: format_time(&line.entry.at),
         session: draft.session.clone(),
-        item: draft.item.as_ref().map_or_else(String::new, |item| harmless(&item.title, 200)),
-        machine: given(&draft.machine),
-        examiner: draft.examiner.as_ref().map(given),
-        reason: lines(&draft.reason),
-        name: harmless(&draft.name, 120),
-        doubtful: line.doubtful,
+        item: draft.item.as_ref().map_or_else(String::new, |item| sanitize_display(&item.title, 200)),
+        machine: points(&draft.machine),
+        examiner: draft.examiner.as_ref().map(points),
+        reason: sanitize_lines(&draft.reason),
+        name: sanitize_display(&draft.name, 120),
+        doubtful: line.is_invalid,
     }
 }
 
-/// What was written at length, on its own lines.
-pub(super) fn lines(text: &str) -> String {
-    text.lines().take(100).map(|line| harmless(line, 2000)).collect::<Vec<_>>().join("\n")
+/// Sanitizes a longer text and keeps its line breaks.
+pub(super) fn sanitize_lines(text: &str) -> String {
+    text.lines().take(100).map(|line| sanitize_display(line, 2000)).collect::<Vec<_>>().join("\n")
 }
 
-/// "2026-11-22 09:05 UTC".
-pub(super) fn when(at: &str) -> String {
+/// Formats an RFC 3339 timestamp as "2026-11-22 09:05 UTC".
+pub(super) fn format_time(at: &str) -> String {
     let minutes: String = at.chars().take(16).collect();
-    harmless(&format!("{} UTC", minutes.replace('T', " ")), 40)
+    sanitize_display(&format!("{} UTC", minutes.replace('T', " ")), 40)
 }

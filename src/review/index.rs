@@ -1,17 +1,13 @@
-//! What is known of every bundle, in SQLite: a cache beside them, which may be deleted at any time.
+//! Index of all bundles in SQLite: a cache in the folder, which may be deleted at any time.
 //!
-//! A bundle is read again when its `session.json` has another size or time. What a person wrote reaches SQLite as bound values
-//! only.
+//! A bundle is read again when the size or modification time of its `session.json` changes. User-written text reaches
+//! SQLite only as bound values.
 
 use super::bundle;
-use super::codes::Codes;
-use super::overrides::{Head, Told, Trouble};
-use super::query::{Outcome, Query, Sort, folded};
-use super::standing::standing;
-use crate::handover::session_id;
-use crate::report::cohort::find;
-use crate::report::{GradeFile, SessionFile};
-use crate::scenario::hex;
+use super::effective_grade::effective_grade;
+use super::overrides::{IntegrityIssue, LogHead, LogSnapshot};
+use super::pseudonyms::Pseudonymizer;
+use super::query::{Query, ResultFilter, SortColumn, fold_case};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, Row, params, params_from_iter};
 use sha2::{Digest, Sha256};
@@ -19,16 +15,20 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, UNIX_EPOCH};
+use typodont_exercise::scenario::hex;
+use typodont_integrations::session_id;
+use typodont_report::cohort::{FoundBundles, find_bundles};
+use typodont_report::{GradeFile, SessionFile};
 
 pub const FILE_NAME: &str = "review.sqlite";
 
-/// Of the tables below. A cache of another version is made anew.
+/// Version of the tables below. A cache of another version is rebuilt.
 const VERSION: i64 = 2;
 
-/// For how long another program may hold the cache.
-const BUSY: Duration = Duration::from_secs(5);
+/// Maximum wait for another program's lock on the cache.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(5);
 
-const TABLES: &str = "
+const SCHEMA: &str = "
 CREATE TABLE session (
   path TEXT PRIMARY KEY, size INTEGER NOT NULL, modified INTEGER NOT NULL, problem TEXT,
   id TEXT, exercise TEXT, title TEXT, participant TEXT, code TEXT, folder TEXT, began TEXT, recording TEXT, searched TEXT, called TEXT,
@@ -40,156 +40,181 @@ CREATE TABLE judged (id TEXT PRIMARY KEY, points REAL NOT NULL, passed INTEGER N
 CREATE TABLE known (name TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
 ";
 
-/// Sessions that can be listed, each with what examiners made of it.
-const LISTED: &str = "
+/// Sessions that can be listed, joined with their effective grades.
+const LISTED_SESSIONS: &str = "
 FROM session LEFT JOIN judged ON judged.id = session.id
 WHERE session.problem IS NULL AND session.twin IS NULL AND session.rival IS NULL";
 
 const COLUMNS: &str = "session.id, session.path, session.exercise, session.title, session.participant, session.code,
   session.began, session.recording, judged.points, judged.passed, coalesce(judged.overrides, 0), session.grade";
 
-/// A session in the list.
+/// Session as listed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Listed {
+pub struct IndexedSession {
     pub id: String,
-    /// Of its bundle, from the folder on.
+    /// Path of the bundle, relative to the folder.
     pub path: PathBuf,
     pub exercise: String,
     pub title: String,
     pub participant: String,
-    /// Empty where the folder has no secret.
+    /// Pseudonymous code of the participant; empty if the folder has no secret.
     pub code: String,
     pub began: String,
     pub recording: String,
-    pub grade: Option<Graded>,
+    pub grade: Option<IndexedGrade>,
 }
 
-/// The machine's grade, and what it comes to with an examiner's judgements.
+/// The scorer's grade (`machine`) and the effective points and result after overrides.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Graded {
+pub struct IndexedGrade {
     pub machine: GradeFile,
     pub points: f64,
     pub passed: bool,
     pub overrides: usize,
 }
 
-/// What a list can be narrowed to.
+/// Values offered by the list's filters.
 #[derive(Clone, Debug, Default)]
-pub struct Choices {
-    /// Id and title.
+pub struct FilterOptions {
+    /// Id and title of each exercise.
     pub exercises: Vec<(String, String)>,
     pub folders: Vec<String>,
 }
 
-/// A file's size, and the time of its last change in ns since 1970.
-type Stamp = (i64, i64);
+/// Size of a file, bytes, and its modification time, ns since 1970.
+type BundleStamp = (i64, i64);
 
-/// A bundle that is new or changed.
-struct Fresh {
+/// Stamp of a folder that cannot be read.
+const UNREADABLE_FOLDER: BundleStamp = (-1, 0);
+
+/// New or changed bundle.
+struct ChangedBundle {
     path: String,
-    stamp: Stamp,
-    /// `Err` says why it is no session.
-    read: Result<SessionFile, String>,
+    stamp: BundleStamp,
+    /// `Err` contains the reason for which the bundle is not a session.
+    session: Result<SessionFile, String>,
 }
 
-pub struct Index {
+/// Difference between the bundles of a folder and those of the cache.
+struct BundleChanges {
+    /// New and changed bundles, in the order of paths; then folders that cannot be read.
+    changed: Vec<ChangedBundle>,
+    /// Paths of the bundles that the folder no longer contains, in order.
+    deleted: Vec<String>,
+}
+
+/// Index of a folder's sessions.
+pub struct SessionIndex {
     path: PathBuf,
     connection: Connection,
-    codes: Option<Codes>,
-    /// The cache lies in memory, because it cannot lie in the folder; why.
-    pub homeless: Option<String>,
-    /// The log's state when `judged` was filled.
-    judged: Option<(Head, Vec<Trouble>)>,
+    pseudonymizer: Option<Pseudonymizer>,
+    /// Reason for which the index is kept in memory: the cache file in the folder cannot be used.
+    pub fallback_reason: Option<String>,
+    /// State of the log when the table `judged` was filled.
+    graded_log: Option<(LogHead, Vec<IntegrityIssue>)>,
 }
 
-impl Index {
-    /// Opens the cache; a broken one, or one of another version or secret, is made anew.
-    pub fn open(folder: &Path, codes: Option<Codes>) -> Result<Index, String> {
+impl SessionIndex {
+    /// Opens the cache. A cache that is damaged or of another version is rebuilt; where no file can be written, the
+    /// index is kept in memory.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when not even a database in memory can be created.
+    pub fn open(folder: &Path, pseudonymizer: Option<Pseudonymizer>) -> Result<SessionIndex, String> {
         let path = folder.join(FILE_NAME);
-        let secret = codes.as_ref().map(Codes::fingerprint).unwrap_or_default();
-        let (connection, homeless) = match on_disk(&path, &secret) {
+        let secret = pseudonymizer.as_ref().map(Pseudonymizer::fingerprint).unwrap_or_default();
+        let (connection, fallback_reason) = match open_on_disk(&path, &secret) {
             Ok(connection) => (connection, None),
-            Err(first) => match remove(&path).and_then(|()| on_disk(&path, &secret).map_err(|e| e.to_string())) {
-                Ok(connection) => (connection, None),
-                Err(_) => {
-                    let made = Connection::open_in_memory().and_then(|c| tables(c, &secret));
-                    (made.map_err(|e| format!("{FILE_NAME}: unusable-cache: {e}"))?, Some(first.to_string()))
+            Err(first) => {
+                match remove_cache_files(&path).and_then(|()| open_on_disk(&path, &secret).map_err(|e| e.to_string())) {
+                    Ok(connection) => (connection, None),
+                    Err(_) => {
+                        let created = Connection::open_in_memory().and_then(|c| prepare_schema(c, &secret));
+                        (created.map_err(|e| format!("{FILE_NAME}: unusable-cache: {e}"))?, Some(first.to_string()))
+                    }
                 }
-            },
+            }
         };
-        Ok(Index { path, connection, codes, homeless, judged: None })
+        Ok(SessionIndex { path, connection, pseudonymizer, fallback_reason, graded_log: None })
     }
 
-    /// Looks at the folder again, and at what examiners judged.
-    pub fn refresh(&mut self, folder: &Path, told: &Told) -> Result<(), String> {
-        let done = self.look_again(folder).and_then(|changed| self.judge(told, changed));
+    /// Updates the index from the folder and the override log.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when the index cannot be used even after it is rebuilt.
+    pub fn refresh(&mut self, folder: &Path, log: &LogSnapshot) -> Result<(), String> {
+        let done = self.rescan(folder).and_then(|changed| self.update_effective_grades(log, changed));
         done.or_else(|_| {
-            // Deleted, moved or broken beneath us: it is a cache, and is made anew.
-            let codes = Codes::of(folder)?.or(self.codes.take());
-            *self = Index::open(folder, codes)?;
-            self.look_again(folder)
-                .and_then(|_| self.judge(told, true))
+            // The cache file was deleted, moved or damaged while it was open, so it is rebuilt.
+            let pseudonymizer = Pseudonymizer::load(folder)?.or(self.pseudonymizer.take());
+            *self = SessionIndex::open(folder, pseudonymizer)?;
+            self.rescan(folder)
+                .and_then(|_| self.update_effective_grades(log, true))
                 .map_err(|e| format!("{FILE_NAME}: unusable-cache: {e}"))
         })
     }
 
-    /// Reads what is new or changed and forgets what is gone; whether there was any.
-    fn look_again(&mut self, folder: &Path) -> rusqlite::Result<bool> {
-        if self.homeless.is_none() && !self.path.exists() {
-            return Err(rusqlite::Error::InvalidQuery);
-        }
-        // Another desk began to mark anonymously: its codes are not ours.
-        let sql = "SELECT value FROM known WHERE name = 'secret'";
-        let secret: String = self.connection.query_row(sql, [], |row| row.get(0))?;
-        if secret != self.codes.as_ref().map(Codes::fingerprint).unwrap_or_default() {
-            return Err(rusqlite::Error::InvalidQuery);
-        }
-        let found = find(folder);
-        let mut known: BTreeMap<String, Stamp> = BTreeMap::new();
-        {
-            let mut all = self.connection.prepare("SELECT path, size, modified FROM session")?;
-            let mut rows = all.query([])?;
-            while let Some(row) = rows.next()? {
-                known.insert(row.get(0)?, (row.get(1)?, row.get(2)?));
-            }
-        }
-        let mut fresh: Vec<Fresh> = Vec::new();
-        for file in &found.files {
-            let bundle = file.parent().and_then(|b| b.strip_prefix(folder).ok()).unwrap_or(Path::new(""));
-            let (name, is_text) = (bundle.to_string_lossy().into_owned(), bundle.to_str().is_some());
-            let stamp = stamp(file);
-            if known.remove(&name) != Some(stamp) {
-                let read = match is_text {
-                    true => bundle::session(folder, bundle),
-                    false => Err("its folder's name is not UTF-8".into()),
-                };
-                fresh.push(Fresh { path: name, stamp, read });
-            }
-        }
-        for (path, why) in found.left_out {
-            let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
-            if known.remove(&name) != Some((-1, 0)) {
-                fresh.push(Fresh { path: name, stamp: (-1, 0), read: Err(why) });
-            }
-        }
-        if fresh.is_empty() && known.is_empty() {
+    /// Reads new and changed bundles and removes deleted ones. Returns true if anything changed.
+    fn rescan(&mut self, folder: &Path) -> rusqlite::Result<bool> {
+        self.check_cache()?;
+        let found = find_bundles(folder);
+        let changes = bundle_changes(folder, found, self.known_stamps()?);
+        if changes.changed.is_empty() && changes.deleted.is_empty() {
             return Ok(false);
         }
-        let codes = self.codes.clone();
-        let change = self.connection.transaction()?;
-        for gone in known.keys() {
-            change.prepare("DELETE FROM session WHERE path = ?1")?.execute([gone])?;
+        self.write_changes(changes)?;
+        Ok(true)
+    }
+
+    /// Checks that the cache file still exists and belongs to the present secret.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error, or `InvalidQuery` for a cache that must be rebuilt.
+    fn check_cache(&self) -> rusqlite::Result<()> {
+        if self.fallback_reason.is_none() && !self.path.exists() {
+            return Err(rusqlite::Error::InvalidQuery);
         }
-        for Fresh { path, stamp, read } in fresh {
+        // Another program has created a secret for anonymous mode since, so the codes in the cache are outdated.
+        let sql = "SELECT value FROM known WHERE name = 'secret'";
+        let secret: String = self.connection.query_row(sql, [], |row| row.get(0))?;
+        if secret != self.pseudonymizer.as_ref().map(Pseudonymizer::fingerprint).unwrap_or_default() {
+            return Err(rusqlite::Error::InvalidQuery);
+        }
+        Ok(())
+    }
+
+    /// Returns the stamps of all bundles in the cache, by path relative to the folder.
+    fn known_stamps(&self) -> rusqlite::Result<BTreeMap<String, BundleStamp>> {
+        let mut known = BTreeMap::new();
+        let mut all = self.connection.prepare("SELECT path, size, modified FROM session")?;
+        let mut rows = all.query([])?;
+        while let Some(row) = rows.next()? {
+            known.insert(row.get(0)?, (row.get(1)?, row.get(2)?));
+        }
+        Ok(known)
+    }
+
+    /// Writes the changes of the folder to the cache, in one transaction.
+    fn write_changes(&mut self, changes: BundleChanges) -> rusqlite::Result<()> {
+        let BundleChanges { changed, deleted } = changes;
+        let change = self.connection.transaction()?;
+        for path in &deleted {
+            change.prepare("DELETE FROM session WHERE path = ?1")?.execute([path])?;
+        }
+        for ChangedBundle { path, stamp, session: read } in changed {
             match read {
-                Ok(session) => enter(&change, &path, stamp, &session, codes.as_ref())?,
+                Ok(session) => insert_session(&change, &path, stamp, &session, self.pseudonymizer.as_ref())?,
                 Err(why) => {
                     let sql = "INSERT OR REPLACE INTO session (path, size, modified, problem) VALUES (?1, ?2, ?3, ?4)";
                     change.prepare(sql)?.execute(params![path, stamp.0, stamp.1, why])?;
                 }
             }
         }
-        // A copy beside its original is no second attempt; where they differ one of them was changed, and none is believed.
+        // An identical copy of a bundle is not a second attempt. If copies differ, one of them was changed, and none
+        // is listed.
         change.execute(
             "UPDATE session SET
              twin = (SELECT min(other.path) FROM session AS other
@@ -198,17 +223,16 @@ impl Index {
                WHERE other.id = session.id AND other.content <> session.content)",
             [],
         )?;
-        change.commit()?;
-        Ok(true)
+        change.commit()
     }
 
-    /// Fills in what examiners made of the grades.
-    fn judge(&mut self, told: &Told, changed: bool) -> rusqlite::Result<()> {
-        let state = (told.head.clone(), told.troubles.clone());
-        if !changed && self.judged.as_ref() == Some(&state) {
+    /// Recomputes the effective grades of overridden sessions.
+    fn update_effective_grades(&mut self, log: &LogSnapshot, changed: bool) -> rusqlite::Result<()> {
+        let state = (log.head.clone(), log.issues.clone());
+        if !changed && self.graded_log.as_ref() == Some(&state) {
             return Ok(());
         }
-        let mut sessions: Vec<&str> = told.counting().map(|entry| entry.draft.session.as_str()).collect();
+        let mut sessions: Vec<&str> = log.valid_entries().map(|entry| entry.draft.session.as_str()).collect();
         sessions.sort_unstable();
         sessions.dedup();
         let change = self.connection.transaction()?;
@@ -219,106 +243,140 @@ impl Index {
             let Some(grade) = text.flatten().and_then(|text| serde_json::from_str::<GradeFile>(&text).ok()) else {
                 continue;
             };
-            let now = standing(&grade, id, told);
-            if now.overrides() > 0 {
+            let effective = effective_grade(&grade, id, log);
+            if effective.overrides() > 0 {
                 let sql = "INSERT INTO judged (id, points, passed, overrides) VALUES (?1, ?2, ?3, ?4)";
-                change.prepare(sql)?.execute(params![id, now.points, now.passed, now.overrides() as i64])?;
+                change.prepare(sql)?.execute(params![
+                    id,
+                    effective.points,
+                    effective.passed,
+                    effective.overrides() as i64
+                ])?;
             }
         }
         change.commit()?;
-        self.judged = Some(state);
+        self.graded_log = Some(state);
         Ok(())
     }
 
-    /// A page of the list, and how many sessions all its pages have. `by_code`: people are known by their codes alone.
-    pub fn page(&self, query: &Query, by_code: bool) -> rusqlite::Result<(Vec<Listed>, usize)> {
-        let (narrowed, mut bound) = narrowed(query, by_code);
-        let sql = format!("SELECT count(*) {LISTED} {narrowed}");
+    /// Returns one page of the list, and the number of sessions on all pages. With `by_code` (anonymous mode),
+    /// participants are identified only by their codes.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
+    pub fn query_sessions(&self, query: &Query, by_code: bool) -> rusqlite::Result<(Vec<IndexedSession>, usize)> {
+        let (narrowed, mut bound) = where_clause(query, by_code);
+        let sql = format!("SELECT count(*) {LISTED_SESSIONS} {narrowed}");
         let count: i64 = self.connection.prepare(&sql)?.query_row(params_from_iter(&bound), |row| row.get(0))?;
         let first = (query.page - 1).saturating_mul(query.length);
         bound.extend([Value::Integer(query.length as i64), Value::Integer(first as i64)]);
-        let order = order(query, by_code);
-        let sql = format!("SELECT {COLUMNS} {LISTED} {narrowed} ORDER BY {order} LIMIT ? OFFSET ?");
+        let order = order_by(query, by_code);
+        let sql = format!("SELECT {COLUMNS} {LISTED_SESSIONS} {narrowed} ORDER BY {order} LIMIT ? OFFSET ?");
         let mut select = self.connection.prepare(&sql)?;
-        let rows = select.query_map(params_from_iter(&bound), listed)?;
+        let rows = select.query_map(params_from_iter(&bound), indexed_session)?;
         Ok((rows.collect::<rusqlite::Result<_>>()?, count as usize))
     }
 
-    pub fn session(&self, id: &str) -> rusqlite::Result<Option<Listed>> {
-        let sql = format!("SELECT {COLUMNS} {LISTED} AND session.id = ?1");
-        self.connection.prepare(&sql)?.query_row([id], listed).optional()
+    /// Returns the session with this id, if it is listed.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
+    pub fn session(&self, id: &str) -> rusqlite::Result<Option<IndexedSession>> {
+        let sql = format!("SELECT {COLUMNS} {LISTED_SESSIONS} AND session.id = ?1");
+        self.connection.prepare(&sql)?.query_row([id], indexed_session).optional()
     }
 
-    pub fn choices(&self) -> rusqlite::Result<Choices> {
-        let sql = format!("SELECT session.exercise, max(session.title) {LISTED} GROUP BY session.exercise ORDER BY 1");
+    /// Returns the exercises and folders of the listed sessions.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
+    pub fn filter_options(&self) -> rusqlite::Result<FilterOptions> {
+        let sql = format!(
+            "SELECT session.exercise, max(session.title) {LISTED_SESSIONS} GROUP BY session.exercise ORDER BY 1"
+        );
         let mut select = self.connection.prepare(&sql)?;
         let exercises = select.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
-        let sql = format!("SELECT DISTINCT session.folder {LISTED} ORDER BY 1");
+        let sql = format!("SELECT DISTINCT session.folder {LISTED_SESSIONS} ORDER BY 1");
         let mut select = self.connection.prepare(&sql)?;
         let folders = select.query_map([], |row| row.get(0))?;
-        Ok(Choices { exercises: exercises.collect::<Result<_, _>>()?, folders: folders.collect::<Result<_, _>>()? })
+        Ok(FilterOptions {
+            exercises: exercises.collect::<Result<_, _>>()?,
+            folders: folders.collect::<Result<_, _>>()?,
+        })
     }
 
-    /// Path and reason of what is no session, or one that is listed already.
+    /// Returns path and reason for every file that is not listed: it is not a session, or a copy of one.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
     pub fn left_out(&self) -> rusqlite::Result<Vec<(String, String)>> {
         let sql = "SELECT path, coalesce(problem,
-                     'it has another result than ' || rival || ', which is the same session: typodont verify says which holds',
-                     'the same session as ' || twin)
+                     'its result differs from that of ' || rival ||
+                       ', a copy of the same session; typodont verify shows which one is valid',
+                     'a copy of ' || twin)
                    FROM session WHERE problem IS NOT NULL OR twin IS NOT NULL OR rival IS NOT NULL ORDER BY path";
         let mut select = self.connection.prepare(sql)?;
         let rows = select.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
         rows.collect()
     }
 
-    /// How far the log of judgements was known to go.
-    pub fn known_head(&self) -> Option<Head> {
+    /// Returns the last state of the override log that this index has remembered.
+    pub fn known_head(&self) -> Option<LogHead> {
         let sql = "SELECT value FROM known WHERE name = 'head'";
         let text: String = self.connection.prepare(sql).ok()?.query_row([], |row| row.get(0)).ok()?;
         let (lines, sha256) = text.split_once(' ')?;
-        Some(Head { lines: lines.parse().ok()?, sha256: sha256.to_string() })
+        Some(LogHead { lines: lines.parse().ok()?, sha256: sha256.to_string() })
     }
 
-    /// Remembers it. A cache that cannot be written forgets.
-    pub fn know_head(&self, head: &Head) {
+    /// Remembers the state of the override log. Errors are ignored: a cache that cannot be written does not remember.
+    pub fn remember_head(&self, head: &LogHead) {
         let sql = "INSERT OR REPLACE INTO known (name, value) VALUES ('head', ?1)";
         let text = format!("{} {}", head.lines, head.sha256);
         let _ = self.connection.execute(sql, [text]);
     }
 }
 
-fn on_disk(path: &Path, secret: &str) -> rusqlite::Result<Connection> {
+fn open_on_disk(path: &Path, secret: &str) -> rusqlite::Result<Connection> {
     let connection = Connection::open(path)?;
-    connection.busy_timeout(BUSY)?;
-    // A cache need not survive a power cut.
+    connection.busy_timeout(BUSY_TIMEOUT)?;
+    // The cache need not survive a power cut.
     connection.pragma_update(None, "synchronous", "OFF")?;
-    // Nothing that stands in a file runs.
+    // Functions in the schema of a foreign file must not run.
     connection.pragma_update(None, "trusted_schema", "OFF")?;
-    tables(connection, secret)
+    prepare_schema(connection, secret)
 }
 
-/// `Err` where the tables are not ours and not new.
-fn tables(mut connection: Connection, secret: &str) -> rusqlite::Result<Connection> {
-    // Two programs that open a new cache at once make its tables once.
+/// Creates the tables in a new cache and empties an existing one.
+///
+/// # Errors
+///
+/// Returns the SQLite error, or `InvalidQuery` for a cache of another version.
+fn prepare_schema(mut connection: Connection, secret: &str) -> rusqlite::Result<Connection> {
+    // The immediate transaction ensures that two programs opening a new cache create its tables only once.
     let change = connection.transaction_with_behavior(rusqlite::TransactionBehavior::Immediate)?;
     let version: i64 = change.query_row("PRAGMA user_version", [], |row| row.get(0))?;
     if version == 0 {
-        change.execute_batch(TABLES)?;
+        change.execute_batch(SCHEMA)?;
         change.pragma_update(None, "user_version", VERSION)?;
         change.execute("INSERT INTO known (name, value) VALUES ('secret', ?1)", [secret])?;
     }
     if !matches!(version, 0 | VERSION) {
         return Err(rusqlite::Error::InvalidQuery);
     }
-    // What another program may have written there meanwhile is not believed, and codes may be of another secret: every desk
-    // reads every bundle once.
+    // Rows written by other programs are not trusted, and codes may belong to another secret: every program reads
+    // every bundle once.
     change.execute("DELETE FROM session", [])?;
     change.execute("UPDATE known SET value = ?1 WHERE name = 'secret'", [secret])?;
     change.commit()?;
     Ok(connection)
 }
 
-/// Takes the cache away, with the journal of a change that was never finished: the next cache would be mended by it.
-fn remove(path: &Path) -> Result<(), String> {
+/// Deletes the cache together with its rollback journal, which SQLite would otherwise apply to the next cache.
+fn remove_cache_files(path: &Path) -> Result<(), String> {
     for path in [path.with_extension("sqlite-journal"), path.to_path_buf()] {
         match fs::remove_file(path) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error.to_string()),
@@ -328,21 +386,46 @@ fn remove(path: &Path) -> Result<(), String> {
     Ok(())
 }
 
-fn stamp(file: &Path) -> Stamp {
+/// Compares the bundles found in a folder with the stamps in the cache, and reads those that differ.
+fn bundle_changes(folder: &Path, found: FoundBundles, mut known: BTreeMap<String, BundleStamp>) -> BundleChanges {
+    let mut changed = Vec::new();
+    for file in &found.files {
+        let bundle = file.parent().and_then(|b| b.strip_prefix(folder).ok()).unwrap_or(Path::new(""));
+        let (name, is_text) = (bundle.to_string_lossy().into_owned(), bundle.to_str().is_some());
+        let stamp = bundle_stamp(file);
+        if known.remove(&name) != Some(stamp) {
+            let read = match is_text {
+                true => bundle::read_bundle_session(folder, bundle),
+                false => Err("the name of the folder is not UTF-8".into()),
+            };
+            changed.push(ChangedBundle { path: name, stamp, session: read });
+        }
+    }
+    for (path, why) in found.skipped {
+        let name = path.strip_prefix(folder).unwrap_or(&path).to_string_lossy().into_owned();
+        if known.remove(&name) != Some(UNREADABLE_FOLDER) {
+            changed.push(ChangedBundle { path: name, stamp: UNREADABLE_FOLDER, session: Err(why) });
+        }
+    }
+    BundleChanges { changed, deleted: known.into_keys().collect() }
+}
+
+/// Returns the stamp of a file, or (-1, -1) if its metadata cannot be read.
+fn bundle_stamp(file: &Path) -> BundleStamp {
     let Ok(meta) = fs::metadata(file) else { return (-1, -1) };
     let since = meta.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
     (meta.len() as i64, since.as_nanos() as i64)
 }
 
-fn enter(
+fn insert_session(
     change: &Connection,
     path: &str,
-    stamp: Stamp,
+    stamp: BundleStamp,
     session: &SessionFile,
-    codes: Option<&Codes>,
+    pseudonymizer: Option<&Pseudonymizer>,
 ) -> rusqlite::Result<()> {
     let id = session_id(session);
-    let code = codes.map_or_else(String::new, |codes| codes.of_participant(&session.participant, &id));
+    let code = pseudonymizer.map_or_else(String::new, |codes| codes.code_for(&session.participant, &id));
     let folder = path.rsplit_once(['/', '\\']).map_or("", |(folder, _)| folder);
     let title = if session.scenario.title.is_empty() { &session.scenario.id } else { &session.scenario.title };
     let grade = session.grade.as_ref();
@@ -361,21 +444,21 @@ fn enter(
         code,
         folder,
         session.started,
-        session.digests.get(crate::record::FILE_NAME).map_or("", String::as_str),
-        folded(&format!("{title}\n{id}\n{code}")),
-        folded(&session.participant),
+        session.digests.get(typodont_exercise::record::FILE_NAME).map_or("", String::as_str),
+        fold_case(&format!("{title}\n{id}\n{code}")),
+        fold_case(&session.participant),
         grade.map(|g| serde_json::to_string(g).unwrap_or_default()),
         grade.map(|g| g.points),
         grade.map(|g| g.max_points),
         grade.map(|g| g.pass_points),
         grade.map(|g| g.passed),
-        hex(&Sha256::digest(session.text())),
+        hex(&Sha256::digest(session.to_json())),
     ])?;
     Ok(())
 }
 
-/// Conditions beyond [`LISTED`], with what they are bound to.
-fn narrowed(query: &Query, by_code: bool) -> (String, Vec<Value>) {
+/// Builds the conditions of a query in addition to [`LISTED_SESSIONS`], with their bound values.
+fn where_clause(query: &Query, by_code: bool) -> (String, Vec<Value>) {
     let (mut conditions, mut bound) = (String::new(), Vec::new());
     let mut only = |condition: &str, values: Vec<Value>| {
         conditions += " AND ";
@@ -389,16 +472,16 @@ fn narrowed(query: &Query, by_code: bool) -> (String, Vec<Value>) {
         only("session.folder = ?", vec![folder.clone().into()]);
     }
     if !query.text.is_empty() {
-        let text = Value::from(folded(&query.text));
+        let text = Value::from(fold_case(&query.text));
         match by_code {
             true => only("instr(session.searched, ?) > 0", vec![text]),
             false => only("(instr(session.searched, ?) > 0 OR instr(session.called, ?) > 0)", vec![text.clone(), text]),
         }
     }
     match query.result {
-        Some(Outcome::Passed) => only("coalesce(judged.passed, session.passed) = 1", vec![]),
-        Some(Outcome::Failed) => only("coalesce(judged.passed, session.passed) = 0", vec![]),
-        Some(Outcome::Ungraded) => only("session.passed IS NULL", vec![]),
+        Some(ResultFilter::Passed) => only("coalesce(judged.passed, session.passed) = 1", vec![]),
+        Some(ResultFilter::Failed) => only("coalesce(judged.passed, session.passed) = 0", vec![]),
+        Some(ResultFilter::Ungraded) => only("session.passed IS NULL", vec![]),
         None => {}
     }
     match query.overridden {
@@ -409,38 +492,38 @@ fn narrowed(query: &Query, by_code: bool) -> (String, Vec<Value>) {
     (conditions, bound)
 }
 
-/// Columns by their names here; nothing that was asked stands in it.
-fn order(query: &Query, by_code: bool) -> String {
-    let way = if query.down { "DESC" } else { "ASC" };
+/// Builds the ORDER BY clause from column names defined here; no text of the request is part of it.
+fn order_by(query: &Query, by_code: bool) -> String {
+    let direction = if query.is_descending { "DESC" } else { "ASC" };
     let who = if by_code { "session.code" } else { "session.participant" };
     let column = match query.sort {
-        Sort::Exercise => "session.exercise",
-        Sort::Participant => who,
-        // The hour tells who it was.
-        Sort::Began if by_code => "substr(session.began, 1, 10)",
-        Sort::Began => "session.began",
-        Sort::Machine => "session.points",
-        Sort::MachineResult => "session.passed",
-        Sort::Examiner => "judged.points",
-        Sort::Result => "coalesce(judged.passed, session.passed)",
-        Sort::Overrides => "coalesce(judged.overrides, 0)",
+        SortColumn::Exercise => "session.exercise",
+        SortColumn::Participant => who,
+        // In anonymous mode only the date: the time could identify the participant.
+        SortColumn::Began if by_code => "substr(session.began, 1, 10)",
+        SortColumn::Began => "session.began",
+        SortColumn::Machine => "session.points",
+        SortColumn::MachineResult => "session.passed",
+        SortColumn::Examiner => "judged.points",
+        SortColumn::Result => "coalesce(judged.passed, session.passed)",
+        SortColumn::Overrides => "coalesce(judged.overrides, 0)",
     };
     let last = if by_code { "session.id" } else { "session.began, session.path" };
-    format!("{column} IS NULL, {column} {way}, session.exercise, {who}, {last}")
+    format!("{column} IS NULL, {column} {direction}, session.exercise, {who}, {last}")
 }
 
-fn listed(row: &Row) -> rusqlite::Result<Listed> {
+fn indexed_session(row: &Row) -> rusqlite::Result<IndexedSession> {
     let machine: Option<String> = row.get(11)?;
     let machine = machine.and_then(|text| serde_json::from_str::<GradeFile>(&text).ok());
     let (points, passed): (Option<f64>, Option<bool>) = (row.get(8)?, row.get(9)?);
     let overrides: i64 = row.get(10)?;
-    let grade = machine.map(|machine| Graded {
+    let grade = machine.map(|machine| IndexedGrade {
         points: points.unwrap_or(machine.points),
         passed: passed.unwrap_or(machine.passed),
         overrides: overrides as usize,
         machine,
     });
-    Ok(Listed {
+    Ok(IndexedSession {
         id: row.get(0)?,
         path: PathBuf::from(row.get::<_, String>(1)?),
         exercise: row.get(2)?,

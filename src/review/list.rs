@@ -1,37 +1,37 @@
-//! The list of sessions, and of what is none.
+//! Pages that list the sessions, and the files that are left out.
 
-use super::desk::{Desk, SHOWN_MAX, Visit};
-use super::exchange::Response;
-use super::index::Listed;
-use super::query::{LENGTHS, Outcome, Query, Sort};
-use crate::report::harmless;
-use crate::report::words;
+use super::app::{RequestContext, ReviewApp, SHOWN_MAX};
+use super::http::Response;
+use super::index::IndexedSession;
+use super::query::{PAGE_LENGTHS, Query, ResultFilter, SortColumn};
 use serde::Serialize;
+use typodont_report::display_format;
+use typodont_report::sanitize_display;
 
 #[derive(Serialize)]
-struct List {
-    rows: Vec<Line>,
-    /// Sessions on all pages, and which of them are on this one, from 1.
+struct ListPage {
+    rows: Vec<SessionListRow>,
+    /// Number of sessions on all pages, and numbers of the first and last session on this page, from 1.
     count: usize,
     first: usize,
     last: usize,
     before: Option<String>,
     after: Option<String>,
-    columns: Vec<Column>,
-    asked: Asked,
-    exercises: Vec<Choice>,
-    folders: Vec<Choice>,
-    results: Vec<Choice>,
-    overridden: Vec<Choice>,
-    lengths: Vec<Choice>,
-    /// The same sessions as tables.
+    columns: Vec<ListColumn>,
+    asked: FilterForm,
+    exercises: Vec<SelectOption>,
+    folders: Vec<SelectOption>,
+    results: Vec<SelectOption>,
+    overridden: Vec<SelectOption>,
+    lengths: Vec<SelectOption>,
+    /// Addresses that export the same sessions.
     csv: String,
     json: String,
     left_out: usize,
 }
 
 #[derive(Serialize)]
-struct Line {
+struct SessionListRow {
     id: String,
     exercise: String,
     who: String,
@@ -40,158 +40,176 @@ struct Line {
     points: String,
     max_points: String,
     passed: bool,
-    /// The examiner's, where anything was judged.
+    /// Examiner's points, if anything is overridden.
     examiner: Option<String>,
     stands_passed: bool,
     overrides: usize,
 }
 
 #[derive(Serialize)]
-struct Column {
+struct ListColumn {
     name: &'static str,
     link: String,
-    /// As `aria-sort` says it; empty where the list is not in this order.
+    /// Value of `aria-sort`; empty if the list is not sorted by this column.
     order: &'static str,
     number: bool,
 }
 
 #[derive(Serialize)]
-struct Choice {
+struct SelectOption {
     value: String,
     title: String,
     chosen: bool,
 }
 
-/// What the form holds.
+/// Current values of the filter form.
 #[derive(Serialize)]
-struct Asked {
+struct FilterForm {
     text: String,
     sort: &'static str,
     down: bool,
     is_narrowed: bool,
 }
 
-pub fn page(desk: &Desk, visit: &Visit) -> Response {
-    let query = Query::of(&visit.request.asked());
-    let (state, told) = match desk.look_again(visit) {
+pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
+    let query = Query::parse(&context.request.query_pairs());
+    let (state, log) = match app.refresh(context) {
         Ok(now) => now,
         Err(response) => return *response,
     };
-    let found = state.index.page(&query, desk.anonymous);
-    let choices = state.index.choices();
+    let found = state.index.query_sessions(&query, app.anonymous);
+    let choices = state.index.filter_options();
     let left_out = state.index.left_out();
     drop(state);
     let (Ok((rows, count)), Ok(choices), Ok(left_out)) = (found, choices, left_out) else {
-        return desk.lost(visit);
+        return app.index_failure(context);
     };
     let first = (query.page - 1).saturating_mul(query.length);
     let last = first + rows.len();
-    let at = |page: usize| address("/", &Query { page, ..query.clone() });
-    let everything = Query { page: 1, length: LENGTHS[0], ..query.clone() };
-    let folders: &[String] = if desk.anonymous { &[] } else { &choices.folders };
-    let body = List {
-        rows: rows.iter().map(|listed| line(desk, listed)).collect(),
+    let at = |page: usize| href("/", &Query { page, ..query.clone() });
+    let everything = unpaged(&query);
+    let body = ListPage {
+        rows: rows.iter().map(|listed| session_row(app, listed)).collect(),
         count,
         first: first + 1,
         last,
         before: (query.page > 1).then(|| at(query.page - 1)),
         after: (last < count).then(|| at(query.page + 1)),
-        columns: Sort::ALL.iter().map(|sort| column(&query, *sort)).collect(),
-        exercises: choices
-            .exercises
-            .iter()
-            .filter(|(id, _)| is_plain(id))
-            .map(|(id, title)| Choice {
-                value: id.clone(),
-                title: harmless(title, SHOWN_MAX),
-                chosen: *id == query.exercise,
-            })
-            .collect(),
-        folders: folders
-            .iter()
-            .filter(|folder| folders.len() > 1 && is_plain(folder))
-            .map(|folder| Choice {
-                value: folder.clone(),
-                title: harmless(folder, SHOWN_MAX),
-                chosen: query.folder.as_ref() == Some(folder),
-            })
-            .collect(),
-        results: Outcome::ALL.iter().map(|o| named(o.name(), query.result == Some(*o))).collect(),
-        overridden: vec![named("yes", query.overridden == Some(true)), named("no", query.overridden == Some(false))],
-        lengths: LENGTHS.iter().map(|l| named(&l.to_string(), query.length == *l)).collect(),
-        csv: address("/sessions.csv", &everything),
-        json: address("/sessions.json", &everything),
+        columns: SortColumn::ALL.iter().map(|sort| column(&query, *sort)).collect(),
+        exercises: exercise_options(&choices.exercises, &query),
+        folders: if app.anonymous { Vec::new() } else { folder_options(&choices.folders, &query) },
+        results: ResultFilter::ALL.iter().map(|o| select_option(o.name(), query.result == Some(*o))).collect(),
+        overridden: vec![
+            select_option("yes", query.overridden == Some(true)),
+            select_option("no", query.overridden == Some(false)),
+        ],
+        lengths: PAGE_LENGTHS.iter().map(|l| select_option(&l.to_string(), query.length == *l)).collect(),
+        csv: href("/sessions.csv", &everything),
+        json: href("/sessions.json", &everything),
         left_out: left_out.len(),
-        asked: Asked {
-            is_narrowed: Query::of(&[]) != Query { sort: Sort::Exercise, down: false, ..everything.clone() },
-            text: harmless(&query.text, 200),
-            sort: query.sort.name(),
-            down: query.down,
-        },
+        asked: filter_form(&query),
     };
-    desk.page(visit, &told, "list.html", body)
+    app.page(context, &log, "list.html", body)
 }
 
-/// What can stand in a form's choice: exercises and folders of ours can; of others a search finds them.
-fn is_plain(text: &str) -> bool {
-    harmless(text, 200) == text
+/// Returns the exercises offered by the filter, given as id and title.
+fn exercise_options(exercises: &[(String, String)], query: &Query) -> Vec<SelectOption> {
+    let offered = exercises.iter().filter(|(id, _)| is_plain_text(id));
+    let option = |(id, title): &(String, String)| SelectOption {
+        value: id.clone(),
+        title: sanitize_display(title, SHOWN_MAX),
+        chosen: *id == query.exercise,
+    };
+    offered.map(option).collect()
 }
 
-fn line(desk: &Desk, listed: &Listed) -> Line {
-    let grade = listed.grade.as_ref();
+/// Returns the folders offered by the filter; a single folder is not offered.
+fn folder_options(folders: &[String], query: &Query) -> Vec<SelectOption> {
+    let offered = folders.iter().filter(|folder| folders.len() > 1 && is_plain_text(folder));
+    let option = |folder: &String| SelectOption {
+        value: folder.clone(),
+        title: sanitize_display(folder, SHOWN_MAX),
+        chosen: query.folder.as_ref() == Some(folder),
+    };
+    offered.map(option).collect()
+}
+
+fn filter_form(query: &Query) -> FilterForm {
+    let unfiltered = Query { sort: SortColumn::Exercise, is_descending: false, ..unpaged(query) };
+    FilterForm {
+        is_narrowed: Query::parse(&[]) != unfiltered,
+        text: sanitize_display(&query.text, 200),
+        sort: query.sort.name(),
+        down: query.is_descending,
+    }
+}
+
+/// Returns a query for the same sessions from the first page, with the default page length.
+fn unpaged(query: &Query) -> Query {
+    Query { page: 1, length: PAGE_LENGTHS[0], ..query.clone() }
+}
+
+/// Returns true if `text` can be the value of a form's option unchanged. Sessions with other exercise ids or folders
+/// are found by searching.
+fn is_plain_text(text: &str) -> bool {
+    sanitize_display(text, 200) == text
+}
+
+fn session_row(app: &ReviewApp, indexed: &IndexedSession) -> SessionListRow {
+    let grade = indexed.grade.as_ref();
     let judged = grade.filter(|g| g.overrides > 0);
-    Line {
-        id: listed.id.clone(),
-        exercise: harmless(&listed.title, SHOWN_MAX),
-        who: desk.called(listed),
-        began: desk.began(listed),
+    SessionListRow {
+        id: indexed.id.clone(),
+        exercise: sanitize_display(&indexed.title, SHOWN_MAX),
+        who: app.display_name(indexed),
+        began: app.display_start(indexed),
         graded: grade.is_some(),
-        points: grade.map_or_else(String::new, |g| words::number(g.machine.points)),
-        max_points: grade.map_or_else(String::new, |g| words::plain(g.machine.max_points)),
+        points: grade.map_or_else(String::new, |g| display_format::number(g.machine.points)),
+        max_points: grade.map_or_else(String::new, |g| display_format::plain_number(g.machine.max_points)),
         passed: grade.is_some_and(|g| g.machine.passed),
-        examiner: judged.map(|g| words::number(g.points)),
+        examiner: judged.map(|g| display_format::number(g.points)),
         stands_passed: grade.is_some_and(|g| g.passed),
         overrides: grade.map_or(0, |g| g.overrides),
     }
 }
 
-fn column(query: &Query, sort: Sort) -> Column {
-    let order = match (query.sort == sort, query.down) {
+fn column(query: &Query, sort: SortColumn) -> ListColumn {
+    let order = match (query.sort == sort, query.is_descending) {
         (false, _) => "",
         (true, false) => "ascending",
         (true, true) => "descending",
     };
-    Column { name: sort.name(), link: address("/", &query.by(sort)), order, number: sort.is_number() }
+    ListColumn { name: sort.name(), link: href("/", &query.sorted_by(sort)), order, number: sort.is_number() }
 }
 
-fn named(name: &str, chosen: bool) -> Choice {
-    Choice { value: name.to_string(), title: name.to_string(), chosen }
+fn select_option(name: &str, chosen: bool) -> SelectOption {
+    SelectOption { value: name.to_string(), title: name.to_string(), chosen }
 }
 
-fn address(path: &str, query: &Query) -> String {
-    match query.written() {
+fn href(path: &str, query: &Query) -> String {
+    match query.to_query_string() {
         query if query.is_empty() => path.to_string(),
         query => format!("{path}?{query}"),
     }
 }
 
 #[derive(Serialize)]
-struct LeftOut {
+struct LeftOutPage {
     count: usize,
-    /// Path and reason; none where they could tell who somebody is.
+    /// Path and reason of each file; empty in anonymous mode, where names could identify participants.
     files: Vec<(String, String)>,
 }
 
-pub fn left_out(desk: &Desk, visit: &Visit) -> Response {
-    let (state, told) = match desk.look_again(visit) {
+pub fn left_out(app: &ReviewApp, context: &RequestContext) -> Response {
+    let (state, log) = match app.refresh(context) {
         Ok(now) => now,
         Err(response) => return *response,
     };
     let files = state.index.left_out();
     drop(state);
-    let Ok(files) = files else { return desk.lost(visit) };
+    let Ok(files) = files else { return app.index_failure(context) };
     let count = files.len();
-    let shown = files.iter().filter(|_| !desk.anonymous);
-    let files = shown.map(|(path, why)| (harmless(path, 200), harmless(why, 300))).collect();
-    desk.page(visit, &told, "left_out.html", LeftOut { count, files })
+    let shown = files.iter().filter(|_| !app.anonymous);
+    let files = shown.map(|(path, why)| (sanitize_display(path, 200), sanitize_display(why, 300))).collect();
+    app.page(context, &log, "left_out.html", LeftOutPage { count, files })
 }

@@ -1,46 +1,63 @@
-//! Whether a question comes from our own pages.
+//! Validation of a request's `Host` and `Origin` headers.
 //!
-//! A page of another site can make a browser ask us anything. It cannot choose `Host` and `Origin`: the first would name the
-//! other site even where its name was made to lead here (DNS rebinding), the second names it whenever a form is sent.
+//! A page of another site can make a browser send any request to this server, but cannot choose these headers: `Host`
+//! names the other site even if its name was made to resolve to this machine (DNS rebinding), and `Origin` names it
+//! whenever a form is submitted.
 
-use super::exchange::Request;
+use super::http::Request;
+use std::fmt;
 use std::net::{IpAddr, SocketAddr};
 
-/// Names by which this machine is reached beside its addresses, without a port.
+/// Host names under which this machine is reached, in addition to its IP addresses; without ports.
 #[derive(Clone, Debug, Default)]
-pub struct Names(pub Vec<String>);
+pub struct AllowedHosts(pub Vec<String>);
 
-/// Why a question is refused.
+/// Header for which a request is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Foreign {
+pub enum OriginError {
     Host,
     Origin,
 }
 
-impl Foreign {
-    pub fn why(self) -> &'static str {
+impl OriginError {
+    pub fn message(self) -> &'static str {
         match self {
-            Foreign::Host => "foreign-host: this address is not known under that name; name it by --name",
-            Foreign::Origin => "foreign-origin: what another site asks is not answered",
+            OriginError::Host => "foreign-host: this host name is not allowed; add it with --name",
+            OriginError::Origin => "foreign-origin: requests from other sites are refused",
         }
     }
 }
 
-impl Names {
-    /// `Err` for a question under another name than ours, from another site, or a form whose origin is not told.
-    pub fn check(&self, request: &Request) -> Result<(), Foreign> {
-        let host = request.header("host").filter(|host| self.is_ours(host, request.at)).ok_or(Foreign::Host)?;
-        let told = request.headers.iter().any(|(name, _)| name == "origin");
+impl fmt::Display for OriginError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(self.message())
+    }
+}
+
+impl std::error::Error for OriginError {}
+
+impl AllowedHosts {
+    /// Checks a request.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error when the host is not allowed, the origin is another site, or a POST request has no origin.
+    pub fn check(&self, request: &Request) -> Result<(), OriginError> {
+        let host = request
+            .header("host")
+            .filter(|host| self.is_allowed_host(host, request.local_addr))
+            .ok_or(OriginError::Host)?;
+        let has_origin = request.headers.iter().any(|(name, _)| name == "origin");
         match request.header("origin") {
             Some(origin) if is_origin_of(origin, host) => Ok(()),
-            None if !told && request.method != "POST" => Ok(()),
-            _ => Err(Foreign::Origin),
+            None if !has_origin && request.method != "POST" => Ok(()),
+            _ => Err(OriginError::Origin),
         }
     }
 
-    fn is_ours(&self, host: &str, at: SocketAddr) -> bool {
-        let (name, port) = split(host);
-        // A name of our own may be a proxy's, at a port of its own.
+    fn is_allowed_host(&self, host: &str, at: SocketAddr) -> bool {
+        let (name, port) = split_host_and_port(host);
+        // A configured name may be that of a proxy, which listens on a port of its own.
         if self.0.iter().any(|own| own.eq_ignore_ascii_case(name)) {
             return true;
         }
@@ -56,8 +73,8 @@ fn is_origin_of(origin: &str, host: &str) -> bool {
     after.is_some_and(|authority| authority.eq_ignore_ascii_case(host))
 }
 
-/// Name and port of an authority; an IPv6 address keeps its brackets.
-fn split(host: &str) -> (&str, Option<&str>) {
+/// Splits an authority into host and port. An IPv6 address keeps its brackets.
+fn split_host_and_port(host: &str) -> (&str, Option<&str>) {
     match host.rsplit_once(':') {
         Some((name, port)) if !port.contains(']') => (name, Some(port)),
         _ => (host, None),
@@ -68,7 +85,7 @@ fn split(host: &str) -> (&str, Option<&str>) {
 mod tests {
     use super::*;
 
-    fn asked(method: &str, at: &str, headers: &[(&str, &str)]) -> Result<(), Foreign> {
+    fn check(method: &str, at: &str, headers: &[(&str, &str)]) -> Result<(), OriginError> {
         let request = Request {
             method: method.into(),
             path: "/".into(),
@@ -76,42 +93,42 @@ mod tests {
             headers: headers.iter().map(|(n, v)| (n.to_string(), v.to_string())).collect(),
             body: Vec::new(),
             peer: [127, 0, 0, 1].into(),
-            at: at.parse().unwrap(),
+            local_addr: at.parse().unwrap(),
             now: jiff::Timestamp::UNIX_EPOCH,
         };
-        Names(vec!["marks.school.example".into()]).check(&request)
+        AllowedHosts(vec!["marks.school.example".into()]).check(&request)
     }
 
     #[test]
-    fn another_name_than_ours_is_refused() {
+    fn an_unknown_host_name_is_refused() {
         let here = "127.0.0.1:4000";
         for host in
             ["127.0.0.1:4000", "localhost:4000", "LocalHost:4000", "marks.school.example", "marks.school.example:8443"]
         {
-            assert_eq!(asked("GET", here, &[("host", host)]), Ok(()), "{host}");
+            assert_eq!(check("GET", here, &[("host", host)]), Ok(()), "{host}");
         }
         for host in
             ["evil.example:4000", "127.0.0.1:4001", "127.0.0.1", "127.0.0.1.evil.example:4000", "[::1]:4000", ""]
         {
-            assert_eq!(asked("GET", here, &[("host", host)]), Err(Foreign::Host), "{host}");
+            assert_eq!(check("GET", here, &[("host", host)]), Err(OriginError::Host), "{host}");
         }
-        assert_eq!(asked("GET", here, &[]), Err(Foreign::Host));
-        assert_eq!(asked("GET", here, &[("host", here), ("host", here)]), Err(Foreign::Host), "told twice");
-        assert_eq!(asked("GET", "[::1]:80", &[("host", "[::1]")]), Ok(()));
-        assert_eq!(asked("GET", "192.0.2.7:80", &[("host", "localhost")]), Err(Foreign::Host));
+        assert_eq!(check("GET", here, &[]), Err(OriginError::Host));
+        assert_eq!(check("GET", here, &[("host", here), ("host", here)]), Err(OriginError::Host), "repeated header");
+        assert_eq!(check("GET", "[::1]:80", &[("host", "[::1]")]), Ok(()));
+        assert_eq!(check("GET", "192.0.2.7:80", &[("host", "localhost")]), Err(OriginError::Host));
     }
 
     #[test]
-    fn a_form_of_another_site_is_refused() {
+    fn a_form_from_another_site_is_refused() {
         let here = "127.0.0.1:4000";
-        let from = |method: &str, origin: &str| asked(method, here, &[("host", here), ("origin", origin)]);
+        let from = |method: &str, origin: &str| check(method, here, &[("host", here), ("origin", origin)]);
         assert_eq!(from("POST", "http://127.0.0.1:4000"), Ok(()));
         for origin in
             ["http://evil.example", "http://127.0.0.1:4001", "http://localhost:4000", "null", "127.0.0.1:4000", ""]
         {
-            assert_eq!(from("POST", origin), Err(Foreign::Origin), "{origin}");
-            assert_eq!(from("GET", origin), Err(Foreign::Origin), "{origin}");
+            assert_eq!(from("POST", origin), Err(OriginError::Origin), "{origin}");
+            assert_eq!(from("GET", origin), Err(OriginError::Origin), "{origin}");
         }
-        assert_eq!(asked("POST", here, &[("host", here)]), Err(Foreign::Origin), "a form tells where it stood");
+        assert_eq!(check("POST", here, &[("host", here)]), Err(OriginError::Origin), "a form must have an origin");
     }
 }

@@ -1,51 +1,55 @@
-//! What of the list is to be seen, and in which order.
+//! Filter, sort order and page of the session list, as query parameters.
 
-use super::exchange::value;
+use super::http::first_value;
 
-/// Letters of a search, an exercise's id, a folder: longer than any that is read.
+/// Maximum length of a search text, exercise id or folder, characters. Longer text is truncated.
 const SEARCH_MAX: usize = 200;
 
-/// Lines of a page that may be chosen; the first is taken unless told otherwise.
-pub const LENGTHS: [usize; 3] = [50, 200, 2000];
+/// Selectable page lengths; the first is the default.
+pub const PAGE_LENGTHS: [usize; 3] = [50, 200, 2000];
 
+/// Query of the session list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Query {
+    /// Exercise id; empty for all.
     pub exercise: String,
-    /// The folder in which a bundle lies: a class, a year.
+    /// Folder that contains the bundle, such as a class or year; `None` for all.
     pub folder: Option<String>,
-    /// Must stand in title, participant or id.
+    /// Text that title, id, code or participant must contain.
     pub text: String,
-    pub result: Option<Outcome>,
+    pub result: Option<ResultFilter>,
+    /// Restricts the list to sessions with or without overrides.
     pub overridden: Option<bool>,
-    pub sort: Sort,
-    pub down: bool,
-    /// From 1.
+    pub sort: SortColumn,
+    pub is_descending: bool,
+    /// Page number, from 1.
     pub page: usize,
     pub length: usize,
 }
 
+/// Effective result to which the list is restricted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub enum ResultFilter {
     Passed,
     Failed,
     Ungraded,
 }
 
-impl Outcome {
-    pub const ALL: [Outcome; 3] = [Outcome::Passed, Outcome::Failed, Outcome::Ungraded];
+impl ResultFilter {
+    pub const ALL: [ResultFilter; 3] = [ResultFilter::Passed, ResultFilter::Failed, ResultFilter::Ungraded];
 
     pub fn name(self) -> &'static str {
         match self {
-            Outcome::Passed => "passed",
-            Outcome::Failed => "failed",
-            Outcome::Ungraded => "ungraded",
+            ResultFilter::Passed => "passed",
+            ResultFilter::Failed => "failed",
+            ResultFilter::Ungraded => "ungraded",
         }
     }
 }
 
-/// A column.
+/// Column by which the list is sorted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sort {
+pub enum SortColumn {
     Exercise,
     Participant,
     Began,
@@ -56,88 +60,93 @@ pub enum Sort {
     Overrides,
 }
 
-impl Sort {
-    pub const ALL: [Sort; 8] = [
-        Sort::Exercise,
-        Sort::Participant,
-        Sort::Began,
-        Sort::Machine,
-        Sort::MachineResult,
-        Sort::Examiner,
-        Sort::Result,
-        Sort::Overrides,
+impl SortColumn {
+    pub const ALL: [SortColumn; 8] = [
+        SortColumn::Exercise,
+        SortColumn::Participant,
+        SortColumn::Began,
+        SortColumn::Machine,
+        SortColumn::MachineResult,
+        SortColumn::Examiner,
+        SortColumn::Result,
+        SortColumn::Overrides,
     ];
 
     pub fn name(self) -> &'static str {
         match self {
-            Sort::Exercise => "exercise",
-            Sort::Participant => "participant",
-            Sort::Began => "began",
-            Sort::Machine => "machine",
-            Sort::MachineResult => "machine_result",
-            Sort::Examiner => "examiner",
-            Sort::Result => "result",
-            Sort::Overrides => "overrides",
+            SortColumn::Exercise => "exercise",
+            SortColumn::Participant => "participant",
+            SortColumn::Began => "began",
+            SortColumn::Machine => "machine",
+            SortColumn::MachineResult => "machine_result",
+            SortColumn::Examiner => "examiner",
+            SortColumn::Result => "result",
+            SortColumn::Overrides => "overrides",
         }
     }
 
     pub fn is_number(self) -> bool {
-        matches!(self, Sort::Machine | Sort::Examiner | Sort::Overrides)
+        matches!(self, SortColumn::Machine | SortColumn::Examiner | SortColumn::Overrides)
     }
 }
 
 impl Query {
-    /// What nobody knows is passed over: an address that was shortened still leads to a list.
-    pub fn of(asked: &[(String, String)]) -> Query {
-        let text = |name: &str| value(asked, name).chars().take(SEARCH_MAX).collect::<String>();
-        let length = value(asked, "length").parse().ok().filter(|l| LENGTHS.contains(l)).unwrap_or(LENGTHS[0]);
-        let folder = asked.iter().any(|(name, value)| name == "folder" && value != "*").then(|| text("folder"));
+    /// Parses query parameters. Unknown and invalid ones are replaced by their defaults, so an incomplete address
+    /// still shows a list.
+    pub fn parse(pairs: &[(String, String)]) -> Query {
+        let text = |name: &str| first_value(pairs, name).chars().take(SEARCH_MAX).collect::<String>();
+        let length =
+            first_value(pairs, "length").parse().ok().filter(|l| PAGE_LENGTHS.contains(l)).unwrap_or(PAGE_LENGTHS[0]);
+        let folder = pairs.iter().any(|(name, value)| name == "folder" && value != "*").then(|| text("folder"));
         Query {
             exercise: text("exercise"),
             folder,
             text: text("text").trim().to_string(),
-            result: Outcome::ALL.into_iter().find(|o| o.name() == value(asked, "result")),
-            overridden: match value(asked, "overridden") {
+            result: ResultFilter::ALL.into_iter().find(|o| o.name() == first_value(pairs, "result")),
+            overridden: match first_value(pairs, "overridden") {
                 "yes" => Some(true),
                 "no" => Some(false),
                 _ => None,
             },
-            sort: Sort::ALL.into_iter().find(|s| s.name() == value(asked, "sort")).unwrap_or(Sort::Exercise),
-            down: value(asked, "down") == "yes",
-            page: value(asked, "page").parse().unwrap_or(1).clamp(1, 1_000_000),
+            sort: SortColumn::ALL
+                .into_iter()
+                .find(|s| s.name() == first_value(pairs, "sort"))
+                .unwrap_or(SortColumn::Exercise),
+            is_descending: first_value(pairs, "down") == "yes",
+            page: first_value(pairs, "page").parse().unwrap_or(1).clamp(1, 1_000_000),
             length,
         }
     }
 
-    /// The address's query that asks for it.
-    pub fn written(&self) -> String {
+    /// Formats the query string of an address, without parameters that have their default value.
+    pub fn to_query_string(&self) -> String {
         let mut out = url::form_urlencoded::Serializer::new(String::new());
-        let mut say = |name: &str, value: &str, usual: &str| {
+        let mut append_unless_default = |name: &str, value: &str, usual: &str| {
             if value != usual {
                 out.append_pair(name, value);
             }
         };
-        say("text", &self.text, "");
-        say("exercise", &self.exercise, "");
-        say("folder", self.folder.as_deref().unwrap_or("*"), "*");
-        say("result", self.result.map_or("", Outcome::name), "");
-        say("overridden", self.overridden.map_or("", |yes| if yes { "yes" } else { "no" }), "");
-        say("sort", self.sort.name(), Sort::Exercise.name());
-        say("down", if self.down { "yes" } else { "" }, "");
-        say("length", &self.length.to_string(), &LENGTHS[0].to_string());
-        say("page", &self.page.to_string(), "1");
+        append_unless_default("text", &self.text, "");
+        append_unless_default("exercise", &self.exercise, "");
+        append_unless_default("folder", self.folder.as_deref().unwrap_or("*"), "*");
+        append_unless_default("result", self.result.map_or("", ResultFilter::name), "");
+        append_unless_default("overridden", self.overridden.map_or("", |yes| if yes { "yes" } else { "no" }), "");
+        append_unless_default("sort", self.sort.name(), SortColumn::Exercise.name());
+        append_unless_default("down", if self.is_descending { "yes" } else { "" }, "");
+        append_unless_default("length", &self.length.to_string(), &PAGE_LENGTHS[0].to_string());
+        append_unless_default("page", &self.page.to_string(), "1");
         out.finish()
     }
 
-    /// The first page of the same, in the order of a column: the other way around where it is ordered so already.
-    pub fn by(&self, sort: Sort) -> Query {
-        let down = if self.sort == sort { !self.down } else { sort.is_number() };
-        Query { sort, down, page: 1, ..self.clone() }
+    /// Returns the query for the first page sorted by a column, in reverse order if the list is already sorted by it.
+    pub fn sorted_by(&self, sort: SortColumn) -> Query {
+        let down = if self.sort == sort { !self.is_descending } else { sort.is_number() };
+        Query { sort, is_descending: down, page: 1, ..self.clone() }
     }
 }
 
-/// A text as it is searched for: without regard to case, and to the dots on which Turkish and English disagree.
-pub fn folded(text: &str) -> String {
+/// Folds a text for searching: lower case, without distinguishing the dotted and dotless i of Turkish.
+pub fn fold_case(text: &str) -> String {
     let lower = text.chars().flat_map(char::to_lowercase);
     lower.filter(|c| *c != '\u{307}').map(|c| if c == 'ı' { 'i' } else { c }).collect()
 }
@@ -147,22 +156,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_query_is_what_its_address_says() {
-        let asked =
-            |text: &str| Query::of(&url::form_urlencoded::parse(text.as_bytes()).into_owned().collect::<Vec<_>>());
-        let usual = asked("");
-        assert_eq!(usual.written(), "");
-        let full = asked(
+    fn a_query_survives_a_round_trip_through_its_address() {
+        let parse =
+            |text: &str| Query::parse(&url::form_urlencoded::parse(text.as_bytes()).into_owned().collect::<Vec<_>>());
+        let default = parse("");
+        assert_eq!(default.to_query_string(), "");
+        let full = parse(
             "text=%27%3B+DROP+TABLE&exercise=5&folder=&result=failed&overridden=yes&sort=machine&down=yes&length=200&page=3",
         );
         assert_eq!((full.text.as_str(), full.folder.as_deref(), full.page), ("'; DROP TABLE", Some(""), 3));
-        assert_eq!(asked(&full.written()), full);
-        assert_eq!(asked("sort=id;--&page=-1&length=7&result=x"), usual);
-        assert!(full.by(Sort::Machine).page == 1 && !full.by(Sort::Machine).down);
+        assert_eq!(parse(&full.to_query_string()), full);
+        assert_eq!(parse("sort=id;--&page=-1&length=7&result=x"), default);
+        assert!(full.sorted_by(SortColumn::Machine).page == 1 && !full.sorted_by(SortColumn::Machine).is_descending);
     }
 
     #[test]
-    fn letters_are_found_whatever_their_case() {
-        assert_eq!(folded("ISPARTA İzmir ığdır"), "isparta izmir iğdir");
+    fn search_ignores_case() {
+        assert_eq!(fold_case("ISPARTA İzmir ığdır"), "isparta izmir iğdir");
     }
 }

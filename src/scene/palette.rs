@@ -1,17 +1,18 @@
-//! Each tissue in its colour.
+//! Colours of the tissues.
 
-use crate::content::{Role, TissueTable};
-use crate::render::Palette;
+use typodont_exercise::catalog::{TissueRole, TissueTable};
+use typodont_render::LabelPalette;
 
-/// Wet enamel and dull decay lie on either side; see [`Finish`](crate::render::Finish).
+/// Gloss of every tissue, between that of wet enamel and that of dull decay; see
+/// [`Appearance`](typodont_render::Appearance).
 pub(super) const GLOSS: f32 = 0.15;
 
-/// Each tissue in its colour; decay in that of enamel, in which it hides, where the exercise does not show it.
-pub fn palette(tissues: &TissueTable, is_decay_shown: bool) -> Palette {
-    let sound = tissues.by_name("enamel");
-    Palette::of(
+/// Colour of each tissue. Unless the exercise shows decay, it has the colour of enamel and cannot be seen.
+pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalette {
+    let enamel = tissues.by_name("enamel");
+    LabelPalette::from_colours(
         |label| {
-            let entry = tissues.by_label(label).filter(|e| is_decay_shown || e.role != Role::Decay).or(sound);
+            let entry = tissues.by_label(label).filter(|e| is_decay_shown || e.role != TissueRole::Decay).or(enamel);
             entry.map_or([0.85, 0.82, 0.75], |e| e.rgb())
         },
         GLOSS,

@@ -1,9 +1,9 @@
-//! Places to look from: at each side of the tooth, at each quadrant, at the whole mouth.
+//! Standard views: of each side of the tooth, of each quadrant, of the whole mouth.
 
 use super::jaw::Mouth;
-use crate::frame::Vec3;
-use crate::render::{Orbit, Quadrant};
-use crate::scenario::{ToothPlace, Workpiece};
+use typodont_core::frame::Vec3;
+use typodont_exercise::scenario::{ToothBounds, Workpiece};
+use typodont_render::{Orbit, Quadrant};
 
 /// A side of the tooth, looked at squarely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl ToothSide {
     }
 }
 
-/// What is seen of a crown's surroundings: the picture is so many times as large as the crown.
+/// Size of the picture relative to the crown.
 const CROWN_ROOM: f32 = 1.25;
 
 /// Half of what a quadrant, and a mouth, fills of a picture, mm.
@@ -47,9 +47,9 @@ const QUADRANT_MIDDLE: [f32; 2] = [18.0, 20.0];
 pub fn tooth_view(workpiece: &Workpiece, side: ToothSide) -> Orbit {
     let [low, high] = crowns(workpiece);
     let middle = workpiece.world_from_tooth * (0.5 * (low + high));
-    let distal = workpiece.teeth.first().map_or(Vec3::Y, ToothPlace::distal);
+    let distal = workpiece.teeth.first().map_or(Vec3::Y, ToothBounds::distal);
     let radius = 0.5 * CROWN_ROOM * (high - low).max_element();
-    toward(middle, radius, workpiece.world_from_tooth.turn(side.toward_eye(distal)))
+    orbit_toward(middle, radius, workpiece.world_from_tooth.rotate(side.toward_eye(distal)))
 }
 
 /// Corners of the box around all crowns, tooth space.
@@ -66,7 +66,7 @@ pub fn work_view(workpiece: &Workpiece) -> Orbit {
     let [low, high] = crowns(workpiece);
     let middle = workpiece.world_from_tooth * (0.5 * (low + high));
     let radius = 0.5 * (high - low).max_element() + BESIDE;
-    Orbit { turn: 0.25, tilt: 0.75, ..Orbit::around(middle, radius) }
+    Orbit { azimuth: 0.25, elevation: 0.75, ..Orbit::around(middle, radius) }
 }
 
 impl Mouth {
@@ -76,31 +76,31 @@ impl Mouth {
         let (world_from_arch, side) = self.arch_of(quadrant, open);
         let [aside, back] = QUADRANT_MIDDLE;
         let middle = world_from_arch * Vec3::new(side * aside, back, -3.0);
-        toward(middle, QUADRANT_REACH, world_from_arch.turn(Vec3::new(-0.50 * side, -0.75, 0.55)))
+        orbit_toward(middle, QUADRANT_REACH, world_from_arch.rotate(Vec3::new(-0.50 * side, -0.75, 0.55)))
     }
 
     /// Both jaws from in front.
     pub fn front_view(&self, open: f32) -> Orbit {
         let near = self.world_from_arch();
         let height = 0.5 * open.clamp(0.0, 35.0);
-        toward(near * Vec3::new(0.0, 12.0, height), MOUTH_REACH, near.turn(Vec3::new(0.0, -1.0, 0.12)))
+        orbit_toward(near * Vec3::new(0.0, 12.0, height), MOUTH_REACH, near.rotate(Vec3::new(0.0, -1.0, 0.12)))
     }
 
     /// The jaw with the carved tooth from straight over its chewing surfaces.
     pub fn arch_view(&self) -> Orbit {
         let near = self.world_from_arch();
-        let front = near.turn(Vec3::NEG_Y);
+        let front = near.rotate(Vec3::NEG_Y);
         // Straight down the picture's up is the way that `turn` looks: the incisors are at its lower edge.
-        let orbit = toward(near * Vec3::new(0.0, 25.0, -4.0), MOUTH_REACH, near.turn(Vec3::Z));
-        Orbit { turn: libm::atan2f(front.x, front.z), ..orbit }
+        let orbit = orbit_toward(near * Vec3::new(0.0, 25.0, -4.0), MOUTH_REACH, near.rotate(Vec3::Z));
+        Orbit { azimuth: libm::atan2f(front.x, front.z), ..orbit }
     }
 }
 
 /// Looks at a ball whole from a direction in world space, which need not be a unit.
-fn toward(middle: Vec3, radius: f32, to_eye: Vec3) -> Orbit {
+fn orbit_toward(middle: Vec3, radius: f32, to_eye: Vec3) -> Orbit {
     let to_eye = to_eye.normalize_or(Vec3::Z);
     let level = libm::hypotf(to_eye.x, to_eye.z);
-    let turn = if level < 1e-3 { 0.0 } else { libm::atan2f(to_eye.x, to_eye.z) };
-    let start = Orbit { turn, tilt: 0.0, ..Orbit::around(middle, radius) };
-    start.turned(0.0, libm::atan2f(to_eye.y, level))
+    let azimuth = if level < 1e-3 { 0.0 } else { libm::atan2f(to_eye.x, to_eye.z) };
+    let start = Orbit { azimuth, elevation: 0.0, ..Orbit::around(middle, radius) };
+    start.rotated(0.0, libm::atan2f(to_eye.y, level))
 }

@@ -1,33 +1,37 @@
-//! Sessions and their measures as Parquet, a folder for each class and month: `sessions/class=2026-A/month=2026-11/`.
+//! Parquet exports partitioned by class and month: `sessions/class=2026-A/month=2026-11/sessions.parquet`.
 //!
-//! The folders' names are Hive's, which DuckDB, pandas and Spark read as two columns more.
+//! Folder names follow Hive's partitioning, which DuckDB, pandas and Spark read as two additional columns.
 
-use super::records::Kept;
-use crate::handover::tables;
-use crate::report::cohort::Cohort;
+use super::records::StoredSession;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use typodont_integrations::parquet_tables;
+use typodont_report::cohort::Cohort;
 
-/// Tables of an export.
-const TABLES: [&str; 3] = [tables::SESSIONS, tables::METRICS, tables::EVENTS];
+/// File names of the tables of an export.
+const TABLES: [&str; 3] = [parquet_tables::SESSIONS, parquet_tables::METRICS, parquet_tables::EVENTS];
 
-/// Sessions by partition.
-pub fn partitions(kept: Vec<Kept>) -> BTreeMap<String, Cohort> {
+/// Groups sessions by partition name, such as `class=2026-A/month=2026-11`.
+pub fn by_partition(stored: Vec<StoredSession>) -> BTreeMap<String, Cohort> {
     let mut parts: BTreeMap<String, Cohort> = BTreeMap::new();
-    for Kept { class, bundle, month, session, .. } in kept {
+    for StoredSession { class, bundle, month, session, .. } in stored {
         let name = format!("class={class}/month={month}");
         parts.entry(name).or_default().sessions.push((PathBuf::from(bundle), session));
     }
     parts
 }
 
-/// A partition's files, by name within the export.
+/// Encodes a partition's tables. Names are relative to the export.
+///
+/// # Errors
+///
+/// Returns a message when a table cannot be encoded.
 pub fn files(partition: &str, sessions: &Cohort) -> Result<Vec<(String, Vec<u8>)>, String> {
-    let made = tables::all(sessions)?;
+    let made = parquet_tables::all_tables(sessions)?;
     Ok(made.into_iter().map(|(table, bytes)| (name(table, partition), bytes)).collect())
 }
 
-/// The names of a partition's files.
+/// Returns the names of a partition's files, relative to the export.
 pub fn names(partition: &str) -> [String; 3] {
     TABLES.map(|table| name(table, partition))
 }

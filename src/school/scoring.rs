@@ -1,24 +1,40 @@
-//! A recording's bytes scored again: the text that `typodont score` prints.
+//! Rescoring of a recording, with the result that `typodont score` prints.
 
-use crate::record::{Recording, Watch};
-use crate::report::SessionFile;
-use crate::score;
+use std::fmt;
 use std::panic::{self, AssertUnwindSafe};
+use typodont_exercise::record::{Recording, ReplayCheck};
+use typodont_exercise::score;
+use typodont_report::SessionFile;
 
-/// Why a recording has no score. Trying again would say the same.
+/// Reason for which a recording cannot be scored. The error is permanent.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Unscored(pub String);
+pub struct ScoringError(pub String);
 
-/// Scores a recording. `name` is told in complaints.
-pub fn rescored(name: &str, bytes: &[u8]) -> Result<SessionFile, Unscored> {
+impl fmt::Display for ScoringError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl std::error::Error for ScoringError {}
+
+/// Scores a recording. `name` identifies the recording in error messages.
+///
+/// # Errors
+///
+/// Returns an error when the recording is damaged or the scorer panics.
+pub fn rescore(name: &str, bytes: &[u8]) -> Result<SessionFile, ScoringError> {
     let scored = panic::catch_unwind(AssertUnwindSafe(|| {
         let recording = Recording::parse(name, bytes).map_err(|e| e.to_string())?;
-        let scored = score::score(&recording, Watch::Nothing).map_err(|e| format!("{name}: damaged-recording: {e}"))?;
+        let scored =
+            score::score(&recording, ReplayCheck::Skip).map_err(|e| format!("{name}: damaged-recording: {e}"))?;
         Ok(SessionFile::of(&recording, &scored))
     }));
     match scored {
-        Ok(result) => result.map_err(Unscored),
-        // One recording that breaks the scorer must not stop the rest.
-        Err(_) => Err(Unscored(format!("{name}: damaged-recording: scoring it broke off; please report it"))),
+        Ok(result) => result.map_err(ScoringError),
+        // A recording that makes the scorer panic must not stop the others.
+        Err(_) => {
+            Err(ScoringError(format!("{name}: damaged-recording: the scorer failed unexpectedly; please report it")))
+        }
     }
 }

@@ -134,6 +134,22 @@ function fell(voxel) {
   await settled(() => page.locator('[data-side="work"]').click());
   await photograph('report-clipped.png');
 
+  // An adapter that is lost and comes back shows the same picture. Regression: colours by verdict and hatching came back on.
+  for (const choice of ['tissue', 'verdict']) {
+    await settled(() => page.locator(`[name="colours"][value="${choice}"]`).check());
+    const shown = await picture('solid');
+    await page.evaluate(() => { window.lost = document.getElementById('solid').getContext('webgl2').getExtension('WEBGL_lose_context'); });
+    await page.evaluate(() => new Promise(done => {
+      document.getElementById('solid').addEventListener('webglcontextlost', done, { once: true });
+      window.lost.loseContext();
+    }));
+    await settled(() => page.evaluate(() => new Promise(done => {
+      document.getElementById('solid').addEventListener('webglcontextrestored', done, { once: true });
+      window.lost.restoreContext();
+    })));
+    claim(await picture('solid') === shown, `coloured by ${choice}, another picture comes back with the adapter`);
+  }
+
   // Whoever cannot see it is told names; nothing is a bare button.
   const unnamed = await page.evaluate(() => [...document.querySelectorAll('button, input, canvas, [role=button]')].filter(element => {
     if (element.closest('[hidden]')) return false;

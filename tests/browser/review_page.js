@@ -55,8 +55,8 @@ const origin = new URL(address).origin;
   await looks('list');
 
   // Narrowed and sorted.
-  await page.getByRole('columnheader', { name: 'Machine’s points' }).getByRole('link').click();
-  const order = await page.getByRole('columnheader', { name: 'Machine’s points' }).getAttribute('aria-sort');
+  await page.getByRole('columnheader', { name: 'Automatic points' }).getByRole('link').click();
+  const order = await page.getByRole('columnheader', { name: 'Automatic points' }).getAttribute('aria-sort');
   claim(order === 'descending', `the list is ${order}`);
   const points = await page.locator('table.list tbody tr td:nth-of-type(4)').allTextContents();
   const numbers = points.map(text => parseFloat(text));
@@ -70,7 +70,7 @@ const origin = new URL(address).origin;
   const boxes = page.locator('input[name="session"]');
   await boxes.nth(0).check();
   await page.getByRole('button', { name: 'Compare' }).click();
-  claim((await page.textContent('main')).includes('Tick two sessions'), 'one session is compared with nothing');
+  claim((await page.textContent('main')).includes('Select two sessions'), 'one session is compared with nothing');
   await photograph('complaint.png');
   await page.goBack();
   await boxes.nth(0).check();
@@ -116,7 +116,7 @@ const origin = new URL(address).origin;
   await photograph('session-withdraw.png');
 
   // The session's own report runs in a room of its own, and cannot judge.
-  const [report] = await Promise.all([context.waitForEvent('page'), page.getByRole('link', { name: 'own report' }).click()]);
+  const [report] = await Promise.all([context.waitForEvent('page'), page.getByRole('link', { name: 'session report' }).click()]);
   watch(report);
   await report.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
   const alone = await report.evaluate(() => {
@@ -141,7 +141,7 @@ const origin = new URL(address).origin;
   await photograph('list-turkish.png');
   await page.locator('table.list tbody a').first().click();
   const text = await page.textContent('main');
-  for (const english of ['Override', 'Machine', 'Reason', 'Passed', 'Points']) claim(!text.includes(english), `"${english}" is left in Turkish`);
+  for (const english of ['Override', 'Automatic', 'Reason', 'Passed', 'Points']) claim(!text.includes(english), `"${english}" is left in Turkish`);
   await photograph('session-turkish.png');
 
   await page.getByRole('button', { name: 'Çıkış' }).click();

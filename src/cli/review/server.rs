@@ -1,7 +1,5 @@
-//! The socket under the desk: HTTP/1.1, few connections at once, and nobody keeps one waiting.
+//! HTTP/1.1 server of the review pages, with limits on connections and times.
 
-use crate::report::harmless;
-use crate::review::{BODY_MAX, Desk, Request, Response, name_of};
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::server::conn::http1;
@@ -14,29 +12,34 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::net::TcpStream;
 use tokio::sync::Semaphore;
+use typodont_report::sanitize_display;
+use typodont_review::{BODY_MAX, Request, Response, ReviewApp, route_name};
 
-/// Connections at once: a browser opens six.
+/// Maximum number of simultaneous connections; a browser opens six.
 const CONNECTIONS_MAX: usize = 96;
 
-/// For a request's head, and for its body. A browser needs milliseconds.
+/// Time limits for the head of a request and for its body; a browser needs milliseconds.
 const HEAD_WAIT: Duration = Duration::from_secs(10);
 const BODY_WAIT: Duration = Duration::from_secs(10);
 
-/// For all that goes over a connection: a report of 6 MB over a bad line takes a minute.
+/// Time limit of a connection: a report of 6 MB over a slow line takes a minute.
 const CONNECTION_LIFE: Duration = Duration::from_secs(180);
 
-/// After the system had no connection to give.
-const BREATH: Duration = Duration::from_millis(100);
+/// Pause after the system failed to accept a connection.
+const ACCEPT_BACKOFF: Duration = Duration::from_millis(100);
 
-/// Headers of a request, and bytes of its head: a browser sends some fifteen.
+/// Maximum number of headers of a request, and of bytes of its head; a browser sends about fifteen headers.
 const HEADERS_MAX: usize = 64;
 const HEAD_MAX: usize = 32 << 10;
 
-/// Letters of a line that is told.
-const TOLD_MAX: usize = 300;
+/// Maximum length of a logged line, characters.
+const LOG_LINE_MAX: usize = 300;
 
-/// Answers until the program is ended.
-pub fn serve(listener: std::net::TcpListener, desk: Arc<Desk>) -> io::Result<()> {
+/// Serves requests until the program is stopped.
+///
+/// # Errors
+/// The system's error if the server cannot be started on this listener.
+pub fn serve(listener: std::net::TcpListener, app: Arc<ReviewApp>) -> io::Result<()> {
     let at = listener.local_addr()?;
     listener.set_nonblocking(true)?;
     let runtime =
@@ -48,27 +51,27 @@ pub fn serve(listener: std::net::TcpListener, desk: Arc<Desk>) -> io::Result<()>
             let Ok(place) = Arc::clone(&room).acquire_owned().await else { return Ok(()) };
             match listener.accept().await {
                 Ok((stream, peer)) => {
-                    let desk = Arc::clone(&desk);
+                    let desk = Arc::clone(&app);
                     tokio::spawn(async move {
-                        connection(stream, peer, at, desk).await;
+                        serve_connection(stream, peer, at, desk).await;
                         drop(place);
                     });
                 }
                 Err(error) => {
-                    tell(&format!("no connection was taken: {error}"));
-                    tokio::time::sleep(BREATH).await;
+                    log(&format!("a connection could not be accepted: {error}"));
+                    tokio::time::sleep(ACCEPT_BACKOFF).await;
                 }
             }
         }
     })
 }
 
-async fn connection(stream: TcpStream, peer: SocketAddr, at: SocketAddr, desk: Arc<Desk>) {
-    // Of an address like 0.0.0.0 the one at which this question came in.
+async fn serve_connection(stream: TcpStream, peer: SocketAddr, at: SocketAddr, app: Arc<ReviewApp>) {
+    // For a listener on an address such as 0.0.0.0: the local address at which this request arrived.
     let at = stream.local_addr().unwrap_or(at);
     let service = service_fn(move |asked: hyper::Request<Incoming>| {
-        let desk = Arc::clone(&desk);
-        async move { Ok::<_, Infallible>(carried(exchange(asked, peer, at, desk).await)) }
+        let desk = Arc::clone(&app);
+        async move { Ok::<_, Infallible>(to_hyper(handle(asked, peer, at, desk).await)) }
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -76,47 +79,57 @@ async fn connection(stream: TcpStream, peer: SocketAddr, at: SocketAddr, desk: A
         .max_headers(HEADERS_MAX)
         .max_buf_size(HEAD_MAX)
         .serve_connection(TokioIo::new(stream), service);
-    // What a browser breaks off, or is too slow for, is its own affair.
+    // A connection that the browser closes, or that exceeds its time limit, is not an error of the server.
     let _ = tokio::time::timeout(CONNECTION_LIFE, connection).await;
 }
 
-/// One question and its answer, told in a line that holds nothing of what was asked.
-async fn exchange(asked: hyper::Request<Incoming>, peer: SocketAddr, at: SocketAddr, desk: Arc<Desk>) -> Response {
+/// Handles one request; the log line about it contains none of the request's content.
+async fn handle(
+    hyper_request: hyper::Request<Incoming>,
+    peer: SocketAddr,
+    at: SocketAddr,
+    app: Arc<ReviewApp>,
+) -> Response {
     let begun = Instant::now();
-    let method = match asked.method().as_str() {
+    let method = match hyper_request.method().as_str() {
         known @ ("GET" | "HEAD" | "POST") => known.to_string(),
         _ => "other".to_string(),
     };
-    let page = name_of(asked.uri().path());
-    let response = match read(asked, peer, at).await {
-        // The desk looks at disks; nobody else waits for it meanwhile.
-        Ok(request) => tokio::task::spawn_blocking(move || desk.answer(&request))
+    let page = route_name(hyper_request.uri().path());
+    let response = match read_request(hyper_request, peer, at).await {
+        // Handling a request reads from disk; it runs on a blocking thread, so that other requests do not wait.
+        Ok(request) => tokio::task::spawn_blocking(move || app.handle(&request))
             .await
-            .unwrap_or_else(|_| Response::refusal(500, "failed: the program's log says why")),
+            .unwrap_or_else(|_| Response::plain_error(500, "failed: the request failed; see the program's log")),
         Err(refused) => *refused,
     };
-    for line in &response.told {
-        tell(line);
+    for line in &response.log_lines {
+        log(line);
     }
-    if let Some(token) = &response.opens {
-        // Whoever closed the terminal's end has heard enough.
-        let _ = super::say(super::address(at, token));
+    if let Some(token) = &response.new_login_token {
+        // A closed terminal is not an error.
+        let _ = super::print_line(super::login_url(at, token));
     }
     let took = begun.elapsed().as_secs_f64() * 1e3;
-    tell(&format!("{} {method} {page} {} {took:.1} ms", peer.ip(), response.status));
+    log(&format!("{} {method} {page} {} {took:.1} ms", peer.ip(), response.status));
     response
 }
 
-async fn read(asked: hyper::Request<Incoming>, peer: SocketAddr, at: SocketAddr) -> Result<Request, Box<Response>> {
-    let (head, body) = asked.into_parts();
-    let refused = |status: u16, why: &str| Err(Box::new(Response::refusal(status, why).with("connection", "close")));
+async fn read_request(
+    hyper_request: hyper::Request<Incoming>,
+    peer: SocketAddr,
+    at: SocketAddr,
+) -> Result<Request, Box<Response>> {
+    let (head, body) = hyper_request.into_parts();
+    let refused =
+        |status: u16, why: &str| Err(Box::new(Response::plain_error(status, why).with_header("connection", "close")));
     if head.uri.authority().is_some() {
-        return refused(400, "wrong-address: this is no proxy");
+        return refused(400, "wrong-address: this server is not a proxy");
     }
     let body = match tokio::time::timeout(BODY_WAIT, Limited::new(body, BODY_MAX).collect()).await {
         Ok(Ok(body)) => body.to_bytes().to_vec(),
-        Ok(Err(_)) => return refused(413, "long-form: nobody writes that much"),
-        Err(_) => return refused(408, "slow-form: it took too long to arrive"),
+        Ok(Err(_)) => return refused(413, "long-form: the form is too long"),
+        Err(_) => return refused(408, "slow-form: the form took too long to arrive"),
     };
     let header = |(name, value): (&hyper::header::HeaderName, &hyper::header::HeaderValue)| {
         (name.as_str().to_string(), String::from_utf8_lossy(value.as_bytes()).into_owned())
@@ -128,12 +141,12 @@ async fn read(asked: hyper::Request<Incoming>, peer: SocketAddr, at: SocketAddr)
         headers: head.headers.iter().map(header).collect(),
         body,
         peer: peer.ip().to_canonical(),
-        at,
+        local_addr: at,
         now: jiff::Timestamp::now(),
     })
 }
 
-fn carried(response: Response) -> hyper::Response<Full<Bytes>> {
+fn to_hyper(response: Response) -> hyper::Response<Full<Bytes>> {
     let mut built = hyper::Response::builder().status(response.status);
     for (name, value) in &response.headers {
         built = built.header(*name, value);
@@ -145,7 +158,7 @@ fn carried(response: Response) -> hyper::Response<Full<Bytes>> {
     })
 }
 
-/// A line for whoever keeps the program, with its time.
-fn tell(line: &str) {
-    eprintln!("{} {}", jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ"), harmless(line, TOLD_MAX));
+/// Prints a log line with the time.
+fn log(line: &str) {
+    eprintln!("{} {}", jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ"), sanitize_display(line, LOG_LINE_MAX));
 }

@@ -1,9 +1,8 @@
-//! Which database, and with what secret: from files and the environment, never from the command line.
+//! Address and password of the database; the password comes from files or the environment, never from the command line.
 
-use super::asking::Line;
-use super::patience::Patience;
-use crate::cli::Failure;
-use crate::school::{is_near, read_address};
+use super::connection::DbConnection;
+use super::retry::RetryPolicy;
+use crate::cli::CliError;
 use clap::Args;
 use postgres::Config;
 use postgres::config::{Host, SslMode};
@@ -14,101 +13,107 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio_postgres_rustls::MakeRustlsConnect;
+use typodont_school::{is_local, parse_database_url};
 
-/// Where it is looked for if the command line does not say.
-const ADDRESS: &str = "TYPODONT_DATABASE";
-const PASSWORD_FILE: &str = "TYPODONT_DATABASE_PASSWORD_FILE";
+/// Environment variables with the database's address and password file, if the command line does not give them.
+const DATABASE_VARIABLE: &str = "TYPODONT_DATABASE";
+const PASSWORD_FILE_VARIABLE: &str = "TYPODONT_DATABASE_PASSWORD_FILE";
 
-/// For a connection. A server in the house needs milliseconds.
-const CONNECT: Duration = Duration::from_secs(10);
+/// Time limit for opening a connection; a server in the local network needs milliseconds.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// After so long a silence the line is asked whether it still holds.
-const KEEP_ALIVE: Duration = Duration::from_secs(30);
+/// Idle time after which the connection is checked by a TCP keepalive.
+const KEEPALIVE_IDLE: Duration = Duration::from_secs(30);
 
 #[derive(Args, Clone)]
-pub struct At {
-    /// The database: postgres://user@host/name. Without it TYPODONT_DATABASE says so. The password comes from the file that
-    /// TYPODONT_DATABASE_PASSWORD_FILE names, from PGPASSWORD, or from PGPASSFILE
+pub struct DatabaseArguments {
+    /// URL of the database: postgres://user@host/name; by default taken from TYPODONT_DATABASE. The password is read from the file
+    /// named by TYPODONT_DATABASE_PASSWORD_FILE, from PGPASSWORD, or from PGPASSFILE
     #[arg(long, value_name = "URL")]
     pub database: Option<String>,
-    /// Certificates to trust in place of the usual, for a school's own
+    /// Certificates to trust instead of the public authorities, for a school's own authority
     #[arg(long, value_name = "FILE.pem")]
     pub database_certificates: Option<PathBuf>,
-    /// For how long a server that does not answer is tried again, in seconds
+    /// Time to keep trying a server that does not respond, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     pub patience: f64,
 }
 
-impl At {
-    /// Whether a database is named at all.
-    pub fn is_named(&self) -> bool {
-        self.database.is_some() || std::env::var_os(ADDRESS).is_some()
+impl DatabaseArguments {
+    /// True if a database is named, on the command line or in the environment.
+    pub fn is_configured(&self) -> bool {
+        self.database.is_some() || std::env::var_os(DATABASE_VARIABLE).is_some()
     }
 
-    pub fn patience(&self) -> Result<Patience, Failure> {
+    pub fn retry_policy(&self) -> Result<RetryPolicy, CliError> {
         let wait = Duration::try_from_secs_f64(self.patience);
-        wait.map(Patience).map_err(|e| Failure::misuse(format!("--patience: {e}")))
+        wait.map(RetryPolicy).map_err(|e| CliError::misuse(format!("--patience: {e}")))
     }
 
-    /// A line to it, not yet open.
-    pub fn line(&self) -> Result<Line, Failure> {
+    /// A connection to the database, not yet open.
+    pub fn connection(&self) -> Result<DbConnection, CliError> {
         let address = match &self.database {
             Some(address) => address.clone(),
-            None => std::env::var(ADDRESS).map_err(|_| {
-                Failure::misuse(format!("no-database: give --database, or its address in the environment's {ADDRESS}"))
+            None => std::env::var(DATABASE_VARIABLE).map_err(|_| {
+                CliError::misuse(format!(
+                    "no-database: give --database, or set the environment variable {DATABASE_VARIABLE}"
+                ))
             })?,
         };
-        let mut config = read_address(&address).map_err(|e| Failure::misuse(format!("--database: {e}")))?;
+        let mut config = parse_database_url(&address).map_err(|e| CliError::misuse(format!("--database: {e}")))?;
         if let Some(password) = password(&config)? {
             config.password(password);
         }
-        config.connect_timeout(CONNECT).keepalives_idle(KEEP_ALIVE).application_name("typodont");
-        let tls = match is_near(&config) && config.get_ssl_mode() != SslMode::Require {
+        config.connect_timeout(CONNECT_TIMEOUT).keepalives_idle(KEEPALIVE_IDLE).application_name("typodont");
+        let tls = match is_local(&config) && config.get_ssl_mode() != SslMode::Require {
             true => None,
-            false => Some(tls(self.database_certificates.as_deref())?),
+            false => Some(tls_connector(self.database_certificates.as_deref())?),
         };
         if tls.is_none() {
             config.ssl_mode(SslMode::Disable);
         }
-        Ok(Line { config, tls, patience: self.patience()?, client: None })
+        Ok(DbConnection { config, tls, retry_policy: self.retry_policy()?, client: None })
     }
 
-    /// The line's client itself, for what must not be asked twice.
-    pub fn client(&self) -> Result<postgres::Client, Failure> {
-        let mut line = self.line()?;
-        let patience = line.patience;
-        patience.keep(|| line.open().map(|_| ()))?;
-        line.client.ok_or_else(|| Failure::wrong("--database: no-answer"))
+    /// An open client, for statements that must not run twice.
+    pub fn connect(&self) -> Result<postgres::Client, CliError> {
+        let mut connection = self.connection()?;
+        let retry_policy = connection.retry_policy;
+        retry_policy.retry(|| connection.connect().map(|_| ()))?;
+        connection.client.ok_or_else(|| CliError::wrong("--database: no-answer"))
     }
 }
 
-/// TLS that believes the usual authorities, or a school's own, and the names in their certificates.
-fn tls(certificates: Option<&Path>) -> Result<MakeRustlsConnect, Failure> {
+/// TLS connector that trusts the public authorities, or a school's own, and checks host names.
+fn tls_connector(certificates: Option<&Path>) -> Result<MakeRustlsConnect, CliError> {
     let mut roots = RootCertStore::empty();
     match certificates {
         None => roots.extend(webpki_roots::TLS_SERVER_ROOTS.iter().cloned()),
         Some(path) => {
-            let pem = crate::content::read_file(path)?;
+            let pem = typodont_formats::read_file(path)?;
             let found: Vec<CertificateDer> = CertificateDer::pem_slice_iter(&pem).filter_map(Result::ok).collect();
             let (added, _) = roots.add_parsable_certificates(found);
             if added == 0 {
-                return Err(Failure::wrong(format!("{}: no-certificate: it holds none in PEM", path.display())));
+                return Err(CliError::wrong(format!(
+                    "{}: no-certificate: the file contains no PEM certificate",
+                    path.display()
+                )));
             }
         }
     }
     let provider = Arc::new(rustls::crypto::ring::default_provider());
     let config = ClientConfig::builder_with_provider(provider)
         .with_safe_default_protocol_versions()
-        .map_err(|e| Failure::wrong(format!("--database: no TLS here: {e}")))?
+        .map_err(|e| CliError::wrong(format!("--database: TLS is not available: {e}")))?
         .with_root_certificates(roots)
         .with_no_client_auth();
     Ok(MakeRustlsConnect::new(config))
 }
 
-/// The secret, where there is one.
-fn password(config: &Config) -> Result<Option<String>, Failure> {
-    if let Some(path) = std::env::var_os(PASSWORD_FILE) {
-        let text = crate::content::read_text(Path::new(&path))?.text.clone();
+/// The password, if there is one.
+fn password(config: &Config) -> Result<Option<String>, CliError> {
+    if let Some(path) = std::env::var_os(PASSWORD_FILE_VARIABLE) {
+        let text = typodont_formats::read_text(Path::new(&path))?.text.clone();
         return Ok(Some(text.trim_end_matches(['\r', '\n']).to_string()));
     }
     if let Ok(password) = std::env::var("PGPASSWORD") {
@@ -119,27 +124,31 @@ fn password(config: &Config) -> Result<Option<String>, Failure> {
         return Ok(None);
     };
     is_private(&path)?;
-    let text = crate::content::read_text(&path)?.text.clone();
-    Ok(text.lines().find_map(|line| in_line(line, config)))
+    let text = typodont_formats::read_text(&path)?.text.clone();
+    Ok(text.lines().find_map(|line| match_pgpass_line(line, config)))
 }
 
 #[cfg(unix)]
-fn is_private(path: &Path) -> Result<(), Failure> {
+fn is_private(path: &Path) -> Result<(), CliError> {
     use std::os::unix::fs::PermissionsExt;
     let mode = std::fs::metadata(path).map_or(0, |meta| meta.permissions().mode());
     match mode & 0o077 {
         0 => Ok(()),
-        _ => Err(Failure::wrong(format!("{}: open-secret: others may read it; chmod 600 closes it", path.display()))),
+        _ => Err(CliError::wrong(format!(
+            "{}: open-secret: other users can read the file; run chmod 600",
+            path.display()
+        ))),
     }
 }
 
 #[cfg(not(unix))]
-fn is_private(_: &Path) -> Result<(), Failure> {
+fn is_private(_: &Path) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The password of a line `host:port:database:user:password`, if it is for this connection; `*` is for any, `\` goes before a colon.
-fn in_line(line: &str, config: &Config) -> Option<String> {
+/// The password of a line `host:port:database:user:password`, if it matches this connection; `*` matches anything, and
+/// `\` escapes a colon.
+fn match_pgpass_line(line: &str, config: &Config) -> Option<String> {
     let mut fields = vec![String::new()];
     let mut letters = line.chars();
     while let Some(letter) = letters.next() {
@@ -172,9 +181,9 @@ mod tests {
 
     #[test]
     fn a_password_is_found_as_psql_finds_it() {
-        let config = read_address("postgres://anna@records.example.edu:5433/school").unwrap();
+        let config = parse_database_url("postgres://anna@records.example.edu:5433/school").unwrap();
         let check = |line: &str, expected: Option<&str>| {
-            assert_eq!(in_line(line, &config).as_deref(), expected, "{line}");
+            assert_eq!(match_pgpass_line(line, &config).as_deref(), expected, "{line}");
         };
         check("records.example.edu:5433:school:anna:se:cret", Some("se:cret"));
         check(r"*:*:*:anna:a\:b\\c", Some(r"a:b\c"));

@@ -1,55 +1,59 @@
-//! `typodont enqueue`: asks workers to score sessions.
+//! `typodont enqueue`: queues sessions for scoring by workers.
 
-use super::database::At;
-use super::sync::no_class;
-use crate::cli::{Failure, say};
+use super::database::DatabaseArguments;
+use super::sync::unknown_class_error;
+use crate::cli::{CliError, print_line};
 
-use crate::school::records::has_class;
-use crate::school::work;
-use crate::score::SCORER_VERSION;
 use clap::Args;
+use typodont_exercise::score::SCORER_VERSION;
+use typodont_school::jobs;
+use typodont_school::records::has_class;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Which version of the formulae: `current`, which is this program's
+    /// Version of the formulae; `current` is that of this program
     #[arg(long, value_name = "VERSION")]
     scorer: String,
-    /// Sessions of this class only
+    /// Only sessions of this class
     #[arg(long, value_name = "NAME")]
     class: Option<String>,
-    /// Let sessions that were set aside be tried again, too; as a worker
+    /// Also retry sessions that were set aside (requires the role of a worker)
     #[arg(long)]
     again: bool,
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { class, again, at, .. } = arguments;
-    scorer(&arguments.scorer)?;
-    let mut line = at.line()?;
+    parse_scorer_version(&arguments.scorer)?;
+    let mut connection = at.connection()?;
     if *again {
-        line.ask(|client| work::try_again(client, SCORER_VERSION))?;
+        connection.query_with_retry(|client| jobs::retry_set_aside(client, SCORER_VERSION))?;
     }
     if let Some(class) = class
-        && !line.ask(|client| has_class(client, class))?
+        && !connection.query_with_retry(|client| has_class(client, class))?
     {
-        return Err(no_class(class));
+        return Err(unknown_class_error(class));
     }
-    let new = line.ask(|client| work::enqueue(client, SCORER_VERSION, class.as_deref()))?;
-    let tally = line.ask(|client| work::tally(client, SCORER_VERSION))?;
-    let work::Tally { waiting, leased, done, set_aside } = tally;
-    say(format!(
-        "{new} sessions are to be scored by version {SCORER_VERSION}: {waiting} wait, {leased} are being scored, {done} are done, {set_aside} set aside"
+    let new = connection.query_with_retry(|client| jobs::enqueue(client, SCORER_VERSION, class.as_deref()))?;
+    let tally = connection.query_with_retry(|client| jobs::count_jobs(client, SCORER_VERSION))?;
+    let jobs::JobCounts { waiting, leased, done, set_aside } = tally;
+    print_line(format!(
+        "{new} sessions queued for scorer version {SCORER_VERSION}: {waiting} waiting, {leased} in progress, {done} \
+        done, {set_aside} set aside"
     ))
 }
 
-/// The version that a word means, if this program is of it.
-pub fn scorer(word: &str) -> Result<u32, Failure> {
+/// Parses a scorer version.
+///
+/// # Errors
+/// A message if it is not the version of this program.
+pub fn parse_scorer_version(word: &str) -> Result<u32, CliError> {
     match word == "current" || word == SCORER_VERSION.to_string() {
         true => Ok(SCORER_VERSION),
-        false => Err(Failure::misuse(format!(
-            "--scorer: unknown-version: this program scores by version {SCORER_VERSION}, which is `current`"
+        false => Err(CliError::misuse(format!(
+            "--scorer: unknown-version: this program has scorer version {SCORER_VERSION} only; give --scorer current"
         ))),
     }
 }

@@ -1,151 +1,166 @@
-//! `typodont school erase` and `retain`: out of the records, the store and the exports.
+//! `typodont school erase` and `retain`: erase sessions from the records, the store and the exports.
 
-use super::asking::Line;
-use super::database::At;
-use super::export::anew;
-use super::mark;
-use super::store::{Named, Store};
-use crate::cli::{Failure, say};
-use crate::school::{Left, erase_participant, left, outlived, removed};
+use super::connection::DbConnection;
+use super::database::DatabaseArguments;
+use super::export::rewrite_partition;
+use super::store::{ObjectStoreHandle, StoreArguments};
+use super::store_marker;
+use crate::cli::{CliError, print_line};
 use clap::Args;
+use typodont_school::{PendingDeletion, erase_participant, expired_sessions, mark_deleted, pending_deletions};
 
 #[derive(Args)]
-pub struct Erase {
-    /// The participant's code; `-` reads it from standard input
+pub struct EraseArguments {
+    /// Participant code; `-` reads it from standard input
     #[arg(required_unless_present_any = ["done", "gone"])]
     participant: Option<String>,
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
     #[command(flatten)]
-    store: Named,
-    /// Say what there is of the participant, and erase nothing
+    store: StoreArguments,
+    /// Print what would be erased, and erase nothing
     #[arg(long)]
     dry_run: bool,
-    /// Also a code of which the records hold no session: what stations have not sent yet is refused, for good
+    /// Also accept a code without sessions in the records: sessions that stations send later are refused permanently
     #[arg(long)]
     unsent: bool,
-    /// An export that was dealt with by hand, as it was listed
+    /// Mark an export, named as it was listed, as corrected by hand
     #[arg(long, value_name = "DESTINATION", conflicts_with_all = ["participant", "dry_run"])]
     done: Option<String>,
-    /// An export that is no more, as it was listed: nobody is looked for there from now on
+    /// Remove an export, named as it was listed, from the records because it no longer exists
     #[arg(long, value_name = "DESTINATION", conflicts_with_all = ["participant", "dry_run", "done"])]
     gone: Option<String>,
 }
 
 #[derive(Args)]
-pub struct Retain {
+pub struct RetainArguments {
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
     #[command(flatten)]
-    store: Named,
-    /// Say how many sessions would go, and erase nothing
+    store: StoreArguments,
+    /// Print how many sessions would be erased, and erase nothing
     #[arg(long)]
     dry_run: bool,
 }
 
-pub fn erase(arguments: &Erase) -> Result<(), Failure> {
-    let mut line = arguments.at.line()?;
+pub fn erase(arguments: &EraseArguments) -> Result<(), CliError> {
+    let mut connection = arguments.at.connection()?;
     if let Some(destination) = &arguments.done {
         let sql = "DELETE FROM typodont.erasing WHERE kind = 'export' AND place = $1";
-        let done = line.ask(|client| client.execute(sql, &[destination]))?;
+        let done = connection.query_with_retry(|client| client.execute(sql, &[destination]))?;
         if done == 0 {
-            return Err(Failure::wrong(format!("{destination}: unknown-export: nothing is left to do there")));
+            return Err(CliError::wrong(format!("{destination}: unknown-export: nothing is pending for this export")));
         }
-        return say(format!("{destination}: {done} partitions dealt with"));
+        return print_line(format!("{destination}: {done} partitions marked as done"));
     }
     if let Some(destination) = &arguments.gone {
         let sql = "DELETE FROM typodont.export WHERE destination = $1";
-        if line.ask(|client| client.execute(sql, &[destination]))? == 0 {
-            return Err(Failure::wrong(format!("{destination}: unknown-export: nothing was exported there")));
+        if connection.query_with_retry(|client| client.execute(sql, &[destination]))? == 0 {
+            return Err(CliError::wrong(format!(
+                "{destination}: unknown-export: the records contain no export to this \
+            destination"
+            )));
         }
         let sql = "DELETE FROM typodont.erasing WHERE kind = 'export' AND place = $1";
-        line.ask(|client| client.execute(sql, &[destination]))?;
-        return say(format!("{destination}: forgotten"));
+        connection.query_with_retry(|client| client.execute(sql, &[destination]))?;
+        return print_line(format!("{destination}: removed from the records"));
     }
-    let code = code(arguments.participant.as_deref().unwrap_or_default())?;
+    let code = read_code(arguments.participant.as_deref().unwrap_or_default())?;
     if code.is_empty() {
-        return Err(Failure::misuse("no-code: name a participant; sessions without a code are nobody's"));
-    }
-    if arguments.dry_run {
-        return foretell(&mut line, &code);
-    }
-    let store = arguments.store.open(arguments.at.patience()?)?;
-    mark::check(&mut line, &store)?;
-    if sessions_of(&mut line, &code)? == 0 && !arguments.unsent {
-        // What broke off before is still gone on with.
-        sweep(&mut line, &store, arguments.at.patience()?)?;
-        return Err(Failure::wrong(
-            "unknown-participant: the records hold no session under this code, and nothing was erased; with --unsent \
-             stations refuse it from now on all the same",
+        return Err(CliError::misuse(
+            "no-code: the participant code is empty; sessions without a code cannot be erased \
+        by participant",
         ));
     }
-    let gone = line.ask(|client| erase_participant(client, &code))?;
-    say(format!("{gone} sessions erased from the records"))?;
-    sweep(&mut line, &store, arguments.at.patience()?)
-}
-
-pub fn retain(arguments: &Retain) -> Result<(), Failure> {
-    let mut line = arguments.at.line()?;
     if arguments.dry_run {
-        let due = line.ask(|client| outlived(client, false))?;
-        return say(format!("{due} sessions are older than their class keeps them"));
+        return print_dry_run(&mut connection, &code);
     }
-    let store = arguments.store.open(arguments.at.patience()?)?;
-    mark::check(&mut line, &store)?;
-    let gone = line.ask(|client| outlived(client, true))?;
-    say(format!("{gone} sessions erased from the records"))?;
-    sweep(&mut line, &store, arguments.at.patience()?)
+    let store = arguments.store.open(arguments.at.retry_policy()?)?;
+    store_marker::verify(&mut connection, &store)?;
+    if count_sessions(&mut connection, &code)? == 0 && !arguments.unsent {
+        // An erasure that was interrupted earlier is still completed.
+        remove_pending(&mut connection, &store, arguments.at.retry_policy()?)?;
+        return Err(CliError::wrong(
+            "unknown-participant: the records contain no session with this code, and nothing was erased; give --unsent \
+             to make stations refuse the code in future",
+        ));
+    }
+    let gone = connection.query_with_retry(|client| erase_participant(client, &code))?;
+    print_line(format!("{gone} sessions erased from the records"))?;
+    remove_pending(&mut connection, &store, arguments.at.retry_policy()?)
 }
 
-/// A code out of the command line, or of standard input, where no list of processes shows it.
-fn code(given: &str) -> Result<String, Failure> {
+pub fn retain(arguments: &RetainArguments) -> Result<(), CliError> {
+    let mut connection = arguments.at.connection()?;
+    if arguments.dry_run {
+        let due = connection.query_with_retry(|client| expired_sessions(client, false))?;
+        return print_line(format!("{due} sessions would be erased because their retention period has expired"));
+    }
+    let store = arguments.store.open(arguments.at.retry_policy()?)?;
+    store_marker::verify(&mut connection, &store)?;
+    let gone = connection.query_with_retry(|client| expired_sessions(client, true))?;
+    print_line(format!("{gone} sessions erased from the records"))?;
+    remove_pending(&mut connection, &store, arguments.at.retry_policy()?)
+}
+
+/// The participant code of the command line, or of standard input, which the list of processes does not show.
+fn read_code(given: &str) -> Result<String, CliError> {
     if given != "-" {
         return Ok(given.to_string());
     }
     let mut line = String::new();
     std::io::stdin()
         .read_line(&mut line)
-        .map_err(|e| Failure::wrong(format!("standard input: unreadable-file: {e}")))?;
+        .map_err(|e| CliError::wrong(format!("standard input: unreadable-file: {e}")))?;
     Ok(line.trim_end_matches(['\r', '\n']).to_string())
 }
 
-fn sessions_of(line: &mut Line, code: &str) -> Result<i64, Failure> {
+fn count_sessions(connection: &mut DbConnection, code: &str) -> Result<i64, CliError> {
     let sql = "SELECT count(*) FROM typodont.session s JOIN typodont.participant p ON p.id = s.participant_id
       WHERE p.code = $1";
-    Ok(line.ask(|client| client.query_one(sql, &[&code]))?.get(0))
+    Ok(connection.query_with_retry(|client| client.query_one(sql, &[&code]))?.get(0))
 }
 
-fn foretell(line: &mut Line, code: &str) -> Result<(), Failure> {
-    let sessions = sessions_of(line, code)?;
-    say(format!("{sessions} sessions with their bundles would go"))?;
+fn print_dry_run(connection: &mut DbConnection, code: &str) -> Result<(), CliError> {
+    let sessions = count_sessions(connection, code)?;
+    print_line(format!("{sessions} sessions and their bundles would be erased"))?;
     let sql = "SELECT DISTINCT e.destination FROM typodont.export e JOIN typodont.exported x ON x.export_id = e.id
       JOIN typodont.session s ON s.id = x.session_id JOIN typodont.participant p ON p.id = s.participant_id
       WHERE p.code = $1 ORDER BY 1";
-    for row in line.ask(|client| client.query(sql, &[&code]))? {
-        say(format!("{}: an export that holds some of them", row.get::<_, String>(0)))?;
+    for row in connection.query_with_retry(|client| client.query(sql, &[&code]))? {
+        print_line(format!("{}: this export contains some of them", row.get::<_, String>(0)))?;
     }
     Ok(())
 }
 
-/// Removes what is left outside the records, also of an erasure that broke off. Fails where an export cannot be reached.
-fn sweep(line: &mut Line, store: &Store, patience: super::patience::Patience) -> Result<(), Failure> {
+/// Removes erased data outside the records, including that of interrupted erasures.
+///
+/// # Errors
+/// A message if an export cannot be reached.
+fn remove_pending(
+    connection: &mut DbConnection,
+    store: &ObjectStoreHandle,
+    retry_policy: super::retry::RetryPolicy,
+) -> Result<(), CliError> {
     let mut unreached = false;
-    for what in line.ask(left)? {
+    for what in connection.query_with_retry(pending_deletions)? {
         match &what {
-            Left::Bundle { folder, .. } => {
-                let count = store.clear(folder)?;
-                say(format!("{folder}: {count} objects removed from the store"))?;
+            PendingDeletion::Bundle { folder, .. } => {
+                let count = store.remove_folder(folder)?;
+                print_line(format!("{folder}: {count} objects removed from the store"))?;
             }
-            Left::Export { destination, partition, .. } => match anew(line, destination, partition, patience) {
-                Ok(()) => say(format!("{destination}: {partition} is made anew without them"))?,
-                Err(failure) => {
-                    unreached = true;
-                    failure.tell();
-                    continue;
+            PendingDeletion::Export { destination, partition, .. } => {
+                match rewrite_partition(connection, destination, partition, retry_policy) {
+                    Ok(()) => print_line(format!("{destination}: {partition} was rewritten without them"))?,
+                    Err(failure) => {
+                        unreached = true;
+                        failure.report();
+                        continue;
+                    }
                 }
-            },
+            }
         }
-        line.ask(|client| removed(client, &what))?;
+        connection.query_with_retry(|client| mark_deleted(client, &what))?;
     }
-    if unreached { Err(Failure::Told) } else { Ok(()) }
+    if unreached { Err(CliError::AlreadyReported) } else { Ok(()) }
 }

@@ -1,53 +1,59 @@
-//! Parquet out of the records, by class and month; what left is written down first.
+//! Parquet exports of the records, by class and month; every export is recorded before it is written.
 
-use super::asking::Line;
-use super::patience::Patience;
-use super::source::Source;
-use super::store::Store;
-use crate::cli::{Failure, say};
-use crate::report::harmless;
-use crate::school::partition;
-use crate::school::records::{self, Kept, Which};
+use super::connection::DbConnection;
+use super::retry::RetryPolicy;
+use super::source::SessionSource;
+use super::store::ObjectStoreHandle;
+use crate::cli::{CliError, print_line};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use typodont_report::sanitize_display;
+use typodont_school::partition;
+use typodont_school::records;
+use typodont_school::records::{SessionFilter, StoredSession};
 
-/// Writes every partition to a folder, or to a store by URL.
-pub fn write(source: &Source, destination: &Path) -> Result<(), Failure> {
+/// Writes all partitions to a folder, or to an object store by URL.
+pub fn write(source: &SessionSource, destination: &Path) -> Result<(), CliError> {
     if source.folder.is_some() {
-        return Err(Failure::misuse("a folder, or --database: sessions come from one of them"));
+        return Err(CliError::misuse("give either a folder or --database, not both"));
     }
-    let patience = source.at.patience()?;
-    let destination = written(destination)?;
-    let wrong = |e: String| Failure::misuse(format!("--output: {e}"));
-    let (mut line, kept) = source.kept()?;
-    let store = Store::at(&destination, patience).map_err(wrong)?;
-    note(&mut line, &destination, source.scorer_version()?, &kept)?;
-    let count = kept.len();
-    let partitions = partition::partitions(kept);
+    let retry_policy = source.at.retry_policy()?;
+    let destination = canonical_destination(destination)?;
+    let wrong = |e: String| CliError::misuse(format!("--output: {e}"));
+    let (mut connection, stored) = source.stored_sessions()?;
+    let store = ObjectStoreHandle::open_folder_or_url(&destination, retry_policy).map_err(wrong)?;
+    record_export(&mut connection, &destination, source.scorer_version()?, &stored)?;
+    let count = stored.len();
+    let partitions = partition::by_partition(stored);
     for (name, sessions) in &partitions {
-        for (file, bytes) in partition::files(name, sessions).map_err(Failure::Wrong)? {
+        for (file, bytes) in partition::files(name, sessions).map_err(CliError::Wrong)? {
             store.put(&file, bytes)?;
         }
     }
-    say(format!("{destination}: {count} sessions in {} partitions", partitions.len()))
+    print_line(format!("{destination}: {count} sessions in {} partitions", partitions.len()))
 }
 
-/// A destination as it is written down: the same from wherever it is named.
-fn written(destination: &Path) -> Result<String, Failure> {
+/// A destination in the form in which it is recorded: the same from every working folder.
+fn canonical_destination(destination: &Path) -> Result<String, CliError> {
     let text = destination.display().to_string();
     match text.contains("://") {
         true => Ok(text.trim_end_matches('/').to_string()),
         false => std::path::absolute(destination)
             .map(|path| path.display().to_string())
-            .map_err(|e| Failure::wrong(format!("{text}: unwritable-folder: {e}"))),
+            .map_err(|e| CliError::wrong(format!("{text}: unwritable-folder: {e}"))),
     }
 }
 
-/// Writes down which sessions go where, before any of them does.
-fn note(line: &mut Line, destination: &str, scorer_version: Option<u32>, kept: &[Kept]) -> Result<(), Failure> {
+/// Records the sessions of an export and its destination, before any of them is written.
+fn record_export(
+    connection: &mut DbConnection,
+    destination: &str,
+    scorer_version: Option<u32>,
+    kept: &[StoredSession],
+) -> Result<(), CliError> {
     let version = scorer_version.map(i64::from);
     let ids: Vec<&str> = kept.iter().map(|k| k.id.as_str()).collect();
-    line.ask(|client| {
+    connection.query_with_retry(|client| {
         let mut change = client.transaction()?;
         let sql =
             "INSERT INTO typodont.export (what, destination, scorer_version) VALUES ('parquet', $1, $2) RETURNING id";
@@ -61,41 +67,50 @@ fn note(line: &mut Line, destination: &str, scorer_version: Option<u32>, kept: &
     Ok(())
 }
 
-/// Makes a partition of an export anew, or removes it where nothing is left of it.
+/// Writes a partition of an export again, or removes it if no session of it is left.
 ///
-/// `Err` where the export cannot be reached from here.
-pub fn anew(line: &mut Line, destination: &str, partition: &str, patience: Patience) -> Result<(), Failure> {
+/// # Errors
+/// A message if the export cannot be reached from this computer.
+pub fn rewrite_partition(
+    connection: &mut DbConnection,
+    destination: &str,
+    partition: &str,
+    retry_policy: RetryPolicy,
+) -> Result<(), CliError> {
     let place = Path::new(destination);
     if !destination.contains("://") && !place.is_dir() {
-        let why = "missing-folder: it is not here; delete what it holds of them by hand, then say --done, or --gone if it \
-                   is no more";
-        return Err(Failure::wrong(format!("{destination}: {why}")));
+        let why = "missing-folder: this computer cannot reach the export; delete the erased sessions there by hand and \
+                   give --done, or give --gone if the export no longer exists";
+        return Err(CliError::wrong(format!("{destination}: {why}")));
     }
-    let store = Store::at(destination, patience).map_err(Failure::Wrong)?;
+    let store = ObjectStoreHandle::open_folder_or_url(destination, retry_policy).map_err(CliError::Wrong)?;
     let class = partition.split('/').next().and_then(|part| part.strip_prefix("class=")).map(String::from);
-    // Only what this export held, with the scores that it had: sessions that came later are no part of it.
+    // Only the sessions of this export, with the scores that it had: later sessions do not belong to it.
     let sql = "SELECT DISTINCT ON (x.session_id) x.session_id::text, e.scorer_version
       FROM typodont.exported x JOIN typodont.export e ON e.id = x.export_id
       WHERE e.destination = $1 ORDER BY x.session_id, e.id DESC";
-    let held: BTreeMap<String, Option<i64>> =
-        line.ask(|client| client.query(sql, &[&destination]))?.iter().map(|row| (row.get(0), row.get(1))).collect();
-    let versions: BTreeSet<Option<i64>> = held.values().copied().collect();
-    let mut kept = Vec::new();
+    let exported: BTreeMap<String, Option<i64>> = connection
+        .query_with_retry(|client| client.query(sql, &[&destination]))?
+        .iter()
+        .map(|row| (row.get(0), row.get(1)))
+        .collect();
+    let versions: BTreeSet<Option<i64>> = exported.values().copied().collect();
+    let mut stored = Vec::new();
     for version in versions {
-        let which = Which { class: class.clone(), scorer_version: version.and_then(|v| u32::try_from(v).ok()) };
-        let (read, unread) = line.ask(|client| records::sessions(client, &which))?;
-        for what in unread {
-            eprintln!("{destination}: {partition}: skipped: {}", harmless(&what, 300));
+        let which = SessionFilter { class: class.clone(), scorer_version: version.and_then(|v| u32::try_from(v).ok()) };
+        let (read, unreadable) = connection.query_with_retry(|client| records::sessions(client, &which))?;
+        for what in unreadable {
+            eprintln!("{destination}: {partition}: skipped: {}", sanitize_display(&what, 300));
         }
-        kept.extend(read.into_iter().filter(|k| held.get(&k.id) == Some(&version)));
+        stored.extend(read.into_iter().filter(|k| exported.get(&k.id) == Some(&version)));
     }
-    let mut partitions = partition::partitions(kept);
+    let mut partitions = partition::by_partition(stored);
     for file in partition::names(partition) {
-        store.settle(file.rsplit_once('/').map_or("", |(folder, _)| folder));
+        store.remove_partial_uploads(file.rsplit_once('/').map_or("", |(folder, _)| folder));
     }
     match partitions.remove(partition) {
         Some(sessions) => {
-            for (file, bytes) in partition::files(partition, &sessions).map_err(Failure::Wrong)? {
+            for (file, bytes) in partition::files(partition, &sessions).map_err(CliError::Wrong)? {
                 store.put(&file, bytes)?;
             }
         }

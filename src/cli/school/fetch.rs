@@ -1,67 +1,74 @@
-//! `typodont school fetch` and `judgements`: bundles out of the school, and an examiner's word back into it.
+//! `typodont school fetch` and `judgements`: downloads bundles, and exchanges examiners' overrides with the records.
 
-use super::asking::Line;
-use super::database::At;
-use super::mark;
-use super::source::{Source, note_read};
-use super::store::Named;
-use super::sync::bar;
-use crate::cli::{Failure, say};
-use crate::report::harmless;
-use crate::review::{Entry, Log, OVERRIDES, Told, Unwritten};
-use crate::scenario::hex;
-use crate::school::records::{self, Kept, is_name};
+use super::connection::DbConnection;
+use super::database::DatabaseArguments;
+use super::source::{SessionSource, audit_read};
+use super::store::StoreArguments;
+use super::store_marker;
+use super::sync::progress_bar;
+use crate::cli::{CliError, print_line};
 use clap::Args;
 use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
+use typodont_exercise::scenario::hex;
+use typodont_report::sanitize_display;
+use typodont_review::{AppendError, LogSnapshot, OVERRIDES, OverrideEntry, OverrideLog};
+use typodont_school::records;
+use typodont_school::records::{StoredSession, is_plain_name};
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    source: Source,
+    source: SessionSource,
 }
 
 #[derive(Args)]
-pub struct Judgements {
+pub struct JudgementsArguments {
     /// Folder in which `typodont review` was used
     folder: PathBuf,
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Source { folder, at, store, class, .. } = &arguments.source;
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    let SessionSource { folder, at, store, class, .. } = &arguments.source;
     let Some(folder) = folder else {
-        return Err(Failure::misuse("no-folder: name the folder that the bundles go to"));
+        return Err(CliError::misuse("no-folder: give the folder for the bundles"));
     };
-    let (fetched, failed) = bundles(at, store, class.as_deref(), folder)?;
-    say(format!("{}: {fetched} bundles fetched, {failed} failed", folder.display()))?;
-    if failed > 0 { Err(Failure::Told) } else { Ok(()) }
+    let (fetched, failed) = fetch_bundles(at, store, class.as_deref(), folder)?;
+    print_line(format!("{}: {fetched} bundles downloaded, {failed} failed", folder.display()))?;
+    if failed > 0 { Err(CliError::AlreadyReported) } else { Ok(()) }
 }
 
-/// Fetches what is not there yet; a bundle is whole or absent. Gives how many came, and how many did not.
-pub fn bundles(at: &At, store: &Named, class: Option<&str>, folder: &Path) -> Result<(usize, usize), Failure> {
+/// Downloads bundles that are missing in the folder; a bundle is complete or absent. Returns the numbers of bundles
+/// downloaded and failed.
+pub fn fetch_bundles(
+    at: &DatabaseArguments,
+    store: &StoreArguments,
+    class: Option<&str>,
+    folder: &Path,
+) -> Result<(usize, usize), CliError> {
     let class = class.map(String::from);
-    let source = Source { folder: None, at: at.clone(), store: store.clone(), class, scorer: None };
-    let store = store.open(at.patience()?)?;
-    let (mut line, kept) = source.kept()?;
-    mark::check(&mut line, &store)?;
-    note_read(&mut line, &kept)?;
-    let bar = bar(kept.len() as u64, "fetched");
+    let source = SessionSource { folder: None, at: at.clone(), store: store.clone(), class, scorer: None };
+    let store = store.open(at.retry_policy()?)?;
+    let (mut connection, stored) = source.stored_sessions()?;
+    store_marker::verify(&mut connection, &store)?;
+    audit_read(&mut connection, &stored)?;
+    let bar = progress_bar(stored.len() as u64, "fetched");
     let (mut fetched, mut failed) = (0, 0);
-    for k in &kept {
+    for k in &stored {
         let (path, partial) = (folder.join(&k.id), folder.join(format!("{}.partial", k.id)));
         if !path.exists() {
-            match bundle(&store, k, &partial) {
+            match fetch_bundle(&store, k, &partial) {
                 Ok(()) => {
-                    let unwritable = |e| Failure::wrong(format!("{}: unwritable-folder: {e}", path.display()));
+                    let unwritable = |e| CliError::wrong(format!("{}: unwritable-folder: {e}", path.display()));
                     fs::rename(&partial, &path).map_err(unwritable)?;
                     fetched += 1;
                 }
                 Err(why) => {
                     failed += 1;
-                    eprintln!("{}: {}", k.id, harmless(&why, 300));
+                    eprintln!("{}: {}", k.id, sanitize_display(&why, 300));
                 }
             }
         }
@@ -71,67 +78,73 @@ pub fn bundles(at: &At, store: &Named, class: Option<&str>, folder: &Path) -> Re
     Ok((fetched, failed))
 }
 
-fn bundle(store: &super::Store, kept: &Kept, partial: &Path) -> Result<(), String> {
+fn fetch_bundle(store: &super::ObjectStoreHandle, stored: &StoredSession, partial: &Path) -> Result<(), String> {
     let unwritable = |e: std::io::Error| format!("unwritable-folder: {e}: {}", partial.display());
-    for file in &kept.manifest.files {
-        // A station named it: it must not lead elsewhere.
-        if !file.name.split('/').all(is_name) {
+    for file in &stored.manifest.files {
+        // The name comes from a station: it must not lead to another folder.
+        if !file.name.split('/').all(is_plain_name) {
             return Err(format!("\"{}\" is not a file of a bundle", file.name));
         }
         let path = partial.join(&file.name);
         fs::create_dir_all(path.parent().unwrap_or(partial)).map_err(unwritable)?;
-        let bytes = store.take(&kept.manifest, &file.name).map_err(|(why, _)| why)?;
+        let bytes = store.read_bundle_file(&stored.manifest, &file.name).map_err(|(why, _)| why)?;
         fs::write(path, bytes).map_err(unwritable)?;
     }
     Ok(())
 }
 
-pub fn judgements(arguments: &Judgements) -> Result<(), Failure> {
-    let Exchanged { entered, taken } = exchange(&mut arguments.at.line()?, &arguments.folder)?;
-    say(format!("{}: {entered} judgements entered, {taken} taken over", arguments.folder.display()))
+pub fn run_judgements(arguments: &JudgementsArguments) -> Result<(), CliError> {
+    let ExchangeCounts { uploaded: entered, downloaded: taken } =
+        exchange_overrides(&mut arguments.at.connection()?, &arguments.folder)?;
+    print_line(format!("{}: {entered} overrides uploaded, {taken} downloaded", arguments.folder.display()))
 }
 
-/// How many judgements went each way.
-pub struct Exchanged {
-    pub entered: u64,
-    pub taken: usize,
+/// Number of overrides exchanged in each direction.
+pub struct ExchangeCounts {
+    pub uploaded: u64,
+    pub downloaded: usize,
 }
 
-/// Enters those lines of a folder's log that hold and are not in the records yet, word for word; and appends to the log what others
-/// judged meanwhile.
-pub fn exchange(line: &mut Line, folder: &Path) -> Result<Exchanged, Failure> {
+/// Uploads, word for word, the valid lines of a folder's log that are not in the records yet, and appends to the log
+/// the overrides of other examiners.
+///
+/// # Errors
+/// A message if the log cannot be read or written, or the database does not answer.
+pub fn exchange_overrides(connection: &mut DbConnection, folder: &Path) -> Result<ExchangeCounts, CliError> {
     let path = folder.join(OVERRIDES);
-    let failed = |e| Failure::wrong(format!("{}: unreadable-file: {e}", path.display()));
-    let mut log = Log::of(folder);
-    let own = log.told(None).map_err(failed)?;
-    let theirs = line.ask(records::judgements)?;
-    let is_in = |told: &Told, entry: &Entry| told.counting().any(|e| e.at == entry.at && e.draft == entry.draft);
-    let text = if path.is_file() { crate::content::read_text(&path)?.text.clone() } else { String::new() };
+    let failed = |e| CliError::wrong(format!("{}: unreadable-file: {e}", path.display()));
+    let mut log = OverrideLog::of(folder);
+    let local_log = log.read(None).map_err(failed)?;
+    let remote_log = connection.query_with_retry(records::read_overrides)?;
+    let is_in = |snapshot: &LogSnapshot, entry: &OverrideEntry| {
+        snapshot.valid_entries().any(|e| e.at == entry.at && e.draft == entry.draft)
+    };
+    let text = if path.is_file() { typodont_formats::read_text(&path)?.text.clone() } else { String::new() };
     let mut lines = Vec::new();
-    for entry in own.counting().filter(|entry| !is_in(&theirs, entry)) {
-        let line = text.lines().find(|line| serde_json::from_str::<Entry>(line).is_ok_and(|e| e == *entry));
+    for entry in local_log.valid_entries().filter(|entry| !is_in(&remote_log, entry)) {
+        let line = text.lines().find(|line| serde_json::from_str::<OverrideEntry>(line).is_ok_and(|e| e == *entry));
         lines.extend(line.map(|line| (entry.clone(), line.to_string(), hex(&Sha256::digest(line)))));
     }
     let mut entered = 0;
     if !lines.is_empty() {
-        // A log is known by its first line, and by whose it is.
+        // A log is identified by its first line and its login.
         let first = hex(&Sha256::digest(text.lines().next().unwrap_or_default()));
-        let name = format!("{}:{}", line.ask(records::login)?, &first[..16]);
-        entered = line.ask(|client| records::judge(client, &name, &lines))?;
+        let name = format!("{}:{}", connection.query_with_retry(records::login_name)?, &first[..16]);
+        entered = connection.query_with_retry(|client| records::insert_overrides(client, &name, &lines))?;
     }
     let mut taken = 0;
-    // What was judged here since stands: a line that is taken over later must not overrule it.
-    let is_overtaken = |entry: &Entry| {
+    // A later override made here takes precedence: a downloaded line must not replace it.
+    let is_overtaken = |entry: &OverrideEntry| {
         let item = entry.draft.item.as_ref().map(|item| item.index);
-        own.last_of(&entry.draft.session, item).is_some_and(|last| last.at > entry.at)
+        local_log.latest_for(&entry.draft.session, item).is_some_and(|last| last.at > entry.at)
     };
-    for entry in theirs.counting().filter(|entry| !is_in(&own, entry) && !is_overtaken(entry)) {
+    for entry in remote_log.valid_entries().filter(|entry| !is_in(&local_log, entry) && !is_overtaken(entry)) {
         let append = log.append(&entry.at, None, |_| Ok::<_, std::convert::Infallible>(entry.draft.clone()));
         append.map_err(|unwritten| match unwritten {
-            Unwritten::Failed(error) => failed(error),
-            Unwritten::Refused(never) => match never {},
+            AppendError::Io(error) => failed(error),
+            AppendError::Rejected(never) => match never {},
         })?;
         taken += 1;
     }
-    Ok(Exchanged { entered, taken })
+    Ok(ExchangeCounts { uploaded: entered, downloaded: taken })
 }

@@ -1,152 +1,177 @@
-//! Where sessions are read from: a folder, or a school's database with its store.
+//! Source of the sessions that a command reads: a folder, or a school's database with its store.
 
-use super::asking::Line;
-use super::database::At;
-use super::enqueue::scorer;
-use super::store::{Named, Store};
-use crate::cli::{Failure, cohort};
-use crate::report::cohort::Cohort;
-use crate::report::harmless;
-use crate::review::{Log, OVERRIDES, Told};
-use crate::school::RECORDING;
-use crate::school::records::{self, Kept, Which};
+use super::connection::DbConnection;
+use super::database::DatabaseArguments;
+use super::enqueue::parse_scorer_version;
+use super::store::{ObjectStoreHandle, StoreArguments};
+use crate::cli::{CliError, cohort};
 use clap::Args;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use typodont_report::cohort::Cohort;
+use typodont_report::sanitize_display;
+use typodont_review::LogSnapshot;
+use typodont_school::RECORDING;
+use typodont_school::records;
+use typodont_school::records::{SessionFilter, StoredSession};
 
 #[derive(Args)]
-pub struct Source {
-    /// Folder that holds bundles, at any depth; or a database, by --database
+pub struct SessionSource {
+    /// Folder that contains bundles, at any depth; to read a database instead, give --database
     pub folder: Option<PathBuf>,
     #[command(flatten)]
-    pub at: At,
+    pub at: DatabaseArguments,
     #[command(flatten)]
-    pub store: Named,
-    /// Of a database: sessions of this class only
+    pub store: StoreArguments,
+    /// With --database: only sessions of this class
     #[arg(long, value_name = "NAME")]
     pub class: Option<String>,
-    /// Of a database: as workers scored them, rather than as their stations did; `current`
+    /// With --database: use the workers' scores of this version (`current`) instead of the stations' scores
     #[arg(long, value_name = "VERSION")]
     pub scorer: Option<String>,
 }
 
-/// Maps of what was removed, by which a cohort draws its own.
-const TIMES: &str = "removal_time.nrrd";
+/// Map of removal times in a bundle, from which a cohort's maps are drawn.
+const REMOVAL_TIMES_FILE: &str = "removal_time.nrrd";
 
-/// Sessions, and where they came from.
-pub struct Read {
+/// Sessions with their source.
+pub struct SourcedCohort {
     pub cohort: Cohort,
-    /// For complaints.
+    /// Name of the source in complaints.
     pub name: String,
-    line: Option<Line>,
+    connection: Option<DbConnection>,
     folder: Option<PathBuf>,
-    /// Files out of the store; they go when this does.
-    _fetched: Option<Fetched>,
+    /// Temporary copies of files of the store; they are removed with this value.
+    _temp_dir: Option<TempDir>,
 }
 
-/// A folder that goes when nobody needs it any more.
-struct Fetched(PathBuf);
+/// A folder that is removed when this value is dropped.
+struct TempDir(PathBuf);
 
-impl Drop for Fetched {
+impl Drop for TempDir {
     fn drop(&mut self) {
-        // What cannot be removed lies among other temporary files.
+        // If the folder cannot be removed, it stays among other temporary files.
         let _ = std::fs::remove_dir_all(&self.0);
     }
 }
 
-impl Source {
-    /// Reads every session; fails where there is none. `maps` says whether what was removed is asked for, too.
-    pub fn read(&self, maps: bool) -> Result<Read, Failure> {
+impl SessionSource {
+    /// The folder of bundles; `None` where sessions come from a database.
+    ///
+    /// # Errors
+    /// Fails if a folder is combined with an option that filters a database.
+    pub fn bundle_folder(&self) -> Result<Option<&Path>, CliError> {
+        let folder = self.folder.as_deref().filter(|_| self.at.database.is_none());
+        if folder.is_some() {
+            self.require_no_filter()?;
+        }
+        Ok(folder)
+    }
+
+    /// Reads all sessions; `maps`: with their maps of removed tissue.
+    ///
+    /// # Errors
+    /// A message if there is no session, or the source cannot be read.
+    pub fn read(&self, maps: bool) -> Result<SourcedCohort, CliError> {
         if let Some(folder) = &self.folder {
             if self.at.database.is_some() {
-                return Err(Failure::misuse("a folder, or --database: sessions come from one of them"));
+                return Err(CliError::misuse("give either a folder or --database, not both"));
             }
-            self.takes_all()?;
-            let cohort = cohort::read(folder)?;
+            self.require_no_filter()?;
+            let cohort = cohort::read_folder(folder)?;
             let name = folder.display().to_string();
-            return Ok(Read { cohort, name, line: None, folder: Some(folder.clone()), _fetched: None });
+            return Ok(SourcedCohort { cohort, name, connection: None, folder: Some(folder.clone()), _temp_dir: None });
         }
-        let (mut line, kept) = self.kept()?;
+        let (mut connection, stored) = self.stored_sessions()?;
         let mut cohort = Cohort::default();
-        let fetched = match maps && self.store.is_named() {
-            true => Some(fetch(&self.store.open(self.at.patience()?)?, &kept, &mut cohort)?),
+        let fetched = match maps && self.store.is_configured() {
+            true => Some(fetch_removal_maps(&self.store.open(self.at.retry_policy()?)?, &stored, &mut cohort)?),
             false => None,
         };
         let base = fetched.as_ref().map_or(Path::new(""), |fetched| &fetched.0);
-        cohort.sessions = kept.iter().map(|k| (base.join(&k.id).join(&k.bundle), k.session.clone())).collect();
-        note_read(&mut line, &kept)?;
-        Ok(Read { cohort, name: "--database".into(), line: Some(line), folder: None, _fetched: fetched })
+        cohort.sessions = stored.iter().map(|k| (base.join(&k.id).join(&k.bundle), k.session.clone())).collect();
+        audit_read(&mut connection, &stored)?;
+        Ok(SourcedCohort {
+            cohort,
+            name: "--database".into(),
+            connection: Some(connection),
+            folder: None,
+            _temp_dir: fetched,
+        })
     }
 
-    /// Fails where a choice is made that a folder does not offer.
-    pub fn takes_all(&self) -> Result<(), Failure> {
+    /// Checks that no option is given that applies to a database only.
+    ///
+    /// # Errors
+    /// A message on wrong usage if there is such an option.
+    pub fn require_no_filter(&self) -> Result<(), CliError> {
         match self.class.is_some() || self.scorer.is_some() {
-            true => {
-                Err(Failure::misuse("--class and --scorer choose among the sessions of a --database, not of a folder"))
-            }
+            true => Err(CliError::misuse("--class and --scorer require --database and do not apply to a folder")),
             false => Ok(()),
         }
     }
 
-    /// Whose scores are asked for: workers' of this version, or else the stations' own.
-    pub fn scorer_version(&self) -> Result<Option<u32>, Failure> {
-        self.scorer.as_deref().map(scorer).transpose()
+    /// Scorer version of the workers' scores that are requested; `None` for the stations' own scores.
+    pub fn scorer_version(&self) -> Result<Option<u32>, CliError> {
+        self.scorer.as_deref().map(parse_scorer_version).transpose()
     }
 
-    /// The sessions of a database, whatever is known of them.
-    pub fn kept(&self) -> Result<(Line, Vec<Kept>), Failure> {
-        if !self.at.is_named() {
-            return Err(Failure::misuse("no-sessions: name a folder that holds bundles, or a --database"));
+    /// Connects to the database, and lists its sessions.
+    ///
+    /// # Errors
+    /// A message if no database is named, it cannot be read, or it holds no session that the login may read.
+    pub fn stored_sessions(&self) -> Result<(DbConnection, Vec<StoredSession>), CliError> {
+        if !self.at.is_configured() {
+            return Err(CliError::misuse("no-sessions: give a folder that contains bundles, or --database"));
         }
         let scorer_version = self.scorer_version()?;
-        let which = Which { class: self.class.clone(), scorer_version };
-        let mut line = self.at.line()?;
-        let (kept, unread) = line.ask(|client| records::sessions(client, &which))?;
-        for what in unread {
-            eprintln!("--database: skipped: {}", harmless(&what, 300));
+        let which = SessionFilter { class: self.class.clone(), scorer_version };
+        let mut connection = self.at.connection()?;
+        let (stored, unreadable) = connection.query_with_retry(|client| records::sessions(client, &which))?;
+        for what in unreadable {
+            eprintln!("--database: skipped: {}", sanitize_display(&what, 300));
         }
-        // Whoever asks for the workers' scores has them.
-        for k in kept.iter().filter(|k| k.differs && scorer_version.is_none()) {
+        // No warning is needed if the workers' scores were requested.
+        for k in stored.iter().filter(|k| k.differs && scorer_version.is_none()) {
             eprintln!(
-                "--database: {}: differs: a worker found another score than its station wrote; --scorer current takes the worker's",
+                "--database: {}: differs: the worker's score differs from the station's; give --scorer current to use \
+                the worker's",
                 k.id
             );
         }
-        match kept.is_empty() {
-            true => Err(Failure::wrong("--database: no-sessions: it holds none that you may read")),
-            false => Ok((line, kept)),
+        match stored.is_empty() {
+            true => Err(CliError::wrong("--database: no-sessions: the database contains no session that you may read")),
+            false => Ok((connection, stored)),
         }
     }
 }
 
-/// Writes down that so many sessions were read, and by whom.
-pub fn note_read(line: &mut Line, kept: &[Kept]) -> Result<(), Failure> {
-    line.ask(|client| client.query("SELECT typodont.note('sessions read', $1)", &[&kept.len().to_string()]))?;
+/// Records in the audit log the number of sessions read, and the login.
+pub fn audit_read(connection: &mut DbConnection, stored: &[StoredSession]) -> Result<(), CliError> {
+    connection.query_with_retry(|client| {
+        client.query("SELECT typodont.note('sessions read', $1)", &[&stored.len().to_string()])
+    })?;
     Ok(())
 }
 
-impl Read {
-    /// What examiners judged, and what is wrong with it.
-    pub fn judgements(&mut self) -> Result<Told, Failure> {
-        if let Some(line) = &mut self.line {
-            return Ok(line.ask(records::judgements)?);
+impl SourcedCohort {
+    /// Reads the examiners' overrides; prints the issues of a folder's log.
+    ///
+    /// # Errors
+    /// A message if they cannot be read.
+    pub fn overrides(&mut self) -> Result<LogSnapshot, CliError> {
+        if let Some(connection) = &mut self.connection {
+            return Ok(connection.query_with_retry(records::read_overrides)?);
         }
-        let folder = self.folder.clone().unwrap_or_default();
-        let path = folder.join(OVERRIDES);
-        let unread = |e| Failure::wrong(format!("{}: unreadable-file: {e}", path.display()));
-        let told = Log::of(&folder).told(None).map_err(unread)?;
-        for trouble in &told.troubles {
-            eprintln!("{}: {trouble}", path.display());
-        }
-        Ok(told)
+        crate::cli::read_override_log(self.folder.as_deref().unwrap_or(Path::new("")))
     }
 }
 
-/// A new folder that only this user can look into.
-fn own_folder() -> std::io::Result<PathBuf> {
-    let mut chance = [0; 8];
-    getrandom::fill(&mut chance).map_err(|e| std::io::Error::other(e.to_string()))?;
-    let folder = std::env::temp_dir().join(format!("typodont-{}", crate::scenario::hex(&chance)));
+/// Creates a temporary folder that only this user can read.
+fn create_private_temp_dir() -> std::io::Result<PathBuf> {
+    let mut random = [0; 8];
+    getrandom::fill(&mut random).map_err(|e| std::io::Error::other(e.to_string()))?;
+    let folder = std::env::temp_dir().join(format!("typodont-{}", typodont_exercise::scenario::hex(&random)));
     let mut builder = std::fs::DirBuilder::new();
     #[cfg(unix)]
     std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
@@ -154,21 +179,26 @@ fn own_folder() -> std::io::Result<PathBuf> {
     Ok(folder)
 }
 
-/// What a cohort's maps are drawn from, and one recording for the words of each questionnaire.
-fn fetch(store: &Store, kept: &[Kept], cohort: &mut Cohort) -> Result<Fetched, Failure> {
-    let folder = own_folder().map_err(|e| Failure::wrong(format!("temporary folder: unwritable-folder: {e}")))?;
-    let fetched = Fetched(folder.clone());
+/// Downloads the files from which a cohort's maps are drawn, and one recording for the wording of each questionnaire.
+fn fetch_removal_maps(
+    store: &ObjectStoreHandle,
+    stored: &[StoredSession],
+    cohort: &mut Cohort,
+) -> Result<TempDir, CliError> {
+    let folder =
+        create_private_temp_dir().map_err(|e| CliError::wrong(format!("temporary folder: unwritable-folder: {e}")))?;
+    let fetched = TempDir(folder.clone());
     let mut worded = BTreeSet::new();
-    for k in kept {
+    for k in stored {
         let own = folder.join(&k.id).join(&k.bundle);
-        let unwritable = |e: std::io::Error| Failure::wrong(format!("{}: unwritable-folder: {e}", folder.display()));
+        let unwritable = |e: std::io::Error| CliError::wrong(format!("{}: unwritable-folder: {e}", folder.display()));
         std::fs::create_dir_all(&own).map_err(unwritable)?;
         let words = k.session.questionnaire.as_ref().is_some_and(|q| worded.insert(q.id.clone()));
-        for name in [TIMES].into_iter().chain(words.then_some(RECORDING)) {
+        for name in [REMOVAL_TIMES_FILE].into_iter().chain(words.then_some(RECORDING)) {
             if k.manifest.file(name).is_none() {
                 continue;
             }
-            match store.take(&k.manifest, name) {
+            match store.read_bundle_file(&k.manifest, name) {
                 Ok(bytes) => std::fs::write(own.join(name), bytes).map_err(unwritable)?,
                 Err((why, _)) => cohort.skipped.push((PathBuf::from(&k.id), why)),
             }

@@ -1,11 +1,8 @@
 //! The store of bundles: a folder, S3, Azure or Google, named by a URL.
 
-use super::http::Client;
-use super::patience::{Passing, Patience};
-use crate::cli::Failure;
-use crate::report::harmless;
-use crate::school::Manifest;
-use crate::school::records::is_name;
+use super::http_client::UreqHttpClient;
+use super::retry::{RetryPolicy, Transient};
+use crate::cli::CliError;
 use clap::Args;
 use hyper::body::Bytes;
 use object_store::aws::{AmazonS3Builder, Checksum};
@@ -18,103 +15,116 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
+use typodont_report::sanitize_display;
+use typodont_school::Manifest;
+use typodont_school::records::is_plain_name;
 use url::Url;
 
-/// Where it is looked for if the command line does not say.
-const ADDRESS: &str = "TYPODONT_STORE";
-const CERTIFICATES: &str = "TYPODONT_STORE_CERTIFICATES";
+/// Environment variables with the store's address and certificates, if the command line does not give them.
+const STORE_VARIABLE: &str = "TYPODONT_STORE";
+const CERTIFICATES_VARIABLE: &str = "TYPODONT_STORE_CERTIFICATES";
 
-/// Letters of a store's own words that are told.
-const WORDS_MAX: usize = 400;
+/// Maximum length of a store's error text that is printed, characters.
+const ERROR_TEXT_MAX: usize = 400;
 
 #[derive(Args, Clone)]
-pub struct Named {
-    /// The store of bundles: file:///folder, s3://bucket/folder, az://container/folder or gs://bucket/folder. Without it
-    /// TYPODONT_STORE says so. Keys come from the environment, under the names that these services' own tools use
+pub struct StoreArguments {
+    /// URL of the bundle store: file:///folder, s3://bucket/folder, az://container/folder or gs://bucket/folder; by default taken
+    /// from TYPODONT_STORE. Keys are read from the environment variables that these services' own tools use
     #[arg(long, value_name = "URL")]
     pub store: Option<String>,
 }
 
-impl Named {
-    pub fn is_named(&self) -> bool {
-        self.store.is_some() || std::env::var_os(ADDRESS).is_some()
+impl StoreArguments {
+    pub fn is_configured(&self) -> bool {
+        self.store.is_some() || std::env::var_os(STORE_VARIABLE).is_some()
     }
 
-    pub fn open(&self, patience: Patience) -> Result<Store, Failure> {
+    pub fn open(&self, retry_policy: RetryPolicy) -> Result<ObjectStoreHandle, CliError> {
         let address = match &self.store {
             Some(address) => address.clone(),
-            None => std::env::var(ADDRESS).map_err(|_| {
-                Failure::misuse(format!("no-store: give --store, or its address in the environment's {ADDRESS}"))
+            None => std::env::var(STORE_VARIABLE).map_err(|_| {
+                CliError::misuse(format!("no-store: give --store, or set the environment variable {STORE_VARIABLE}"))
             })?,
         };
-        Store::open(&address, patience).map_err(|e| Failure::misuse(format!("--store: {e}")))
+        ObjectStoreHandle::open(&address, retry_policy).map_err(|e| CliError::misuse(format!("--store: {e}")))
     }
 }
 
-/// Why the store did not do it.
+/// Error of a store.
 #[derive(Debug)]
-pub struct Undone {
+pub struct StoreError {
     pub why: String,
-    passing: bool,
-    /// There is no such object.
+    is_transient: bool,
+    /// True if the object does not exist.
     is_missing: bool,
 }
 
-impl Passing for Undone {
-    fn is_passing(&self) -> bool {
-        self.passing
+impl Transient for StoreError {
+    fn is_transient(&self) -> bool {
+        self.is_transient
     }
 }
 
-impl From<object_store::Error> for Undone {
-    fn from(error: object_store::Error) -> Undone {
+impl From<object_store::Error> for StoreError {
+    fn from(error: object_store::Error) -> StoreError {
         use object_store::Error as E;
         let is_missing = matches!(error, E::NotFound { .. });
-        let for_good = matches!(
+        let is_permanent = matches!(
             error,
             E::PermissionDenied { .. } | E::Unauthenticated { .. } | E::InvalidPath { .. } | E::NotSupported { .. }
         );
-        let why = harmless(&error.to_string(), WORDS_MAX);
-        let plain = why.contains("plain-http:");
-        Undone { passing: !is_missing && !for_good && !plain, why, is_missing }
+        let why = sanitize_display(&error.to_string(), ERROR_TEXT_MAX);
+        let is_plain_http = why.contains("plain-http:");
+        StoreError { is_transient: !is_missing && !is_permanent && !is_plain_http, why, is_missing }
     }
 }
 
-impl From<Undone> for Failure {
-    fn from(undone: Undone) -> Failure {
-        Failure::wrong(format!("--store: no-answer: {}", undone.why))
+impl From<StoreError> for CliError {
+    fn from(undone: StoreError) -> CliError {
+        CliError::wrong(format!("--store: no-answer: {}", undone.why))
     }
 }
 
-/// A store, tried again for as long as patience lasts.
-pub struct Store {
+/// A store; requests are repeated as the retry policy allows.
+pub struct ObjectStoreHandle {
     runtime: Runtime,
     inner: Arc<dyn ObjectStore>,
-    /// What stands before every name.
+    /// Prefix of all object names.
     base: Place,
-    patience: Patience,
-    /// Where it lies, if it is a folder of this machine.
+    retry_policy: RetryPolicy,
+    /// Path of the store, if it is a folder of this computer.
     folder: Option<PathBuf>,
 }
 
-impl Store {
-    /// `Err` says what is wrong with the address.
-    pub fn open(address: &str, patience: Patience) -> Result<Store, String> {
-        let url = Url::parse(address).map_err(|e| format!("\"{}\" is no address: {e}", harmless(address, 100)))?;
+impl ObjectStoreHandle {
+    /// Opens a store by its URL.
+    ///
+    /// # Errors
+    /// A message if the address is not valid.
+    pub fn open(address: &str, retry_policy: RetryPolicy) -> Result<ObjectStoreHandle, String> {
+        let url = Url::parse(address)
+            .map_err(|e| format!("\"{}\" is not an address: {e}", sanitize_display(address, 100)))?;
         if url.password().is_some() || url.query().is_some() || url.fragment().is_some() {
-            return Err("give it without a secret, query or fragment; keys come from the environment".into());
+            return Err(
+                "the address must not contain a secret, query or fragment; put keys into environment variables".into(),
+            );
         }
-        let roots = std::env::var_os(CERTIFICATES).map(PathBuf::from);
-        let roots = roots.map(|path| crate::content::read_file(&path).map_err(|d| d.headline())).transpose()?;
-        let client = Client::new(roots.as_deref())?;
-        let wrong = |e: object_store::Error| harmless(&e.to_string(), WORDS_MAX);
-        // Patience is ours; the crate's own covers what is short.
+        let roots = std::env::var_os(CERTIFICATES_VARIABLE).map(PathBuf::from);
+        let roots = roots.map(|path| typodont_formats::read_file(&path).map_err(|d| d.headline())).transpose()?;
+        let client = UreqHttpClient::new(roots.as_deref())?;
+        let wrong = |e: object_store::Error| sanitize_display(&e.to_string(), ERROR_TEXT_MAX);
+        // Long waits follow the retry policy; the crate's own retries cover short interruptions.
         let retry = RetryConfig { max_retries: 2, retry_timeout: Duration::from_secs(20), ..RetryConfig::default() };
         let mut base = Place::parse(url.path().trim_matches('/')).map_err(|e| e.to_string())?;
         let mut on_disk = None;
         let inner: Arc<dyn ObjectStore> = match url.scheme() {
             "file" => {
-                let folder = url.to_file_path().map_err(|()| "a folder of another machine".to_string())?;
+                let folder = url.to_file_path().map_err(|()| {
+                    "the folder is on another computer; give a folder of this \
+                computer"
+                        .to_string()
+                })?;
                 std::fs::create_dir_all(&folder)
                     .map_err(|e| format!("unwritable-folder: {e}: {}", folder.display()))?;
                 base = Place::default();
@@ -123,7 +133,7 @@ impl Store {
                 Arc::new(local.with_automatic_cleanup(true).with_fsync(true))
             }
             "s3" | "s3a" => {
-                // Each part goes with its SHA-256, which the store compares before it keeps the part.
+                // Each part is sent with its SHA-256, which the store compares before it saves the part.
                 let builder = AmazonS3Builder::from_env().with_url(address).with_retry(retry);
                 let builder = builder.with_checksum_algorithm(Checksum::SHA256).with_allow_http(true);
                 Arc::new(builder.with_http_connector(client).build().map_err(wrong)?)
@@ -136,48 +146,52 @@ impl Store {
                 let builder = GoogleCloudStorageBuilder::from_env().with_url(address).with_retry(retry);
                 Arc::new(builder.with_http_connector(client).build().map_err(wrong)?)
             }
-            other => return Err(format!("stores are named by file, s3, az or gs, not by {other}")),
+            other => return Err(format!("the address must begin with file, s3, az or gs, not with {other}")),
         };
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_time()
             .max_blocking_threads(4)
             .build()
             .map_err(|e| e.to_string())?;
-        Ok(Store { runtime, inner, base, patience, folder: on_disk })
+        Ok(ObjectStoreHandle { runtime, inner, base, retry_policy, folder: on_disk })
     }
 
-    /// A folder of this machine as a store, or one that is named by a URL.
-    pub fn at(place: &str, patience: Patience) -> Result<Store, String> {
+    /// Opens a folder of this computer as a store, or a store by its URL.
+    pub fn open_folder_or_url(place: &str, retry_policy: RetryPolicy) -> Result<ObjectStoreHandle, String> {
         if place.contains("://") {
-            return Store::open(place, patience);
+            return ObjectStoreHandle::open(place, retry_policy);
         }
         let folder = std::path::absolute(Path::new(place)).map_err(|e| e.to_string())?;
-        let url = Url::from_file_path(&folder).map_err(|()| format!("{}: no folder", folder.display()))?;
-        Store::open(url.as_str(), patience)
+        let url =
+            Url::from_file_path(&folder).map_err(|()| format!("{}: the path is not a folder", folder.display()))?;
+        ObjectStoreHandle::open(url.as_str(), retry_policy)
     }
 
-    fn place(&self, name: &str) -> Place {
+    fn object_path(&self, name: &str) -> Place {
         name.split('/').fold(self.base.clone(), |place, part| place.join(part))
     }
 
-    pub fn put(&self, name: &str, bytes: Vec<u8>) -> Result<(), Undone> {
-        let (place, bytes) = (self.place(name), Bytes::from(bytes));
-        self.patience.keep(|| {
+    pub fn put(&self, name: &str, bytes: Vec<u8>) -> Result<(), StoreError> {
+        let (place, bytes) = (self.object_path(name), Bytes::from(bytes));
+        self.retry_policy.retry(|| {
             let put = self.inner.put(&place, PutPayload::from_bytes(bytes.clone()));
             Ok(self.runtime.block_on(put).map(|_| ())?)
         })
     }
 
-    pub fn get(&self, name: &str) -> Result<Vec<u8>, Undone> {
-        let place = self.place(name);
-        self.patience.keep(|| {
+    pub fn get(&self, name: &str) -> Result<Vec<u8>, StoreError> {
+        let place = self.object_path(name);
+        self.retry_policy.retry(|| {
             let bytes = self.runtime.block_on(async { self.inner.get(&place).await?.bytes().await });
             Ok(bytes?.to_vec())
         })
     }
 
-    /// The same; `None` where there is none.
-    pub fn find(&self, name: &str) -> Result<Option<Vec<u8>>, Undone> {
+    /// Reads an object; `None` if it does not exist.
+    ///
+    /// # Errors
+    /// The store's error if the object exists, or may exist, but cannot be read.
+    pub fn get_if_present(&self, name: &str) -> Result<Option<Vec<u8>>, StoreError> {
         match self.get(name) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(undone) if undone.is_missing => Ok(None),
@@ -185,40 +199,43 @@ impl Store {
         }
     }
 
-    /// Name and size of everything right within a folder.
-    pub fn list(&self, folder: &str) -> Result<Vec<(String, u64)>, Undone> {
-        let place = self.place(folder);
-        let listed = self.patience.keep(|| -> Result<_, Undone> {
+    /// Name and size, bytes, of all objects directly within a folder.
+    pub fn list(&self, folder: &str) -> Result<Vec<(String, u64)>, StoreError> {
+        let place = self.object_path(folder);
+        let listed = self.retry_policy.retry(|| -> Result<_, StoreError> {
             Ok(self.runtime.block_on(self.inner.list_with_delimiter(Some(&place)))?)
         })?;
         let name = |place: &Place| place.filename().map(|name| format!("{folder}/{name}"));
         Ok(listed.objects.iter().filter_map(|object| Some((name(&object.location)?, object.size))).collect())
     }
 
-    /// Removes a file; one that is not there is removed.
-    pub fn remove(&self, name: &str) -> Result<(), Undone> {
-        let place = self.place(name);
-        self.patience.keep(|| match self.runtime.block_on(self.inner.delete(&place)) {
+    /// Removes an object; a missing one counts as removed.
+    ///
+    /// # Errors
+    /// The store's error if the object cannot be removed.
+    pub fn remove(&self, name: &str) -> Result<(), StoreError> {
+        let place = self.object_path(name);
+        self.retry_policy.retry(|| match self.runtime.block_on(self.inner.delete(&place)) {
             Err(object_store::Error::NotFound { .. }) => Ok(()),
             result => Ok(result?),
         })
     }
 
-    /// Removes what a killed program left half written right within a folder. Only folders of this machine have such files, and call
-    /// them `NAME#1`; elsewhere an object is whole or absent.
-    pub fn settle(&self, folder: &str) {
-        let is_within = folder.split('/').all(is_name);
+    /// Removes incomplete files that a killed program left directly within a folder. Only stores in a folder of this
+    /// computer have such files, named `NAME#1`; in other stores an object is complete or absent.
+    pub fn remove_partial_uploads(&self, folder: &str) {
+        let is_within = folder.split('/').all(is_plain_name);
         let own = self.folder.as_ref().filter(|_| is_within).map(|base| base.join(folder));
         let entries = own.and_then(|own| std::fs::read_dir(own).ok()).into_iter().flatten().flatten();
         for entry in entries.filter(|entry| entry.file_name().to_string_lossy().contains('#')) {
-            // What cannot be removed is met again by whoever comes next.
+            // A file that cannot be removed is tried again by the next call.
             let _ = std::fs::remove_file(entry.path());
         }
     }
 
-    /// Removes everything right within a folder; gives how much.
-    pub fn clear(&self, folder: &str) -> Result<usize, Undone> {
-        self.settle(folder);
+    /// Removes all objects directly within a folder; returns their number.
+    pub fn remove_folder(&self, folder: &str) -> Result<usize, StoreError> {
+        self.remove_partial_uploads(folder);
         let names = self.list(folder)?;
         for (name, _) in &names {
             self.remove(name)?;
@@ -226,17 +243,19 @@ impl Store {
         Ok(names.len())
     }
 
-    /// A file of a bundle, checked by the digests of its parts and its own. The second of an error says whether trying again may
-    /// help: not where the bytes are others than were stored.
-    pub fn take(&self, manifest: &Manifest, name: &str) -> Result<Vec<u8>, (String, bool)> {
-        let file = manifest.file(name).ok_or((format!("{name}: the bundle has none"), false))?;
-        let mut passing = false;
-        let bytes = manifest.take(file, |index| {
+    /// Reads a file of a bundle, and checks the digests of its parts and its own.
+    ///
+    /// # Errors
+    /// A message, and true if another attempt may succeed; false if the bytes differ from those that were stored.
+    pub fn read_bundle_file(&self, manifest: &Manifest, name: &str) -> Result<Vec<u8>, (String, bool)> {
+        let file = manifest.file(name).ok_or((format!("{name}: the bundle does not contain this file"), false))?;
+        let mut is_transient = false;
+        let bytes = manifest.extract(file, |index| {
             self.get(&manifest.part_name(index)).map_err(|undone| {
-                passing = true;
+                is_transient = true;
                 undone.why
             })
         });
-        bytes.map_err(|why| (why, passing))
+        bytes.map_err(|why| (why, is_transient))
     }
 }

@@ -1,17 +1,11 @@
-//! `typodont sync`: a station's finished bundles to the school. The bytes first, the row last.
+//! `typodont sync`: uploads a station's finished bundles: first the files, then the row in the database.
 
-use super::asking::{Line, Unanswered};
-use super::database::At;
-use super::mark;
-use super::patience::Passing;
-use super::store::{Named, Store, Undone};
-use crate::cli::{Failure, say};
-use crate::handover::session_id;
-use crate::report::SessionFile;
-use crate::report::cohort::{find, read_session};
-use crate::report::harmless;
-use crate::school::records::{self, Entered, Finished, Standing};
-use crate::school::{Changed, Pack};
+use super::connection::{DbConnection, DbError};
+use super::database::DatabaseArguments;
+use super::retry::Transient;
+use super::store::{ObjectStoreHandle, StoreArguments, StoreError};
+use super::store_marker;
+use crate::cli::{CliError, print_line};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use postgres::error::SqlState;
@@ -20,178 +14,173 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
+use typodont_integrations::session_id;
+use typodont_report::SessionFile;
+use typodont_report::cohort::{find_bundles, read_session};
+use typodont_report::sanitize_display;
+use typodont_school::records;
+use typodont_school::records::{InsertOutcome, NewSession, SyncStatus};
+use typodont_school::{ArchiveError, BundleArchive};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder that holds bundles, at any depth
+    /// Folder that contains bundles, at any depth
     folder: PathBuf,
-    /// Class that the sessions belong to
+    /// Class to which the sessions belong
     #[arg(long, value_name = "NAME")]
     class: String,
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
     #[command(flatten)]
-    store: Named,
-    /// Delete bundles here whose session or participant the school erased
+    store: StoreArguments,
+    /// Delete local bundles whose session or participant the school has erased
     #[arg(long)]
     remove_erased: bool,
-    /// Stay, and send whatever is finished, until ended
+    /// Keep running and send finished sessions until the program is stopped
     #[arg(long)]
     stay: bool,
 }
 
-/// Sessions that are asked about at once.
-const ASKED_AT_ONCE: usize = 500;
+/// Number of sessions per status query.
+const STATUS_BATCH: usize = 500;
 
-/// Between two looks into the folder.
-const LOOK_EVERY: Duration = Duration::from_secs(5);
+/// Poll interval of the folder.
+const POLL_INTERVAL: Duration = Duration::from_secs(5);
 
-/// Letters of a path or a reason that are told.
-const TOLD_MAX: usize = 300;
+/// Maximum length of a printed path or reason, characters.
+const PRINTED_MAX: usize = 300;
 
-/// What came of a round.
+/// Counts of one synchronisation.
 #[derive(Default)]
-struct Round {
+struct SyncStats {
     sent: usize,
     known: usize,
     erased: usize,
     refused: usize,
 }
 
-/// Why a round broke off.
-pub enum Stopped {
-    Database(Unanswered),
-    Store(Undone),
-    /// It is not the store that the records know.
-    WrongStore(Failure),
-    NoClass,
+/// Reason why a synchronisation was interrupted.
+pub enum SyncError {
+    Database(DbError),
+    Store(StoreError),
+    /// The store is not the one that belongs to the records.
+    WrongStore(CliError),
+    UnknownClass,
 }
 
-impl From<Unanswered> for Stopped {
-    fn from(unanswered: Unanswered) -> Stopped {
-        Stopped::Database(unanswered)
+impl From<DbError> for SyncError {
+    fn from(unanswered: DbError) -> SyncError {
+        SyncError::Database(unanswered)
     }
 }
 
-impl From<Undone> for Stopped {
-    fn from(undone: Undone) -> Stopped {
-        Stopped::Store(undone)
+impl From<StoreError> for SyncError {
+    fn from(undone: StoreError) -> SyncError {
+        SyncError::Store(undone)
     }
 }
 
-/// A bundle that was found.
-struct Found {
+/// A bundle in the station's folder.
+struct LocalBundle {
     path: PathBuf,
     session: SessionFile,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { folder, at, store, stay, .. } = arguments;
     if !folder.is_dir() {
-        return Err(Failure::wrong(format!("{}: missing-folder: there is no such folder", folder.display())));
+        return Err(CliError::wrong(format!("{}: missing-folder: the folder does not exist", folder.display())));
     }
-    let mut line = at.line()?;
-    let store = store.open(at.patience()?)?;
-    let mut told = BTreeSet::new();
+    let mut connection = at.connection()?;
+    let store = store.open(at.retry_policy()?)?;
+    let mut reported = BTreeSet::new();
     loop {
-        let mut round = Round::default();
-        let stopped = send_all(arguments, &mut line, &store, &mut round, &mut told).err();
-        let words = in_words(&round);
-        match stopped {
-            None if !stay && round.refused == 0 => return say(words),
+        let mut stats = SyncStats::default();
+        let sync_error = sync_once(arguments, &mut connection, &store, &mut stats, &mut reported).err();
+        let words = describe(&stats);
+        match sync_error {
+            None if !stay && stats.refused == 0 => return print_line(words),
             None if !stay => {
-                say(words)?;
-                return Err(Failure::Told);
+                print_line(words)?;
+                return Err(CliError::AlreadyReported);
             }
             None => {
-                if round.sent > 0 {
-                    say(words)?;
+                if stats.sent > 0 {
+                    print_line(words)?;
                 }
             }
-            Some(Stopped::NoClass) => return Err(no_class(&arguments.class)),
-            Some(Stopped::WrongStore(failure)) if !stay => return Err(failure),
-            Some(Stopped::Database(Unanswered::Refused(error))) => return Err(Unanswered::Refused(error).into()),
-            Some(Stopped::Database(away)) if !stay => return Err(offline(away.into(), &words)),
-            Some(Stopped::Store(undone)) if !stay => return Err(offline(undone.into(), &words)),
-            // A station goes on without its school: what is finished waits in its folder.
-            Some(Stopped::WrongStore(failure)) => {
-                if told.insert("wrong-store".into()) {
-                    failure.tell();
+            Some(SyncError::UnknownClass) => return Err(unknown_class_error(&arguments.class)),
+            Some(SyncError::WrongStore(failure)) if !stay => return Err(failure),
+            Some(SyncError::Database(DbError::Rejected(error))) => return Err(DbError::Rejected(error).into()),
+            Some(SyncError::Database(away)) if !stay => return Err(offline_error(away.into(), &words)),
+            Some(SyncError::Store(undone)) if !stay => return Err(offline_error(undone.into(), &words)),
+            // A station continues without the school: finished bundles wait in its folder.
+            Some(SyncError::WrongStore(failure)) => {
+                if reported.insert("wrong-store".into()) {
+                    failure.report();
                 }
             }
-            // A store that is away will be back; one that refuses says so once.
-            Some(Stopped::Store(undone)) if !undone.is_passing() && told.insert(undone.why.clone()) => {
-                Failure::from(undone).tell();
+            // An unavailable store is tried again without a message; a refusal is reported once.
+            Some(SyncError::Store(undone)) if !undone.is_transient() && reported.insert(undone.why.clone()) => {
+                CliError::from(undone).report();
             }
-            Some(Stopped::Database(_) | Stopped::Store(_)) => {}
+            Some(SyncError::Database(_) | SyncError::Store(_)) => {}
         }
-        thread::sleep(LOOK_EVERY);
+        thread::sleep(POLL_INTERVAL);
     }
 }
 
-fn in_words(round: &Round) -> String {
-    let Round { sent, known, erased, refused } = round;
-    format!("{sent} sessions sent, {known} were there, {erased} are erased, {refused} refused")
+fn describe(stats: &SyncStats) -> String {
+    let SyncStats { sent, known, erased, refused } = stats;
+    format!("{sent} sessions sent, {known} already stored, {erased} erased by the school, {refused} refused")
 }
 
-pub fn no_class(class: &str) -> Failure {
-    let class = harmless(class, 80);
-    Failure::wrong(format!("--class: unknown-class: there is no class \"{class}\"; typodont school class makes one"))
+pub fn unknown_class_error(class: &str) -> CliError {
+    let class = sanitize_display(class, 80);
+    CliError::wrong(format!(
+        "--class: unknown-class: there is no class \"{class}\"; create it with `typodont school \
+    class`"
+    ))
 }
 
-fn offline(failure: Failure, words: &str) -> Failure {
-    Failure::wrong(format!("{}; so far {words}; the rest waits here and is sent next time", failure.lines()))
+fn offline_error(failure: CliError, words: &str) -> CliError {
+    CliError::wrong(format!("{}; so far {words}; the others remain here and are sent next time", failure.message()))
 }
 
-fn send_all(
+fn sync_once(
     arguments: &Arguments,
-    line: &mut Line,
-    store: &Store,
-    round: &mut Round,
-    told: &mut BTreeSet<String>,
-) -> Result<(), Stopped> {
+    connection: &mut DbConnection,
+    store: &ObjectStoreHandle,
+    stats: &mut SyncStats,
+    reported: &mut BTreeSet<String>,
+) -> Result<(), SyncError> {
     let mut complain = |path: &Path, why: &str| {
-        let text = format!("{}: {}", harmless(&path.display().to_string(), TOLD_MAX), harmless(why, TOLD_MAX));
-        // Who stays does not say the same every five seconds.
-        if told.insert(text.clone()) {
+        let text = format!(
+            "{}: {}",
+            sanitize_display(&path.display().to_string(), PRINTED_MAX),
+            sanitize_display(why, PRINTED_MAX)
+        );
+        // With --stay, the same message is not repeated every five seconds.
+        if reported.insert(text.clone()) {
             eprintln!("{text}");
         }
     };
-    let found = bundles(&arguments.folder, &mut complain);
-    let station = line.ask(records::login)?;
-    if !line.ask(|client| records::has_class(client, &arguments.class))? {
-        return Err(Stopped::NoClass);
+    let found = find_local_bundles(&arguments.folder, &mut complain);
+    let station = connection.query_with_retry(records::login_name)?;
+    if !connection.query_with_retry(|client| records::has_class(client, &arguments.class))? {
+        return Err(SyncError::UnknownClass);
     }
-    mark::check_or_lay(line, store)?;
-    let mut new = Vec::new();
-    for some in found.chunks(ASKED_AT_ONCE) {
-        let sessions: Vec<&SessionFile> = some.iter().map(|found| &found.session).collect();
-        let standing = line.ask(|client| records::standing(client, &sessions))?;
-        let ids: Vec<String> = sessions.iter().map(|session| session_id(session)).collect();
-        let written = line.ask(|client| records::written(client, &ids))?;
-        for (found, standing) in some.iter().zip(standing) {
-            match standing {
-                Standing::New => new.push(found),
-                Standing::Known => {
-                    round.known += 1;
-                    if written.get(&session_id(&found.session)).is_some_and(|digest| *digest != digest_of(&found.path))
-                    {
-                        complain(&found.path, "changed: its session.json is not what was sent; what was sent counts");
-                    }
-                }
-                Standing::Erased => erased(arguments, round, found, &mut complain),
-            }
-        }
-    }
-    let bar = bar(new.len() as u64, "sent");
+    store_marker::verify_or_create(connection, store)?;
+    let new = select_new(arguments, connection, stats, &found, &mut complain)?;
+    let bar = progress_bar(new.len() as u64, "sent");
     for found in new {
-        match send(arguments, line, store, &station, found)? {
-            Ok(Entered::Now) => round.sent += 1,
-            Ok(Entered::Before | Entered::Elsewhere) => round.known += 1,
-            Ok(Entered::Erased) => erased(arguments, round, found, &mut complain),
-            Ok(Entered::NoClass) => return Err(Stopped::NoClass),
+        match upload_session(arguments, connection, store, &station, found)? {
+            Ok(InsertOutcome::Inserted) => stats.sent += 1,
+            Ok(InsertOutcome::AlreadyInserted | InsertOutcome::OtherStation) => stats.known += 1,
+            Ok(InsertOutcome::Erased) => handle_erased(arguments, stats, found, &mut complain),
+            Ok(InsertOutcome::UnknownClass) => return Err(SyncError::UnknownClass),
             Err(why) => {
-                round.refused += 1;
+                stats.refused += 1;
                 complain(&found.path, &why);
             }
         }
@@ -201,10 +190,47 @@ fn send_all(
     Ok(())
 }
 
-/// Every bundle below a folder, each session once.
-fn bundles(folder: &Path, complain: &mut impl FnMut(&Path, &str)) -> Vec<Found> {
-    let all = find(folder);
-    for (path, why) in &all.left_out {
+/// Bundles that the school does not yet have. Counts the others, and reports those that were changed or erased.
+fn select_new<'a>(
+    arguments: &Arguments,
+    connection: &mut DbConnection,
+    stats: &mut SyncStats,
+    all: &'a [LocalBundle],
+    complain: &mut impl FnMut(&Path, &str),
+) -> Result<Vec<&'a LocalBundle>, SyncError> {
+    let mut new = Vec::new();
+    for some in all.chunks(STATUS_BATCH) {
+        let sessions: Vec<&SessionFile> = some.iter().map(|found| &found.session).collect();
+        let standing = connection.query_with_retry(|client| records::sync_status(client, &sessions))?;
+        let ids: Vec<String> = sessions.iter().map(|session| session_id(session)).collect();
+        let written = connection.query_with_retry(|client| records::session_digests(client, &ids))?;
+        for (found, standing) in some.iter().zip(standing) {
+            match standing {
+                SyncStatus::New => new.push(found),
+                SyncStatus::Known => {
+                    stats.known += 1;
+                    if written
+                        .get(&session_id(&found.session))
+                        .is_some_and(|digest| *digest != session_file_digest(&found.path))
+                    {
+                        complain(
+                            &found.path,
+                            "changed: session.json differs from the version that was sent; the \
+                        version that was sent is valid",
+                        );
+                    }
+                }
+                SyncStatus::Erased => handle_erased(arguments, stats, found, complain),
+            }
+        }
+    }
+    Ok(new)
+}
+
+/// All bundles below a folder, each session once.
+fn find_local_bundles(folder: &Path, complain: &mut impl FnMut(&Path, &str)) -> Vec<LocalBundle> {
+    let all = find_bundles(folder);
+    for (path, why) in &all.skipped {
         complain(path, why);
     }
     let mut known = BTreeSet::new();
@@ -212,106 +238,115 @@ fn bundles(folder: &Path, complain: &mut impl FnMut(&Path, &str)) -> Vec<Found> 
     for file in all.files {
         let path = file.parent().unwrap_or(folder).to_path_buf();
         match read_session(&file) {
-            Ok(session) if known.insert(session_id(&session)) => found.push(Found { path, session }),
-            Ok(_) => complain(&path, "skipped: another bundle here is of the same session"),
+            Ok(session) if known.insert(session_id(&session)) => found.push(LocalBundle { path, session }),
+            Ok(_) => complain(&path, "skipped: another bundle in this folder contains the same session"),
             Err(why) => complain(&path, &format!("skipped: {why}")),
         }
     }
     found
 }
 
-fn erased(arguments: &Arguments, round: &mut Round, found: &Found, complain: &mut impl FnMut(&Path, &str)) {
-    round.erased += 1;
+fn handle_erased(
+    arguments: &Arguments,
+    stats: &mut SyncStats,
+    bundle: &LocalBundle,
+    complain: &mut impl FnMut(&Path, &str),
+) {
+    stats.erased += 1;
     if !arguments.remove_erased {
-        return complain(&found.path, "erased: the school erased it; delete it here, or sync with --remove-erased");
+        return complain(
+            &bundle.path,
+            "erased: the school has erased this session; delete the bundle, or give \
+        --remove-erased",
+        );
     }
-    if let Err(error) = std::fs::remove_dir_all(&found.path) {
-        complain(&found.path, &format!("erased: it cannot be deleted: {error}"));
+    if let Err(error) = std::fs::remove_dir_all(&bundle.path) {
+        complain(&bundle.path, &format!("erased: the bundle cannot be deleted: {error}"));
     }
 }
 
-/// Sends one bundle. The inner `Err` says why it is refused, for good.
-fn send(
+/// Uploads one bundle. The inner `Err` is the reason of a permanent refusal.
+fn upload_session(
     arguments: &Arguments,
-    line: &mut Line,
-    store: &Store,
+    connection: &mut DbConnection,
+    store: &ObjectStoreHandle,
     station: &str,
-    found: &Found,
-) -> Result<Result<Entered, String>, Stopped> {
+    found: &LocalBundle,
+) -> Result<Result<InsertOutcome, String>, SyncError> {
     let folder = format!("{station}/{}", session_id(&found.session));
-    let text = match crate::content::read_text(&found.path.join(crate::report::bundle::SESSION_FILE)) {
+    let text = match typodont_formats::read_text(&found.path.join(typodont_report::bundle::SESSION_FILE)) {
         Ok(source) => source.text.clone(),
         Err(complaint) => return Ok(Err(complaint.message)),
     };
-    let pack = match Pack::of(&found.path, &found.session, folder.clone()) {
+    let archive = match BundleArchive::of(&found.path, &found.session, folder.clone()) {
         Ok(pack) => pack,
         Err(why) => return Ok(Err(why.to_string())),
     };
-    if let Err(why) = store_parts(store, &pack)? {
+    if let Err(why) = upload_parts(store, &archive)? {
         return Ok(Err(why.to_string()));
     }
     let bundle = found.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    let finished = Finished {
+    let finished = NewSession {
         class: &arguments.class,
         bundle: &bundle,
         session: &found.session,
-        text: &text,
-        manifest: &pack.manifest,
+        session_json: &text,
+        manifest: &archive.manifest,
     };
-    let entered = match line.ask(|client| records::enter(client, &finished)) {
-        // What a person wrote that no database takes, as a letter of the value zero.
-        Err(Unanswered::Refused(error)) if is_of_values(&error) => {
-            store.clear(&folder)?;
-            return Ok(Err(format!("unkept-session: {}", records::told(&error))));
+    let entered = match connection.query_with_retry(|client| records::insert_session(client, &finished)) {
+        // Text that a database cannot store, such as a character with the value zero.
+        Err(DbError::Rejected(error)) if is_data_error(&error) => {
+            store.remove_folder(&folder)?;
+            return Ok(Err(format!("unkept-session: {}", records::describe_db_error(&error))));
         }
         entered => entered?,
     };
-    if matches!(entered, Entered::Elsewhere | Entered::Erased) {
-        // Its row names other bytes, or none.
-        store.clear(&folder)?;
+    if matches!(entered, InsertOutcome::OtherStation | InsertOutcome::Erased) {
+        // The row in the database belongs to other files, or does not exist.
+        store.remove_folder(&folder)?;
     }
     Ok(Ok(entered))
 }
 
-/// Of a bundle's `session.json` as it would be sent; nothing of one that is gone.
-fn digest_of(bundle: &Path) -> String {
-    let text = crate::content::read_text(&bundle.join(crate::report::bundle::SESSION_FILE));
-    text.map_or(String::new(), |source| crate::scenario::hex(&Sha256::digest(source.text.as_bytes())))
+/// SHA-256 of a bundle's `session.json` as it would be sent; empty if the file is missing.
+fn session_file_digest(bundle: &Path) -> String {
+    let text = typodont_formats::read_text(&bundle.join(typodont_report::bundle::SESSION_FILE));
+    text.map_or(String::new(), |source| typodont_exercise::scenario::hex(&Sha256::digest(source.text.as_bytes())))
 }
 
-fn is_of_values(error: &postgres::Error) -> bool {
+fn is_data_error(error: &postgres::Error) -> bool {
     let class = error.code().map(SqlState::code).unwrap_or_default();
     class.starts_with("22") || class.starts_with("23")
 }
 
-/// Stores the parts that are not there. What is there from an earlier try is read back and compared.
-fn store_parts(store: &Store, pack: &Pack) -> Result<Result<(), Changed>, Undone> {
-    store.settle(&pack.manifest.folder);
-    let there = store.list(&pack.manifest.folder)?;
-    for (index, part) in pack.manifest.parts.iter().enumerate() {
-        let name = pack.manifest.part_name(index);
-        if there.iter().any(|(known, bytes)| *known == name && *bytes == part.bytes) {
-            let digest = crate::scenario::hex(&Sha256::digest(store.get(&name)?));
+/// Uploads the missing parts. Parts of an earlier attempt are read back and compared.
+fn upload_parts(store: &ObjectStoreHandle, archive: &BundleArchive) -> Result<Result<(), ArchiveError>, StoreError> {
+    store.remove_partial_uploads(&archive.manifest.folder);
+    let stored = store.list(&archive.manifest.folder)?;
+    for (index, part) in archive.manifest.parts.iter().enumerate() {
+        let name = archive.manifest.part_name(index);
+        if stored.iter().any(|(known, bytes)| *known == name && *bytes == part.bytes) {
+            let digest = typodont_exercise::scenario::hex(&Sha256::digest(store.get(&name)?));
             if digest == part.sha256 {
                 continue;
             }
         }
-        match pack.part(index) {
+        match archive.part(index) {
             Ok(bytes) => store.put(&name, bytes)?,
             Err(why) => return Ok(Err(why)),
         }
     }
-    for (name, _) in there {
-        // Parts of a bundle that was another when it was begun.
-        if !(0..pack.manifest.parts.len()).any(|index| pack.manifest.part_name(index) == name) {
+    for (name, _) in stored {
+        // Parts of an earlier attempt with a different content of the bundle.
+        if !(0..archive.manifest.parts.len()).any(|index| archive.manifest.part_name(index) == name) {
             store.remove(&name)?;
         }
     }
     Ok(Ok(()))
 }
 
-/// A bar for people; it draws nothing where nobody looks.
-pub fn bar(length: u64, what: &'static str) -> ProgressBar {
+/// A progress bar on a terminal; hidden elsewhere.
+pub fn progress_bar(length: u64, what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}, {eta} left").expect("the template is valid");
     ProgressBar::new(length).with_style(style).with_message(what)
 }

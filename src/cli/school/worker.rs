@@ -1,188 +1,238 @@
-//! `typodont worker`: scores what was enqueued, a session at a time, until it is ended.
+//! `typodont worker`: scores queued sessions, one at a time, until it is stopped.
 
-use super::asking::{Line, Unanswered};
-use super::database::At;
-use super::mark;
+use super::connection::{DbConnection, DbError};
+use super::database::DatabaseArguments;
 use super::metrics::{self, Counters};
-use super::patience::Passing;
-use super::store::{Named, Store};
-use super::sync::bar;
-use crate::cli::{Failure, say};
-use crate::report::SessionFile;
-use crate::report::harmless;
-use crate::school::work::{self, Job, Lease};
-use crate::school::{RECORDING, rescored};
-use crate::score::SCORER_VERSION;
+use super::retry::Transient;
+use super::store::{ObjectStoreHandle, StoreArguments};
+use super::store_marker;
+use super::sync::progress_bar;
+use crate::cli::{CliError, print_line};
 use clap::Args;
+use indicatif::ProgressBar;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
+use typodont_exercise::score::SCORER_VERSION;
+use typodont_report::SessionFile;
+use typodont_report::sanitize_display;
+use typodont_school::jobs;
+use typodont_school::jobs::{Lease, ScoringJob};
+use typodont_school::{RECORDING, rescore};
 
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    at: At,
+    at: DatabaseArguments,
     #[command(flatten)]
-    store: Named,
-    /// End when nothing waits any more, rather than stay
+    store: StoreArguments,
+    /// Stop when no session is waiting
     #[arg(long)]
     drain: bool,
-    /// For how long a session is this worker's without a sign of life, in seconds
+    /// Duration of a lease, in seconds: a session whose worker does not renew the lease is given to another worker
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     lease: f64,
-    /// Attempts of a session before it is set aside
+    /// Attempts to score a session before it is set aside
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(i32).range(1..))]
     attempts: i32,
-    /// Port on this machine's loopback at which Prometheus finds counters, under /metrics
+    /// Port on the loopback address at which Prometheus reads counters, under /metrics
     #[arg(long, value_name = "PORT")]
     metrics: Option<u16>,
 }
 
-/// Between two looks for work.
-const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// Poll interval of the queue.
+const POLL_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Between two counts of what waits, while there is work.
-const COUNT_EVERY: Duration = Duration::from_secs(5);
+/// Interval between two counts of the queue while there is work.
+const COUNT_INTERVAL: Duration = Duration::from_secs(5);
 
-/// After the first failed attempt, s; after each further one twice as long.
-const PAUSE_S: f64 = 2.0;
+/// Pause after the first failed attempt, s; it doubles after each further one.
+const RETRY_AFTER_S: f64 = 2.0;
 
-/// Leases that make sense, s: shorter ones are lost to a busy disk, longer ones keep a dead worker's session for hours.
-const LEASES_S: std::ops::RangeInclusive<f64> = 1.0..=3600.0;
+/// Valid lease times, s: shorter leases expire while the disk is busy; longer ones block the session of a stopped
+/// worker for hours.
+const LEASE_RANGE_S: std::ops::RangeInclusive<f64> = 1.0..=3600.0;
 
-pub fn run(arguments: &Arguments) -> Result<(), Failure> {
+pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { at, store, drain, attempts, .. } = arguments;
-    if !LEASES_S.contains(&arguments.lease) {
-        return Err(Failure::misuse("--lease: from 1 to 3600 seconds"));
+    if !LEASE_RANGE_S.contains(&arguments.lease) {
+        return Err(CliError::misuse("--lease: the duration must be from 1 to 3600 seconds"));
     }
-    let mut line = at.line()?;
-    let store = store.open(at.patience()?)?;
-    mark::check(&mut line, &store)?;
-    let lease =
-        Lease { worker: name(), scorer_version: SCORER_VERSION, seconds: arguments.lease, attempts_max: *attempts };
+    let mut connection = at.connection()?;
+    let store = store.open(at.retry_policy()?)?;
+    store_marker::verify(&mut connection, &store)?;
+    let lease = Lease {
+        worker: worker_name(),
+        scorer_version: SCORER_VERSION,
+        seconds: arguments.lease,
+        attempts_max: *attempts,
+    };
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed))
-        .map_err(|e| Failure::wrong(format!("worker: it could not be ended: {e}")))?;
+        .map_err(|e| CliError::wrong(format!("worker: cannot install the handler for Ctrl-C: {e}")))?;
     let counters = Arc::new(Counters::default());
     if let Some(port) = arguments.metrics {
         let at = metrics::serve(port, Arc::clone(&counters))
-            .map_err(|e| Failure::wrong(format!("--metrics: no-address: {e}")))?;
+            .map_err(|e| CliError::wrong(format!("--metrics: no-address: {e}")))?;
         eprintln!("http://{at}/metrics");
     }
-    let held = Arc::new(Mutex::new(None));
-    beat(line.another(), lease.clone(), Arc::clone(&held), Arc::clone(&stop));
-    let bar = bar(0, "scored");
-    let mut counted: Option<Instant> = None;
-    let mut look = || -> Result<Looked, Unanswered> {
-        let job = line.ask(|client| work::lease(client, &lease))?;
-        // Counting reads every job there is: not for each of them.
-        let is_empty = if job.is_none() || counted.is_none_or(|at| at.elapsed() > COUNT_EVERY) {
-            let tally = line.ask(|client| work::tally(client, SCORER_VERSION))?;
-            counted = Some(Instant::now());
-            counters.set_queue(tally);
-            bar.set_length(counters.scored.load(Ordering::Relaxed) + (tally.waiting + tally.leased) as u64);
-            tally.waiting == 0 && tally.leased == 0
-        } else {
-            false
-        };
-        let Some(job) = job else { return Ok(if is_empty { Looked::Empty } else { Looked::Nothing }) };
-        *lock(&held) = Some(job.session.clone());
-        let done = turn(&mut line, &store, &lease, &job, &counters);
-        *lock(&held) = None;
-        done?;
-        bar.set_position(counters.scored.load(Ordering::Relaxed));
-        Ok(Looked::Worked)
-    };
-    let mut is_away = false;
-    while !stop.load(Ordering::Relaxed) {
-        match look() {
-            Ok(Looked::Worked) => is_away = false,
-            Ok(Looked::Empty) if *drain => break,
-            Ok(Looked::Empty | Looked::Nothing) => nap(&stop),
-            // The school's servers may be away for a while: a worker that stays waits for them, and says so once.
-            Err(away) if away.is_passing() && !drain => {
-                if !std::mem::replace(&mut is_away, true) {
-                    Failure::from(away).tell();
-                }
-                nap(&stop);
-            }
-            Err(unanswered) => return Err(unanswered.into()),
-        }
-    }
-    bar.finish_and_clear();
+    let current_session = Arc::new(Mutex::new(None));
+    spawn_lease_renewal(connection.new_connection(), lease.clone(), Arc::clone(&current_session), Arc::clone(&stop));
+    let bar = progress_bar(0, "scored");
+    let mut worker = ScoringWorker { connection, store, lease, counters, current_session, bar, counted: None };
+    worker.score_until_stopped(&stop, *drain)?;
+    worker.bar.finish_and_clear();
     let count = |of: &std::sync::atomic::AtomicU64| of.load(Ordering::Relaxed);
-    say(format!(
+    print_line(format!(
         "{} scored, {} failed, {} set aside",
-        count(&counters.scored),
-        count(&counters.failed),
-        count(&counters.set_aside)
+        count(&worker.counters.scored),
+        count(&worker.counters.failed),
+        count(&worker.counters.set_aside)
     ))
 }
 
-/// What came of a look for work.
-enum Looked {
+/// A worker's connections and the state of its queue.
+struct ScoringWorker {
+    connection: DbConnection,
+    store: ObjectStoreHandle,
+    lease: Lease,
+    counters: Arc<Counters>,
+    /// Session whose lease is being renewed.
+    current_session: Arc<Mutex<Option<String>>>,
+    bar: ProgressBar,
+    /// Time of the last count of the queue.
+    counted: Option<Instant>,
+}
+
+impl ScoringWorker {
+    /// Scores queued sessions until the worker is stopped or, with `drain`, until the queue is empty.
+    fn score_until_stopped(&mut self, stop: &AtomicBool, drain: bool) -> Result<(), CliError> {
+        let mut is_away = false;
+        while !stop.load(Ordering::Relaxed) {
+            match self.poll() {
+                Ok(PollOutcome::Worked) => is_away = false,
+                Ok(PollOutcome::Empty) if drain => break,
+                Ok(PollOutcome::Empty | PollOutcome::NothingDue) => sleep_unless_stopped(stop),
+                // The school's servers may be unavailable for a while: the worker waits for them, and reports it once.
+                Err(away) if away.is_transient() && !drain => {
+                    if !std::mem::replace(&mut is_away, true) {
+                        CliError::from(away).report();
+                    }
+                    sleep_unless_stopped(stop);
+                }
+                Err(unanswered) => return Err(unanswered.into()),
+            }
+        }
+        Ok(())
+    }
+
+    /// Leases the next job and scores its session, if a job is due.
+    fn poll(&mut self) -> Result<PollOutcome, DbError> {
+        let lease = &self.lease;
+        let job = self.connection.query_with_retry(|client| jobs::lease_next(client, lease))?;
+        // Counting reads all jobs, so that it is not done for each of them.
+        let is_count_due = job.is_none() || self.counted.is_none_or(|at| at.elapsed() > COUNT_INTERVAL);
+        let is_empty = is_count_due && self.count_queue()? == 0;
+        let Some(job) = job else { return Ok(if is_empty { PollOutcome::Empty } else { PollOutcome::NothingDue }) };
+        *lock(&self.current_session) = Some(job.session.clone());
+        let done = process_job(&mut self.connection, &self.store, &self.lease, &job, &self.counters);
+        *lock(&self.current_session) = None;
+        done?;
+        self.bar.set_position(self.counters.scored.load(Ordering::Relaxed));
+        Ok(PollOutcome::Worked)
+    }
+
+    /// Counts the waiting and leased jobs, and shows their number.
+    fn count_queue(&mut self) -> Result<u64, DbError> {
+        let tally = self.connection.query_with_retry(|client| jobs::count_jobs(client, SCORER_VERSION))?;
+        self.counted = Some(Instant::now());
+        self.counters.set_queue(tally);
+        let unfinished = (tally.waiting + tally.leased) as u64;
+        self.bar.set_length(self.counters.scored.load(Ordering::Relaxed) + unfinished);
+        Ok(unfinished)
+    }
+}
+
+/// Result of polling the queue.
+enum PollOutcome {
     Worked,
-    /// Nothing that is due, though something is leased or waits for its time.
-    Nothing,
-    /// Nothing at all.
+    /// No job is due, but some are leased or wait for their time.
+    NothingDue,
+    /// The queue is empty.
     Empty,
 }
 
-/// What the worker is called in the records: nobody else is.
-fn name() -> String {
-    let mut chance = [0; 6];
-    // Without chance the process's number must do.
-    let _ = getrandom::fill(&mut chance);
-    format!("{}-{}", std::process::id(), crate::scenario::hex(&chance))
+/// Unique name of the worker in the records.
+fn worker_name() -> String {
+    let mut random = [0; 6];
+    // Without random numbers, the process id alone is used.
+    let _ = getrandom::fill(&mut random);
+    format!("{}-{}", std::process::id(), typodont_exercise::scenario::hex(&random))
 }
 
-/// Scores a session and writes down what came of it.
-fn turn(line: &mut Line, store: &Store, lease: &Lease, job: &Job, counters: &Counters) -> Result<(), Unanswered> {
+/// Scores a session and records the result.
+fn process_job(
+    connection: &mut DbConnection,
+    store: &ObjectStoreHandle,
+    lease: &Lease,
+    job: &ScoringJob,
+    counters: &Counters,
+) -> Result<(), DbError> {
     let begun = Instant::now();
-    let scored = store.take(&job.manifest, RECORDING).map_err(|(why, passing)| (why, !passing));
-    let scored = scored.and_then(|bytes| rescored(&job.session, &bytes).map_err(|unscored| (unscored.0, true)));
+    let scored = store.read_bundle_file(&job.manifest, RECORDING).map_err(|(why, passing)| (why, !passing));
+    let scored = scored.and_then(|bytes| rescore(&job.session, &bytes).map_err(|unscored| (unscored.0, true)));
     counters.add_seconds(begun.elapsed());
     match scored {
         Ok(result) => {
-            let agrees = agrees(&job.written, &result);
-            let first = line.ask(|client| work::finish(client, job, &result, agrees))?;
+            let agrees = agrees_with_station(&job.station_result, &result);
+            let first = connection.query_with_retry(|client| jobs::finish_job(client, job, &result, agrees))?;
             counters.scored.fetch_add(u64::from(first), Ordering::Relaxed);
             if agrees == Some(false) {
-                eprintln!("{}: differs: its station says another score; typodont verify says where", job.session);
+                eprintln!(
+                    "{}: differs: the station's score differs from the worker's; `typodont verify` lists the \
+                differences",
+                    job.session
+                );
             }
         }
         Err((why, hopeless)) => {
-            let why = harmless(&why, 400);
-            let pause = PAUSE_S * 2f64.powi(job.attempts - 1);
-            let aside = line.ask(|client| work::fail(client, lease, job, &why, hopeless, pause))?;
+            let why = sanitize_display(&why, 400);
+            let pause = RETRY_AFTER_S * 2f64.powi(job.attempts - 1);
+            let aside =
+                connection.query_with_retry(|client| jobs::fail_job(client, lease, job, &why, hopeless, pause))?;
             counters.failed.fetch_add(1, Ordering::Relaxed);
             counters.set_aside.fetch_add(u64::from(aside), Ordering::Relaxed);
-            eprintln!("{}: {}: {why}", job.session, if aside { "set aside" } else { "tried again later" });
+            eprintln!("{}: {}: {why}", job.session, if aside { "set aside" } else { "will be tried again later" });
         }
     }
     Ok(())
 }
 
-/// Whether a station wrote what the recording gives; none where it scored by another version.
-fn agrees(written: &str, result: &SessionFile) -> Option<bool> {
-    let written: SessionFile = serde_json::from_str(written).ok()?;
+/// True if the station's results equal those computed from the recording; `None` if it used another scorer version.
+fn agrees_with_station(station_result: &str, result: &SessionFile) -> Option<bool> {
+    let written: SessionFile = serde_json::from_str(station_result).ok()?;
     let same =
         written.metrics == result.metrics && written.grade == result.grade && written.participant == result.participant;
     (written.scorer_version == result.scorer_version).then_some(same)
 }
 
-/// Renews the lease of what is held, three times in a lease, on a line of its own.
-fn beat(mut line: Line, lease: Lease, held: Arc<Mutex<Option<String>>>, stop: Arc<AtomicBool>) {
+/// Renews the lease of the current session, three times per lease, on a connection of its own.
+fn spawn_lease_renewal(
+    mut connection: DbConnection,
+    lease: Lease,
+    current_session: Arc<Mutex<Option<String>>>,
+    stop: Arc<AtomicBool>,
+) {
     let every = Duration::from_secs_f64(lease.seconds / 3.0);
     thread::spawn(move || {
         loop {
             thread::sleep(every);
-            let session = lock(&held).clone();
+            let session = lock(&current_session).clone();
             match session {
-                // A beat that is lost is made up for by the next; a lease that is lost costs a second scoring, which changes nothing.
-                Some(session) => drop(line.ask_once(|client| work::renew(client, &lease, &session))),
+                // A failed renewal is made up for by the next; a lost lease leads to a second, identical scoring.
+                Some(session) => drop(connection.query_once(|client| jobs::renew_lease(client, &lease, &session))),
                 None if stop.load(Ordering::Relaxed) => return,
                 None => {}
             }
@@ -190,14 +240,14 @@ fn beat(mut line: Line, lease: Lease, held: Arc<Mutex<Option<String>>>, stop: Ar
     });
 }
 
-fn lock(held: &Mutex<Option<String>>) -> std::sync::MutexGuard<'_, Option<String>> {
-    held.lock().unwrap_or_else(PoisonError::into_inner)
+fn lock(current_session: &Mutex<Option<String>>) -> std::sync::MutexGuard<'_, Option<String>> {
+    current_session.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Waits for work, and not for long if it is to end.
-fn nap(stop: &AtomicBool) {
+/// Waits for work, and returns soon if the worker is to stop.
+fn sleep_unless_stopped(stop: &AtomicBool) {
     let begun = Instant::now();
-    while begun.elapsed() < LOOK_EVERY && !stop.load(Ordering::Relaxed) {
+    while begun.elapsed() < POLL_INTERVAL && !stop.load(Ordering::Relaxed) {
         thread::sleep(Duration::from_millis(50));
     }
 }

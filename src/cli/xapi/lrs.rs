@@ -1,15 +1,15 @@
-//! A learning record store, spoken to by xAPI 1.0.3 (Part Three) or 2.0.0 (IEEE 9274.1.1): one request, one answer.
+//! Client of a learning record store, by xAPI 1.0.3 (Part Three) or 2.0.0 (IEEE 9274.1.1).
 
-use crate::cli::trusted;
+use crate::cli::tls_roots;
 use base64::Engine;
 use serde_json::Value as Json;
 use std::time::Duration;
 use ureq::Agent;
 
-/// For one request with its answer: a slow store over a bad line. Longer is as good as gone.
+/// Time limit of one request with its response: enough for a slow store over a slow line.
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Letters of a store's own words that are told.
+/// Maximum length of a store's error text that is printed, characters.
 const WORDS_MAX: usize = 400;
 
 pub struct Lrs {
@@ -19,32 +19,36 @@ pub struct Lrs {
     version: String,
 }
 
-/// What a store makes of statements.
+/// Response of a store to statements.
 #[derive(Debug, PartialEq)]
-pub enum Answer {
-    /// It has them now, or had the very same before.
-    Taken,
-    /// It has one of them already, with other content.
+pub enum LrsResponse {
+    /// The store has the statements now, or had identical ones before.
+    Accepted,
+    /// The store has a statement with the same id but other content.
     Conflict,
-    /// It will never take them.
-    Refused(String),
-    /// It does not let us in.
-    LockedOut(String),
-    /// It cannot be reached, or not now.
-    Later(String),
+    /// The store permanently rejects the statements.
+    Rejected(String),
+    /// The store denies access.
+    Unauthorized(String),
+    /// The store is unavailable at present; the request may be repeated.
+    RetryLater(String),
 }
 
 impl Lrs {
-    /// `endpoint` is the address that `statements` is appended to. `version` is of xAPI; what we send is right in both.
-    /// `roots` are certificates in PEM to trust in place of the usual.
+    /// Creates a client. `endpoint` is the address to which `statements` is appended; `version` is the version of xAPI,
+    /// and the statements sent are valid in both versions. `roots` are certificates in PEM that replace the public
+    /// authorities.
     ///
-    /// `Err` for an address that would send the secret in the clear, or is none.
+    /// # Errors
+    /// A message if `endpoint` is not a valid address, or would transmit the secret without encryption.
     pub fn at(endpoint: &str, key: &str, secret: &str, roots: Option<&[u8]>, version: &str) -> Result<Lrs, String> {
-        let url = url::Url::parse(endpoint).map_err(|e| format!("\"{endpoint}\" is no address: {e}"))?;
+        let url = url::Url::parse(endpoint).map_err(|e| format!("\"{endpoint}\" is not an address: {e}"))?;
         if !url.username().is_empty() || url.password().is_some() || url.query().is_some() || url.fragment().is_some() {
-            return Err("give it without a name, secret, query or fragment; the key and its secret have options".into());
+            return Err("the address must not contain a user name, secret, query or fragment; use --key and \
+            --secret-file"
+                .into());
         }
-        let near = match url.host() {
+        let is_local = match url.host() {
             Some(url::Host::Domain(name)) => name == "localhost",
             Some(url::Host::Ipv4(ip)) => ip.is_loopback(),
             Some(url::Host::Ipv6(ip)) => ip.is_loopback(),
@@ -52,17 +56,17 @@ impl Lrs {
         };
         match url.scheme() {
             "https" => {}
-            "http" if near => {}
-            "http" => return Err("over http the secret could be read on the way; use https".into()),
-            other => return Err(format!("a store is reached by https, not by {other}")),
+            "http" if is_local => {}
+            "http" => return Err("http would transmit the secret without encryption; use https".into()),
+            other => return Err(format!("the address must begin with https, not with {other}")),
         }
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .timeout_global(Some(TIMEOUT))
             .max_redirects(0)
-            // Over http a proxy would read the secret, and `localhost` would be another machine's.
+            // Over http a proxy could read the secret, and would take `localhost` for itself.
             .proxy(if url.scheme() == "http" { None } else { ureq::Proxy::try_from_env() })
-            .tls_config(trusted::tls(roots)?)
+            .tls_config(tls_roots::tls_config(roots)?)
             .user_agent(concat!("typodont/", env!("CARGO_PKG_VERSION")))
             .build();
         let login = base64::engine::general_purpose::STANDARD.encode(format!("{key}:{secret}"));
@@ -74,8 +78,8 @@ impl Lrs {
         })
     }
 
-    /// Sends statements, all or none.
-    pub fn post(&self, statements: &[Json]) -> Answer {
+    /// Sends statements; the store accepts all or none of them.
+    pub fn post(&self, statements: &[Json]) -> LrsResponse {
         let body = serde_json::to_string(statements).unwrap_or_default();
         let request = self
             .agent
@@ -83,11 +87,11 @@ impl Lrs {
             .header("X-Experience-API-Version", &self.version)
             .header("Authorization", &self.authorization)
             .header("Content-Type", "application/json");
-        answer(request.send(body))
+        classify_response(request.send(body))
     }
 
-    /// Whether it has a statement of this id: taken if so, refused if not.
-    pub fn has(&self, id: &str) -> Answer {
+    /// Asks for a statement by its id: [`LrsResponse::Accepted`] if the store has it, [`LrsResponse::Rejected`] if not.
+    pub fn has(&self, id: &str) -> LrsResponse {
         let request = self
             .agent
             .get(&self.statements)
@@ -95,35 +99,35 @@ impl Lrs {
             .header("X-Experience-API-Version", &self.version)
             .header("Authorization", &self.authorization);
         match request.call() {
-            Ok(response) if response.status() == 404 => {
-                Answer::Refused(format!("statement {id} is in conflict, and not there"))
-            }
-            response => answer(response),
+            Ok(response) if response.status() == 404 => LrsResponse::Rejected(format!(
+                "the store reports a conflict for statement {id} but does not contain it"
+            )),
+            response => classify_response(response),
         }
     }
 }
 
-fn answer(response: Result<ureq::http::Response<ureq::Body>, ureq::Error>) -> Answer {
+fn classify_response(response: Result<ureq::http::Response<ureq::Body>, ureq::Error>) -> LrsResponse {
     let mut response = match response {
         Ok(response) => response,
-        Err(error) => return Answer::Later(error.to_string()),
+        Err(error) => return LrsResponse::RetryLater(error.to_string()),
     };
     let status = response.status().as_u16();
     let words = response.body_mut().read_to_string();
     match (status, words) {
-        // Whoever hangs up while answering may not have written it down.
-        (200 | 204, Ok(_)) => Answer::Taken,
-        (200 | 204, Err(error)) => Answer::Later(error.to_string()),
+        // A store that closes the connection during its response may not have saved the statements.
+        (200 | 204, Ok(_)) => LrsResponse::Accepted,
+        (200 | 204, Err(error)) => LrsResponse::RetryLater(error.to_string()),
         (status, words) => {
-            let words = crate::report::harmless(&words.unwrap_or_default(), WORDS_MAX);
+            let words = typodont_report::sanitize_display(&words.unwrap_or_default(), WORDS_MAX);
             let said = format!("the store answers {status}: {words}");
             match status {
-                409 => Answer::Conflict,
-                401 | 403 => Answer::LockedOut(said),
-                408 | 425 | 429 | 500.. => Answer::Later(said),
-                // What was sent is at fault; anything else is at the wrong address, and would be for every file.
-                400 | 413 | 422 => Answer::Refused(said),
-                _ => Answer::LockedOut(said),
+                409 => LrsResponse::Conflict,
+                401 | 403 => LrsResponse::Unauthorized(said),
+                408 | 425 | 429 | 500.. => LrsResponse::RetryLater(said),
+                // With these codes the statements are at fault; with any other, the address or the access is.
+                400 | 413 | 422 => LrsResponse::Rejected(said),
+                _ => LrsResponse::Unauthorized(said),
             }
         }
     }

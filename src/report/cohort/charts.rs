@@ -1,8 +1,8 @@
 //! Small drawings for the cohort's page, as SVG.
 
-use super::progress::Progress;
-use super::summary::Spread;
-use crate::report::words;
+use super::progress::LearningCurves;
+use super::summary::SpreadFile;
+use crate::display_format;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ const STRIP: (f64, f64) = (260.0, 36.0);
 const EDGE: f64 = 6.0;
 
 /// Every session as a dot (or columns, of many), the quartiles as a box, the mean with its interval as a diamond and a line.
-pub fn strip(values: &[f64], spread: &Spread, alt: &str) -> String {
+pub fn strip_plot(values: &[f64], spread: &SpreadFile, alt: &str) -> String {
     let (width, height) = STRIP;
     let room = (spread.max - spread.min).max(1e-12);
     let x = |v: f64| EDGE + (width - 2.0 * EDGE) * ((v - spread.min) / room).clamp(0.0, 1.0);
@@ -35,8 +35,8 @@ pub fn strip(values: &[f64], spread: &Spread, alt: &str) -> String {
         m = x(spread.median),
     );
     match values.len() > DOTS_MAX {
-        true => columns(&mut svg, values, spread),
-        false => dots(&mut svg, values, &x),
+        true => draw_histogram(&mut svg, values, spread),
+        false => draw_dots(&mut svg, values, &x),
     }
     let mean = x(spread.mean);
     if let Some([low, high]) = spread.mean_interval.map(|i| i.map(x)) {
@@ -50,7 +50,7 @@ pub fn strip(values: &[f64], spread: &Spread, alt: &str) -> String {
 }
 
 /// Dots that would cover each other are stacked.
-fn dots(svg: &mut String, values: &[f64], x: &dyn Fn(f64) -> f64) {
+fn draw_dots(svg: &mut String, values: &[f64], x: &dyn Fn(f64) -> f64) {
     const APART: f64 = 5.0;
     let mut stacked: BTreeMap<i64, u32> = BTreeMap::new();
     for &value in values {
@@ -65,7 +65,7 @@ fn dots(svg: &mut String, values: &[f64], x: &dyn Fn(f64) -> f64) {
     }
 }
 
-fn columns(svg: &mut String, values: &[f64], spread: &Spread) {
+fn draw_histogram(svg: &mut String, values: &[f64], spread: &SpreadFile) {
     let room = (spread.max - spread.min).max(1e-12);
     let mut counts = [0u32; COLUMNS];
     for value in values {
@@ -86,8 +86,8 @@ fn columns(svg: &mut String, values: &[f64], spread: &Spread) {
     }
 }
 
-/// How often each answer was given, from 1 to `steps`.
-pub fn answers(counts: &BTreeMap<String, usize>, steps: usize, alt: &str) -> String {
+/// Bar chart of the frequency of each answer from 1 to `steps`.
+pub fn answer_histogram(counts: &BTreeMap<String, usize>, steps: usize, alt: &str) -> String {
     const WIDE: f64 = 18.0;
     let most = counts.values().copied().max().unwrap_or(1).max(1) as f64;
     let width = WIDE * steps as f64;
@@ -118,8 +118,16 @@ pub fn answers(counts: &BTreeMap<String, usize>, steps: usize, alt: &str) -> Str
     svg + "</svg>"
 }
 
+/// Texts of a drawing of learning curves.
+pub struct CurveLabels {
+    /// Description for readers who cannot see the drawing.
+    pub alt: String,
+    /// Title of the horizontal axis.
+    pub attempt: String,
+}
+
 /// A thin line for each participant over their attempts, the mean of each attempt with its interval in bold.
-pub fn curves(progress: &Progress, measure: &str, title: &str) -> String {
+pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveLabels) -> String {
     const SIZE: (f64, f64) = (440.0, 230.0);
     const LEFT: f64 = 76.0;
     const BOTTOM: f64 = 34.0;
@@ -131,14 +139,14 @@ pub fn curves(progress: &Progress, measure: &str, title: &str) -> String {
     let x = |n: usize| LEFT + (SIZE.0 - LEFT - 16.0) * n as f64 / (longest - 1).max(1) as f64;
     let y = |v: f64| SIZE.1 - BOTTOM - (SIZE.1 - BOTTOM - TOP) * ((v - low) / room).clamp(-0.02, 1.02);
     let mut svg = format!(
-        "<svg class=\"curves\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{} by attempt\">",
+        "<svg class=\"curves\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
         SIZE.0,
         SIZE.1,
-        escape(title)
+        escape(&labels.alt)
     );
     for value in [low, high] {
         let at = y(value);
-        let label = escape(&words::measure(measure, Some(value)));
+        let label = escape(&display_format::measure(measure, Some(value)));
         let _ = write!(
             svg,
             "<line x1=\"{LEFT}\" x2=\"{:.0}\" y1=\"{at:.1}\" y2=\"{at:.1}\" stroke=\"#d5dae0\"/>\
@@ -160,15 +168,16 @@ pub fn curves(progress: &Progress, measure: &str, title: &str) -> String {
     }
     let _ = write!(
         svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#57606a\">attempt</text>",
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#57606a\">{}</text>",
         0.5 * (LEFT + SIZE.0),
-        SIZE.1 - 2.0
+        SIZE.1 - 2.0,
+        escape(&labels.attempt)
     );
     // Many lines stay a veil through which the mean is seen.
     let faint = (15.0 / progress.participants.len() as f64).clamp(0.05, 0.45);
     for person in &progress.participants {
         let points = person.values.iter().enumerate().filter_map(|(n, v)| Some(format!("{:.1},{:.1}", x(n), y((*v)?))));
-        let name = escape(&words::harmless(&person.participant, 60));
+        let name = escape(&display_format::sanitize_display(&person.participant, 60));
         let points = points.collect::<Vec<_>>().join(" ");
         let _ = write!(
             svg,

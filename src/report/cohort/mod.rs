@@ -4,27 +4,28 @@
 //! tables, a page, and maps of what people removed. A file that cannot be read is listed and left out; it never stops the rest.
 //! Never opens more than one recording per questionnaire, and verifies none.
 
-mod reading;
+mod loader;
 mod summary;
 mod questionnaire;
 mod progress;
-mod standard;
+mod pass_mark;
 mod removal;
-mod table;
+mod csv_export;
 mod charts;
 mod page;
 
-pub use progress::Progress;
+pub use loader::{FoundBundles, find_bundles, read_session};
+pub use pass_mark::{ExaminerRating, read_ratings};
+pub use progress::LearningCurves;
 pub use questionnaire::{QuestionnaireSummary, wording};
-pub use reading::{Found, find, read_session};
-pub use removal::{Distance, Removal};
-pub use standard::{Rating, ratings};
-pub(super) use summary::in_words;
-pub use summary::{RightCount, ScenarioSummary, Spread, Summary};
+pub use removal::{ExpertDistance, RemovalMap};
+use summary::summary_lines;
+pub use summary::{CohortSummary, RightCount, ScenarioSummary, SpreadFile};
 
-use super::html::Templates;
+use super::display_format;
+use super::language::Translator;
 use super::session_file::SessionFile;
-use super::words;
+use super::templates::{Templates, shipped_languages};
 use std::path::{Path, PathBuf};
 
 /// Sessions that were read, and files that were not.
@@ -36,51 +37,64 @@ pub struct Cohort {
     pub skipped: Vec<(PathBuf, String)>,
     /// Codes of the participants whom the others are compared with.
     pub experts: Vec<String>,
-    /// What examiners judged of participants, on a scale of their own.
-    pub ratings: Vec<Rating>,
-    /// What was removed where; filled by [`Cohort::map_removals`].
-    pub removals: Vec<Removal>,
+    /// Examiners' judgements of participants, on the scale of [`ExaminerRating::rating`].
+    pub ratings: Vec<ExaminerRating>,
+    /// Maps of removed voxels; filled by [`Cohort::map_removals`].
+    pub removals: Vec<RemovalMap>,
 }
 
 impl Cohort {
     /// Reads every `session.json` below a folder.
     pub fn read(folder: &Path) -> Cohort {
-        reading::below(folder)
+        loader::read_cohort(folder)
     }
 
-    /// A page for people. `at` is where the page will be: sessions are linked from there.
-    pub fn html(&self, templates: &Templates, at: &Path) -> Result<String, String> {
-        page::html(templates, self, &self.links(at))
+    /// HTML page of the cohort in the language of a code. `at` is the path of the page, from which sessions are linked.
+    ///
+    /// # Errors
+    ///
+    /// When there is no such language, a map of removed voxels cannot be drawn or the template fails.
+    pub fn html(&self, templates: &Templates, at: &Path, language: &str) -> Result<String, String> {
+        page::html(templates, self, &self.report_links(at), language)
     }
 
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(&self.summary()).unwrap_or_default() + "\n"
     }
 
-    /// The main numbers as lines for a terminal.
+    /// The main numbers as lines for a terminal, in English.
     pub fn text(&self) -> String {
         let mut lines = Vec::new();
         for scenario in self.summary().scenarios {
             let plural = if scenario.sessions == 1 { "" } else { "s" };
-            lines.push(format!("{} ({} session{plural})", words::harmless(&scenario.title, 100), scenario.sessions));
+            lines.push(format!(
+                "{} ({} session{plural})",
+                display_format::sanitize_display(&scenario.title, 100),
+                scenario.sessions
+            ));
             if let Some(points) = scenario.points_mean {
                 let (passed, graded) = (scenario.passed, scenario.graded);
-                lines.push(format!("  {passed} of {graded} passed, {} points on average", words::number(points)));
+                lines.push(format!(
+                    "  {passed} of {graded} passed, {} points on average",
+                    display_format::number(points)
+                ));
             }
-            lines.extend(in_words(&scenario).into_iter().map(|(what, text)| format!("  {what}: {text}")));
+            let right = summary_lines(&scenario, english());
+            lines.extend(right.into_iter().map(|(what, text)| format!("  {what}: {text}")));
             for name in ["decay_cleared_pct", "healthy_per_decay_pct", "time_to_clear_s"] {
                 if let Some(spread) = scenario.metrics.get(name) {
-                    let mean = words::measure(name, Some(spread.mean));
-                    lines.push(format!("  {}: {mean} on average", words::title(name)));
+                    let mean = display_format::measure(name, Some(spread.mean));
+                    lines.push(format!("  {}: {mean} on average", display_format::measure_title(name)));
                 }
             }
-            lines.extend(scenario.cautions.iter().map(|caution| format!("  caution: {caution}")));
+            let cautions = scenario.cautions.iter().map(|caution| english().translate(caution));
+            lines.extend(cautions.map(|caution| format!("  caution: {caution}")));
         }
         lines.join("\n") + "\n"
     }
 
-    /// Where each session's page is, seen from a file; empty for a session without a page.
-    fn links(&self, at: &Path) -> Vec<String> {
+    /// Relative link from a file to each session's page; empty for a session without a page.
+    fn report_links(&self, at: &Path) -> Vec<String> {
         let folder = at.parent().unwrap_or(Path::new(""));
         let link = |path: &PathBuf| {
             let page = path.join("report.html");
@@ -91,19 +105,19 @@ impl Cohort {
         self.sessions.iter().map(|(path, _)| link(path)).collect()
     }
 
-    /// Whether a session is one of the experts'.
+    /// True if the participant of a session is one of the experts.
     fn is_expert(&self, session: &SessionFile) -> bool {
         self.experts.contains(&session.participant)
     }
 
-    /// How far a session's cavity is from the experts', where that is known.
-    fn distance(&self, session: usize) -> Option<&Distance> {
+    /// Distance of a session's cavity from the experts', if known.
+    fn distance_to_experts(&self, session: usize) -> Option<&ExpertDistance> {
         self.removals.iter().flat_map(|r| &r.distances).find(|(index, _)| *index == session).map(|(_, d)| d)
     }
 
     /// Each participant's sessions of an exercise in the order of time, as indices. People without a code are nobody's second
     /// attempt: each of their sessions stands alone.
-    fn attempts(&self, scenario: &str) -> Vec<Vec<usize>> {
+    fn attempts_by_participant(&self, scenario: &str) -> Vec<Vec<usize>> {
         let mut people: Vec<Vec<usize>> = Vec::new();
         // Sessions stand in the order of participant and beginning.
         for (index, (_, session)) in self.sessions.iter().enumerate().filter(|(_, (_, s))| s.scenario.id == scenario) {
@@ -116,19 +130,24 @@ impl Cohort {
     }
 }
 
+/// Translator into the English that ships with the program, for the terminal and for files that programs read.
+fn english() -> Translator<'static> {
+    shipped_languages().translator("en").expect("English ships with the program")
+}
+
 fn is_same_person(a: &SessionFile, b: &SessionFile) -> bool {
     !a.participant.is_empty() && a.participant == b.participant
 }
 
 /// A score or a measure of a session: `points`, or a measure's name.
-fn value(session: &SessionFile, measure: &str) -> Option<f64> {
+fn points_or_measure(session: &SessionFile, measure: &str) -> Option<f64> {
     match measure {
         POINTS => session.grade.as_ref().map(|g| g.points),
         name => session.metric(name),
     }
 }
 
-/// What the grade comes to, beside the measures.
+/// Name under which the points of the grade are listed with the measures.
 const POINTS: &str = "points";
 
 fn dedup<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {

@@ -1,26 +1,28 @@
-//! The cohort's page: what stands in it, in words, for the template `cohort.html`.
+//! The cohort's page: its contents in the words of one language, for the template `cohort.html`.
 
-use super::questionnaire::{QuestionnaireSummary, Statement};
-use super::reading::read_session;
-use super::standard::Standard;
-use super::summary::{ScenarioSummary, Spread, Summary, in_words};
-use super::{Cohort, POINTS, Removal, charts, value};
-use crate::frame::Vec3;
-use crate::report::html::Templates;
-use crate::report::session_file::SessionFile;
-use crate::report::{pictures, words};
+use super::charts::CurveLabels;
+use super::loader::read_session;
+use super::pass_mark::PassMarkEstimate;
+use super::questionnaire::{QuestionnaireStatement, QuestionnaireSummary};
+use super::summary::{CohortSummary, ScenarioSummary, SpreadFile, summary_lines};
+use super::{Cohort, POINTS, RemovalMap, charts, points_or_measure};
+use crate::language::{COUNT, Message, Translator};
+use crate::session_file::SessionFile;
+use crate::templates::Templates;
+use crate::{display_format, phrases, pictures};
 use base64::Engine;
 use serde::Serialize;
 use std::path::Path;
+use typodont_core::frame::Vec3;
 
-/// Letters of a code, title or path shown: what is longer was not written to be read.
+/// Most characters of a code, title or path that are shown.
 const SHOWN_MAX: usize = 80;
 
 /// Teeth of one exercise whose maps are drawn: those that most people worked on.
 const MAPS_MAX: usize = 4;
 
 /// Measures shown per session, where there are any.
-const COLUMNS: [&str; 9] = [
+const SESSION_MEASURES: [&str; 9] = [
     "detect_tooth",
     "detect_level",
     "detect_level_time_s",
@@ -32,34 +34,43 @@ const COLUMNS: [&str; 9] = [
     "force_max_n",
 ];
 
-/// Makes the page. `links` says where each session's own page is, relative to this one.
-pub fn html(templates: &Templates, cohort: &Cohort, links: &[String]) -> Result<String, String> {
+/// Renders the page in one language. `links` holds the relative link to each session's own page, empty for none.
+///
+/// # Errors
+///
+/// When there is no such language, a map cannot be drawn or the template fails.
+pub fn html(templates: &Templates, cohort: &Cohort, links: &[String], language: &str) -> Result<String, String> {
+    let translator = templates.languages().translator(language)?;
     let summary = cohort.summary();
-    let page = Page {
-        scenarios: summary.scenarios.iter().map(|s| scenario(cohort, s, links)).collect::<Result<_, _>>()?,
-        questionnaires: summary.questionnaires.iter().map(questionnaire).collect(),
-        skipped: summary.skipped.iter().map(|f| (shown(&f.file), shown(&f.reason))).collect(),
-        experts: cohort.experts.iter().map(|code| shown(code)).collect(),
-        bands: bands(),
+    let scenarios = summary.scenarios.iter().map(|s| scenario(translator, cohort, s, links));
+    let page = CohortPage {
+        language: translator.code(),
+        scenarios: scenarios.collect::<Result<_, _>>()?,
+        questionnaires: summary.questionnaires.iter().map(|q| questionnaire(translator, q)).collect(),
+        skipped: summary.skipped.iter().map(|f| (sanitize(&f.file), sanitize(&f.reason))).collect(),
+        experts: cohort.experts.iter().map(|code| sanitize(code)).collect(),
+        bands: bands(translator),
         summary: &summary,
     };
-    templates.render_cohort(&page)
+    templates.render_cohort(&page, translator.code())
 }
 
-/// What the template can use. What is named `svg` is a drawing; everything else is text, and is escaped.
+/// Values for the template. A value named `svg` is a drawing; every other value is text, and is escaped.
 #[derive(Serialize)]
-struct Page<'a> {
-    summary: &'a Summary,
+struct CohortPage<'a> {
+    /// Code of the page's language.
+    language: &'a str,
+    summary: &'a CohortSummary,
     scenarios: Vec<ScenarioPart>,
     questionnaires: Vec<QuestionnairePart>,
     skipped: Vec<(String, String)>,
     experts: Vec<String>,
-    bands: Vec<Band>,
+    bands: Vec<ShareBand>,
 }
 
 /// A colour of the maps, and the shares that it stands for.
 #[derive(Serialize)]
-struct Band {
+struct ShareBand {
     color: String,
     text: String,
 }
@@ -76,7 +87,7 @@ struct ScenarioPart {
     words: Vec<(String, String)>,
     cautions: Vec<String>,
     columns: Vec<String>,
-    rows: Vec<Row>,
+    rows: Vec<CohortSessionRow>,
     metrics: Vec<SpreadLine>,
     progress: Vec<(String, String)>,
     repeated: Vec<RepeatedLine>,
@@ -86,12 +97,12 @@ struct ScenarioPart {
 }
 
 #[derive(Serialize)]
-struct Row {
+struct CohortSessionRow {
     participant: String,
     started: String,
     link: String,
     points: String,
-    result: &'static str,
+    result: String,
     class: &'static str,
     cells: Vec<String>,
 }
@@ -182,198 +193,247 @@ struct StatementLine {
     svg: String,
 }
 
-fn shown(text: &str) -> String {
-    words::harmless(text, SHOWN_MAX)
+fn sanitize(text: &str) -> String {
+    display_format::sanitize_display(text, SHOWN_MAX)
 }
 
-fn bands() -> Vec<Band> {
+fn bands(translator: Translator) -> Vec<ShareBand> {
     let mut from = 0.0;
     let band = |&(to, [r, g, b]): &(f32, [u8; 3])| {
         let text = match from {
-            0.0 => format!("up to {:.0} %", to * 100.0),
+            0.0 => translator.text("cohort.up_to", &[("share", format!("{:.0} %", to * 100.0))]),
             from => format!("{:.0}–{:.0} %", from * 100.0, to * 100.0),
         };
         from = to;
-        Band { color: format!("#{r:02x}{g:02x}{b:02x}"), text }
+        ShareBand { color: format!("#{r:02x}{g:02x}{b:02x}"), text }
     };
-    pictures::BANDS.iter().map(band).collect()
+    pictures::SHARE_BANDS.iter().map(band).collect()
 }
 
-fn scenario(cohort: &Cohort, summary: &ScenarioSummary, links: &[String]) -> Result<ScenarioPart, String> {
-    let columns: Vec<&str> = COLUMNS.into_iter().filter(|name| summary.metrics.contains_key(*name)).collect();
+fn scenario(
+    translator: Translator,
+    cohort: &Cohort,
+    summary: &ScenarioSummary,
+    links: &[String],
+) -> Result<ScenarioPart, String> {
+    let columns: Vec<&str> = SESSION_MEASURES.into_iter().filter(|name| summary.metrics.contains_key(*name)).collect();
     let own: Vec<usize> =
         (0..cohort.sessions.len()).filter(|&i| cohort.sessions[i].1.scenario.id == summary.id).collect();
-    let distances = own.iter().any(|&i| cohort.distance(i).is_some());
-    let mut titles: Vec<String> = columns.iter().map(|c| words::title(c)).collect();
+    let distances = own.iter().any(|&i| cohort.distance_to_experts(i).is_some());
+    let mut titles: Vec<String> = columns.iter().map(|c| measure_title(translator, c)).collect();
     if distances {
-        titles.extend(["Differs from the experts".to_string(), "Alike (Dice)".to_string()]);
+        titles.extend(["cohort.expert_difference", "cohort.expert_agreement"].map(|key| translator.text(key, &[])));
     }
     let rows = own.iter().map(|&index| {
         let session = &cohort.sessions[index].1;
-        let mut row = row(session, &links[index], &columns);
+        let mut row = row(translator, session, &links[index], &columns);
         if distances {
-            let distance = cohort.distance(index);
-            row.cells.push(distance.map_or("—".into(), |d| format!("{} mm³", words::number(d.differs_mm3))));
+            let distance = cohort.distance_to_experts(index);
+            row.cells.push(distance.map_or("—".into(), |d| format!("{} mm³", display_format::number(d.differs_mm3))));
             row.cells.push(distance.map_or("—".into(), |d| format!("{:.2}", d.dice)));
         }
         row
     });
-    let values = |name: &str| own.iter().filter_map(|&i| value(&cohort.sessions[i].1, name)).collect::<Vec<f64>>();
+    let values =
+        |name: &str| own.iter().filter_map(|&i| points_or_measure(&cohort.sessions[i].1, name)).collect::<Vec<f64>>();
     let with_experts =
-        |line: SpreadLine, name: &str, told: &dyn Fn(f64) -> String| match summary.expert_metrics.get(name) {
+        |line: SpreadLine, name: &str, to_text: &dyn Fn(f64) -> String| match summary.expert_metrics.get(name) {
             None => line,
-            Some(s) => SpreadLine { experts: told(s.mean), experts_sd: s.sd.map_or(String::new(), told), ..line },
+            Some(s) => SpreadLine { experts: to_text(s.mean), experts_sd: s.sd.map_or(String::new(), to_text), ..line },
         };
     let points = summary.points.iter().map(|s| {
-        let line = spread_line("Points".into(), s, words::number, &values(POINTS));
-        with_experts(line, POINTS, &words::number)
+        let title = measure_title(translator, POINTS);
+        let line = spread_line(translator, title, s, display_format::number, &values(POINTS));
+        with_experts(line, POINTS, &display_format::number)
     });
     let metric = |name: &String| {
         let spread = summary.metrics.get(name)?;
         // A mean of right and wrong is a share, not "right".
         let is_flag = matches!(name.as_str(), "detect_tooth" | "detect_quadrant" | "pulp_exposed");
-        let told = |v: f64| if is_flag { words::number(v) } else { words::measure(name, Some(v)) };
-        let line = spread_line(shown(&words::title(name)), spread, told, &values(name));
-        Some(with_experts(line, name, &told))
+        let to_text = |v: f64| if is_flag { display_format::number(v) } else { display_format::measure(name, Some(v)) };
+        let title = sanitize(&measure_title(translator, name));
+        let line = spread_line(translator, title, spread, to_text, &values(name));
+        Some(with_experts(line, name, &to_text))
     };
     let progress = summary.progress.iter().map(|(name, progress)| {
-        let title = measure_title(name);
-        let svg = charts::curves(progress, name, &title);
+        let title = measure_title(translator, name);
+        let labels = CurveLabels {
+            alt: translator.text("cohort.curves_alt", &[("title", title.clone())]),
+            attempt: translator.text("cohort.attempt", &[]),
+        };
+        let svg = charts::learning_curves(progress, name, &labels);
         (title, svg)
     });
-    let mine: Vec<&Removal> = cohort.removals.iter().filter(|r| r.scenario == summary.id).collect();
+    let own_removals: Vec<&RemovalMap> = cohort.removals.iter().filter(|r| r.scenario == summary.id).collect();
     Ok(ScenarioPart {
-        title: shown(&summary.title),
+        title: sanitize(&summary.title),
         sessions: summary.sessions,
         participants: summary.participants,
         passed: summary.passed,
         graded: summary.graded,
         passed_interval: summary
             .passed_interval
-            .map_or(String::new(), |i| interval(&i.map(|v| 100.0 * v), |v| format!("{v:.0} %"))),
-        points_mean: summary.points_mean.map_or("–".into(), words::number),
-        words: in_words(summary),
-        cautions: summary.cautions.clone(),
+            .map_or(String::new(), |i| interval(translator, &i.map(|v| 100.0 * v), |v| format!("{v:.0} %"))),
+        points_mean: summary.points_mean.map_or("–".into(), display_format::number),
+        words: summary_lines(summary, translator),
+        cautions: summary.cautions.iter().map(|caution| translator.translate(caution)).collect(),
         columns: titles,
         rows: rows.collect(),
         metrics: points.chain(cohort.metric_names().iter().filter_map(metric)).collect(),
         progress: progress.collect(),
-        repeated: summary.repeated.iter().map(|(name, r)| repeated(name, r)).collect(),
-        standard: summary.standard.as_ref().map(standard),
-        more_maps: mine.len().saturating_sub(MAPS_MAX),
-        maps: mine.into_iter().take(MAPS_MAX).zip(&summary.removals).map(|(r, s)| map(r, s)).collect(),
+        repeated: summary.repeated.iter().map(|(name, r)| repeated(translator, name, r)).collect(),
+        standard: summary.standard.as_ref().map(|s| standard(translator, s)),
+        more_maps: own_removals.len().saturating_sub(MAPS_MAX),
+        maps: own_removals
+            .into_iter()
+            .take(MAPS_MAX)
+            .zip(&summary.removals)
+            .map(|(r, s)| map_part(translator, r, s))
+            .collect(),
     })
 }
 
-fn row(session: &SessionFile, link: &str, columns: &[&str]) -> Row {
+fn row(translator: Translator, session: &SessionFile, link: &str, columns: &[&str]) -> CohortSessionRow {
     let grade = session.grade.as_ref();
     let (result, class) = match grade {
-        Some(grade) if grade.passed => ("passed", "good"),
-        Some(grade) if !grade.hard_fails.is_empty() => ("failed outright", "bad"),
-        Some(_) => ("not passed", "bad"),
-        None => ("–", ""),
+        Some(grade) if grade.passed => (translator.text("cohort.passed", &[]), "good"),
+        Some(grade) if !grade.hard_fails.is_empty() => (translator.text("cohort.failed", &[]), "bad"),
+        Some(_) => (translator.text("cohort.not_passed", &[]), "bad"),
+        None => ("–".to_string(), ""),
     };
-    Row {
-        participant: shown(&session.participant),
-        started: shown(&session.started.replace('T', " ").replace('Z', "")),
+    CohortSessionRow {
+        participant: sanitize(&session.participant),
+        started: sanitize(&session.started.replace('T', " ").replace('Z', "")),
         link: link.to_string(),
-        points: grade.map_or("–".into(), |g| words::number(g.points)),
+        points: grade.map_or("–".into(), |g| display_format::number(g.points)),
         result,
         class,
-        cells: columns.iter().map(|c| words::measure(c, session.metric(c))).collect(),
+        cells: columns.iter().map(|c| translator.translate(&phrases::value(c, session.metric(c)))).collect(),
     }
 }
 
-fn measure_title(name: &str) -> String {
-    if name == POINTS { "Points".into() } else { words::title(name) }
+fn measure_title(translator: Translator, name: &str) -> String {
+    match name {
+        POINTS => translator.text("cohort.points", &[]),
+        name => translator.translate(&phrases::measure_title(name)),
+    }
 }
 
-fn interval(&[low, high]: &[f64; 2], told: impl Fn(f64) -> String) -> String {
-    format!("{} to {}", told(low), told(high))
+fn interval(translator: Translator, &[low, high]: &[f64; 2], to_text: impl Fn(f64) -> String) -> String {
+    translator.text("cohort.interval", &[("low", to_text(low)), ("high", to_text(high))])
 }
 
-fn spread_line(title: String, spread: &Spread, told: impl Fn(f64) -> String, values: &[f64]) -> SpreadLine {
-    let alt = format!(
-        "{title}: {} sessions from {} to {}, mean {}",
-        spread.n,
-        told(spread.min),
-        told(spread.max),
-        told(spread.mean)
-    );
+/// A text with the number that selects its singular or plural.
+fn counted(translator: Translator, key: &str, count: usize) -> String {
+    translator.text(key, &[(COUNT, count.to_string())])
+}
+
+fn spread_line(
+    translator: Translator,
+    title: String,
+    spread: &SpreadFile,
+    to_text: impl Fn(f64) -> String,
+    values: &[f64],
+) -> SpreadLine {
+    let described = [
+        ("title", title.clone()),
+        ("sessions", counted(translator, "cohort.sessions", spread.n)),
+        ("low", to_text(spread.min)),
+        ("high", to_text(spread.max)),
+        ("mean", to_text(spread.mean)),
+    ];
+    let alt = translator.text("cohort.distribution_alt", &described);
     SpreadLine {
         n: spread.n,
-        mean: told(spread.mean),
-        interval: spread.mean_interval.as_ref().map_or("–".into(), |i| interval(i, words::number)),
-        sd: spread.sd.map_or("–".into(), &told),
-        min: told(spread.min),
-        median: told(spread.median),
-        max: told(spread.max),
-        svg: charts::strip(values, spread, &alt),
+        mean: to_text(spread.mean),
+        interval: spread
+            .mean_interval
+            .as_ref()
+            .map_or("–".into(), |i| interval(translator, i, display_format::number)),
+        sd: spread.sd.map_or("–".into(), &to_text),
+        min: to_text(spread.min),
+        median: to_text(spread.median),
+        max: to_text(spread.max),
+        svg: charts::strip_plot(values, spread, &alt),
         experts: String::new(),
         experts_sd: String::new(),
         title,
     }
 }
 
-fn repeated(name: &str, found: &super::progress::Repeated) -> RepeatedLine {
+fn repeated(translator: Translator, name: &str, found: &super::progress::RepeatedAttempts) -> RepeatedLine {
     let with = |value: Option<f64>, bounds: Option<&[f64; 2]>| match (value, bounds) {
         (None, _) => "–".to_string(),
         (Some(value), None) => format!("{value:.2}"),
-        (Some(value), Some(bounds)) => format!("{value:.2} ({})", interval(bounds, |v| format!("{v:.2}"))),
+        (Some(value), Some(bounds)) => format!("{value:.2} ({})", interval(translator, bounds, |v| format!("{v:.2}"))),
     };
     RepeatedLine {
-        title: measure_title(name),
+        title: measure_title(translator, name),
         people: found.people,
         icc: with(found.icc, found.icc_interval.as_ref()),
         correlation: with(found.correlation, None),
-        gain: format!("{} ({})", words::number(found.gain), interval(&found.gain_interval, words::number)),
-        error: words::number(found.error),
+        gain: format!(
+            "{} ({})",
+            display_format::number(found.gain),
+            interval(translator, &found.gain_interval, display_format::number)
+        ),
+        error: display_format::number(found.error),
     }
 }
 
-fn standard(standard: &Standard) -> StandardPart {
-    let group = |g: &super::standard::Group| {
-        format!("{} people, mean {}, SD {}", g.people, words::number(g.mean), words::number(g.sd))
+fn standard(translator: Translator, standard: &PassMarkEstimate) -> StandardPart {
+    let group = |g: &super::pass_mark::RatedGroup| {
+        let values = [
+            ("participants", counted(translator, "cohort.participants", g.people)),
+            ("mean", display_format::number(g.mean)),
+            ("sd", display_format::number(g.sd)),
+        ];
+        translator.text("cohort.group", &values)
     };
     let contrasting = standard.contrasting_groups.as_ref().map(|c| {
-        format!(
-            "{} points. Not yet competent: {}. Competent: {}. At this mark {} of the competent would fail, and {} of the not yet \
-             competent pass.",
-            words::number(c.cut),
-            group(&c.not_yet),
-            group(&c.competent),
-            c.failed_wrongly,
-            c.passed_wrongly
-        )
+        let values = [
+            ("cut", display_format::number(c.cut)),
+            ("not_yet", group(&c.not_yet)),
+            ("competent", group(&c.competent)),
+            ("failed", counted(translator, "cohort.competent_participants", c.failed_wrongly)),
+            ("passed", counted(translator, "cohort.not_yet_competent_participants", c.passed_wrongly)),
+        ];
+        translator.text("cohort.contrasting_result", &values)
     });
     let regression = standard.borderline_regression.as_ref().map(|r| {
-        format!(
-            "{} points ({}), over {} people; {} points for each step of the rating, R² {:.2}.",
-            words::number(r.cut),
-            interval(&r.interval, words::number),
-            r.people,
-            words::number(r.points_per_step),
-            r.explained
-        )
+        let values = [
+            ("cut", display_format::number(r.cut)),
+            ("interval", interval(translator, &r.interval, display_format::number)),
+            ("participants", counted(translator, "cohort.participants", r.people)),
+            ("slope", display_format::number(r.points_per_step)),
+            ("explained", format!("{:.2}", r.explained)),
+        ];
+        translator.text("cohort.regression_result", &values)
     });
     StandardPart {
         by_examiners: standard.judged_by == "examiners",
         people: standard.people,
-        pass_points: standard.pass_points.map_or("not the same for all".into(), words::plain),
+        pass_points: standard
+            .pass_points
+            .map_or_else(|| translator.text("cohort.pass_marks_differ", &[]), display_format::plain_number),
         contrasting,
         regression,
     }
 }
 
-fn map(removal: &Removal, summary: &super::removal::RemovalSummary) -> MapPart {
-    let volume = |v: f64| format!("{} mm³", words::number(v));
+fn map_part(translator: Translator, removal: &RemovalMap, summary: &super::removal::RemovalSummary) -> MapPart {
+    let volume = |v: f64| format!("{} mm³", display_format::number(v));
     let tooth = removal.tooth.join("initial.seg.nrrd");
-    let drawn = pictures::shares(&tooth, distal(&removal.tooth), &removal.grid, &removal.share);
+    let drawn = pictures::draw_removal_share(&tooth, distal_of_bundle(&removal.tooth), &removal.grid, &removal.share);
     let encode =
         |png: &[u8]| format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png));
+    let title = |p: &pictures::EncodedPicture| {
+        let view = p.name.strip_prefix("share-").unwrap_or(&p.name);
+        translator.translate(&Message::text_or(format!("side.{view}"), &p.title))
+    };
     let (pictures, complaint) = match drawn {
-        Ok(pictures) => (pictures.into_iter().map(|p| (p.title, encode(&p.png))).collect(), String::new()),
-        Err(why) => (Vec::new(), shown(&why)),
+        Ok(pictures) => (pictures.iter().map(|p| (title(p), encode(&p.png))).collect(), String::new()),
+        Err(why) => (Vec::new(), sanitize(&why)),
     };
     MapPart {
         people: removal.people,
@@ -387,18 +447,19 @@ fn map(removal: &Removal, summary: &super::removal::RemovalSummary) -> MapPart {
     }
 }
 
-/// Which way is distal in a bundle's first tooth; where nobody says which that is, as in the lower left.
-fn distal(bundle: &Path) -> Vec3 {
+/// Distal direction in a bundle's first tooth, in tooth space; +y (as in the lower left quadrant) if the tooth is not
+/// known.
+fn distal_of_bundle(bundle: &Path) -> Vec3 {
     let session = read_session(&bundle.join("session.json")).ok();
-    session.and_then(|session| session.tooth_fdi).map_or(Vec3::Y, crate::scenario::distal)
+    session.and_then(|session| session.tooth_fdi).map_or(Vec3::Y, typodont_exercise::scenario::distal)
 }
 
-fn questionnaire(summary: &QuestionnaireSummary) -> QuestionnairePart {
+fn questionnaire(translator: Translator, summary: &QuestionnaireSummary) -> QuestionnairePart {
     let alpha = |category: &str| {
         let found = summary.alphas.iter().find(|a| a.category == category)?;
         Some(AlphaLine {
             alpha: format!("{:.2}", found.alpha),
-            interval: interval(&found.interval, |v| format!("{v:.2}")),
+            interval: interval(translator, &found.interval, |v| format!("{v:.2}")),
             people: found.people,
             statements: found.statements,
         })
@@ -415,27 +476,28 @@ fn questionnaire(summary: &QuestionnaireSummary) -> QuestionnairePart {
         let spread = summary.categories.get(name);
         let own = summary.statements.iter().filter(|s| s.category == name);
         CategoryPart {
-            title: shown(name),
+            title: sanitize(name),
             mean: spread.map_or("–".into(), |s| format!("{:.2}", s.mean)),
             sd: spread.and_then(|s| s.sd).map_or("–".into(), |sd| format!("{sd:.2}")),
             interval: spread
                 .and_then(|s| s.mean_interval)
-                .map_or("–".into(), |i| interval(&i, |v| format!("{v:.2}"))),
+                .map_or("–".into(), |i| interval(translator, &i, |v| format!("{v:.2}"))),
             alpha: alpha(name),
-            statements: own.map(|s| statement(s, steps)).collect(),
+            statements: own.map(|s| statement(translator, s, steps)).collect(),
         }
     };
     QuestionnairePart {
-        title: shown(if summary.title.is_empty() { &summary.id } else { &summary.title }),
+        title: sanitize(if summary.title.is_empty() { &summary.id } else { &summary.title }),
         n: summary.n,
         whole: alpha(""),
         categories: names.into_iter().map(category).collect(),
     }
 }
 
-fn statement(statement: &Statement, steps: usize) -> StatementLine {
+fn statement(translator: Translator, statement: &QuestionnaireStatement, steps: usize) -> StatementLine {
     let two = |value: Option<f64>| value.map_or("–".to_string(), |v| format!("{v:.2}"));
-    let title = shown(if statement.text.is_empty() { &statement.id } else { &statement.text });
+    let title = sanitize(if statement.text.is_empty() { &statement.id } else { &statement.text });
+    let alt = translator.text("cohort.answers_alt", &[("title", title.clone())]);
     StatementLine {
         mirrored: statement.mirrored == Some(true),
         n: statement.answered.as_ref().map_or(0, |s| s.n),
@@ -444,7 +506,7 @@ fn statement(statement: &Statement, steps: usize) -> StatementLine {
         sd: two(statement.answered.as_ref().and_then(|s| s.sd)),
         with_rest: two(statement.with_rest),
         alpha_without: two(statement.alpha_without),
-        svg: charts::answers(&statement.counts, steps, &format!("{title}: how often each answer was given")),
+        svg: charts::answer_histogram(&statement.counts, steps, &alt),
         title,
     }
 }

@@ -1,13 +1,15 @@
-//! What people said of an exercise, statement by statement.
+//! Statistics of questionnaires, by statement.
 
-use super::{Cohort, Spread, is_same_person};
-use crate::content::Library;
-use crate::record::{self, Recording};
-use crate::report::session_file::QuestionnaireFile;
-use crate::scenario::Questionnaire;
-use crate::statistics::{self, Interval};
+use super::{Cohort, SpreadFile, is_same_person};
+use crate::session_file::QuestionnaireFile;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use typodont_core::statistics;
+use typodont_core::statistics::Interval;
+use typodont_exercise::record;
+use typodont_exercise::record::Recording;
+use typodont_exercise::scenario::Questionnaire;
+use typodont_formats::Library;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QuestionnaireSummary {
@@ -17,27 +19,27 @@ pub struct QuestionnaireSummary {
     /// Forms with any answer.
     pub n: usize,
     /// Mean of each category, negative statements mirrored.
-    pub categories: BTreeMap<String, Spread>,
+    pub categories: BTreeMap<String, SpreadFile>,
     /// Mean of each statement as answered.
-    pub items: BTreeMap<String, Spread>,
+    pub items: BTreeMap<String, SpreadFile>,
     /// Every statement in its order.
-    pub statements: Vec<Statement>,
-    /// Whether the statements of a category, and all of them, ask after one thing; those that can be told.
+    pub statements: Vec<QuestionnaireStatement>,
+    /// Internal consistency (Cronbach's α) of each category and of all statements, as far as it can be computed.
     pub alphas: Vec<AlphaFile>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Statement {
+pub struct QuestionnaireStatement {
     pub id: String,
     pub category: String,
     /// Empty where the questionnaire's own words are not to be had.
     pub text: String,
-    /// Agreeing speaks against the system; null where nobody's answer tells.
+    /// True if agreement is a negative judgement; null if neither the wording nor an answer shows it.
     pub mirrored: Option<bool>,
     /// As answered, and as counted.
-    pub answered: Option<Spread>,
-    pub counted: Option<Spread>,
-    /// How many gave each answer.
+    pub answered: Option<SpreadFile>,
+    pub counted: Option<SpreadFile>,
+    /// Number of people by answer.
     pub counts: BTreeMap<String, usize>,
     /// Correlation with the rest of its category, and α of the category without it.
     pub with_rest: Option<f64>,
@@ -58,7 +60,7 @@ pub struct AlphaFile {
 
 impl QuestionnaireSummary {
     pub fn of(cohort: &Cohort, id: &str) -> QuestionnaireSummary {
-        let filled: Vec<&QuestionnaireFile> = forms(cohort, id).map(|(_, form)| form).collect();
+        let filled: Vec<&QuestionnaireFile> = answered_forms(cohort, id).map(|(_, form)| form).collect();
         let wording = wording(cohort, id);
         let mut statements = statements(&filled, wording.as_ref());
         let last = last_forms(cohort, id);
@@ -74,14 +76,14 @@ impl QuestionnaireSummary {
                 .filter(|&s| category.is_empty() || statements[s].category == category)
                 .filter(|&s| statements[s].counted.is_some())
                 .collect();
-            let answers = complete(&last, asked.iter().map(|&s| statements[s].id.as_str()).collect());
-            let Some(found) = statistics::alpha(&answers) else { continue };
-            let statistics::Alpha { people, statements: count, alpha, interval, items } = found;
+            let answers = complete_answers(&last, asked.iter().map(|&s| statements[s].id.as_str()).collect());
+            let Some(found) = statistics::cronbach_alpha(&answers) else { continue };
+            let statistics::CronbachAlpha { people, statements: count, alpha, interval, items } = found;
             alphas.push(AlphaFile { category: category.into(), people, statements: count, alpha, interval });
             if !category.is_empty() {
                 for (&statement, fit) in asked.iter().zip(items) {
-                    statements[statement].with_rest = fit.with_rest;
-                    statements[statement].alpha_without = fit.alpha_without;
+                    statements[statement].with_rest = fit.item_rest_correlation;
+                    statements[statement].alpha_without = fit.alpha_if_deleted;
                 }
             }
         }
@@ -94,7 +96,7 @@ impl QuestionnaireSummary {
             id: id.into(),
             title: wording.map_or_else(String::new, |w| w.title),
             n: filled.len(),
-            categories: means.into_iter().filter_map(|(name, values)| Some((name, Spread::of(&values)?))).collect(),
+            categories: means.into_iter().filter_map(|(name, values)| Some((name, SpreadFile::of(&values)?))).collect(),
             items: items.collect(),
             statements,
             alphas,
@@ -103,8 +105,8 @@ impl QuestionnaireSummary {
 }
 
 /// Every form of a questionnaire with an answer, and whose session it is.
-fn forms<'a>(cohort: &'a Cohort, id: &'a str) -> impl Iterator<Item = (usize, &'a QuestionnaireFile)> {
-    let form = move |(index, (_, session)): (usize, &'a (std::path::PathBuf, crate::report::SessionFile))| {
+fn answered_forms<'a>(cohort: &'a Cohort, id: &'a str) -> impl Iterator<Item = (usize, &'a QuestionnaireFile)> {
+    let form = move |(index, (_, session)): (usize, &'a (std::path::PathBuf, crate::SessionFile))| {
         let form = session.questionnaire.as_ref()?;
         (form.id == id && form.items.iter().any(|i| i.value.is_some())).then_some((index, form))
     };
@@ -114,7 +116,7 @@ fn forms<'a>(cohort: &'a Cohort, id: &'a str) -> impl Iterator<Item = (usize, &'
 /// Of each participant the form filled in last: answers must come from different people.
 fn last_forms<'a>(cohort: &'a Cohort, id: &'a str) -> Vec<&'a QuestionnaireFile> {
     let mut last: Vec<(usize, &QuestionnaireFile)> = Vec::new();
-    for (index, form) in forms(cohort, id) {
+    for (index, form) in answered_forms(cohort, id) {
         let session = &cohort.sessions[index].1;
         match last.iter_mut().find(|(other, _)| is_same_person(&cohort.sessions[*other].1, session)) {
             Some(found) if cohort.sessions[found.0].1.started <= session.started => *found = (index, form),
@@ -126,12 +128,12 @@ fn last_forms<'a>(cohort: &'a Cohort, id: &'a str) -> Vec<&'a QuestionnaireFile>
 }
 
 /// The answers, as they count, of everyone who answered all these statements.
-fn complete(forms: &[&QuestionnaireFile], statements: Vec<&str>) -> Vec<Vec<f64>> {
+fn complete_answers(forms: &[&QuestionnaireFile], statements: Vec<&str>) -> Vec<Vec<f64>> {
     let answer = |form: &QuestionnaireFile, id: &str| form.items.iter().find(|i| i.id == id).and_then(|i| i.counted);
     forms.iter().filter_map(|form| statements.iter().map(|id| answer(form, id)).collect()).collect()
 }
 
-fn statements(filled: &[&QuestionnaireFile], wording: Option<&Questionnaire>) -> Vec<Statement> {
+fn statements(filled: &[&QuestionnaireFile], wording: Option<&Questionnaire>) -> Vec<QuestionnaireStatement> {
     let mut ids: Vec<(&str, &str)> = Vec::new();
     for item in filled.iter().flat_map(|form| &form.items) {
         if !ids.contains(&(item.id.as_str(), item.category.as_str())) {
@@ -146,14 +148,14 @@ fn statements(filled: &[&QuestionnaireFile], wording: Option<&Questionnaire>) ->
         let mut counts = BTreeMap::new();
         answered.iter().for_each(|v| *counts.entry(v.to_string()).or_insert(0) += 1);
         let words = wording.and_then(|w| w.items().find(|i| i.id == id));
-        let told = own.iter().any(|i| i.value.is_some() && i.value != i.counted);
-        Statement {
+        let is_answered_mirrored = own.iter().any(|i| i.value.is_some() && i.value != i.counted);
+        QuestionnaireStatement {
             id: id.into(),
             category: category.into(),
             text: words.map_or_else(String::new, |w| w.text.clone()),
-            mirrored: words.map(|w| w.negative).or(told.then_some(true)),
-            answered: Spread::of(&answered),
-            counted: Spread::of(&counted),
+            mirrored: words.map(|w| w.negative).or(is_answered_mirrored.then_some(true)),
+            answered: SpreadFile::of(&answered),
+            counted: SpreadFile::of(&counted),
             counts,
             with_rest: None,
             alpha_without: None,
@@ -168,11 +170,11 @@ pub fn wording(cohort: &Cohort, id: &str) -> Option<Questionnaire> {
     let fits = |q: &Questionnaire| {
         q.items().count() == asked.items.len() && q.items().zip(&asked.items).all(|(own, given)| own.id == given.id)
     };
-    let shipped = is_plain(id).then(|| Questionnaire::read(&Library::shipped(), id).ok()).flatten();
+    let shipped = is_plain_id(id).then(|| Questionnaire::read(&Library::shipped(), id).ok()).flatten();
     if let Some(shipped) = shipped.filter(&fits) {
         return Some(shipped);
     }
-    let with_recording = |(path, session): &&(std::path::PathBuf, crate::report::SessionFile)| {
+    let with_recording = |(path, session): &&(std::path::PathBuf, crate::SessionFile)| {
         session.questionnaire.as_ref().is_some_and(|q| q.id == id) && path.join(record::FILE_NAME).is_file()
     };
     let (path, _) = cohort.sessions.iter().find(with_recording)?;
@@ -180,6 +182,6 @@ pub fn wording(cohort: &Cohort, id: &str) -> Option<Questionnaire> {
     recording.scenario.questionnaire.clone().filter(fits)
 }
 
-fn is_plain(id: &str) -> bool {
+fn is_plain_id(id: &str) -> bool {
     id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
 }

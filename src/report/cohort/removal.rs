@@ -1,45 +1,46 @@
-//! Which voxel how many people removed, and how far each of them is from the experts.
+//! Maps of removed voxels over many people, and the distance of each person's cavity from the experts'.
 
 use super::Cohort;
-use crate::content::nrrd::{self, Encoding, Geometry, Image, Samples, Space};
-use crate::volume::Grid;
-use crate::volume::rows::each;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use typodont_core::parallel::par_map;
+use typodont_core::volume::Grid;
+use typodont_formats::nrrd;
+use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
 
 /// Names of a bundle's files that are read here.
-const START: &str = "initial.seg.nrrd";
-const TIMES: &str = "removal_time.nrrd";
+const INITIAL_VOLUME_FILE: &str = "initial.seg.nrrd";
+const REMOVAL_TIMES_FILE: &str = "removal_time.nrrd";
 
 /// Cavities read at a time: enough to share among threads, and some megabytes of memory.
-const AT_ONCE: usize = 32;
+const MASKS_AT_ONCE: usize = 32;
 
-/// How far a cavity's voxels may lie off the tooth's, in voxels: what rounding leaves.
-const OFF_MAX: f32 = 0.02;
+/// Largest misalignment between a cavity's voxels and the tooth's, in voxels: that of rounding.
+const ALIGNMENT_TOLERANCE: f32 = 0.02;
 
-/// What people removed from one tooth, as it stood at the start.
+/// Voxels that people removed from one tooth, given its state at the start.
 #[derive(Clone, Debug)]
-pub struct Removal {
+pub struct RemovalMap {
     pub scenario: String,
-    /// SHA-256 of the tooth's label map before the first cut: only like teeth are laid over each other.
+    /// SHA-256 of the tooth's label map before the first cut: only identical teeth are compared.
     pub start: String,
     /// A bundle that holds this tooth.
     pub tooth: PathBuf,
-    /// People in the map. Of each the last session counts.
+    /// Number of people in the map; the last session of each counts.
     pub people: usize,
     pub experts: usize,
     /// The box that holds everything anybody removed, in tooth space.
     pub grid: Grid,
     /// Share of people who removed a voxel, 0 to 1, x fastest.
     pub share: Vec<f32>,
-    /// By session: how far its cavity is from the experts'.
-    pub distances: Vec<(usize, Distance)>,
+    /// Session index and the distance of its cavity from the experts'.
+    pub distances: Vec<(usize, ExpertDistance)>,
 }
 
-/// From one cavity to those of the experts; an expert is compared with the others.
+/// Distance from one cavity to those of the experts; an expert is compared with the other experts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
+pub struct ExpertDistance {
     /// Volume in which it differs from an expert's cavity, mean over the experts, mm³: Σ|r − p|·v, r whether a voxel was removed,
     /// p the share of experts who did, v a voxel's volume.
     pub differs_mm3: f64,
@@ -47,7 +48,7 @@ pub struct Distance {
     pub dice: f64,
 }
 
-/// The same for `cohort.json`.
+/// Summary of a [`RemovalMap`] for `cohort.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RemovalSummary {
     pub start_sha256: String,
@@ -58,12 +59,12 @@ pub struct RemovalSummary {
     pub by_any_mm3: f64,
     pub by_half_mm3: f64,
     pub by_all_mm3: f64,
-    /// How far each session's cavity is from the experts'; empty without experts.
-    pub distances: Vec<DistanceFile>,
+    /// Distance of each session's cavity from the experts'; empty without experts.
+    pub distances: Vec<ExpertDistanceFile>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct DistanceFile {
+pub struct ExpertDistanceFile {
     pub participant: String,
     pub bundle: String,
     pub differs_mm3: f64,
@@ -71,10 +72,10 @@ pub struct DistanceFile {
 }
 
 impl RemovalSummary {
-    pub fn of(cohort: &Cohort, removal: &Removal) -> RemovalSummary {
-        let distance = |&(index, distance): &(usize, Distance)| {
+    pub fn of(cohort: &Cohort, removal: &RemovalMap) -> RemovalSummary {
+        let distance = |&(index, distance): &(usize, ExpertDistance)| {
             let (path, session) = &cohort.sessions[index];
-            DistanceFile {
+            ExpertDistanceFile {
                 participant: session.participant.clone(),
                 bundle: path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
                 differs_mm3: distance.differs_mm3,
@@ -98,18 +99,22 @@ impl RemovalSummary {
     }
 }
 
-impl Removal {
-    /// The map as a volume that 3D Slicer opens: share of people per voxel.
+impl RemovalMap {
+    /// Encodes the map as NRRD, which 3D Slicer opens: share of people (0 to 1) per voxel.
+    ///
+    /// # Errors
+    ///
+    /// When the file cannot be encoded.
     pub fn nrrd(&self) -> Result<Vec<u8>, String> {
-        let geometry = Geometry::of(&self.grid, Space::LeftPosteriorSuperior);
+        let geometry = Geometry::of(&self.grid, CoordinateSystem::LeftPosteriorSuperior);
         let keys = [
-            ("typodont_quantity", "share of people who removed the voxel".to_string()),
+            ("typodont_quantity", "proportion of participants who removed the voxel".to_string()),
             ("typodont_unit", "1".to_string()),
             ("typodont_people", self.people.to_string()),
             ("typodont_start_sha256", self.start.clone()),
         ];
         let keys = keys.map(|(key, value)| (key.to_string(), value)).to_vec();
-        let image = Image { geometry, samples: Samples::F32(self.share.clone()), keys };
+        let image = VoxelImage { geometry, samples: Samples::F32(self.share.clone()), keys };
         nrrd::bytes(&image, Encoding::Gzip).map_err(|e| e.to_string())
     }
 
@@ -123,11 +128,13 @@ impl Removal {
 }
 
 impl Cohort {
-    /// Lays the cavities of like teeth over each other, wherever two people or more worked on one.
+    /// Adds up the cavities of identical teeth, for each tooth on which two or more people worked.
     pub fn map_removals(&mut self) {
         let mut groups: BTreeMap<(String, String), Vec<usize>> = BTreeMap::new();
         for (index, (_, session)) in self.sessions.iter().enumerate() {
-            if let (Some(start), true) = (session.digests.get(START), session.digests.contains_key(TIMES)) {
+            if let (Some(start), true) =
+                (session.digests.get(INITIAL_VOLUME_FILE), session.digests.contains_key(REMOVAL_TIMES_FILE))
+            {
                 groups.entry((session.scenario.id.clone(), start.clone())).or_default().push(index);
             }
         }
@@ -135,14 +142,14 @@ impl Cohort {
         for ((scenario, start), sessions) in groups {
             removals.extend(self.removal(scenario, start, &sessions));
         }
-        // The best known first.
+        // The tooth with the most people first.
         removals.sort_by(|a, b| (&a.scenario, b.people, &a.start).cmp(&(&b.scenario, a.people, &b.start)));
         self.removals = removals;
     }
 
-    fn removal(&mut self, scenario: String, start: String, sessions: &[usize]) -> Option<Removal> {
+    fn removal(&mut self, scenario: String, start: String, sessions: &[usize]) -> Option<RemovalMap> {
         let people: Vec<Vec<usize>> = self
-            .attempts(&scenario)
+            .attempts_by_participant(&scenario)
             .into_iter()
             .filter_map(|person| {
                 let of_them: Vec<usize> = person.into_iter().filter(|i| sessions.contains(i)).collect();
@@ -152,17 +159,17 @@ impl Cohort {
         if people.len() < 2 {
             return None;
         }
-        let (tooth, whole) = sessions.iter().find_map(|&i| {
+        let (tooth, tooth_grid) = sessions.iter().find_map(|&i| {
             let bundle = &self.sessions[i].0;
-            let map = nrrd::segmentation::read(&bundle.join(START)).ok()?;
+            let map = nrrd::segmentation::read(&bundle.join(INITIAL_VOLUME_FILE)).ok()?;
             Some((bundle.clone(), map.geometry.grid()?))
         })?;
         let last: Vec<usize> = people.iter().map(|person| person[person.len() - 1]).collect();
-        let (mut everyone, mut experts) = (Pile::on(whole), Pile::on(whole));
-        let mut own: BTreeMap<String, Cavity> = BTreeMap::new();
-        let mut unread: BTreeMap<PathBuf, String> = BTreeMap::new();
-        self.each_cavity(&last, &whole, &mut unread, |index, cavity| {
-            everyone.add(&cavity);
+        let (mut all_counts, mut experts) = (VoxelCounter::on_grid(tooth_grid), VoxelCounter::on_grid(tooth_grid));
+        let mut own: BTreeMap<String, RemovalMask> = BTreeMap::new();
+        let mut unreadable: BTreeMap<PathBuf, String> = BTreeMap::new();
+        self.for_each_mask(&last, &tooth_grid, &mut unreadable, |index, cavity| {
+            all_counts.add(&cavity);
             let session = &self.sessions[index].1;
             if self.is_expert(session) {
                 experts.add(&cavity);
@@ -170,41 +177,41 @@ impl Cohort {
             }
         });
         let mut distances = Vec::new();
-        if experts.cavities > 0 {
-            self.each_cavity(sessions, &whole, &mut unread, |index, cavity| {
+        if experts.masks > 0 {
+            self.for_each_mask(sessions, &tooth_grid, &mut unreadable, |index, cavity| {
                 let own = own.get(&self.sessions[index].1.participant);
                 distances.extend(experts.distance(&cavity, own).map(|d| (index, d)));
             });
         }
-        self.skipped.extend(unread);
-        let share = everyone.counts.iter().map(|&c| c as f32 / everyone.cavities as f32).collect();
-        let (people, experts) = (everyone.cavities as usize, experts.cavities as usize);
-        (people > 1).then(|| Removal {
+        self.skipped.extend(unreadable);
+        let share = all_counts.counts.iter().map(|&c| c as f32 / all_counts.masks as f32).collect();
+        let (people, experts) = (all_counts.masks as usize, experts.masks as usize);
+        (people > 1).then(|| RemovalMap {
             scenario,
             start,
             tooth,
             people,
             experts,
-            grid: everyone.grid(),
+            grid: all_counts.grid(),
             share,
             distances,
         })
     }
 
-    /// Reads sessions' cavities, some at a time; what is damaged goes to `unread`.
-    fn each_cavity(
+    /// Reads the cavities of sessions, some at a time; damaged files are passed to `unread`.
+    fn for_each_mask(
         &self,
         sessions: &[usize],
         whole: &Grid,
-        unread: &mut BTreeMap<PathBuf, String>,
-        mut take: impl FnMut(usize, Cavity),
+        unreadable: &mut BTreeMap<PathBuf, String>,
+        mut take: impl FnMut(usize, RemovalMask),
     ) {
-        for part in sessions.chunks(AT_ONCE) {
-            let path = |n: usize| self.sessions[part[n]].0.join(TIMES);
-            for (n, cavity) in each(part.len(), |n| Cavity::read(&path(n), whole)).into_iter().enumerate() {
+        for part in sessions.chunks(MASKS_AT_ONCE) {
+            let path = |n: usize| self.sessions[part[n]].0.join(REMOVAL_TIMES_FILE);
+            for (n, cavity) in par_map(part.len(), |n| RemovalMask::read(&path(n), whole)).into_iter().enumerate() {
                 match cavity {
                     Ok(cavity) => take(part[n], cavity),
-                    Err(why) => drop(unread.insert(path(n), why)),
+                    Err(why) => drop(unreadable.insert(path(n), why)),
                 }
             }
         }
@@ -212,79 +219,85 @@ impl Cohort {
 }
 
 /// A box of a tooth's voxels: which of them fell.
-struct Cavity {
+struct RemovalMask {
     low: [u32; 3],
     dims: [u32; 3],
-    fell: Vec<bool>,
+    removed: Vec<bool>,
 }
 
-impl Cavity {
+impl RemovalMask {
     /// From the times at which voxels fell; `whole` is the tooth's grid.
-    fn read(path: &Path, whole: &Grid) -> Result<Cavity, String> {
+    fn read(path: &Path, whole: &Grid) -> Result<RemovalMask, String> {
         if !path.is_file() {
-            return Err("there is no such file".into());
+            return Err("the file does not exist".into());
         }
         let image = nrrd::read(path).map_err(|e| e.to_string())?;
-        let grid = image.geometry.grid().ok_or("its axes are not the tooth's")?;
-        let Samples::F32(times) = image.samples else { return Err("it holds no times".into()) };
+        let grid = image.geometry.grid().ok_or("its axes differ from those of the tooth")?;
+        let Samples::F32(times) = image.samples else { return Err("it contains no times".into()) };
         let at = whole.from_tooth(grid.origin);
-        let is_off = (at - at.round()).abs().max_element() > OFF_MAX
+        let is_off = (at - at.round()).abs().max_element() > ALIGNMENT_TOLERANCE
             || (grid.spacing / whole.spacing - 1.0).abs().max_element() > 1e-4;
         let low = at.round().to_array();
         let fits = |a: usize| low[a] >= 0.0 && low[a] + grid.dims[a] as f32 <= whole.dims[a] as f32;
         if is_off || !(0..3).all(fits) {
-            return Err("its voxels are not those of the tooth".into());
+            return Err("its voxels differ from those of the tooth".into());
         }
-        Ok(Cavity { low: low.map(|v| v as u32), dims: grid.dims, fell: times.iter().map(|t| !t.is_nan()).collect() })
+        Ok(RemovalMask {
+            low: low.map(|v| v as u32),
+            dims: grid.dims,
+            removed: times.iter().map(|t| !t.is_nan()).collect(),
+        })
     }
 
     /// The voxels that fell, in the tooth's grid.
-    fn fallen(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
+    fn removed_cells(&self) -> impl Iterator<Item = [u32; 3]> + '_ {
         let [nx, ny, _] = self.dims.map(|n| n as usize);
         let cell = move |i: usize| [i % nx, i / nx % ny, i / (nx * ny)];
-        let fell = self.fell.iter().enumerate().filter(|(_, fell)| **fell);
+        let fell = self.removed.iter().enumerate().filter(|(_, fell)| **fell);
         fell.map(move |(i, _)| std::array::from_fn(|a| self.low[a] + cell(i)[a] as u32))
     }
 }
 
 /// Cavities of one tooth, counted voxel by voxel in a box that grows as they come.
-struct Pile {
-    whole: Grid,
+struct VoxelCounter {
+    tooth_grid: Grid,
     low: [u32; 3],
     dims: [u32; 3],
     counts: Vec<u32>,
-    cavities: u32,
+    masks: u32,
 }
 
-impl Pile {
-    fn on(whole: Grid) -> Pile {
-        Pile { whole, low: [0; 3], dims: [0; 3], counts: Vec::new(), cavities: 0 }
+impl VoxelCounter {
+    fn on_grid(tooth_grid: Grid) -> VoxelCounter {
+        VoxelCounter { tooth_grid, low: [0; 3], dims: [0; 3], counts: Vec::new(), masks: 0 }
     }
 
-    fn add(&mut self, cavity: &Cavity) {
-        self.grow(cavity);
-        for cell in cavity.fallen() {
+    fn add(&mut self, mask: &RemovalMask) {
+        self.grow(mask);
+        for cell in mask.removed_cells() {
             let index = self.index(cell).expect("the box has grown to hold the cavity");
             self.counts[index] += 1;
         }
-        self.cavities += 1;
+        self.masks += 1;
     }
 
-    fn grow(&mut self, cavity: &Cavity) {
+    fn grow(&mut self, mask: &RemovalMask) {
         if self.counts.is_empty() {
-            (self.low, self.dims) = (cavity.low, cavity.dims);
+            (self.low, self.dims) = (mask.low, mask.dims);
             self.counts = vec![0; self.grid().len()];
             return;
         }
         let high = |low: [u32; 3], dims: [u32; 3]| -> [u32; 3] { std::array::from_fn(|a| low[a] + dims[a]) };
-        let (own, new) = (high(self.low, self.dims), high(cavity.low, cavity.dims));
-        let low: [u32; 3] = std::array::from_fn(|a| self.low[a].min(cavity.low[a]));
+        let (own, new) = (high(self.low, self.dims), high(mask.low, mask.dims));
+        let low: [u32; 3] = std::array::from_fn(|a| self.low[a].min(mask.low[a]));
         let dims: [u32; 3] = std::array::from_fn(|a| own[a].max(new[a]) - low[a]);
         if (low, dims) == (self.low, self.dims) {
             return;
         }
-        let before =
-            std::mem::replace(self, Pile { whole: self.whole, low, dims, counts: Vec::new(), cavities: self.cavities });
+        let before = std::mem::replace(
+            self,
+            VoxelCounter { tooth_grid: self.tooth_grid, low, dims, counts: Vec::new(), masks: self.masks },
+        );
         self.counts = vec![0; self.grid().len()];
         let old = before.grid();
         for (index, &count) in before.counts.iter().enumerate().filter(|(_, c)| **c > 0) {
@@ -296,7 +309,7 @@ impl Pile {
 
     /// The box in tooth space.
     fn grid(&self) -> Grid {
-        Grid { dims: self.dims, spacing: self.whole.spacing, origin: self.whole.centre(self.low) }
+        Grid { dims: self.dims, spacing: self.tooth_grid.spacing, origin: self.tooth_grid.centre(self.low) }
     }
 
     fn index(&self, cell: [u32; 3]) -> Option<usize> {
@@ -310,50 +323,50 @@ impl Pile {
         self.index(cell).map_or(0, |i| self.counts[i])
     }
 
-    /// From a cavity to those of the pile, without one of them that is the same person's; none where no other is left.
-    fn distance(&self, cavity: &Cavity, own: Option<&Cavity>) -> Option<Distance> {
-        let others = self.cavities - u32::from(own.is_some());
+    /// Distance from a cavity to those counted, without the same person's own; `None` if no other is left.
+    fn distance(&self, mask: &RemovalMask, own: Option<&RemovalMask>) -> Option<ExpertDistance> {
+        let others = self.masks - u32::from(own.is_some());
         if others == 0 {
             return None;
         }
         // |r − p| is p where r = 0, and 1 − p where r = 1: Σp + Σr − 2·Σrp.
-        let is_own = |cell: [u32; 3]| own.is_some_and(|own| own.holds(cell));
-        let own_size = own.map_or(0, |own| own.fallen().count());
+        let is_own = |cell: [u32; 3]| own.is_some_and(|own| own.is_removed(cell));
+        let own_size = own.map_or(0, |own| own.removed_cells().count());
         let shares =
             (self.counts.iter().map(|&c| u64::from(c)).sum::<u64>() - own_size as u64) as f64 / f64::from(others);
         let (mut size, mut common) = (0u64, 0u64);
-        for cell in cavity.fallen() {
+        for cell in mask.removed_cells() {
             size += 1;
             common += u64::from(self.count(cell) - u32::from(is_own(cell)));
         }
         let (size, common) = (size as f64, common as f64 / f64::from(others));
-        let differs_mm3 = (shares + size - 2.0 * common) * self.whole.voxel_mm3();
+        let differs_mm3 = (shares + size - 2.0 * common) * self.tooth_grid.voxel_mm3();
         let dice = if shares + size > 0.0 { 2.0 * common / (shares + size) } else { 1.0 };
-        Some(Distance { differs_mm3, dice })
+        Some(ExpertDistance { differs_mm3, dice })
     }
 }
 
-impl Cavity {
-    fn holds(&self, cell: [u32; 3]) -> bool {
+impl RemovalMask {
+    fn is_removed(&self, cell: [u32; 3]) -> bool {
         let inside = (0..3).all(|a| cell[a] >= self.low[a] && cell[a] - self.low[a] < self.dims[a]);
         let [nx, ny, _] = self.dims.map(|n| n as usize);
         let place = |a: usize| (cell[a] - self.low[a]) as usize;
-        inside && self.fell[(place(2) * ny + place(1)) * nx + place(0)]
+        inside && self.removed[(place(2) * ny + place(1)) * nx + place(0)]
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Vec3;
+    use typodont_core::frame::Vec3;
 
-    fn cavity(low: [u32; 3], dims: [u32; 3]) -> Cavity {
-        Cavity { low, dims, fell: vec![true; dims.iter().product::<u32>() as usize] }
+    fn cavity(low: [u32; 3], dims: [u32; 3]) -> RemovalMask {
+        RemovalMask { low, dims, removed: vec![true; dims.iter().product::<u32>() as usize] }
     }
 
     #[test]
     fn cavities_pile_up_wherever_they_lie() {
-        let mut pile = Pile::on(Grid::centred([20, 20, 20], Vec3::splat(0.5)));
+        let mut pile = VoxelCounter::on_grid(Grid::centred([20, 20, 20], Vec3::splat(0.5)));
         for part in [cavity([5, 5, 5], [2, 2, 2]), cavity([2, 6, 5], [4, 1, 1]), cavity([6, 6, 6], [3, 3, 3])] {
             pile.add(&part);
         }
@@ -361,23 +374,23 @@ mod tests {
             assert_eq!(pile.count(cell), expected, "{cell:?}");
         }
         assert_eq!(pile.counts.iter().sum::<u32>(), 8 + 4 + 27);
-        assert_eq!(pile.grid().origin, pile.whole.centre([2, 5, 5]));
+        assert_eq!(pile.grid().origin, pile.tooth_grid.centre([2, 5, 5]));
     }
 
     #[test]
     fn the_distance_is_the_mean_volume_in_which_two_cavities_differ() {
         // Aim: Σ|r − p| by its definition. Method: two experts, a trainee, voxels of 1 mm³ counted by hand: 8 + 8 voxels of the
         // experts, of which the trainee's 12 share 8 with the one and 4 with the other: 4 and 12 differ.
-        let mut pile = Pile::on(Grid::centred([20, 20, 20], Vec3::ONE));
+        let mut pile = VoxelCounter::on_grid(Grid::centred([20, 20, 20], Vec3::ONE));
         let (first, second) = (cavity([5, 5, 5], [2, 2, 2]), cavity([7, 5, 5], [2, 2, 2]));
         pile.add(&first);
         pile.add(&second);
         let trainee = cavity([5, 5, 5], [3, 2, 2]);
         let found = pile.distance(&trainee, None).unwrap();
-        assert_eq!(found, Distance { differs_mm3: 8.0, dice: 2.0 * 6.0 / (8.0 + 12.0) });
+        assert_eq!(found, ExpertDistance { differs_mm3: 8.0, dice: 2.0 * 6.0 / (8.0 + 12.0) });
         // An expert is compared with the other one alone, and the only expert with nobody.
-        assert_eq!(pile.distance(&first, Some(&first)).unwrap(), Distance { differs_mm3: 16.0, dice: 0.0 });
-        let mut alone = Pile::on(pile.whole);
+        assert_eq!(pile.distance(&first, Some(&first)).unwrap(), ExpertDistance { differs_mm3: 16.0, dice: 0.0 });
+        let mut alone = VoxelCounter::on_grid(pile.tooth_grid);
         alone.add(&first);
         assert_eq!(alone.distance(&first, Some(&first)), None);
     }

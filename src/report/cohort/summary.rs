@@ -1,18 +1,20 @@
-//! What a cohort's numbers say, exercise by exercise: `cohort.json`.
+//! Statistics of a cohort, by exercise: `cohort.json`.
 
-use super::progress::{Progress, Repeated};
+use super::pass_mark::PassMarkEstimate;
+use super::progress::{LearningCurves, RepeatedAttempts};
 use super::questionnaire::QuestionnaireSummary;
 use super::removal::RemovalSummary;
-use super::standard::Standard;
-use super::{Cohort, POINTS, dedup, value};
-use crate::report::session_file::{SessionFile, mean};
-use crate::report::words;
-use crate::statistics::{self, Interval};
-use serde::Serialize;
+use super::{Cohort, POINTS, dedup, english, points_or_measure};
+use crate::language::{COUNT, Message, Translator};
+use crate::session_file::{SessionFile, mean};
+use crate::{display_format, phrases};
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
+use typodont_core::statistics;
+use typodont_core::statistics::Interval;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Summary {
+pub struct CohortSummary {
     pub version: u32,
     pub sessions: usize,
     pub scenarios: Vec<ScenarioSummary>,
@@ -39,27 +41,28 @@ pub struct ScenarioSummary {
     /// Of the share passed; null where nothing was graded.
     pub passed_interval: Option<Interval>,
     pub points_mean: Option<f64>,
-    pub points: Option<Spread>,
-    pub metrics: BTreeMap<String, Spread>,
+    pub points: Option<SpreadFile>,
+    pub metrics: BTreeMap<String, SpreadFile>,
     /// Of the named experts' sessions alone, `points` among them; empty without experts.
-    pub expert_metrics: BTreeMap<String, Spread>,
-    /// Why these sessions should not be compared without a second look.
-    pub cautions: Vec<String>,
+    pub expert_metrics: BTreeMap<String, SpreadFile>,
+    /// Why these sessions should not be compared without a second look; in English in the file.
+    #[serde(serialize_with = "in_english")]
+    pub cautions: Vec<Message>,
     /// Answers that were right, of those that were asked for, by the measure that says so.
     pub right: BTreeMap<String, RightCount>,
-    /// How people came on from attempt to attempt, by measure; empty where nobody tried twice.
-    pub progress: BTreeMap<String, Progress>,
-    /// Whether first and second attempts agree, by measure.
-    pub repeated: BTreeMap<String, Repeated>,
-    /// Where examiners' judgements put the pass mark; null without judgements.
-    pub standard: Option<Standard>,
-    /// What was removed, for each tooth as it stood at the start.
+    /// Learning curves by measure; empty if nobody made a second attempt.
+    pub progress: BTreeMap<String, LearningCurves>,
+    /// Agreement of first and second attempts, by measure.
+    pub repeated: BTreeMap<String, RepeatedAttempts>,
+    /// Pass mark as estimated from examiners' judgements; null without judgements.
+    pub standard: Option<PassMarkEstimate>,
+    /// Summary of the removed volume, for each tooth as it was at the start.
     pub removals: Vec<RemovalSummary>,
 }
 
-/// How a measure is spread over sessions.
+/// Distribution of a measure over sessions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Spread {
+pub struct SpreadFile {
     pub n: usize,
     pub mean: f64,
     /// Standard deviation of the sample; none of one session.
@@ -80,34 +83,34 @@ pub struct RightCount {
     pub interval: Option<Interval>,
     /// Mean time of the right answers, s.
     pub time_mean_s: Option<f64>,
-    /// Their times added up and divided by everyone who was asked, s; null where everyone was right. The thesis prints such a
-    /// figure (8.1.2): it is no one's time, and is told only so that both can be compared.
+    /// Sum of the times of right answers divided by the number of people asked, s; null if everyone was right. The
+    /// thesis prints such a figure (8.1.2). It is no mean time, and is given only for comparison with that figure.
     pub time_over_all_s: Option<f64>,
-    /// Where the stiffness fell in steps: how many right answers came at which coefficient.
+    /// Number of right answers by stiffness coefficient, if the stage lowers the stiffness in steps.
     pub levels: BTreeMap<String, usize>,
 }
 
 /// Measures that say whether an answer was right, with the measure of its time and of its level.
-const ANSWERS: [(&str, &str, Option<&str>); 2] = [
+const ANSWER_MEASURES: [(&str, &str, Option<&str>); 2] = [
     ("detect_tooth", "detect_level_time_s", Some("detect_level")),
     ("detect_quadrant", "detect_quadrant_time_s", None),
 ];
 
-impl Spread {
-    pub fn of(values: &[f64]) -> Option<Spread> {
-        let statistics::Spread { n, mean, sd, mean_interval, min, median, quartiles, max } =
-            statistics::spread(values)?;
-        Some(Spread { n, mean, sd, mean_interval, min, quartiles, median, max })
+impl SpreadFile {
+    pub fn of(values: &[f64]) -> Option<SpreadFile> {
+        let statistics::DescriptiveStatistics { n, mean, sd, mean_interval, min, median, quartiles, max } =
+            statistics::describe(values)?;
+        Some(SpreadFile { n, mean, sd, mean_interval, min, quartiles, median, max })
     }
 }
 
 impl Cohort {
-    pub fn summary(&self) -> Summary {
+    pub fn summary(&self) -> CohortSummary {
         let ids = dedup(self.sessions.iter().map(|(_, s)| s.scenario.id.as_str()));
         let questionnaires =
             dedup(self.sessions.iter().filter_map(|(_, s)| Some(s.questionnaire.as_ref()?.id.as_str())));
         let skipped = self.skipped.iter();
-        Summary {
+        CohortSummary {
             version: 1,
             sessions: self.sessions.len(),
             scenarios: ids.into_iter().map(|id| self.scenario(id)).collect(),
@@ -119,23 +122,24 @@ impl Cohort {
     fn scenario(&self, id: &str) -> ScenarioSummary {
         let sessions: Vec<&SessionFile> =
             self.sessions.iter().map(|(_, s)| s).filter(|s| s.scenario.id == id).collect();
-        let attempts = self.attempts(id);
+        let attempts = self.attempts_by_participant(id);
         let grades: Vec<_> = sessions.iter().filter_map(|s| s.grade.as_ref()).collect();
         let passed = grades.iter().filter(|g| g.passed).count();
         let names = dedup(sessions.iter().flat_map(|s| s.metrics.keys().map(String::as_str)));
         let metrics = names.into_iter().filter_map(|name| {
             let values: Vec<f64> = sessions.iter().filter_map(|s| s.metric(name)).collect();
-            Some((name.to_string(), Spread::of(&values)?))
+            Some((name.to_string(), SpreadFile::of(&values)?))
         });
-        let theirs: Vec<&&SessionFile> = sessions.iter().filter(|s| self.is_expert(s)).collect();
-        let measures =
-            dedup(theirs.iter().flat_map(|s| s.metrics.keys().map(String::as_str))).into_iter().chain([POINTS]);
+        let expert_sessions: Vec<&&SessionFile> = sessions.iter().filter(|s| self.is_expert(s)).collect();
+        let measures = dedup(expert_sessions.iter().flat_map(|s| s.metrics.keys().map(String::as_str)))
+            .into_iter()
+            .chain([POINTS]);
         let expert_metrics = measures.filter_map(|name| {
-            let values: Vec<f64> = theirs.iter().filter_map(|s| value(s, name)).collect();
-            Some((name.to_string(), Spread::of(&values)?))
+            let values: Vec<f64> = expert_sessions.iter().filter_map(|s| points_or_measure(s, name)).collect();
+            Some((name.to_string(), SpreadFile::of(&values)?))
         });
         let points: Vec<f64> = grades.iter().map(|g| g.points).collect();
-        let points = Spread::of(&points);
+        let points = SpreadFile::of(&points);
         ScenarioSummary {
             id: id.into(),
             title: sessions.iter().map(|s| s.scenario.title.as_str()).find(|t| !t.is_empty()).unwrap_or(id).into(),
@@ -143,22 +147,22 @@ impl Cohort {
             participants: attempts.len(),
             passed,
             graded: grades.len(),
-            passed_interval: statistics::share(passed, grades.len()).map(|s| s.interval),
+            passed_interval: statistics::proportion(passed, grades.len()).map(|s| s.interval),
             points_mean: points.as_ref().map(|p| p.mean),
             points,
             metrics: metrics.collect(),
             expert_metrics: expert_metrics.collect(),
             cautions: cautions(&sessions),
-            right: right(&sessions),
-            progress: self.progress(&attempts),
-            repeated: self.repeated(&attempts),
-            standard: self.standard(id, &attempts),
+            right: right_counts(&sessions),
+            progress: self.progress_by_measure(&attempts),
+            repeated: self.repeated_by_measure(&attempts),
+            standard: self.pass_mark(id, &attempts),
             removals: self.removals.iter().filter(|r| r.scenario == id).map(|r| RemovalSummary::of(self, r)).collect(),
         }
     }
 }
 
-fn right(sessions: &[&SessionFile]) -> BTreeMap<String, RightCount> {
+fn right_counts(sessions: &[&SessionFile]) -> BTreeMap<String, RightCount> {
     let count = |&(flag, time, level): &(&str, &str, Option<&str>)| {
         let asked = sessions.iter().filter(|s| s.metric(flag).is_some()).count();
         let right: Vec<&&SessionFile> = sessions.iter().filter(|s| s.metric(flag) == Some(1.0)).collect();
@@ -171,61 +175,70 @@ fn right(sessions: &[&SessionFile]) -> BTreeMap<String, RightCount> {
         let count = RightCount {
             right: right.len(),
             of: asked,
-            interval: statistics::share(right.len(), asked).map(|s| s.interval),
+            interval: statistics::proportion(right.len(), asked).map(|s| s.interval),
             time_mean_s: mean(times.into_iter()),
             time_over_all_s: over_all,
             levels,
         };
         (asked > 0).then(|| (flag.to_string(), count))
     };
-    ANSWERS.iter().filter_map(count).collect()
+    ANSWER_MEASURES.iter().filter_map(count).collect()
 }
 
-/// What keeps sessions of an exercise from being alike.
-fn cautions(sessions: &[&SessionFile]) -> Vec<String> {
+/// Reasons why sessions of an exercise may not be comparable.
+fn cautions(sessions: &[&SessionFile]) -> Vec<Message> {
     let mut found = Vec::new();
     let versions = dedup(sessions.iter().map(|s| s.scenario.sha256.as_str()).filter(|s| !s.is_empty())).len();
     if versions > 1 {
-        found.push(format!("the exercise was changed between these sessions: {versions} versions of it"));
+        found.push(Message::text("cohort.caution_versions", &[(COUNT, Message::plain(versions.to_string()))]));
     }
     let mut formulae: Vec<u32> = sessions.iter().map(|s| s.scorer_version).filter(|v| *v > 0).collect();
     formulae.sort_unstable();
     formulae.dedup();
     if formulae.len() > 1 {
-        found.push(format!("scored by different versions of the formulae: {formulae:?}"));
+        let versions = Message::plain(format!("{formulae:?}"));
+        found.push(Message::text("cohort.caution_formulae", &[("versions", versions)]));
     }
     let ended_early = |s: &&&SessionFile| !matches!(s.ended_because.as_str(), "" | "complete");
     let unfinished = sessions.iter().filter(ended_early).count();
     if unfinished > 0 {
-        found.push(format!("{unfinished} of them ended before their time"));
+        found.push(Message::text("cohort.caution_early", &[(COUNT, Message::plain(unfinished.to_string()))]));
     }
     found
 }
 
-/// A summary's numbers in words, for pages: title, and lines of (what, value).
-pub fn in_words(summary: &ScenarioSummary) -> Vec<(String, String)> {
-    let mut lines = Vec::new();
-    for (name, count) in &summary.right {
-        let mut text = format!("{} of {}", count.right, count.of);
-        if !count.levels.is_empty() {
-            let mut levels: Vec<_> = count.levels.iter().collect();
-            levels.sort_by(|a, b| b.0.cmp(a.0));
-            let levels: Vec<String> = levels.iter().map(|(level, n)| format!("{n} at stiffness {level}")).collect();
-            text += &format!(" ({})", levels.join(", "));
-        }
-        if let Some(time) = count.time_mean_s {
-            text += &format!("; right answers after {} on average", words::duration(time));
-        }
-        if let Some(over_all) = count.time_over_all_s {
-            text += &format!(
-                ", over the {} that were right (divided by all {}, as the founding thesis prints it, it would read {}, \
-                 which is nobody's time)",
-                count.right,
-                count.of,
-                words::duration(over_all)
-            );
-        }
-        lines.push((words::title(name), text));
+fn in_english<S: Serializer>(messages: &[Message], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(messages.iter().map(|message| english().translate(message)))
+}
+
+/// A summary's numbers in words, for pages and the terminal: lines of (title of the measure, text).
+pub fn summary_lines(summary: &ScenarioSummary, translator: Translator) -> Vec<(String, String)> {
+    let line = |(name, count): (&String, &RightCount)| {
+        (translator.translate(&phrases::measure_title(name)), right_text(count, translator))
+    };
+    summary.right.iter().map(line).collect()
+}
+
+fn right_text(count: &RightCount, translator: Translator) -> String {
+    let (right, of) = (count.right.to_string(), count.of.to_string());
+    let mut text = translator.text("cohort.right", &[("right", right.clone()), ("of", of.clone())]);
+    if !count.levels.is_empty() {
+        let mut levels: Vec<_> = count.levels.iter().collect();
+        levels.sort_by(|a, b| b.0.cmp(a.0));
+        let level = |(level, n): (&String, &usize)| {
+            translator.text("cohort.right_level", &[(COUNT, n.to_string()), ("level", level.clone())])
+        };
+        let levels: Vec<String> = levels.into_iter().map(level).collect();
+        text = translator.text("cohort.right_levels", &[("answers", text), ("levels", levels.join(", "))]);
     }
-    lines
+    if let Some(time) = count.time_mean_s {
+        let time = display_format::duration(time);
+        text = translator.text("cohort.right_time", &[("answers", text), ("time", time)]);
+    }
+    if let Some(over_all) = count.time_over_all_s {
+        let time = display_format::duration(over_all);
+        let values = [("answers", text), (COUNT, right), ("of", of), ("time", time)];
+        text = translator.text("cohort.right_time_over_all", &values);
+    }
+    text
 }

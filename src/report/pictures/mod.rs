@@ -1,34 +1,35 @@
-//! What the work looks like: from all sides, and cut through.
+//! Pictures of a session's work: views from all sides, and sections.
 //!
 //! Takes a recording and its score, or an exercise. Gives PNG pictures and coloured surfaces. The same score gives the same
 //! bytes.
 
-mod marks;
+mod annotations;
 mod preview;
 mod sections;
-mod shares;
-mod tint;
+mod removal_share;
+mod verdict_colours;
 
-pub use preview::{SEEN, preview_png};
+pub use preview::{PREVIEW_SIZE, preview_png};
+pub use removal_share::{SHARE_BANDS, draw_removal_share};
 pub use sections::sections_png;
-pub use shares::{BANDS, shares};
-pub(super) use tint::linear;
+pub(super) use verdict_colours::srgb_to_linear;
 
-use super::glb::Part;
-use crate::frame::Vec3;
-use crate::record::{Recording, Replay};
-use crate::scenario::ToothPlace;
-use crate::score::{Scored, Verdict};
-use crate::volume::march::{self, Camera, Picture as Pixels, Shot, Side};
-use crate::volume::rows::each;
-use crate::volume::{Volume, surface};
+use super::glb::SurfacePart;
+use crate::raycast;
+use crate::raycast::{ImagePlane, OrthographicCamera, PixelBuffer, ViewSide};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use tint::{Palette, Tint};
+use typodont_core::frame::Vec3;
+use typodont_core::parallel::par_map;
+use typodont_core::volume::{Volume, surface};
+use typodont_exercise::record::{Recording, Replay};
+use typodont_exercise::scenario::ToothBounds;
+use typodont_exercise::score::{Scored, Verdict};
+use verdict_colours::{TissueColours, VerdictColours};
 
-/// What a picture is of.
+/// Subject of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shows {
+pub enum ViewKind {
     Before,
     After,
     Map,
@@ -37,11 +38,11 @@ pub enum Shows {
     MapSlice,
 }
 
-pub struct Picture {
-    /// Stem of its file's name.
+pub struct EncodedPicture {
+    /// Stem of the picture's file name.
     pub name: String,
     pub title: String,
-    pub shows: Shows,
+    pub kind: ViewKind,
     pub png: Vec<u8>,
 }
 
@@ -50,74 +51,83 @@ const SIZE: u32 = 480;
 
 const PAPER: [f32; 3] = [1.0; 3];
 
-/// Where a cut meets a surface that is there, and one that was.
-const LINE: [f32; 3] = [0.22, 0.20, 0.18];
-const FORMER_LINE: [f32; 3] = [0.62, 0.62, 0.62];
+/// Colours of the line in which a section meets the present surface, and of the line of the surface before the work.
+const CONTOUR: [f32; 3] = [0.22, 0.20, 0.18];
+const FORMER_CONTOUR: [f32; 3] = [0.62, 0.62, 0.62];
 
 /// Width of such a line, pixels.
-const LINE_WIDTH: f32 = 1.6;
+const CONTOUR_WIDTH: f32 = 1.6;
 
 /// Every picture of a session: six sides and three cuts, each before, after and as a map.
-pub fn all(recording: &Recording, scored: &Scored) -> Vec<Picture> {
-    let palette = Palette::of(&recording.scenario.tissues);
-    let tint = Tint::of(scored);
-    let mut drawn = Vec::new();
-    for side in Side::ALL {
-        drawn.extend(sides(scored, &palette, &tint, side));
+pub fn all_pictures(recording: &Recording, scored: &Scored) -> Vec<EncodedPicture> {
+    let palette = TissueColours::of(&recording.scenario.tissues);
+    let colours = VerdictColours::of(scored);
+    let mut raw = Vec::new();
+    for side in ViewSide::ALL {
+        raw.extend(side_pictures(scored, &palette, &colours, side));
     }
-    let middle = middle_of_work(scored);
-    for cut in CUTS {
-        drawn.extend(cuts(scored, &palette, cut, middle));
+    let middle = centre_of_work(scored);
+    for cut in SECTIONS {
+        raw.extend(section_pictures(scored, &palette, cut, middle));
     }
-    encoded(drawn)
+    encode_all(raw)
 }
 
 /// A picture before it is a file.
-struct Drawn {
+struct RawPicture {
     name: String,
     title: String,
-    shows: Shows,
-    pixels: Pixels,
+    kind: ViewKind,
+    pixels: PixelBuffer,
 }
 
-impl Drawn {
-    fn new(shows: Shows, name: &str, title: &str, pixels: Pixels) -> Drawn {
-        let (stem, when) = match shows {
-            Shows::Before | Shows::BeforeSlice => ("before", "before"),
-            Shows::After | Shows::AfterSlice => ("after", "after"),
-            Shows::Map | Shows::MapSlice => ("map", "map"),
+impl RawPicture {
+    fn new(kind: ViewKind, name: &str, title: &str, pixels: PixelBuffer) -> RawPicture {
+        let (stem, when) = match kind {
+            ViewKind::Before | ViewKind::BeforeSlice => ("before", "before"),
+            ViewKind::After | ViewKind::AfterSlice => ("after", "after"),
+            ViewKind::Map | ViewKind::MapSlice => ("map", "map"),
         };
-        Drawn { name: format!("{stem}-{name}"), title: format!("{title}, {when}"), shows, pixels }
+        RawPicture { name: format!("{stem}-{name}"), title: format!("{title}, {when}"), kind, pixels }
     }
 }
 
-fn sides(scored: &Scored, palette: &Palette, tint: &Tint, side: Side) -> [Drawn; 3] {
+fn side_pictures(
+    scored: &Scored,
+    palette: &TissueColours,
+    colours: &VerdictColours,
+    side: ViewSide,
+) -> [RawPicture; 3] {
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
-    let shot = Shot { camera: Camera::framing(side, before, 1.0), width: SIZE, height: SIZE };
-    let first = march::look(before, &shot);
-    let last = if is_unchanged(scored) { first.clone() } else { march::look_again(after, &shot, &first) };
+    let plane = ImagePlane { camera: OrthographicCamera::framing_volume(side, before, 1.0), width: SIZE, height: SIZE };
+    let before_view = raycast::render(before, &plane);
+    let after_view = if is_unchanged(scored) {
+        before_view.clone()
+    } else {
+        raycast::render_after_removal(after, &plane, &before_view)
+    };
     let distal = scored.replay.workpiece.distal();
-    // What a side is called where y is mesial.
-    let called = match side {
-        Side::Mesial if distal.y < 0.0 => Side::Distal,
-        Side::Distal if distal.y < 0.0 => Side::Mesial,
+    // Name of the side where y is mesial.
+    let side_in_chart = match side {
+        ViewSide::Mesial if distal.y < 0.0 => ViewSide::Distal,
+        ViewSide::Distal if distal.y < 0.0 => ViewSide::Mesial,
         side => side,
     };
-    let (name, title) = match called {
-        Side::Occlusal => ("occlusal", "Occlusal side"),
-        Side::Buccal => ("buccal", "Buccal side"),
-        Side::Lingual => ("lingual", "Lingual side"),
-        Side::Mesial => ("mesial", "Mesial side"),
-        Side::Distal => ("distal", "Distal side"),
-        Side::Apical => ("apical", "Apical side"),
+    let (name, title) = match side_in_chart {
+        ViewSide::Occlusal => ("occlusal", "Occlusal side"),
+        ViewSide::Buccal => ("buccal", "Buccal side"),
+        ViewSide::Lingual => ("lingual", "Lingual side"),
+        ViewSide::Mesial => ("mesial", "Mesial side"),
+        ViewSide::Distal => ("distal", "Distal side"),
+        ViewSide::Apical => ("apical", "Apical side"),
     };
-    let kept = |label, voxel: usize| palette.quiet(label, scored.verdicts[voxel]);
+    let unchanged = |label, voxel: usize| palette.muted(label, scored.verdicts[voxel]);
     [
-        (Shows::Before, first.paint(before, |label, _| palette.tissue(label))),
-        (Shows::After, last.paint(after, |label, _| palette.tissue(label))),
-        (Shows::Map, last.paint(after, |label, voxel| tint.colour(voxel, kept(label, voxel)))),
+        (ViewKind::Before, before_view.paint(before, |label, _| palette.tissue(label))),
+        (ViewKind::After, after_view.paint(after, |label, _| palette.tissue(label))),
+        (ViewKind::Map, after_view.paint(after, |label, voxel| colours.colour_at(voxel, unchanged(label, voxel)))),
     ]
-    .map(|(shows, pixels)| Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, distal)))
+    .map(|(shows, pixels)| RawPicture::new(shows, name, title, annotations::annotate(&pixels, &plane, distal)))
 }
 
 fn is_unchanged(scored: &Scored) -> bool {
@@ -125,67 +135,73 @@ fn is_unchanged(scored: &Scored) -> bool {
 }
 
 /// Cuts: the side from which each is seen, its file's name and its title.
-const CUTS: [(Side, &str, &str); 3] = [
-    (Side::Mesial, "slice-buccolingual", "Buccolingual section"),
-    (Side::Buccal, "slice-mesiodistal", "Mesiodistal section"),
-    (Side::Occlusal, "slice-horizontal", "Horizontal section"),
+const SECTIONS: [(ViewSide, &str, &str); 3] = [
+    (ViewSide::Mesial, "slice-buccolingual", "Buccolingual section"),
+    (ViewSide::Buccal, "slice-mesiodistal", "Mesiodistal section"),
+    (ViewSide::Occlusal, "slice-horizontal", "Horizontal section"),
 ];
 
-fn cuts(scored: &Scored, palette: &Palette, (side, name, title): (Side, &str, &str), middle: Vec3) -> [Drawn; 3] {
+fn section_pictures(
+    scored: &Scored,
+    palette: &TissueColours,
+    (side, name, title): (ViewSide, &str, &str),
+    middle: Vec3,
+) -> [RawPicture; 3] {
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
-    let shot = crown_shot(side, tooth_at(&scored.replay.workpiece.teeth, middle));
-    let cut = |volume: &Volume| march::slice(volume, &shot, middle, |label, _| palette.tissue(label));
-    let line = |volume: &Volume, colour| march::outline(volume, &shot, middle, colour, LINE_WIDTH);
+    let plane = crown_image_plane(side, nearest_tooth(&scored.replay.workpiece.teeth, middle));
+    let cut = |volume: &Volume| raycast::slice(volume, &plane, middle, |label, _| palette.tissue(label));
+    let line = |volume: &Volume, colour| raycast::contour(volume, &plane, middle, colour, CONTOUR_WIDTH);
     let verdict = |label, voxel: usize| match scored.verdicts[voxel] {
-        kept @ (Verdict::KeptSound | Verdict::Kept) => palette.quiet(label, kept),
+        kept @ (Verdict::KeptSound | Verdict::Kept) => palette.muted(label, kept),
         verdict => verdict.color(),
     };
-    let map = match laid_too(scored) {
-        Some(all) => march::slice(&all, &shot, middle, verdict),
-        None => march::slice(before, &shot, middle, verdict),
+    let map = match merged_matter(scored) {
+        Some(all) => raycast::slice(&all, &plane, middle, verdict),
+        None => raycast::slice(before, &plane, middle, verdict),
     };
-    let (was, is) = (line(before, FORMER_LINE), line(after, LINE));
+    let (was, is) = (line(before, FORMER_CONTOUR), line(after, CONTOUR));
     [
-        (Shows::BeforeSlice, vec![cut(before), line(before, LINE)]),
-        (Shows::AfterSlice, vec![cut(after), was.clone(), is.clone()]),
-        (Shows::MapSlice, vec![map, was, is]),
+        (ViewKind::BeforeSlice, vec![cut(before), line(before, CONTOUR)]),
+        (ViewKind::AfterSlice, vec![cut(after), was.clone(), is.clone()]),
+        (ViewKind::MapSlice, vec![map, was, is]),
     ]
     .map(|(shows, layers)| {
         let mut layers = layers.into_iter();
-        let mut pixels = layers.next().unwrap_or_else(|| Pixels::clear(SIZE, SIZE));
-        layers.for_each(|layer| pixels.lay_over(&layer));
-        Drawn::new(shows, name, title, marks::on_paper(&pixels, &shot, scored.replay.workpiece.distal()))
+        let mut pixels = layers.next().unwrap_or_else(|| PixelBuffer::transparent(SIZE, SIZE));
+        layers.for_each(|layer| pixels.composite(&layer));
+        RawPicture::new(shows, name, title, annotations::annotate(&pixels, &plane, scored.replay.workpiece.distal()))
     })
 }
 
-/// All matter that a filling's map is about: what was there, what was to be there and what was laid. `None` without a filling.
-fn laid_too(scored: &Scored) -> Option<Volume> {
+/// All matter that the map of a filling covers: the matter before, the planned filling and the placed filling. `None`
+/// without a filling.
+fn merged_matter(scored: &Scored) -> Option<Volume> {
     let Replay { workpiece, volume: after, .. } = &scored.replay;
     let original = workpiece.original.as_ref().filter(|_| scored.restoration.is_some())?;
     let layers = [&*workpiece.volume, original, after];
-    let (grid, band) = (*after.grid(), after.band());
-    let most = |voxel: usize| layers.iter().map(|v| v.voxel(voxel)).max_by_key(|v| v.density).unwrap_or_default();
-    let (density, label) = (0..grid.len()).map(|voxel| (most(voxel).density, most(voxel).label)).unzip();
-    Volume::restored(grid, band, density, label)
+    let (grid, band) = (*after.grid(), after.half_band());
+    let densest = |voxel: usize| layers.iter().map(|v| v.voxel(voxel)).max_by_key(|v| v.density).unwrap_or_default();
+    let (density, label) = (0..grid.len()).map(|voxel| (densest(voxel).density, densest(voxel).label)).unzip();
+    Volume::from_parts(grid, band, density, label)
 }
 
-/// Frames the crown of a tooth and the beginning of its roots.
-fn crown_shot(side: Side, tooth: &ToothPlace) -> Shot {
-    /// Of the roots, mm.
+/// Frames the crown of a tooth and the coronal part of its roots.
+fn crown_image_plane(side: ViewSide, tooth: &ToothBounds) -> ImagePlane {
+    /// Length of the roots shown, mm.
     const ROOTS: f32 = 3.0;
     let low = tooth.low.max(Vec3::new(f32::NEG_INFINITY, f32::NEG_INFINITY, tooth.crown_low.z - ROOTS));
-    let camera = Camera::around(side, low, tooth.high, 1.0);
-    Shot { camera, width: SIZE, height: SIZE }
+    let camera = OrthographicCamera::framing_box(side, low, tooth.high, 1.0);
+    ImagePlane { camera, width: SIZE, height: SIZE }
 }
 
 /// The tooth whose crown is nearest to a point.
-fn tooth_at(teeth: &[ToothPlace], point_in_tooth: Vec3) -> &ToothPlace {
-    let off = |t: &&ToothPlace| point_in_tooth.distance(point_in_tooth.clamp(t.crown_low, t.crown_high));
-    teeth.iter().min_by(|a, b| off(a).total_cmp(&off(b))).expect("a workpiece has a tooth")
+fn nearest_tooth(teeth: &[ToothBounds], point_in_tooth: Vec3) -> &ToothBounds {
+    let distance = |t: &&ToothBounds| point_in_tooth.distance(point_in_tooth.clamp(t.crown_low, t.crown_high));
+    teeth.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a workpiece has a tooth")
 }
 
-/// The middle of what was done and what was to be done; of the first crown, where there is neither.
-fn middle_of_work(scored: &Scored) -> Vec3 {
+/// Centre of the work done and the work planned; the centre of the first crown if there is neither.
+fn centre_of_work(scored: &Scored) -> Vec3 {
     let workpiece = &scored.replay.workpiece;
     let grid = workpiece.volume.grid();
     let mut sum = glam::DVec3::ZERO;
@@ -202,30 +218,35 @@ fn middle_of_work(scored: &Scored) -> Vec3 {
     }
 }
 
-/// The surfaces of `performance.glb`: what is left of the tooth, its cavity coloured by verdict; and what was left behind.
-pub fn parts(scored: &Scored) -> Vec<Part> {
+/// Surfaces of `performance.glb`: the remaining tooth with its cavity coloured by verdict, and the matter that was left
+/// behind.
+pub fn surface_parts(scored: &Scored) -> Vec<SurfacePart> {
     let after = &scored.replay.volume;
-    let tint = Tint::of(scored);
-    let colour = |_, voxel: usize| tint.colour(voxel, scored.verdicts[voxel].color());
+    let colours = VerdictColours::of(scored);
+    let colour = |_, voxel: usize| colours.colour_at(voxel, scored.verdicts[voxel].color());
     let mesh = surface::extract(after);
-    let colors = mesh.positions.iter().map(|p| tint::linear(march::surface_colour(after, *p, colour))).collect();
+    let colors = mesh
+        .positions
+        .iter()
+        .map(|p| verdict_colours::srgb_to_linear(raycast::surface_colour(after, *p, colour)))
+        .collect();
     let left = surface::of_mask(after.grid(), |voxel| scored.verdicts[voxel] == Verdict::Left);
-    let left_colors = vec![tint::linear(Verdict::Left.color()); left.positions.len()];
+    let left_colors = vec![verdict_colours::srgb_to_linear(Verdict::Left.color()); left.positions.len()];
     vec![
-        Part { name: "tooth".into(), mesh, colors },
-        Part { name: Verdict::Left.id().into(), mesh: left, colors: left_colors },
+        SurfacePart { name: "tooth".into(), mesh, colors },
+        SurfacePart { name: Verdict::Left.id().into(), mesh: left, colors: left_colors },
     ]
 }
 
 /// Every picture as a file's bytes; each processor takes its share.
-fn encoded(drawn: Vec<Drawn>) -> Vec<Picture> {
-    each(drawn.len(), |number| {
-        let Drawn { name, title, shows, pixels } = &drawn[number];
-        Picture { name: name.clone(), title: title.clone(), shows: *shows, png: png(pixels) }
+fn encode_all(raw: Vec<RawPicture>) -> Vec<EncodedPicture> {
+    par_map(raw.len(), |number| {
+        let RawPicture { name, title, kind: shows, pixels } = &raw[number];
+        EncodedPicture { name: name.clone(), title: title.clone(), kind: *shows, png: encode_png(pixels) }
     })
 }
 
-fn png(pixels: &Pixels) -> Vec<u8> {
+fn encode_png(pixels: &PixelBuffer) -> Vec<u8> {
     let mut bytes = Vec::new();
     let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Default, FilterType::Adaptive);
     encoder

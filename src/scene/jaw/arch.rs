@@ -1,21 +1,22 @@
-//! Where the teeth of one jaw stand.
+//! Positions of the teeth in one jaw.
 //!
 //! *Arch space*: x to the patient's left in the lower jaw and to the right in the upper one, y back from the edges of the
 //! central incisors, z occlusal, 0 on the plane through the incisors' edges; right-handed, mm. Both jaws have such a space of
 //! their own.
 
-use super::teeth::Model;
-use crate::anatomy::{self, girth::Girth};
-use crate::frame::{Pose, Quat, Vec3};
+use super::teeth::ToothModel;
+use typodont_anatomy::crown_contour::CrownContour;
+use typodont_core::frame::{Pose, Quat, Vec3};
 
 /// A jaw's shape.
 #[derive(Clone, Copy, Debug)]
-pub struct Form {
-    /// Between the middles of the second molars.
+pub struct ArchShape {
+    /// Distance between the centres of the second molars, mm.
     pub width: f32,
-    /// How far back the second molars' middles lie; `None`: as the teeth's widths ask for.
+    /// Distance from the incisors back to the centres of the second molars, mm; `None` to derive it from the teeth's
+    /// widths.
     pub depth: Option<f32>,
-    /// How far the curve of Spee leaves the plane between canine and second molar; negative where it bulges occlusally.
+    /// Depth of the curve of Spee between canine and second molar, mm; negative where the curve bulges occlusally.
     pub spee: f32,
 }
 
@@ -23,20 +24,20 @@ pub struct Form {
 /// above and 54.2 mm below (Mina and others, *Odontology* 105, 2017), and with how far canines stand out their tips, 34 and 26 mm, to
 /// 5 %. Those people's teeth were wider than the table's, so the arches stay 10 to 17 % less deep than theirs. Spee's curve: 1.5 mm in untreated adults, as a
 /// round figure of many authors; the upper jaw follows the lower.
-pub const UPPER: Form = Form { width: 54.0, depth: None, spee: -1.4 };
-pub const LOWER: Form = Form { width: 50.3, depth: None, spee: 1.4 };
+pub const UPPER: ArchShape = ArchShape { width: 54.0, depth: None, spee: -1.4 };
+pub const LOWER: ArchShape = ArchShape { width: 50.3, depth: None, spee: 1.4 };
 
 /// One half of an arch, from the midline back.
 #[derive(Clone, Debug)]
-pub struct Half {
-    pub seats: Vec<Seat>,
+pub struct HalfArch {
+    pub seats: Vec<ToothSeat>,
     /// Points of the line through the middles of all crowns, by way along it.
     line: Vec<[f32; 3]>,
 }
 
-/// Where one tooth stands.
+/// Position of one tooth in the arch.
 #[derive(Clone, Copy, Debug)]
-pub struct Seat {
+pub struct ToothSeat {
     /// Way along the arch from the midline to its mesial and distal contact.
     pub from: f32,
     pub to: f32,
@@ -53,7 +54,7 @@ pub struct Seat {
     pub tip: f32,
 }
 
-impl Seat {
+impl ToothSeat {
     /// The tooth's own space, upright but for its lean; its crown's top is over the middle of its seat.
     pub fn arch_from_tooth(&self) -> Pose {
         let level = Quat::from_mat3(&glam::Mat3::from_cols(self.buccal, self.distal, Vec3::Z));
@@ -71,24 +72,26 @@ impl Seat {
     }
 }
 
-impl Half {
+impl HalfArch {
     /// Seats for teeth of these widths and models; the line fits the first seven.
     ///
     /// The line is the beta function of Braun et al. (1998): in an arch W wide and D deep a place x to the side lies
     /// 3.0314 · D · ((1/2 + x/W)(1/2 − x/W))^0.8 before the last molars' middles, which is D · (1 − (2x/W)²)^0.8. D follows from
     /// the teeth's widths.
-    pub fn of(form: Form, teeth: &[(Model, f32)]) -> Half {
+    pub fn new(shape: ArchShape, teeth: &[(ToothModel, f32)]) -> HalfArch {
         let wanted: f32 = teeth.iter().take(7).map(|(_, width)| width).sum::<f32>() - 0.5 * teeth[6].1;
         let (mut low, mut high) = (15.0, 80.0);
         for _ in 0..24 {
             let depth = 0.5 * (low + high);
-            if length(&curve(form.width, depth)) < wanted { low = depth } else { high = depth }
+            if polyline_length(&beta_curve(shape.width, depth)) < wanted { low = depth } else { high = depth }
         }
-        let depth = form.depth.unwrap_or(0.5 * (low + high));
-        let line = measured(&curve(form.width, depth));
-        let mut half = Half { seats: Vec::new(), line };
-        let girths: Vec<Girth> =
-            teeth.iter().map(|(model, _)| Girth::of(&anatomy::Form { sizes: model.sizes, ..model.form })).collect();
+        let depth = shape.depth.unwrap_or(0.5 * (low + high));
+        let line = with_arc_length(&beta_curve(shape.width, depth));
+        let mut half = HalfArch { seats: Vec::new(), line };
+        let girths: Vec<CrownContour> = teeth
+            .iter()
+            .map(|(model, _)| CrownContour::of(&typodont_anatomy::ToothForm { sizes: model.sizes, ..model.form }))
+            .collect();
         let mut middles: Vec<f32> = Vec::new();
         for (i, (model, width)) in teeth.iter().enumerate() {
             // Each tooth goes back until it just touches the one before it, the first until it touches its twin.
@@ -97,47 +100,47 @@ impl Half {
                 Some(before) => (before + 0.25 * (width + teeth[i - 1].1), before + 0.8 * (width + teeth[i - 1].1)),
             };
             for _ in 0..12 {
-                let way = 0.5 * (near + far);
-                let seat = half.seat_at(form, model, *width, way);
+                let arc_length = 0.5 * (near + far);
+                let seat = half.position_at(shape, model, *width, arc_length);
                 let gap = match half.seats.last() {
-                    None => to_twin(&girths[0], &seat),
-                    Some(before) => between_two(&girths[i - 1], before, &girths[i], &seat),
+                    None => midline_gap(&girths[0], &seat),
+                    Some(before) => crown_gap(&girths[i - 1], before, &girths[i], &seat),
                 };
-                if gap < TOUCH { near = way } else { far = way }
+                if gap < CONTACT_GAP { near = arc_length } else { far = arc_length }
             }
-            let way = 0.5 * (near + far);
-            middles.push(way);
-            let seat = half.seat_at(form, model, *width, way);
+            let arc_length = 0.5 * (near + far);
+            middles.push(arc_length);
+            let seat = half.position_at(shape, model, *width, arc_length);
             half.seats.push(seat);
         }
-        half.share_out(&middles);
+        half.divide_arc(&middles);
         half
     }
 
     /// A tooth whose middle lies so far along the line, turned as the line runs from its mesial to its distal end.
-    fn seat_at(&self, form: Form, model: &Model, width: f32, way: f32) -> Seat {
-        let [mesial, behind] = [way - 0.5 * width, way + 0.5 * width].map(|way| self.place(way));
+    fn position_at(&self, shape: ArchShape, model: &ToothModel, width: f32, arc_length: f32) -> ToothSeat {
+        let [mesial, behind] = [arc_length - 0.5 * width, arc_length + 0.5 * width].map(|way| self.point_at(way));
         let distal = (behind - mesial).normalize_or(Vec3::Y);
         let buccal = distal.cross(Vec3::Z);
-        let place = 0.5 * (mesial + behind) + buccal * model.out;
-        let (sin, cos) = (libm::sinf(model.turn.to_radians()), libm::cosf(model.turn.to_radians()));
+        let place = 0.5 * (mesial + behind) + buccal * model.buccal_offset;
+        let (sin, cos) = (libm::sinf(model.rotation.to_radians()), libm::cosf(model.rotation.to_radians()));
         let (distal, buccal) = (distal * cos - buccal * sin, buccal * cos + distal * sin);
-        let top = Vec3::new(place.x, place.y, -model.short - spee(form, self, way));
-        let (from, to) = (way - 0.5 * width, way + 0.5 * width);
-        Seat {
+        let top = Vec3::new(place.x, place.y, -model.infraocclusion - spee_depth(shape, self, arc_length));
+        let (from, to) = (arc_length - 0.5 * width, arc_length + 0.5 * width);
+        ToothSeat {
             from,
             to,
             top,
             distal,
             buccal,
-            crown: model.sizes.crown - model.form.aged.map_or(0.0, |aged| aged.off_crown(&model.form)),
+            crown: model.sizes.crown - model.form.age_effects.map_or(0.0, |aged| aged.crown_wear(&model.form)),
             lean: model.lean.to_radians(),
             tip: model.tip.to_radians(),
         }
     }
 
-    /// What lies between two teeth's middles belongs to both by their widths.
-    fn share_out(&mut self, middles: &[f32]) {
+    /// Divides the arc between the centres of two neighbours in proportion to their widths.
+    fn divide_arc(&mut self, middles: &[f32]) {
         let widths: Vec<f32> = self.seats.iter().map(|seat| seat.to - seat.from).collect();
         let mut from = 0.0;
         for (i, seat) in self.seats.iter_mut().enumerate() {
@@ -151,24 +154,27 @@ impl Half {
     }
 
     /// The line's point and its way back, level, so far along it.
-    pub fn at(&self, way: f32) -> (Vec3, Vec3) {
+    pub fn frame_at(&self, arc_length: f32) -> (Vec3, Vec3) {
         /// The way is taken over a tooth's width or so: the beta function bends sharply where it ends, gum does not. mm
         const BEND: f32 = 3.0;
-        (self.place(way), (self.place(way + BEND) - self.place(way - BEND)).normalize_or(Vec3::Y))
+        (
+            self.point_at(arc_length),
+            (self.point_at(arc_length + BEND) - self.point_at(arc_length - BEND)).normalize_or(Vec3::Y),
+        )
     }
 
     /// A point of the line; straight on behind its end, and on the other side before its beginning.
-    fn place(&self, way: f32) -> Vec3 {
-        if way < 0.0 {
-            return self.place(-way) * Vec3::new(-1.0, 1.0, 1.0);
+    fn point_at(&self, arc_length: f32) -> Vec3 {
+        if arc_length < 0.0 {
+            return self.point_at(-arc_length) * Vec3::new(-1.0, 1.0, 1.0);
         }
-        let after = self.line.partition_point(|p| p[2] <= way).max(1);
+        let after = self.line.partition_point(|p| p[2] <= arc_length).max(1);
         let Some(&[bx, by, b]) = self.line.get(after) else {
             let [x, y, end] = self.line[self.line.len() - 1];
-            return Vec3::new(x, y + way - end, 0.0);
+            return Vec3::new(x, y + arc_length - end, 0.0);
         };
         let [ax, ay, a] = self.line[after - 1];
-        let part = (way - a) / (b - a).max(1e-6);
+        let part = (arc_length - a) / (b - a).max(1e-6);
         Vec3::new(ax + (bx - ax) * part, ay + (by - ay) * part, 0.0)
     }
 
@@ -178,35 +184,35 @@ impl Half {
     }
 }
 
-/// Room between two crowns that touch, mm: what is grown later is good to a few hundredths, and they must not overlap.
-const TOUCH: f32 = 0.04;
+/// Gap between two crowns that touch, mm: the crowns are accurate to a few hundredths, and must not overlap.
+const CONTACT_GAP: f32 = 0.04;
 
 /// Least distance between two crowns' sides, mm; negative where they overlap.
-fn between_two(mesial: &Girth, before: &Seat, distal: &Girth, after: &Seat) -> f32 {
+fn crown_gap(mesial: &CrownContour, before: &ToothSeat, distal: &CrownContour, after: &ToothSeat) -> f32 {
     let (before, after) = (before.arch_from_tooth(), after.arch_from_tooth());
     let [before_from_after, after_from_before] = [before.inverse() * after, after.inverse() * before];
     // Only sides that face each other.
     let faces = |p: &Vec3, way: f32| p.y * way > 0.3 * p.with_z(0.0).length();
-    let ahead = mesial.places().filter(|p| faces(p, 1.0)).map(|p| distal.outside(after_from_before * p));
-    let back = distal.places().filter(|p| faces(p, -1.0)).map(|p| mesial.outside(before_from_after * p));
+    let ahead = mesial.points().filter(|p| faces(p, 1.0)).map(|p| distal.distance_outside(after_from_before * p));
+    let back = distal.points().filter(|p| faces(p, -1.0)).map(|p| mesial.distance_outside(before_from_after * p));
     ahead.chain(back).fold(f32::INFINITY, f32::min)
 }
 
 /// Between a front tooth and its mirror image beyond the midline, mm.
-fn to_twin(girth: &Girth, seat: &Seat) -> f32 {
+fn midline_gap(girth: &CrownContour, seat: &ToothSeat) -> f32 {
     let arch_from_tooth = seat.arch_from_tooth();
-    2.0 * girth.places().map(|p| (arch_from_tooth * p).x).fold(f32::INFINITY, f32::min)
+    2.0 * girth.points().map(|p| (arch_from_tooth * p).x).fold(f32::INFINITY, f32::min)
 }
 
-/// How far a place of the arch lies below the plane through the incisors.
-fn spee(form: Form, half: &Half, way: f32) -> f32 {
+/// Distance, mm, of a point of the arch below the plane through the incisors' edges.
+fn spee_depth(shape: ArchShape, half: &HalfArch, arc_length: f32) -> f32 {
     let [_, _, end] = half.line.last().copied().unwrap_or_default();
-    let share = ((way - 0.25 * end) / (0.75 * end)).clamp(0.0, 1.2);
-    form.spee * 4.0 * share * (1.0 - share)
+    let share = ((arc_length - 0.25 * end) / (0.75 * end)).clamp(0.0, 1.2);
+    shape.spee * 4.0 * share * (1.0 - share)
 }
 
 /// Points of the beta function, from the midline to the last molar.
-fn curve(width: f32, depth: f32) -> Vec<[f32; 2]> {
+fn beta_curve(width: f32, depth: f32) -> Vec<[f32; 2]> {
     const POINTS: usize = 240;
     let at = |i: usize| {
         let t = i as f32 / POINTS as f32;
@@ -219,18 +225,18 @@ fn curve(width: f32, depth: f32) -> Vec<[f32; 2]> {
     (0..=POINTS).map(at).collect()
 }
 
-fn length(curve: &[[f32; 2]]) -> f32 {
+fn polyline_length(curve: &[[f32; 2]]) -> f32 {
     curve.windows(2).map(|p| libm::hypotf(p[1][0] - p[0][0], p[1][1] - p[0][1])).sum()
 }
 
 /// The same points with the way to each.
-fn measured(curve: &[[f32; 2]]) -> Vec<[f32; 3]> {
-    let mut way = 0.0;
+fn with_arc_length(curve: &[[f32; 2]]) -> Vec<[f32; 3]> {
+    let mut arc_length = 0.0;
     let mut before = curve[0];
     let step = |&[x, y]: &[f32; 2]| {
-        way += libm::hypotf(x - before[0], y - before[1]);
+        arc_length += libm::hypotf(x - before[0], y - before[1]);
         before = [x, y];
-        [x, y, way]
+        [x, y, arc_length]
     };
     curve.iter().map(step).collect()
 }
@@ -239,17 +245,17 @@ fn measured(curve: &[[f32; 2]]) -> Vec<[f32; 3]> {
 mod tests {
     use super::super::{crown, teeth};
     use super::*;
-    use crate::mesh::Mesh;
-    use crate::touch::Obstacle;
+    use typodont_core::mesh::Mesh;
+    use typodont_core::touch::ClosedMesh;
 
-    fn half(form: Form, models: &[Model]) -> Half {
-        let teeth: Vec<(Model, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
-        Half::of(form, &teeth)
+    fn half(form: ArchShape, models: &[ToothModel]) -> HalfArch {
+        let teeth: Vec<(ToothModel, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
+        HalfArch::new(form, &teeth)
     }
 
     /// Each crown's surface, arch space.
-    fn crowns(half: &Half, models: &[Model]) -> Vec<(Mesh, Pose)> {
-        let crown = |(model, seat): (&Model, &Seat)| (crown::crown(model).mesh, seat.arch_from_tooth());
+    fn crowns(half: &HalfArch, models: &[ToothModel]) -> Vec<(Mesh, Pose)> {
+        let crown = |(model, seat): (&ToothModel, &ToothSeat)| (crown::crown(model).mesh, seat.arch_from_tooth());
         models.iter().zip(&half.seats).map(crown).collect()
     }
 
@@ -263,7 +269,7 @@ mod tests {
             for (i, pair) in crowns.windows(2).enumerate() {
                 let [(a, arch_from_a), (b, arch_from_b)] = [&pair[0], &pair[1]];
                 let least = |from: &Mesh, arch_from: &Pose, to: &Mesh, arch_to: &Pose| {
-                    let obstacle = Obstacle::new(to).unwrap();
+                    let obstacle = ClosedMesh::new(to).unwrap();
                     let to_from = arch_to.inverse() * *arch_from;
                     let places = from.positions.iter().filter(|p| p.z > 0.0).map(|p| to_from * *p);
                     places.filter(|p| p.z > 0.0).map(|p| obstacle.distance(p)).fold(f32::INFINITY, f32::min)
@@ -284,7 +290,7 @@ mod tests {
             let half = half(form, &models);
             assert!((half.seats[6].top.x - 0.5 * form.width).abs() < 1.5);
             for seat in &half.seats {
-                assert!(seat.arch_from_tooth().is_sound() && seat.buccal.x > 0.0);
+                assert!(seat.arch_from_tooth().is_valid() && seat.buccal.x > 0.0);
             }
         }
     }

@@ -1,50 +1,57 @@
-//! One crown as triangles: grown as a carved tooth is, coarser, and cut off in the gum.
+//! One crown as triangles, made as a carved tooth is, but coarser and cut off below the gingival margin.
 
-use super::teeth::{Kind, Model};
-use crate::anatomy::{Tissues, grid_of_spacing, grow};
-use crate::frame::Vec3;
-use crate::mesh::Mesh;
-use crate::render::Rgb;
-use crate::volume::{Grid, Label, Volume, surface};
+use super::teeth::{ToothKind, ToothModel};
+use typodont_anatomy::{TissueLabels, grid_of_spacing, grow};
+use typodont_core::frame::Vec3;
+use typodont_core::mesh::Mesh;
+use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_render::Rgb;
 
 /// Distance between samples, mm: cusps and ridges show, the finest grooves as shallow valleys. From 0.45 on edges fray, below 0.3
 /// a mouth takes longer to draw than it gains.
 const SPACING: f32 = 0.36;
 
-/// Length of root that a crown brings along, mm: it ends out of sight in the gum.
-const STUB: f32 = 4.5;
+/// Length of root below a crown, mm: it ends within the gingiva, out of sight.
+const ROOT_LENGTH: f32 = 4.5;
 
-/// How far around a place of the surface matter is looked for, mm: a groove is surrounded by more of it than a cusp.
-const AROUND: f32 = 0.9;
+/// Distance from a point of the surface at which the density is sampled, mm: a groove has more matter around it than a
+/// cusp.
+const SAMPLE_DISTANCE: f32 = 0.9;
 
 /// Share of matter around a place that is flat, and above it until a groove is as dark as can be.
 const FLAT: f32 = 0.53;
 const DEEPER: f32 = 0.17;
 
-/// What a crown is grown of here: the table of tissues has no say in what is only looked at.
-const TISSUES: Tissues = Tissues { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+/// Labels used while a crown is made. They are independent of the exercise's tissues, since a crown is only drawn.
+const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
 /// A surface with a colour at each corner.
 #[derive(Clone, Debug, Default)]
-pub struct Coloured {
+pub struct ColouredMesh {
     pub mesh: Mesh,
-    pub tints: Vec<Rgb>,
+    pub vertex_colours: Vec<Rgb>,
 }
 
-impl Coloured {
+impl ColouredMesh {
     /// Adds another surface, its corners and normals carried over by a map.
-    pub fn add(&mut self, other: &Coloured, point: impl Fn(Vec3) -> Vec3, way: impl Fn(Vec3) -> Vec3, turned: bool) {
+    pub fn append(
+        &mut self,
+        other: &ColouredMesh,
+        point: impl Fn(Vec3) -> Vec3,
+        direction: impl Fn(Vec3) -> Vec3,
+        is_mirrored: bool,
+    ) {
         let first = self.mesh.positions.len() as u32;
         self.mesh.positions.extend(other.mesh.positions.iter().map(|p| point(*p)));
-        self.mesh.normals.extend(other.mesh.normals.iter().map(|n| way(*n)));
-        let corners = |[a, b, c]: [u32; 3]| if turned { [a, c, b] } else { [a, b, c] };
+        self.mesh.normals.extend(other.mesh.normals.iter().map(|n| direction(*n)));
+        let corners = |[a, b, c]: [u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
         self.mesh.triangles.extend(other.mesh.triangles.iter().map(|t| corners(t.map(|i| first + i))));
-        self.tints.extend(&other.tints);
+        self.vertex_colours.extend(&other.vertex_colours);
     }
 }
 
 /// Outward normals of the corners, weighted by the area of their triangles.
-pub fn smooth_normals(mesh: &mut Mesh) {
+pub fn compute_normals(mesh: &mut Mesh) {
     mesh.normals = vec![Vec3::ZERO; mesh.positions.len()];
     for &triangle in &mesh.triangles {
         let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
@@ -54,15 +61,15 @@ pub fn smooth_normals(mesh: &mut Mesh) {
 }
 
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm.
-pub fn crown(model: &Model) -> Coloured {
-    let volume = grow(&model.form, above(grid_of_spacing(&model.form, SPACING), -STUB), &TISSUES);
+pub fn crown(model: &ToothModel) -> ColouredMesh {
+    let volume = grow(&model.form, cropped_above(grid_of_spacing(&model.form, SPACING), -ROOT_LENGTH), &TISSUES);
     let mesh = surface::extract(&volume);
-    let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
-    Coloured { mesh, tints }
+    let vertex_colours = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
+    ColouredMesh { mesh, vertex_colours }
 }
 
 /// The part of a grid above a height.
-fn above(grid: Grid, height: f32) -> Grid {
+fn cropped_above(grid: Grid, height: f32) -> Grid {
     let levels = (((height - grid.origin.z) / grid.spacing.z).max(0.0) as u32).min(grid.dims[2] - 1);
     let [nx, ny, nz] = grid.dims;
     let origin = grid.origin + Vec3::Z * (levels as f32 * grid.spacing.z);
@@ -77,38 +84,40 @@ const DEEP: Rgb = [0.84, 0.75, 0.62];
 const CANINE: Rgb = [0.99, 0.975, 0.94];
 const PLAIN: Rgb = [1.0; 3];
 
-fn mixed(a: Rgb, b: Rgb, share: f32) -> Rgb {
+fn lerp_colour(a: Rgb, b: Rgb, share: f32) -> Rgb {
     let share = share.clamp(0.0, 1.0);
     std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share)
 }
 
-fn tint(model: &Model, volume: &Volume, place: Vec3) -> Rgb {
+fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Rgb {
     let sizes = &model.form.sizes;
     let [mesial, distal] = sizes.neckline_rise;
     let rise = if place.y < 0.0 { mesial } else { distal };
     let neckline = rise * place.y * place.y / (place.x * place.x + place.y * place.y + 0.01);
-    let body = if model.kind == Kind::Canine { CANINE } else { PLAIN };
+    let body = if model.kind == ToothKind::Canine { CANINE } else { PLAIN };
     let height = (place.z - neckline) / sizes.crown;
-    let on_enamel = mixed(NECK, body, height / 0.45);
+    let on_enamel = lerp_colour(NECK, body, height / 0.45);
     let enamel = match model.kind {
-        Kind::Incisor => mixed(on_enamel, EDGE, (height - 0.65) / 0.3),
-        Kind::Canine => on_enamel,
-        Kind::Premolar | Kind::Molar if height > 0.3 => mixed(on_enamel, DEEP, sunk(volume, place)),
-        Kind::Premolar | Kind::Molar => on_enamel,
+        ToothKind::Incisor => lerp_colour(on_enamel, EDGE, (height - 0.65) / 0.3),
+        ToothKind::Canine => on_enamel,
+        ToothKind::Premolar | ToothKind::Molar if height > 0.3 => {
+            lerp_colour(on_enamel, DEEP, groove_depth(volume, place))
+        }
+        ToothKind::Premolar | ToothKind::Molar => on_enamel,
     };
     // Over a sample's width, so that the neckline is a line and not a stair.
-    mixed(ROOT, enamel, 0.5 + (place.z - neckline) / SPACING)
+    lerp_colour(ROOT, enamel, 0.5 + (place.z - neckline) / SPACING)
 }
 
 /// 0 on flat or bulging places, 1 deep in a groove.
-fn sunk(volume: &Volume, place: Vec3) -> f32 {
+fn groove_depth(volume: &Volume, place: Vec3) -> f32 {
     const CORNERS: [[f32; 3]; 8] = {
         const S: f32 = 0.577;
         [[S, S, S], [S, S, -S], [S, -S, S], [S, -S, -S], [-S, S, S], [-S, S, -S], [-S, -S, S], [-S, -S, -S]]
     };
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
-    let ways = axes.into_iter().chain(CORNERS.map(Vec3::from));
-    let matter: f32 = ways.map(|way| volume.density_at(place + way * AROUND)).sum();
+    let directions = axes.into_iter().chain(CORNERS.map(Vec3::from));
+    let matter: f32 = directions.map(|way| volume.density_at(place + way * SAMPLE_DISTANCE)).sum();
     ((matter / 14.0 - FLAT) / DEEPER).clamp(0.0, 1.0)
 }
 
@@ -116,15 +125,15 @@ fn sunk(volume: &Volume, place: Vec3) -> f32 {
 mod tests {
     use super::super::teeth::{LOWER, UPPER};
     use super::*;
-    use crate::touch::Obstacle;
+    use typodont_core::touch::ClosedMesh;
 
     #[test]
     fn every_crown_is_closed_and_as_large_as_the_table_says() {
         // Aim: a closed surface facing outward, of the table's widths and length to a sample's distance.
         for model in UPPER.iter().chain(&LOWER) {
-            let Coloured { mesh, tints } = crown(model);
+            let ColouredMesh { mesh, vertex_colours: tints } = crown(model);
             let sizes = &model.sizes;
-            assert!(Obstacle::new(&mesh).is_some(), "{sizes:?} is closed");
+            assert!(ClosedMesh::new(&mesh).is_some(), "{sizes:?} is closed");
             assert!(mesh.volume_mm3() > 50.0, "{sizes:?}");
             assert_eq!(tints.len(), mesh.positions.len());
             let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
@@ -132,7 +141,7 @@ mod tests {
             let found = Vec3::new(high.x - low.x, high.y - low.y, high.z);
             let wanted = Vec3::new(sizes.buccolingual[0], sizes.mesiodistal[0], sizes.crown);
             assert!((found - wanted).abs().max_element() < SPACING, "{found} not {wanted}");
-            assert!((low.z + STUB).abs() < 2.0 * SPACING, "the root ends at {}", low.z);
+            assert!((low.z + ROOT_LENGTH).abs() < 2.0 * SPACING, "the root ends at {}", low.z);
         }
     }
 }

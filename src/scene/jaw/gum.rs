@@ -1,15 +1,16 @@
-//! The gum of one jaw, with palate or floor of the mouth, as one closed sheet over the ridge that the teeth stand in.
+//! The gingiva of one jaw, with the palate or the floor of the mouth, as one closed sheet over the alveolar ridge.
 //!
-//! Teeth are put through it, so its margin is where the sheet meets them: low in the middle of each tooth, high between two.
+//! The teeth pass through the sheet, so the gingival margin is the line in which the sheet meets them: low in the
+//! middle of each tooth, high between two teeth.
 
-use super::arch::{Half, Seat};
-use super::crown::{Coloured, smooth_normals};
-use super::teeth::Model;
-use crate::anatomy::periodontium::{AtSites, Site};
-use crate::frame::Vec3;
-use crate::render::Rgb;
+use super::arch::{HalfArch, ToothSeat};
+use super::crown::{ColouredMesh, compute_normals};
+use super::teeth::ToothModel;
+use typodont_anatomy::periodontium::{ProbingSite, SiteLengths};
+use typodont_core::frame::Vec3;
+use typodont_render::Rgb;
 
-/// Which of the two jaws.
+/// Upper or lower jaw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Jaw {
     Upper,
@@ -19,14 +20,14 @@ pub enum Jaw {
 /// Distance between columns along the arch, mm: a papilla is some 3 mm wide.
 const COLUMN: f32 = 0.9;
 
-/// Gum behind the last molar: tuberosity or retromolar pad, mm.
+/// Length of the tuberosity or retromolar pad behind the last molar, mm.
 const PAD: f32 = 8.0;
 
 /// Height of a jaw's flat base below the occlusal plane, mm.
 const BASE: f32 = -27.0;
 
-/// How far the free gum reaches over the neck in the middle of a tooth, mm, and between two, share of the crown: healthy gum
-/// fills the space up to a few millimetres below the contact.
+/// Height of the free gingiva above the neck: in the middle of a tooth, mm, and between two teeth, as a share of the
+/// crown's height. Healthy gingiva fills the space up to a few millimetres below the contact.
 const MARGIN: f32 = 0.6;
 const PAPILLA: f32 = 0.42;
 
@@ -37,20 +38,20 @@ const INNER: usize = 12;
 const VAULT: f32 = -20.5;
 
 /// One half of a jaw to be covered.
-pub struct Side<'a> {
-    pub half: &'a Half,
-    pub models: &'a [Model],
-    /// How far the margin has gone back, mm.
-    pub gone: AtSites,
-    /// −1 to be mirrored to the other side.
+pub struct HalfJaw<'a> {
+    pub half: &'a HalfArch,
+    pub models: &'a [ToothModel],
+    /// Recession of the margin, mm.
+    pub recession: SiteLengths,
+    /// 1, or −1 to mirror this half to the other side.
     pub sign: f32,
 }
 
-/// The gum over both halves, arch space. `fit` may move each of its places.
-pub fn gum(jaw: Jaw, sides: [Side; 2], fit: impl Fn(Vec3) -> Vec3) -> Coloured {
+/// The gingiva over both halves, in arch space, mm. `fit` may move each point.
+pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], fit: impl Fn(Vec3) -> Vec3) -> ColouredMesh {
     let mut columns: Vec<Vec<(Vec3, Rgb)>> = Vec::new();
     // Both sides end equally far back, also where one tooth is larger than its twin.
-    let ends = sides.each_ref().map(|side| side.half.at(side.half.length() + PAD).0.y);
+    let ends = sides.each_ref().map(|side| side.half.frame_at(side.half.length() + PAD).0.y);
     for (number, side) in sides.iter().enumerate() {
         let end = side.half.length() + PAD + ends[0].max(ends[1]) - ends[number];
         let count = (end / COLUMN).ceil() as usize;
@@ -64,38 +65,39 @@ pub fn gum(jaw: Jaw, sides: [Side; 2], fit: impl Fn(Vec3) -> Vec3) -> Coloured {
     for (place, _) in columns.iter_mut().flatten() {
         *place = fit(*place);
     }
-    sheet(&columns)
+    closed_sheet(&columns)
 }
 
-impl Side<'_> {
+impl HalfJaw<'_> {
     /// Places from the base's outer edge over the ridge to the midline, so far along the arch.
-    fn column(&self, jaw: Jaw, way: f32) -> Vec<(Vec3, Rgb)> {
-        let mut rows = smooth(&self.ridge(jaw, way));
+    fn column(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Rgb)> {
+        let mut rows = subdivide(&self.ridge(jaw, arc_length));
         let (foot, tint) = rows[rows.len() - 1];
         let front = self.ridge(jaw, 0.0).pop().map_or(foot, |row| row.0);
         for i in 1..=INNER {
             let share = i as f32 / INNER as f32;
             let bend = libm::sinf(share * std::f32::consts::FRAC_PI_2);
             let (x, y) = (foot.x * (1.0 - share), foot.y);
-            let z = foot.z + (middle_height(jaw, front, y) - foot.z) * bend;
+            let z = foot.z + (midline_height(jaw, front, y) - foot.z) * bend;
             let inner = match jaw {
                 Jaw::Upper => PALATE,
                 Jaw::Lower => FLOOR,
             };
-            rows.push((Vec3::new(x, y, z + relief(jaw, front, x, y)), blended(tint, inner, 2.5 * share)));
+            rows.push((Vec3::new(x, y, z + relief(jaw, front, x, y)), lerp_tint(tint, inner, 2.5 * share)));
         }
         rows.iter().map(|&(p, tint)| (Vec3::new(p.x * self.sign, p.y, p.z), tint)).collect()
     }
 
     /// The ridge's section, from cheek to tongue.
-    fn ridge(&self, jaw: Jaw, way: f32) -> Vec<(Vec3, Rgb)> {
-        let (place, distal) = self.half.at(way);
+    fn ridge(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Rgb)> {
+        let (place, distal) = self.half.frame_at(arc_length);
         let out = distal.cross(Vec3::Z);
-        let Section { neck, offset, half, margin, inner_margin, between, root, pad } = self.section(way);
+        let RidgeSection { neck, offset, half, margin, inner_margin, between_teeth: between, root, pad } =
+            self.section(arc_length);
         let middle = place + out * offset;
         let shrink = 1.0 - 0.45 * pad * pad;
         let (wide, narrow) = (half * shrink, half * (1.0 - 0.3 * between) * shrink);
-        let front = 1.0 - ramp((way - 12.0) / 16.0);
+        let front = 1.0 - smoothstep((arc_length - 12.0) / 16.0);
         let crest = margin.max(inner_margin) - 0.25 * between;
         let mut rows = vec![
             (wide + 5.0, BASE, MUCOSA),
@@ -133,21 +135,21 @@ impl Side<'_> {
         rows.into_iter().map(|(aside, z, tint)| (middle + out * aside + Vec3::Z * (z - middle.z), tint)).collect()
     }
 
-    fn section(&self, way: f32) -> Section {
+    fn section(&self, arc_length: f32) -> RidgeSection {
         let seats = &self.half.seats;
-        let neck_of = |seat: &Seat| seat.neck().z;
-        let offset_of = |seat: &Seat| (seat.neck() - self.half.at(seat.middle()).0).dot(seat.buccal);
+        let neck_of = |seat: &ToothSeat| seat.neck().z;
+        let offset_of = |seat: &ToothSeat| (seat.neck() - self.half.frame_at(seat.middle()).0).dot(seat.buccal);
         let half_of = |i: usize| 0.5 * self.models[i].sizes.buccolingual[1];
         let between_seats = |of: &dyn Fn(usize) -> f32| {
-            let after = seats.iter().position(|s| s.middle() > way).unwrap_or(seats.len());
+            let after = seats.iter().position(|s| s.middle() > arc_length).unwrap_or(seats.len());
             let (before, after) = (after.saturating_sub(1), after.min(seats.len() - 1));
             let (a, b) = (seats[before].middle(), seats[after].middle());
-            of(before) + (of(after) - of(before)) * ramp((way - a) / (b - a).max(1e-3))
+            of(before) + (of(after) - of(before)) * smoothstep((arc_length - a) / (b - a).max(1e-3))
         };
         let last = seats.len() - 1;
-        let here = seats.iter().position(|s| way < s.to).unwrap_or(last);
+        let here = seats.iter().position(|s| arc_length < s.to).unwrap_or(last);
         let seat = &seats[here];
-        let from_middle = ((way - seat.middle()) / (0.5 * (seat.to - seat.from))).clamp(-1.0, 1.0);
+        let from_middle = ((arc_length - seat.middle()) / (0.5 * (seat.to - seat.from))).clamp(-1.0, 1.0);
         let between = libm::powf(from_middle.abs(), 2.4);
         let beside = if from_middle < 0.0 { here.saturating_sub(1) } else { (here + 1).min(last) };
         let papilla = if here == last && from_middle > 0.0 {
@@ -155,44 +157,44 @@ impl Side<'_> {
         } else {
             0.5 * (neck_of(seat) + neck_of(&seats[beside]) + PAPILLA * (seat.crown + seats[beside].crown))
         };
-        let pad = ((way - self.half.length()) / PAD).clamp(0.0, 1.0);
+        let pad = ((arc_length - self.half.length()) / PAD).clamp(0.0, 1.0);
         let neck = between_seats(&|i| neck_of(&seats[i])) - 2.0 * pad * pad;
-        let [buccal, lingual, beside] =
-            [Site::Buccal, Site::Lingual, Site::MesioBuccal].map(|site| self.gone[site as usize]);
+        let [buccal, lingual, beside] = [ProbingSite::Buccal, ProbingSite::Lingual, ProbingSite::MesioBuccal]
+            .map(|site| self.recession[site as usize]);
         let risen = |low: f32, high: f32| low + (high - low) * between - 4.0 * pad * pad;
-        Section {
+        RidgeSection {
             neck,
             offset: between_seats(&|i| offset_of(&seats[i])),
             half: between_seats(&half_of),
             margin: risen(neck_of(seat) + MARGIN - buccal, papilla - beside),
             inner_margin: risen(neck_of(seat) + MARGIN + 0.2 - lingual, papilla - 0.5 - beside),
-            between,
+            between_teeth: between,
             root: 0.6 * (1.0 - from_middle * from_middle) * if here == 2 { 1.6 } else { 1.0 },
             pad,
         }
     }
 }
 
-/// What the ridge is like at one place of the arch; mm.
-struct Section {
+/// Section of the ridge at one point of the arch; lengths in mm.
+struct RidgeSection {
     /// Height of the necks.
     neck: f32,
-    /// How far the necks stand outside the line through the crowns.
+    /// Distance of the necks from the line through the crowns, outward.
     offset: f32,
     /// Half the necks' width.
     half: f32,
-    /// Height of the gum's margin toward cheek and tongue.
+    /// Height of the gingival margin, buccally and lingually.
     margin: f32,
     inner_margin: f32,
     /// 0 in the middle of a tooth, 1 between two.
-    between: f32,
-    /// How far a root bulges.
+    between_teeth: f32,
+    /// Bulge of the ridge over a root.
     root: f32,
-    /// 0 beside teeth, 1 at the end of what lies behind them.
+    /// 0 beside teeth, 1 at the end of the pad behind them.
     pad: f32,
 }
 
-/// Tints of the gum's colour: pale where it is bound to bone, redder where it is loose.
+/// Tints of the gingiva's colour: pale where it is attached to bone, redder where it is loose.
 const ATTACHED: Rgb = [1.0, 1.0, 1.0];
 const FREE: Rgb = [1.0, 0.94, 0.93];
 const LINE: Rgb = [0.97, 0.87, 0.86];
@@ -200,60 +202,62 @@ const MUCOSA: Rgb = [0.90, 0.70, 0.69];
 const PALATE: Rgb = [0.98, 0.96, 0.94];
 const FLOOR: Rgb = [0.88, 0.68, 0.67];
 
-fn blended(a: Rgb, b: Rgb, share: f32) -> Rgb {
+fn lerp_tint(a: Rgb, b: Rgb, share: f32) -> Rgb {
     std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share.min(1.0))
 }
 
 /// From 0 to 1, level at both ends.
-fn ramp(share: f32) -> f32 {
+fn smoothstep(share: f32) -> f32 {
     let t = share.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 /// Height on the midline.
-fn middle_height(jaw: Jaw, front: Vec3, y: f32) -> f32 {
+fn midline_height(jaw: Jaw, front: Vec3, y: f32) -> f32 {
     match jaw {
-        Jaw::Upper => front.z + (VAULT - front.z) * ramp((y - front.y) / 26.0),
-        Jaw::Lower => front.z - 2.5 * ramp((y - front.y) / 12.0),
+        Jaw::Upper => front.z + (VAULT - front.z) * smoothstep((y - front.y) / 26.0),
+        Jaw::Lower => front.z - 2.5 * smoothstep((y - front.y) / 12.0),
     }
 }
 
-/// What makes the inside alive: folds, raphe and incisive papilla of the palate; the frenulum below the tongue.
+/// Relief of the oral side, mm: rugae, raphe and incisive papilla of the palate; the frenulum below the tongue.
 fn relief(jaw: Jaw, front: Vec3, x: f32, y: f32) -> f32 {
     let behind = y - front.y;
     let bell = |v: f32, width: f32| libm::expf(-(v / width) * (v / width));
     match jaw {
         Jaw::Upper => {
             let aside = x.abs();
-            let mask = ramp(aside / 2.0) * (1.0 - ramp((aside - 7.0) / 4.0)) * ramp(behind / 2.0);
-            let mask = mask * (1.0 - ramp((behind - 9.0) / 5.0));
+            let mask = smoothstep(aside / 2.0) * (1.0 - smoothstep((aside - 7.0) / 4.0)) * smoothstep(behind / 2.0);
+            let mask = mask * (1.0 - smoothstep((behind - 9.0) / 5.0));
             let folds = libm::sinf(std::f32::consts::TAU * (behind - 0.45 * aside + 0.3 * libm::sinf(aside)) / 4.0);
-            0.4 * mask * folds + 0.25 * bell(x, 0.9) * ramp(behind / 4.0) + 0.9 * bell(x, 1.6) * bell(behind + 0.5, 2.4)
+            0.4 * mask * folds
+                + 0.25 * bell(x, 0.9) * smoothstep(behind / 4.0)
+                + 0.9 * bell(x, 1.6) * bell(behind + 0.5, 2.4)
         }
-        Jaw::Lower => 1.8 * bell(x, 1.0) * ramp(behind / 1.5) * (1.0 - ramp((behind - 5.0) / 8.0)),
+        Jaw::Lower => 1.8 * bell(x, 1.0) * smoothstep(behind / 1.5) * (1.0 - smoothstep((behind - 5.0) / 8.0)),
     }
 }
 
 /// Twice as many places on a smooth line through them (Catmull–Rom).
-fn smooth(rows: &[(Vec3, Rgb)]) -> Vec<(Vec3, Rgb)> {
+fn subdivide(rows: &[(Vec3, Rgb)]) -> Vec<(Vec3, Rgb)> {
     let mut finer = Vec::with_capacity(2 * rows.len());
     for (i, &(place, tint)) in rows.iter().enumerate() {
         finer.push((place, tint));
         let Some(&(next, next_tint)) = rows.get(i + 1) else { break };
         let before = rows[i.saturating_sub(1)].0;
         let after = rows[(i + 2).min(rows.len() - 1)].0;
-        finer.push(((place + next) * 0.5625 - (before + after) * 0.0625, blended(tint, next_tint, 0.5)));
+        finer.push(((place + next) * 0.5625 - (before + after) * 0.0625, lerp_tint(tint, next_tint, 0.5)));
     }
     finer
 }
 
 /// Columns of places as one closed surface: the sheet, a flat base under it and a wall behind.
-fn sheet(columns: &[Vec<(Vec3, Rgb)>]) -> Coloured {
-    let mut made = Coloured::default();
+fn closed_sheet(columns: &[Vec<(Vec3, Rgb)>]) -> ColouredMesh {
+    let mut made = ColouredMesh::default();
     let rows = columns[0].len();
     for (place, tint) in columns.iter().flatten() {
         made.mesh.positions.push(*place);
-        made.tints.push(*tint);
+        made.vertex_colours.push(*tint);
     }
     let mut strip = |corner: &dyn Fn(usize, usize) -> u32, columns: usize, rows: usize| {
         for c in 0..columns - 1 {
@@ -264,7 +268,7 @@ fn sheet(columns: &[Vec<(Vec3, Rgb)>]) -> Coloured {
         }
     };
     strip(&|c, r| (c * rows + r) as u32, columns.len(), rows);
-    smooth_normals(&mut made.mesh);
+    compute_normals(&mut made.mesh);
     // On the midline both halves end alike.
     for c in 0..columns.len() {
         let normal = &mut made.mesh.normals[c * rows + rows - 1];
@@ -275,7 +279,7 @@ fn sheet(columns: &[Vec<(Vec3, Rgb)>]) -> Coloured {
         for i in 0..count {
             made.mesh.positions.extend(places(i));
             made.mesh.normals.extend([normal; 2]);
-            made.tints.extend([MUCOSA; 2]);
+            made.vertex_colours.extend([MUCOSA; 2]);
         }
         for i in 0..count as u32 - 1 {
             let [a, b, c, d] = [0, 1, 2, 3].map(|n| first + 2 * i + n);

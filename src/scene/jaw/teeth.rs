@@ -3,31 +3,32 @@
 //! Axes as in tooth space of the upper right and the lower left: x lingual (−) to buccal (+), y mesial (−) to distal (+),
 //! z apical (−) to occlusal (+), 0 at the neck.
 
-use crate::anatomy::form::{Form, Sizes};
-use crate::anatomy::teeth;
+use typodont_anatomy::form::{Sizes, ToothForm};
+use typodont_anatomy::teeth;
 
 /// One tooth: its shape, the size of its place, and how it stands.
 #[derive(Clone, Copy, Debug)]
-pub struct Model {
-    pub form: Form,
-    /// The form's, but for the place of the carved tooth, which fits that one.
+pub struct ToothModel {
+    pub form: ToothForm,
+    /// Sizes of the form; for the place of the carved tooth, that tooth's own sizes.
     pub sizes: Sizes,
-    pub kind: Kind,
-    /// The crown's axis leans so far toward lip or cheek, degrees.
+    pub kind: ToothKind,
+    /// Inclination of the crown's axis toward lip or cheek, degrees.
     pub lean: f32,
-    /// How far cusps or edge stay short of the occlusal plane, mm; a canine's tip stands beyond it, which brings its contact level with
-    /// the lateral incisor's.
-    pub short: f32,
-    /// How far its middle stands out of the arch's line toward lip or cheek, mm: a canine is an arch's corner.
-    pub out: f32,
-    /// How far its root leans distally under its crown, degrees (Andrews's tip).
+    /// Distance of the cusps or the edge below the occlusal plane, mm. It is negative for a canine, whose tip lies
+    /// beyond the plane so that its contact is level with the lateral incisor's.
+    pub infraocclusion: f32,
+    /// Distance of the tooth's centre from the line of the arch toward lip or cheek, mm: a canine is a corner of the
+    /// arch.
+    pub buccal_offset: f32,
+    /// Distal inclination of the root (Andrews's tip), degrees.
     pub tip: f32,
-    /// How far its mesial side is turned toward lip or cheek, degrees.
-    pub turn: f32,
+    /// Rotation of the mesial side toward lip or cheek, degrees.
+    pub rotation: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub enum ToothKind {
     Incisor,
     Canine,
     Premolar,
@@ -35,43 +36,43 @@ pub enum Kind {
 }
 
 /// Upper teeth from the midline outward.
-pub const UPPER: [Model; 8] = {
+pub const UPPER: [ToothModel; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::UPPER;
     [
-        tipped(model(a, Kind::Incisor, 20.0, 0.0), 5.0),
-        tipped(model(b, Kind::Incisor, 16.0, 0.6), 6.0),
-        tipped(standing_out(model(c, Kind::Canine, 12.0, -0.4), 2.2), 2.0),
-        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.8),
-        standing_out(model(e, Kind::Premolar, 0.0, 0.3), 0.1),
-        model(f, Kind::Molar, 2.0, 0.3),
-        model(g, Kind::Molar, 2.0, 0.3),
-        model(h, Kind::Molar, 2.0, 0.3),
+        with_tip(tooth_model(a, ToothKind::Incisor, 20.0, 0.0), 5.0),
+        with_tip(tooth_model(b, ToothKind::Incisor, 16.0, 0.6), 6.0),
+        with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -0.4), 2.2), 2.0),
+        with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.8),
+        with_buccal_offset(tooth_model(e, ToothKind::Premolar, 0.0, 0.3), 0.1),
+        tooth_model(f, ToothKind::Molar, 2.0, 0.3),
+        tooth_model(g, ToothKind::Molar, 2.0, 0.3),
+        tooth_model(h, ToothKind::Molar, 2.0, 0.3),
     ]
 };
 
 /// Lower teeth from the midline outward.
-pub const LOWER: [Model; 8] = {
+pub const LOWER: [ToothModel; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::LOWER;
     [
-        tipped(model(a, Kind::Incisor, 12.0, 0.0), 2.0),
-        tipped(standing_out(model(b, Kind::Incisor, 8.0, 0.0), -0.2), 2.0),
-        tipped(standing_out(model(c, Kind::Canine, 12.0, -1.0), 2.5), 2.0),
-        standing_out(model(d, Kind::Premolar, 0.0, 0.3), 0.6),
-        standing_out(model(e, Kind::Premolar, 0.0, 0.3), 0.1),
-        model(f, Kind::Molar, -3.0, 0.3),
-        model(g, Kind::Molar, -3.0, 0.3),
-        model(h, Kind::Molar, -3.0, 0.3),
+        with_tip(tooth_model(a, ToothKind::Incisor, 12.0, 0.0), 2.0),
+        with_tip(with_buccal_offset(tooth_model(b, ToothKind::Incisor, 8.0, 0.0), -0.2), 2.0),
+        with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -1.0), 2.5), 2.0),
+        with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.6),
+        with_buccal_offset(tooth_model(e, ToothKind::Premolar, 0.0, 0.3), 0.1),
+        tooth_model(f, ToothKind::Molar, -3.0, 0.3),
+        tooth_model(g, ToothKind::Molar, -3.0, 0.3),
+        tooth_model(h, ToothKind::Molar, -3.0, 0.3),
     ]
 };
 
-const fn model(form: Form, kind: Kind, lean: f32, short: f32) -> Model {
-    Model { form, sizes: form.sizes, kind, lean, short, out: 0.0, tip: 0.0, turn: 0.0 }
+const fn tooth_model(form: ToothForm, kind: ToothKind, lean: f32, infraocclusion: f32) -> ToothModel {
+    ToothModel { form, sizes: form.sizes, kind, lean, infraocclusion, buccal_offset: 0.0, tip: 0.0, rotation: 0.0 }
 }
 
-const fn tipped(model: Model, tip: f32) -> Model {
-    Model { tip, ..model }
+const fn with_tip(model: ToothModel, tip: f32) -> ToothModel {
+    ToothModel { tip, ..model }
 }
 
-const fn standing_out(model: Model, out: f32) -> Model {
-    Model { out, ..model }
+const fn with_buccal_offset(model: ToothModel, buccal_offset: f32) -> ToothModel {
+    ToothModel { buccal_offset, ..model }
 }

@@ -1,0 +1,711 @@
+//! The application: chooses the screen that is shown, and carries out the commands of every screen.
+
+use super::command::{AppCommand, CameraCommand, PracticeCommand};
+use super::editor::{self, EditorCommand, EditorState, OpenMode};
+use super::exercise_list::{self, ExerciseList, exercise_list_ui};
+use super::i18n::{self, Translations};
+use super::lesson_scene::DisplayMode;
+use super::lesson_state::LessonState;
+use super::lesson_thread::{InputDevice, LessonConfig};
+use super::messages::SecondHandStatus;
+use super::results::{LessonResults, results_ui};
+use super::screen::Screen;
+use super::settings::{self, Settings};
+use super::settings_screen::settings_ui;
+use super::state_log::StateLog;
+use super::viewport::Viewport;
+use super::{AppOptions, briefing, practice, questionnaire, shortcuts, theme, viewport};
+use eframe::egui::{self, ViewportCommand};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+use typodont_audio::wav_files;
+use typodont_audio::{PlaybackOptions, Replacements};
+use typodont_author::new_exercise;
+use typodont_exercise::scenario::Scenario;
+use typodont_exercise::session::Input;
+use typodont_formats::Library;
+use typodont_formats::diagnostic::headlines;
+use typodont_lesson as lesson;
+
+pub struct App {
+    options: AppOptions,
+    settings: Settings,
+    languages: Vec<Translations>,
+    words: Translations,
+    exercise_list: ExerciseList,
+    participant: String,
+    screen: Screen,
+    /// The editor to return to after the test run of an exercise.
+    test_run_origin: Option<Box<EditorState>>,
+    overlay: shortcuts::OverlayState,
+    closing: CloseState,
+    /// True if a widget had the keyboard focus at the end of the last frame.
+    had_focus: bool,
+    /// True if settings were changed and are not saved yet.
+    has_unsaved_settings: bool,
+    /// Errors that concern no single screen, such as unreadable settings, languages or sounds.
+    complaints: Vec<String>,
+    state_log: StateLog,
+    /// True if a graphics processor draws; false for rendering in software.
+    has_graphics: bool,
+    /// Sound files with which the school replaces the built-in sounds.
+    replacements: Replacements,
+    /// Created for the first lesson and kept for the next.
+    viewport: Option<Viewport>,
+    frame_count: u64,
+}
+
+/// State of a request to close the window.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum CloseState {
+    No,
+    /// The user is asked to confirm that the lesson is aborted.
+    Asked,
+    /// The window closes as soon as the lesson's bundle is written.
+    AfterLesson,
+}
+
+/// Frame interval of a running lesson.
+const LESSON_FRAME_INTERVAL: Duration = Duration::from_millis(16);
+
+/// Poll interval of a screen that waits for something.
+const IDLE_POLL_INTERVAL: Duration = Duration::from_millis(100);
+
+impl App {
+    pub fn new(context: &eframe::CreationContext, options: AppOptions) -> App {
+        let ctx = &context.egui_ctx;
+        let (settings, complaint) = Settings::load();
+        let folder = settings::config_folder().map(|folder| folder.join("languages"));
+        let (languages, mut complaints) = i18n::load_all(folder.as_deref());
+        complaints.extend(complaint);
+        let (replacements, broken) = wav_files::read_folder(&sounds_folder());
+        complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
+        theme::apply(ctx, &settings);
+        let mut exercise_list = ExerciseList::load(&settings.exercises);
+        let mut screen = Screen::ExerciseList;
+        if let Some(path) = &options.exercise {
+            exercise_list.add_and_select(path);
+            if let Some(scan) = &options.tooth {
+                exercise_list.replace_teeth(scan);
+            }
+            if exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
+                screen = Screen::Briefing;
+            }
+        }
+        let begins = options.begins_at_once;
+        let mut app = App {
+            words: i18n::select_language(&languages, &settings.language),
+            participant: options.participant.clone(),
+            options,
+            settings,
+            languages,
+            exercise_list,
+            screen,
+            test_run_origin: None,
+            overlay: shortcuts::OverlayState::default(),
+            closing: CloseState::No,
+            had_focus: false,
+            has_unsaved_settings: false,
+            complaints,
+            state_log: StateLog::from_environment(),
+            replacements,
+            has_graphics: context.wgpu_render_state.as_ref().is_some_and(viewport::has_graphics),
+            viewport: None,
+            frame_count: 0,
+        };
+        if let (Some(mode), Some(path)) = (app.options.editor_mode, app.options.exercise.clone()) {
+            app.open_editor(&path, mode, ctx);
+        } else if begins {
+            app.begin_lesson(ctx);
+        }
+        app
+    }
+
+    /// Takes over all events since the last frame.
+    fn poll(&mut self, ctx: &egui::Context) {
+        if let Screen::Editor(editor) = &mut self.screen {
+            editor.poll(ctx.input(|input| input.time));
+        }
+        let Screen::Lesson(lesson) = &mut self.screen else { return };
+        let was_captured = lesson.is_pointer_captured;
+        lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
+        if was_captured && !lesson.is_pointer_captured {
+            set_pointer_capture(ctx, false);
+        }
+        let end = lesson.outcome.take();
+        if end.is_some() {
+            set_pointer_capture(ctx, false);
+        }
+        match end {
+            Some(Ok(bundle)) => match LessonResults::load(bundle, ctx) {
+                Ok(results) => self.screen = Screen::Results(Box::new(results)),
+                Err(why) => self.screen = Screen::Failed(why),
+            },
+            Some(Err(why)) => self.screen = Screen::Failed(why),
+            None => {}
+        }
+    }
+
+    fn execute(&mut self, command: AppCommand, ctx: &egui::Context) {
+        match command {
+            AppCommand::SelectExercise(place) => self.exercise_list.selected = place,
+            AppCommand::SelectNextExercise(by) => self.select_next_exercise(by),
+            AppCommand::OpenBriefing => self.open_briefing(),
+            AppCommand::OpenFolder(folder) => {
+                self.exercise_list = ExerciseList::load(&folder);
+                self.apply_settings(Settings { exercises: folder, ..self.settings.clone() }, ctx);
+            }
+            AppCommand::BackToList => self.go_back(),
+            AppCommand::BeginLesson => self.begin_lesson(ctx),
+            AppCommand::NewExercise => self.create_exercise(ctx),
+            AppCommand::EditExercise => self.edit_selected(ctx),
+            AppCommand::Editor(EditorCommand::TestRun) => self.test_run(ctx),
+            AppCommand::Editor(EditorCommand::Leave) => self.leave_editor(),
+            AppCommand::Editor(ask) => {
+                if let Screen::Editor(editor) = &mut self.screen {
+                    editor.execute(ask);
+                }
+            }
+            AppCommand::OpenReport => self.open_report(ctx),
+            AppCommand::ShowShortcuts(is_open) => {
+                self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false }, ctx)
+            }
+            AppCommand::ShowSettings(is_open) => {
+                self.open_overlay(shortcuts::OverlayState { shortcuts: false, settings: is_open }, ctx)
+            }
+            AppCommand::CloseWindow(is_closing) => self.confirm_close(is_closing, ctx),
+            AppCommand::ApplySettings(settings) => self.apply_settings(*settings, ctx),
+            AppCommand::Practice(command) => {
+                if let Screen::Lesson(lesson) = &mut self.screen {
+                    execute_in_lesson(lesson, command, ctx);
+                }
+            }
+            AppCommand::Camera(command) => self.move_camera(command),
+        }
+    }
+
+    /// Moves the selection down the list by this many places; negative is up.
+    fn select_next_exercise(&mut self, by: i32) {
+        let last = self.exercise_list.exercises.len().saturating_sub(1);
+        self.exercise_list.selected = self.exercise_list.selected.saturating_add_signed(by as isize).min(last);
+        self.exercise_list.scroll_to_selected = true;
+    }
+
+    /// Shows the instructions of the selected exercise, if it is valid.
+    fn open_briefing(&mut self) {
+        if self.exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
+            self.screen = Screen::Briefing;
+        }
+    }
+
+    /// Returns to the author's screen after a test run, otherwise to the list of exercises.
+    fn go_back(&mut self) {
+        if let Some(mut editor) = self.test_run_origin.take() {
+            editor.invalidate_preview();
+            self.screen = Screen::Editor(editor);
+            return;
+        }
+        if !matches!(self.screen, Screen::Briefing) {
+            // The next person at this station is a different trainee.
+            self.participant = self.options.participant.clone();
+        }
+        self.screen = Screen::ExerciseList;
+    }
+
+    /// Opens the report of the results in the browser.
+    fn open_report(&self, ctx: &egui::Context) {
+        if let Screen::Results(results) = &self.screen
+            && let Some(page) = results.report_url()
+        {
+            ctx.open_url(egui::OpenUrl::new_tab(page));
+        }
+    }
+
+    /// Moves the camera of a lesson or of the author's preview.
+    fn move_camera(&mut self, command: CameraCommand) {
+        let orbit = match &mut self.screen {
+            Screen::Lesson(lesson) => &mut lesson.orbit,
+            Screen::Editor(editor) => &mut editor.preview.orbit,
+            Screen::ExerciseList | Screen::Briefing | Screen::Results(_) | Screen::Failed(_) => return,
+        };
+        *orbit = match command {
+            CameraCommand::Orbit { right, up } => orbit.rotated(right, up),
+            CameraCommand::Zoom(factor) => orbit.zoomed(factor),
+            CameraCommand::Pan { right, up } => orbit.panned(right, up),
+        };
+    }
+
+    /// Shows one page over the screen, or none. The pointer is released while a page is shown.
+    fn open_overlay(&mut self, overlay: shortcuts::OverlayState, ctx: &egui::Context) {
+        self.overlay = overlay;
+        if let Screen::Lesson(lesson) = &mut self.screen
+            && lesson.is_pointer_captured
+        {
+            lesson.release_pointer();
+            set_pointer_capture(ctx, false);
+        }
+    }
+
+    /// Aborts the lesson and closes the window when its bundle is written, or continues the lesson.
+    fn confirm_close(&mut self, is_closing: bool, ctx: &egui::Context) {
+        self.closing = CloseState::No;
+        match &mut self.screen {
+            _ if !is_closing => {}
+            Screen::Lesson(lesson) => {
+                lesson.abort();
+                self.closing = CloseState::AfterLesson;
+            }
+            _ => ctx.send_viewport_cmd(ViewportCommand::Close),
+        }
+    }
+
+    /// Opens the author's screen with a new exercise in the user's language.
+    fn create_exercise(&mut self, ctx: &egui::Context) {
+        let words = &self.words;
+        let lines = ["author.new_cleared", "author.new_spared", "author.new_light"].map(|key| words.get(key));
+        let [title, stage, instruction] =
+            ["author.new_title", "author.new_stage", "author.new_instruction"].map(|key| words.get(key));
+        let text = new_exercise(title, stage, instruction, lines, words.get("author.new_fail"));
+        self.screen = Screen::Editor(Box::new(EditorState::new(text, repaint_waker(ctx))));
+    }
+
+    /// Opens the selected exercise at the author's screen; a shipped exercise is opened as a copy.
+    fn edit_selected(&mut self, ctx: &egui::Context) {
+        let Some(exercise) = self.exercise_list.selected_exercise() else { return };
+        match (exercise.path.clone(), exercise_list::shipped_text(&exercise.name)) {
+            (Some(path), _) => self.open_editor(&path, OpenMode::Edit, ctx),
+            (None, Some(text)) => {
+                self.screen = Screen::Editor(Box::new(EditorState::copy(&exercise.name, text, repaint_waker(ctx))));
+            }
+            (None, None) => {}
+        }
+    }
+
+    fn open_editor(&mut self, path: &Path, mode: OpenMode, ctx: &egui::Context) {
+        self.screen = match EditorState::open(path, mode, repaint_waker(ctx)) {
+            Ok(editor) => Screen::Editor(Box::new(editor)),
+            Err(complaint) => Screen::Failed(complaint.headline()),
+        };
+    }
+
+    /// Returns to the exercise list, which now includes the edited exercise. Unsaved changes are kept as a draft.
+    fn leave_editor(&mut self) {
+        let Screen::Editor(editor) = &mut self.screen else { return };
+        editor.autosave();
+        let path = editor.path.clone();
+        self.exercise_list = ExerciseList::load(&self.settings.exercises);
+        if let Some(path) = path {
+            self.exercise_list.select_file(&path);
+        }
+        self.screen = Screen::ExerciseList;
+    }
+
+    /// Begins a lesson with the exercise being edited. Its bundle replaces that of the test run before.
+    fn test_run(&mut self, ctx: &egui::Context) {
+        let Screen::Editor(editor) = &mut self.screen else { return };
+        editor.autosave();
+        let scenario = match editor.scenario() {
+            Ok(scenario) => scenario,
+            Err(_) => return editor.execute(EditorCommand::Check),
+        };
+        let library = editor.library.clone();
+        let out = settings::config_folder().unwrap_or_else(std::env::temp_dir).join("tried");
+        let _ = std::fs::remove_dir_all(&out);
+        let left = std::mem::replace(&mut self.screen, Screen::ExerciseList);
+        if let Screen::Editor(editor) = left {
+            self.test_run_origin = Some(editor);
+        }
+        self.begin_lesson_with(Arc::new(scenario), library, BTreeMap::new(), out, ctx);
+    }
+
+    /// Delays a request to close the window while a lesson runs and until its bundle is written.
+    fn handle_close_request(&mut self, ctx: &egui::Context) {
+        let is_in_lesson = matches!(self.screen, Screen::Lesson(_));
+        if ctx.input(|input| input.viewport().close_requested())
+            && let Screen::Editor(editor) = &mut self.screen
+        {
+            editor.autosave();
+        }
+        if ctx.input(|input| input.viewport().close_requested()) && is_in_lesson {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            if self.closing == CloseState::No {
+                self.open_overlay(shortcuts::OverlayState::default(), ctx);
+                self.closing = CloseState::Asked;
+            }
+        }
+        if self.closing == CloseState::AfterLesson && !is_in_lesson {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+
+    fn begin_lesson(&mut self, ctx: &egui::Context) {
+        let Some(exercise) = self.exercise_list.selected_exercise() else { return };
+        let (Ok(scenario), library) = (&exercise.scenario, exercise.library.clone()) else { return };
+        if !lesson::is_valid_participant_code(&self.participant) {
+            return;
+        }
+        let (scenario, digests, out) = (scenario.clone(), exercise.digests.clone(), self.options.out.clone());
+        self.begin_lesson_with(scenario, library, digests, out, ctx);
+    }
+
+    fn begin_lesson_with(
+        &mut self,
+        scenario: Arc<Scenario>,
+        library: Library,
+        digests: BTreeMap<String, String>,
+        out: PathBuf,
+        ctx: &egui::Context,
+    ) {
+        let input_device = match self.options.device.as_deref().unwrap_or(&self.settings.device) {
+            "mouse" => InputDevice::Mouse,
+            device => match lesson::open_device(device) {
+                Ok(held) => InputDevice::Device(held),
+                Err(failed) => {
+                    self.screen = Screen::Failed(failed.to_string());
+                    return;
+                }
+            },
+        };
+        let started = jiff::Timestamp::now();
+        let config = LessonConfig {
+            scenario,
+            seed: self.options.seed.unwrap_or_else(|| lesson::seed_from_time(started)),
+            participant: self.participant.clone(),
+            out,
+            templates: self.options.templates.clone(),
+            started,
+            input_device,
+            second: self.options.second.clone(),
+            digests,
+            wake: repaint_waker(ctx),
+        };
+        self.state_log.record("seed", config.seed);
+        let output = PlaybackOptions {
+            seed: config.seed,
+            replacements: self.replacements.clone(),
+            ..PlaybackOptions::default()
+        };
+        let mode = if self.has_graphics { DisplayMode::Iso } else { DisplayMode::Surface };
+        self.screen = match LessonState::begin(config, library, output, mode) {
+            Ok(lesson) => Screen::Lesson(Box::new(lesson)),
+            Err(why) => Screen::Failed(why),
+        };
+    }
+
+    fn apply_settings(&mut self, settings: Settings, ctx: &egui::Context) {
+        self.words = i18n::select_language(&self.languages, &settings.language);
+        if settings.font_size == self.settings.font_size {
+            theme::apply(ctx, &settings);
+        }
+        self.settings = settings;
+        self.has_unsaved_settings = true;
+    }
+
+    /// Applies and saves changed settings once the mouse button is released: a text size that changed during a drag
+    /// would move the slider away from the pointer.
+    fn save_settings(&mut self, ctx: &egui::Context) {
+        if self.has_unsaved_settings && !ctx.input(|input| input.pointer.any_down()) {
+            theme::apply(ctx, &self.settings);
+            self.complaints.extend(self.settings.save());
+            self.has_unsaved_settings = false;
+        }
+    }
+
+    fn screen_ui(&mut self, ui: &mut egui::Ui, frame: &eframe::Frame, commands: &mut Vec<AppCommand>) {
+        let is_test_run = self.test_run_origin.is_some();
+        let App { screen, exercise_list, words, settings, participant, viewport, .. } = self;
+        match screen {
+            Screen::ExerciseList => exercise_list_ui(ui, exercise_list, words, commands),
+            Screen::Editor(editor) => {
+                if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
+                    *viewport = Some(Viewport::new(state));
+                }
+                editor::editor_ui(ui, editor, viewport.as_mut(), words, commands);
+            }
+            Screen::Briefing => {
+                if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
+                    briefing::briefing_ui(ui, scenario, participant, words, commands);
+                }
+            }
+            Screen::Lesson(lesson) if lesson.are_stages_over && !lesson.is_submitted => {
+                questionnaire::questionnaire_ui(ui, lesson, words, commands);
+                lesson.scroll_to_statement = false;
+            }
+            Screen::Lesson(lesson) if lesson.are_stages_over || lesson.is_scoring => theme::centered_column(ui, |ui| {
+                ui.heading(words.get("practice.scoring"));
+                theme::progress_dots(ui);
+            }),
+            Screen::Lesson(lesson) => {
+                if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
+                    *viewport = Some(Viewport::new(state));
+                }
+                practice::practice_ui(ui, lesson, settings, viewport.as_mut(), words, commands);
+            }
+            Screen::Results(results) => results_ui(ui, results, is_test_run, words, commands),
+            Screen::Failed(why) => theme::centered_column(ui, |ui| {
+                ui.heading(words.get("desk.failed"));
+                ui.label(why.as_str());
+                ui.add_space(12.0);
+                if ui.add(theme::primary_button(words.get("results.again"))).clicked() {
+                    commands.push(AppCommand::BackToList);
+                }
+            }),
+        }
+    }
+
+    /// Pages over the screen: shortcuts, settings, the question before closing.
+    fn overlay_ui(&self, ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
+        let words = &self.words;
+        if self.overlay.shortcuts {
+            modal_page(ctx, words.get("keys.title"), |ui| shortcuts::shortcuts_ui(ui, words, commands));
+        }
+        if self.overlay.settings {
+            modal_page(ctx, words.get("settings.title"), |ui| {
+                settings_ui(ui, &self.settings, self.has_graphics, &self.languages, words, commands);
+            });
+        }
+        if self.closing == CloseState::Asked {
+            modal_page(ctx, words.get("desk.close"), |ui| {
+                ui.label(words.get("practice.give_up_sure"));
+                ui.add_space(8.0);
+                ui.horizontal(|ui| {
+                    for (key, is_closing) in [("desk.close_yes", true), ("practice.give_up_no", false)] {
+                        if ui.button(words.get(key)).clicked() {
+                            commands.push(AppCommand::CloseWindow(is_closing));
+                        }
+                    }
+                });
+            });
+        }
+    }
+
+    /// Writes the state of the screen to the state log, a line per change.
+    fn log_state(&mut self) {
+        let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, .. } = self;
+        state_log.record(
+            "over",
+            if open.shortcuts {
+                "keys"
+            } else if open.settings {
+                "settings"
+            } else if *closing == CloseState::Asked {
+                "close"
+            } else {
+                "nothing"
+            },
+        );
+        match screen {
+            Screen::ExerciseList => {
+                state_log.record("screen", "shelf");
+                state_log.record("chosen", exercise_list.selected_exercise().map_or("", |e| e.id()));
+            }
+            Screen::Editor(editor) => {
+                log_editor(state_log, editor);
+                state_log.record("turn", *frame_count);
+            }
+            Screen::Briefing => state_log.record("screen", "briefing"),
+            Screen::Lesson(lesson) => log_lesson(state_log, lesson),
+            Screen::Results(results) => {
+                state_log.record("bundle", results.bundle.display());
+                state_log.record("screen", "results");
+            }
+            Screen::Failed(why) => state_log.record("screen", format!("failed {why}")),
+        }
+    }
+}
+
+/// A modal page over the screen; it takes all keyboard and pointer input.
+fn modal_page(ctx: &egui::Context, title: &str, contents: impl FnOnce(&mut egui::Ui)) {
+    let room = ctx.content_rect().size() - egui::vec2(80.0, 120.0);
+    let height = room.y.max(200.0);
+    let frame = egui::Frame::popup(&ctx.global_style()).inner_margin(24);
+    egui::Modal::new(egui::Id::unique(title)).frame(frame).show(ctx, |ui| {
+        ui.heading(title);
+        ui.add_space(10.0);
+        // As high as it needs to be, up to the window's own height.
+        egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, contents);
+    });
+}
+
+fn log_editor(log: &mut StateLog, editor: &EditorState) {
+    log.record("part", format!("{:?}", editor.section));
+    log.record("file", editor.path.as_ref().map_or(String::new(), |path| path.display().to_string()));
+    log.record("unsaved", editor.is_unsaved());
+    log.record("complaints", editor.complaints.len());
+    log.record("checked", editor.is_checked);
+    log.record("teeth", editor.preview.generation);
+    log.record("told", editor.notice.as_ref().map_or("", |(key, _)| key));
+    let chosen = editor.selected_decay_pointer().and_then(|at| Some(editor.draft.value_at(&at)?.to_string()));
+    log.record("decay", chosen.unwrap_or_default());
+    log.record("screen", "author");
+}
+
+/// A function that makes the window draw a new frame; callable from another thread.
+fn repaint_waker(ctx: &egui::Context) -> Box<dyn Fn() + Send> {
+    let ctx = ctx.clone();
+    Box::new(move || ctx.request_repaint())
+}
+
+fn log_lesson(log: &mut StateLog, lesson: &LessonState) {
+    if lesson.is_scoring {
+        log.record("screen", "scoring");
+    } else if lesson.are_stages_over {
+        log.record("statement", lesson.statement);
+        log.record("rated", lesson.ratings.len());
+        log.record("screen", "questionnaire");
+    } else {
+        log.record("screen", if lesson.stage.is_some() { "practice" } else { "making" });
+    }
+    log.record("pointer", if lesson.is_pointer_captured { "held" } else { "free" });
+    log.record("paused", lesson.is_paused);
+    if let Some(SecondHandStatus::AwaitingConnection(address)) = lesson.second_hand {
+        log.record("may_join", address);
+    }
+    log.record("view", format!("{:.4} {:.4}", lesson.orbit.azimuth, lesson.orbit.elevation));
+    if let Some(scene) = &lesson.scene {
+        log.record("open", scene.mouth_opening);
+        let specks = scene.particles.as_ref().map_or((0, 0), |field| (field.opaque().len(), field.translucent().len()));
+        log.record("dust", specks.0);
+        log.record("water", specks.1);
+        log.record("tooth", if scene.is_new { "made" } else { "drawn" });
+    }
+    log.record("shown", format!("{:?}", lesson.display_mode));
+    if let Some(snapshot) = lesson.snapshot {
+        let [x, y, z] = snapshot.hand.to_array();
+        log.record("hand", format!("{x:.2} {y:.2} {z:.2}"));
+        let [x, y, z] = snapshot.tip.to_array();
+        log.record("tip", format!("{x:.2} {y:.2} {z:.2}"));
+        log.record("cleared", format!("{:.0}", snapshot.cleared_pct.unwrap_or_default()));
+        log.record("instrument", snapshot.instrument);
+        log.record("ticks", snapshot.timing.ticks);
+        log.record(
+            "late",
+            format!("{} {} {}", snapshot.timing.late_p99, snapshot.timing.late_max, snapshot.timing.missed),
+        );
+    }
+}
+
+/// Carries out commands of a lesson.
+fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand, ctx: &egui::Context) {
+    match command {
+        PracticeCommand::SelectInstrument(instrument) => lesson.submit(Input::Take { instrument }),
+        PracticeCommand::AnswerQuestion(question, value) => lesson.answer_question(question, value),
+        PracticeCommand::AddToChart(sign) => lesson.add_to_chart(sign),
+        PracticeCommand::ConfirmStage => lesson.confirm_stage(),
+        PracticeCommand::Pause(is_paused) => {
+            lesson.pause(is_paused);
+            set_pointer_capture(ctx, lesson.is_pointer_captured);
+        }
+        PracticeCommand::AskToAbort(is_giving_up) => lesson.is_confirming_abort = is_giving_up,
+        PracticeCommand::Abort => lesson.abort(),
+        PracticeCommand::AdjustCoefficient(label, coefficient, value) => lesson.adjust(label, coefficient, value),
+        PracticeCommand::SetDisplayMode(way) => lesson.display_mode = way,
+        PracticeCommand::SetTransferFunction(curves) => {
+            if let Some(scene) = &mut lesson.scene {
+                scene.transfer_function = *curves;
+                lesson.display_mode = DisplayMode::Drawn;
+            }
+        }
+        PracticeCommand::CapturePointer(is_held) => capture_pointer(lesson, is_held, ctx),
+        PracticeCommand::CentrePointer(at) => ctx.send_viewport_cmd(ViewportCommand::CursorPosition(at)),
+        PracticeCommand::MoveHand { right, down } => {
+            if let Some(mouse) = lesson.mouse() {
+                mouse.move_by_pixels(right, down, lesson.orbit.world_from_view());
+            }
+        }
+        PracticeCommand::MoveHandDepth(steps) => {
+            if let Some(mouse) = lesson.mouse() {
+                mouse.move_by_wheel(steps, lesson.orbit.world_from_view());
+            }
+        }
+        PracticeCommand::SetDeviceButton { bit, is_down } => {
+            if let Some(mouse) = lesson.mouse() {
+                mouse.set_button(bit, is_down);
+            }
+        }
+        PracticeCommand::AdjustMouthOpening(by) => {
+            if let Some(scene) = &mut lesson.scene {
+                scene.open_mouth(by);
+            }
+        }
+        PracticeCommand::SetCamera(view) => {
+            if let Some(orbit) = lesson.scene.as_ref().and_then(|matter| view.orbit(matter)) {
+                lesson.orbit = orbit;
+            }
+        }
+        PracticeCommand::RateStatement(item, value) => {
+            lesson.rate_statement(item, value);
+        }
+        PracticeCommand::SelectNextStatement(by) => lesson.select_next_statement(by),
+        PracticeCommand::SubmitQuestionnaire if lesson.unrated_statements() > 0 && !lesson.is_confirming_submit => {
+            lesson.is_confirming_submit = true
+        }
+        PracticeCommand::SubmitQuestionnaire => lesson.submit_questionnaire(),
+    }
+}
+
+/// Makes the pointer act as the device if the lesson has a mouse and is not paused, or releases it.
+fn capture_pointer(lesson: &mut LessonState, is_held: bool, ctx: &egui::Context) {
+    lesson.is_pointer_captured = is_held && lesson.has_mouse() && !lesson.is_paused;
+    if !is_held {
+        lesson.release_pointer();
+    }
+    set_pointer_capture(ctx, lesson.is_pointer_captured);
+}
+
+/// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the settings folder.
+fn sounds_folder() -> PathBuf {
+    let beside = PathBuf::from("content/sounds");
+    match settings::config_folder() {
+        Some(folder) if !beside.is_dir() => folder.join("sounds"),
+        _ => beside,
+    }
+}
+
+/// Locks and hides the pointer while it acts as the device.
+fn set_pointer_capture(ctx: &egui::Context, is_captured: bool) {
+    // X11 cannot lock a pointer, and reports each movement twice while it is confined; there the pointer is moved back
+    // to the centre instead.
+    let grab_mode = egui::CursorGrab::Locked;
+    ctx.send_viewport_cmd(ViewportCommand::CursorGrab(if is_captured { grab_mode } else { egui::CursorGrab::None }));
+    ctx.send_viewport_cmd(ViewportCommand::CursorVisible(!is_captured));
+}
+
+impl eframe::App for App {
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        let mut commands = Vec::new();
+        self.poll(&ctx);
+        self.handle_close_request(&ctx);
+        shortcuts::collect_commands(&ctx, &self.screen, self.overlay, self.had_focus, &mut commands);
+        for complaint in &self.complaints {
+            ui.colored_label(theme::ERROR, complaint);
+        }
+        self.screen_ui(ui, frame, &mut commands);
+        self.overlay_ui(&ctx, &mut commands);
+        for command in commands {
+            self.execute(command, &ctx);
+        }
+        self.save_settings(&ctx);
+        self.had_focus = ctx.memory(|memory| memory.focused().is_some());
+        self.frame_count += 1;
+        self.state_log.record("pictures", self.frame_count / 10);
+        self.log_state();
+        editor::log_anchors(&ctx, &mut self.state_log);
+        if let Some(wait) = self.options.frame_delay {
+            std::thread::sleep(wait);
+        }
+        ctx.request_repaint_after(match &self.screen {
+            // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
+            Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
+            Screen::Lesson(lesson) if !lesson.are_stages_over => LESSON_FRAME_INTERVAL,
+            _ => IDLE_POLL_INTERVAL,
+        });
+    }
+}

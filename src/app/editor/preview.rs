@@ -1,0 +1,125 @@
+//! The author's view of the tooth: camera, display mode and slice position.
+
+use super::build_worker::BuildResult;
+use eframe::egui;
+use std::sync::Arc;
+use typodont_core::frame::Vec3;
+use typodont_core::volume::Label;
+use typodont_exercise::catalog::TissueRole;
+use typodont_render::{LabelPalette, MeshInstance, Orbit, RenderMode, TransferFunction};
+use typodont_scene as scene;
+
+/// The way in which the tooth is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PreviewMode {
+    #[default]
+    Surface,
+    /// Tissues drawn transparently, in their colours.
+    Glass,
+    /// Decay alone.
+    Decay,
+}
+
+impl PreviewMode {
+    pub const ALL: [(PreviewMode, &str); 3] = [
+        (PreviewMode::Surface, "author.surface"),
+        (PreviewMode::Glass, "menu.clear"),
+        (PreviewMode::Decay, "menu.decay"),
+    ];
+}
+
+/// Inputs of a rendered image; an image with equal inputs need not be drawn again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PreviewFrame {
+    pub orbit: Orbit,
+    pub mode: PreviewMode,
+    pub shows_surroundings: bool,
+    pub size: [u32; 2],
+    pub generation: u64,
+}
+
+/// A slice as it was last drawn: generation of the build, position along its axis, mm, and size, pixels.
+pub struct SliceImage {
+    pub generation: u64,
+    pub position: f32,
+    pub size: [u32; 2],
+    pub texture: egui::TextureHandle,
+}
+
+pub struct PreviewState {
+    pub orbit: Orbit,
+    pub mode: PreviewMode,
+    pub shows_surroundings: bool,
+    /// Intersection of the three slices, tooth space, mm.
+    pub slice_point: Vec3,
+    /// Number of builds taken over so far.
+    pub generation: u64,
+    /// True until the renderer has received this volume.
+    pub is_new: bool,
+    pub last_frame: Option<(PreviewFrame, egui::TextureId)>,
+    pub slices: [Option<SliceImage>; 3],
+    pub palette: LabelPalette,
+    pub surroundings: Vec<MeshInstance>,
+    glass: Arc<TransferFunction>,
+    decay: Arc<TransferFunction>,
+    /// FDI numbers of the teeth; if they change, the camera returns to the usual view.
+    teeth: Vec<u8>,
+}
+
+impl Default for PreviewState {
+    fn default() -> PreviewState {
+        let palette = LabelPalette::from_colours(|_| [0.85, 0.82, 0.75], 0.15);
+        PreviewState {
+            orbit: Orbit::around(Vec3::ZERO, 9.0),
+            mode: PreviewMode::Surface,
+            shows_surroundings: false,
+            slice_point: Vec3::ZERO,
+            generation: 0,
+            is_new: true,
+            last_frame: None,
+            slices: [None, None, None],
+            glass: Arc::new(TransferFunction::tissue(&palette)),
+            decay: Arc::new(TransferFunction::highlighting(&[], &palette)),
+            palette,
+            surroundings: Vec::new(),
+            teeth: Vec::new(),
+        }
+    }
+}
+
+impl PreviewState {
+    /// Shows a new build; the camera returns to the usual view if the teeth are others.
+    pub fn update(&mut self, build: &BuildResult) {
+        let tissues = &build.scenario.tissues;
+        self.palette = scene::tissue_palette(tissues, true);
+        let decay: Vec<Label> =
+            tissues.entries().iter().filter(|e| e.role == TissueRole::Decay).map(|e| e.label()).collect();
+        self.glass = Arc::new(TransferFunction::tissue(&self.palette));
+        self.decay = Arc::new(TransferFunction::highlighting(&decay, &self.palette));
+        self.surroundings = scene::surrounding_solids(&build.workpiece, tissues);
+        let teeth: Vec<u8> = build.workpiece.teeth.iter().map(|tooth| tooth.fdi).collect();
+        if teeth != self.teeth {
+            self.orbit = scene::work_view(&build.workpiece).zoomed(0.8);
+            let middle = build.workpiece.teeth.first().map(|tooth| 0.5 * (tooth.crown_low + tooth.crown_high));
+            self.slice_point =
+                build.workpiece.lesions.first().map(|lesion| lesion.centre).or(middle).unwrap_or_default();
+            self.teeth = teeth;
+        }
+        self.generation += 1;
+        self.invalidate();
+    }
+
+    /// Forces a redraw, because the renderer may have drawn another scene since.
+    pub fn invalidate(&mut self) {
+        self.is_new = true;
+        self.last_frame = None;
+    }
+
+    pub fn render_mode(&self) -> RenderMode {
+        match self.mode {
+            PreviewMode::Surface => RenderMode::Surface,
+            PreviewMode::Glass => RenderMode::Volume(self.glass.clone()),
+            PreviewMode::Decay => RenderMode::Volume(self.decay.clone()),
+        }
+    }
+}

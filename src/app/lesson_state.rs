@@ -1,0 +1,392 @@
+//! A lesson as the window knows it: its events so far, its scene, and answers not yet submitted.
+
+use super::answer_draft::parse_draft;
+use super::lesson_scene::{DisplayMode, LessonScene};
+use super::lesson_thread::{LessonCommand, LessonConfig, LessonEvent, LessonThread};
+use super::messages::{self, PauseReason, SecondHandStatus};
+use super::snapshot::LessonSnapshot;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer};
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::sim::Command as Tell;
+use typodont_core::touch::{Coefficient, Materials};
+use typodont_core::volume::Label;
+use typodont_exercise::scenario::{Scenario, Stage};
+use typodont_exercise::session::{AnswerValue, ChartInput, ChartRecord, Effect, Input};
+use typodont_formats::Library;
+use typodont_lesson::live::LiveEvent;
+use typodont_render::Orbit;
+use typodont_scene::particles::CollisionWorld;
+use typodont_scene::{self as scene};
+
+/// Maximum number of voxel edits taken over per frame, so that a burst of edits does not delay the frame.
+const MAX_EDITS_PER_FRAME: usize = 1 << 16;
+
+pub struct LessonState {
+    pub scenario: Arc<Scenario>,
+    thread: LessonThread,
+    player: SoundPlayer,
+    /// Reason why there is no sound, if there is none.
+    pub audio_error: Option<String>,
+    /// Mean time between frames, s.
+    mean_frame_time: f32,
+    pub frames_per_second: f32,
+    /// The workpiece and its drawn scene; `None` until it is built.
+    pub scene: Option<LessonScene>,
+    pub snapshot: Option<LessonSnapshot>,
+    /// The running stage; `None` before the first and after the last.
+    pub stage: Option<usize>,
+    pub are_stages_over: bool,
+    /// True, by question of the stage, once it is answered.
+    pub answered: Vec<bool>,
+    /// Text typed but not yet submitted, by question.
+    pub drafts: BTreeMap<String, String>,
+    /// Last submitted answer, by question.
+    pub answers: BTreeMap<String, AnswerValue>,
+    /// Reason why the last input was not accepted: a key of the language file.
+    pub refusal_key: Option<&'static str>,
+    /// Reason why the lesson is suspended by the system, if it is.
+    pub pause_reason: Option<PauseReason>,
+    /// Last status of a second hand.
+    pub second_hand: Option<SecondHandStatus>,
+    pub is_paused: bool,
+    /// True while the pointer acts as the device.
+    pub is_pointer_captured: bool,
+    pub is_confirming_abort: bool,
+    pub orbit: Orbit,
+    /// Source of the instruments' models.
+    library: Library,
+    /// Entries of the running stage's periodontal chart.
+    pub chart: Vec<ChartRecord>,
+    /// Complaints about parts of the scene that could not be drawn as the exercise requires.
+    pub complaints: Vec<String>,
+    pub display_mode: DisplayMode,
+    /// Present coefficients of the tissues, before any instrument's own factors.
+    pub materials: Materials,
+    /// Ratings chosen on the questionnaire's scale, by statement.
+    pub ratings: BTreeMap<String, u8>,
+    /// Index of the current statement, which a digit key rates.
+    pub statement: usize,
+    pub scroll_to_statement: bool,
+    /// True while the user is asked to confirm submission with statements not rated.
+    pub is_confirming_submit: bool,
+    pub is_submitted: bool,
+    pub is_scoring: bool,
+    /// Folder of the bundle, or the reason why there is none.
+    pub outcome: Option<Result<PathBuf, String>>,
+}
+
+/// Radius of the view until the workpiece is built, mm.
+const FIRST_RADIUS: f32 = 9.0;
+
+impl LessonState {
+    /// Begins a lesson with an audio output and a first display mode.
+    pub fn begin(
+        config: LessonConfig,
+        library: Library,
+        output: PlaybackOptions,
+        display_mode: DisplayMode,
+    ) -> Result<LessonState, String> {
+        let scenario = config.scenario.clone();
+        let materials = scenario.tissues.materials();
+        let (sound_sender, sound_receiver) = audio::sound_channel();
+        let thread = LessonThread::start(config, sound_sender)
+            .map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
+        Ok(LessonState {
+            scenario,
+            thread,
+            player: SoundPlayer::start(sound_receiver, output),
+            audio_error: None,
+            mean_frame_time: 0.0,
+            frames_per_second: 0.0,
+            scene: None,
+            snapshot: None,
+            stage: None,
+            are_stages_over: false,
+            answered: Vec::new(),
+            drafts: BTreeMap::new(),
+            answers: BTreeMap::new(),
+            chart: Vec::new(),
+            refusal_key: None,
+            pause_reason: None,
+            second_hand: None,
+            is_paused: false,
+            is_pointer_captured: false,
+            is_confirming_abort: false,
+            orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
+            library,
+            display_mode,
+            materials,
+            ratings: BTreeMap::new(),
+            statement: 0,
+            scroll_to_statement: false,
+            is_confirming_submit: false,
+            is_submitted: false,
+            is_scoring: false,
+            complaints: Vec::new(),
+            outcome: None,
+        })
+    }
+
+    /// The running stage.
+    pub fn stage(&self) -> Option<&Stage> {
+        self.stage.and_then(|stage| self.scenario.stages.get(stage))
+    }
+
+    /// True if the pointer can act as the device.
+    pub fn has_mouse(&self) -> bool {
+        self.thread.mouse.is_some()
+    }
+
+    pub fn mouse(&self) -> Option<&typodont_devices::mouse::Mouse> {
+        self.thread.mouse.as_ref()
+    }
+
+    /// Takes over all events of the lesson since the last frame.
+    ///
+    /// `volume`: share of full scale, 0 to 1; `elapsed`: time since the last frame, s.
+    pub fn poll(&mut self, volume: f32, elapsed: f32) {
+        /// Number of frames over which the frame rate is smoothed.
+        const SMOOTHED_FRAMES: f32 = 8.0;
+        self.mean_frame_time += (elapsed - self.mean_frame_time) / SMOOTHED_FRAMES;
+        self.frames_per_second = 1.0 / self.mean_frame_time.max(1e-3);
+        self.player.set_volume(volume);
+        while let Some(event) = self.player.next_event() {
+            self.audio_error = match event {
+                PlayerEvent::Playing { .. } => None,
+                PlayerEvent::Silent(silence) => Some(silence.to_string()),
+            };
+        }
+        while let Some(event) = self.thread.next_event() {
+            self.apply_event(event);
+        }
+        if let Some(scene) = &mut self.scene {
+            for _ in 0..MAX_EDITS_PER_FRAME {
+                let Some(edit) = self.thread.next_edit() else { break };
+                if let Some(particles) = &mut scene.particles {
+                    particles.record_removal(&edit, scene.volume.grid());
+                }
+                scene.volume.apply_edit(&edit);
+            }
+        }
+        self.snapshot = self.thread.snapshot().or(self.snapshot);
+        self.step_particles(elapsed);
+        if self.outcome.is_none() && self.thread.is_finished() {
+            self.outcome = Some(Err(
+                "broken-off: the session ended unexpectedly; its recording is in the folder of finished sessions, and \
+                 `typodont finish` makes a bundle from it"
+                    .into(),
+            ));
+        }
+    }
+
+    /// Advances dust and water by `elapsed`, s, while the lesson runs.
+    fn step_particles(&mut self, elapsed: f32) {
+        let does_drill_run = self.stage().is_some_and(|stage| stage.cutting);
+        let snapshot = self.snapshot.filter(|_| does_drill_run);
+        let is_still = self.is_paused || self.pause_reason.is_some();
+        let Some(LessonScene { particles: Some(field), volume, workpiece, palette, .. }) = &mut self.scene else {
+            return;
+        };
+        if is_still {
+            return;
+        }
+        let world_from_tip = |seen: LessonSnapshot| Pose { position: seen.tip, orientation: seen.orientation };
+        let bur = snapshot.and_then(|seen| field.bur(seen.instrument as usize, world_from_tip(seen)));
+        let ground =
+            CollisionWorld { volume, world_from_tooth: workpiece.world_from_tooth, obstacles: &workpiece.surroundings };
+        field.advance(elapsed, bur.as_ref(), &ground, palette);
+    }
+
+    fn apply_event(&mut self, event: LessonEvent) {
+        match event {
+            LessonEvent::WorkpieceReady(workpiece) => {
+                self.orbit = scene::work_view(&workpiece);
+                let (scene, complaints) =
+                    LessonScene::build(&self.scenario, &self.library, workpiece, self.is_decay_shown());
+                (self.scene, self.complaints) = (Some(scene), complaints);
+            }
+            LessonEvent::Live(LiveEvent::Effect(effect)) => self.apply_effect(&effect),
+            LessonEvent::Live(LiveEvent::DeviceState(state)) => {
+                self.pause_reason = PauseReason::from_state(state);
+            }
+            LessonEvent::Live(LiveEvent::DeviceLost(gone)) => self.pause_reason = Some(PauseReason::device_lost(gone)),
+            LessonEvent::Live(LiveEvent::ServoStarted(_)) => {}
+            LessonEvent::AwaitingSecondHand(address) => {
+                self.second_hand = Some(SecondHandStatus::AwaitingConnection(address))
+            }
+            LessonEvent::SecondHand(news) => self.second_hand = Some(SecondHandStatus::from_event(news)),
+            LessonEvent::DifferentDevice => self.pause_reason = Some(PauseReason::different_device()),
+            LessonEvent::Scoring => self.is_scoring = true,
+            LessonEvent::Finished(path) => self.outcome = Some(Ok(path)),
+            LessonEvent::Failed(why) => self.outcome = Some(Err(why)),
+        }
+    }
+
+    fn apply_effect(&mut self, effect: &Effect) {
+        match effect {
+            Effect::StageStarted { stage } => {
+                self.stage = Some(*stage);
+                self.answered = vec![false; self.scenario.stages[*stage].ask.len()];
+                self.drafts.clear();
+                self.answers.clear();
+                self.chart.clear();
+                self.refusal_key = None;
+                self.materials = self.scenario.tissues.materials();
+                self.update_palette();
+                if !DisplayMode::available(self.stage()).any(|(way, _)| way == self.display_mode) {
+                    self.display_mode = DisplayMode::Surface;
+                }
+            }
+            Effect::Answered { question, .. } => {
+                if let Some(answered) = self.answered.get_mut(*question) {
+                    *answered = true;
+                }
+                self.refusal_key = None;
+            }
+            Effect::Charted { record: note, is_present: is_there, .. } => {
+                let is_like = |n: &ChartRecord| n.site == note.site && n.entry.is_same_kind(&note.entry);
+                self.chart.retain(|n| !is_like(n));
+                self.chart.extend(is_there.then_some(*note));
+                self.refusal_key = None;
+            }
+            Effect::StagesOver => {
+                (self.stage, self.are_stages_over) = (None, true);
+                self.release_pointer();
+            }
+            Effect::Refused { why } => self.refusal_key = Some(messages::refusal_key(*why)),
+            Effect::Command(Tell::SetCoefficient { label, coefficient, value }) => {
+                self.materials.set(*label, self.materials.get(*label).with(*coefficient, *value));
+            }
+            Effect::Command(_) | Effect::StepStarted { .. } | Effect::StageEnded { .. } => {}
+        }
+    }
+
+    /// The display mode after the present one.
+    pub fn next_display_mode(&self) -> DisplayMode {
+        let modes: Vec<DisplayMode> = DisplayMode::available(self.stage()).map(|(way, _)| way).collect();
+        let place = modes.iter().position(|way| *way == self.display_mode).map_or(0, |place| (place + 1) % modes.len());
+        modes[place]
+    }
+
+    fn update_palette(&mut self) {
+        let is_shown = self.is_decay_shown();
+        if let Some(scene) = &mut self.scene {
+            scene.colour(&self.scenario.tissues, is_shown);
+        }
+    }
+
+    pub fn is_decay_shown(&self) -> bool {
+        self.stage().is_some_and(|stage| stage.show_decay)
+    }
+
+    /// Sends an input to the session.
+    pub fn submit(&mut self, input: Input) {
+        self.send(LessonCommand::Input(input));
+    }
+
+    /// Sends a command to the lesson. Returns false, and sets a message, if the lesson has ended.
+    fn send(&mut self, command: LessonCommand) -> bool {
+        let is_accepted = self.thread.send(command);
+        if !is_accepted {
+            self.refusal_key = Some(messages::NOT_LISTENING);
+        }
+        is_accepted
+    }
+
+    /// Answers a question of the running stage.
+    pub fn answer_question(&mut self, question: String, value: AnswerValue) {
+        let Some(stage) = self.stage else { return };
+        self.answers.insert(question.clone(), value.clone());
+        self.send(LessonCommand::StageInput(stage, Input::Answer { question, value }));
+    }
+
+    /// Records an entry in the running stage's periodontal chart, at the site of the instrument.
+    pub fn add_to_chart(&mut self, sign: ChartInput) {
+        let Some(stage) = self.stage else { return };
+        self.send(LessonCommand::StageInput(stage, Input::Chart(sign)));
+    }
+
+    /// Sets a coefficient of a tissue; the session accepts it if the stage allows adjustment.
+    pub fn adjust(&mut self, label: Label, coefficient: Coefficient, value: f32) {
+        let Some(stage) = self.stage else { return };
+        if self.send(LessonCommand::StageInput(stage, Input::Adjust { label, coefficient, value })) {
+            // The new value is shown at once; the session's answer arrives some milliseconds later.
+            self.materials.set(label, self.materials.get(label).with(coefficient, value));
+        }
+    }
+
+    /// Ends the running stage, after submitting typed answers. Does nothing while a typed number is not a number.
+    pub fn confirm_stage(&mut self) {
+        let Some((stage, questions)) = self.stage.zip(self.stage().map(|stage| stage.ask.clone())) else { return };
+        for question in questions {
+            let draft = self.drafts.get(&question.id).map_or("", String::as_str);
+            match parse_draft(&question, draft) {
+                Some(None) => return,
+                Some(Some(answer)) if self.answers.get(&question.id) != Some(&answer) => {
+                    self.answer_question(question.id, answer)
+                }
+                _ => {}
+            }
+        }
+        self.send(LessonCommand::StageInput(stage, Input::Confirm));
+    }
+
+    /// Releases the pointer: the instrument stays in place without force.
+    pub fn release_pointer(&mut self) {
+        self.is_pointer_captured = false;
+        if let Some((mouse, seen)) = self.mouse().zip(self.snapshot.as_ref()) {
+            mouse.release_at(seen.tip);
+        }
+    }
+
+    pub fn rate_statement(&mut self, item: String, value: u8) {
+        let questionnaire = self.scenario.questionnaire.as_ref();
+        let place = questionnaire.and_then(|q| q.items().position(|i| i.id == item));
+        self.statement = place.unwrap_or(self.statement);
+        self.ratings.insert(item, value);
+        self.is_confirming_submit = false;
+    }
+
+    /// Moves to another statement, `by` places further down.
+    pub fn select_next_statement(&mut self, by: i32) {
+        let count = self.scenario.questionnaire.as_ref().map_or(0, |q| q.items().count());
+        self.statement = self.statement.saturating_add_signed(by as isize).min(count.saturating_sub(1));
+        self.scroll_to_statement = true;
+    }
+
+    /// Number of statements without a rating.
+    pub fn unrated_statements(&self) -> usize {
+        let count = self.scenario.questionnaire.as_ref().map_or(0, |q| q.items().count());
+        count.saturating_sub(self.ratings.len())
+    }
+
+    pub fn pause(&mut self, is_paused: bool) {
+        self.is_paused = is_paused;
+        if is_paused {
+            self.release_pointer();
+        }
+        self.thread.send(LessonCommand::Pause(is_paused));
+    }
+
+    /// Submits the questionnaire with the present ratings.
+    pub fn submit_questionnaire(&mut self) {
+        if self.is_submitted {
+            return;
+        }
+        for (item, value) in self.ratings.clone() {
+            self.submit(Input::Rate { item, value });
+        }
+        self.is_submitted = self.thread.send(LessonCommand::FinishQuestionnaire);
+    }
+
+    /// Aborts the lesson; all actions, answers and ratings so far are kept.
+    pub fn abort(&mut self) {
+        match self.are_stages_over {
+            true => self.submit_questionnaire(),
+            false => self.submit(Input::Abort),
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! Desktop program: the window in which a trainee works and an author edits exercises.
+//!
+//! Takes pointer and keyboard input and the trainee's choices. Gives lessons on a thread of their own, and pictures of
+//! their progress. Never computes a score and never carves: the crates below do, and no session waits for a picture.
+//!
+//! ```no_run
+//! use typodont_app::{AppOptions, open_window};
+//! use typodont_report::Templates;
+//!
+//! let options = AppOptions::at_exercise_list("sessions", Templates::shipped());
+//! assert!(options.exercise.is_none());
+//! open_window(options)?;
+//! # Ok::<(), String>(())
+//! ```
+
+mod editor;
+mod briefing;
+mod lesson_thread;
+mod command;
+mod screen;
+mod app;
+mod state_log;
+mod shortcuts;
+mod i18n;
+mod theme;
+mod tools_panel;
+mod viewport_input;
+mod practice;
+mod questionnaire;
+mod questions;
+mod answer_draft;
+mod periodontal_chart;
+mod results;
+mod snapshot;
+mod settings;
+mod settings_screen;
+mod exercise_list;
+mod lesson_state;
+mod lesson_scene;
+mod lesson_sound;
+mod messages;
+mod transfer_function_editor;
+mod transfer_function_draft;
+mod viewport;
+mod camera_preset;
+
+pub use editor::OpenMode;
+
+use app::App;
+use eframe::egui;
+use std::path::PathBuf;
+use std::time::Duration;
+use typodont_devices::servo::SecondHandRole;
+use typodont_lesson::{ToothScan, second_hand};
+use typodont_report::Templates;
+
+/// Options with which the window opens.
+pub struct AppOptions {
+    /// The exercise that is selected first; without one the exercise list is shown.
+    pub exercise: Option<PathBuf>,
+    /// A scan that replaces the teeth of that exercise.
+    pub tooth: Option<ToothScan>,
+    /// Source and role of a second hand that may join every lesson.
+    pub second: Option<(second_hand::SecondHandSource, SecondHandRole)>,
+    /// True if that exercise begins at once, without its instructions.
+    pub begins_at_once: bool,
+    /// Opens that exercise at the author's screen instead, for editing or for display only.
+    pub editor_mode: Option<OpenMode>,
+    /// The input device, as in `--device`; without it that of the settings.
+    pub device: Option<String>,
+    /// Seed of the random choices of exercises; without one it is taken from the clock.
+    pub seed: Option<u64>,
+    /// A code for the trainee; never a name.
+    pub participant: String,
+    /// Folder in which bundles are written.
+    pub out: PathBuf,
+    pub templates: Templates,
+    /// Delay of every frame, for tests that the session does not wait for frames.
+    pub frame_delay: Option<Duration>,
+}
+
+impl AppOptions {
+    /// Options of a window that opens at the exercise list.
+    pub fn at_exercise_list(out: impl Into<PathBuf>, templates: Templates) -> AppOptions {
+        let (exercise, seed, frame_delay) = (None, None, None);
+        AppOptions {
+            exercise,
+            tooth: None,
+            second: None,
+            begins_at_once: false,
+            editor_mode: None,
+            device: None,
+            seed,
+            participant: String::new(),
+            out: out.into(),
+            templates,
+            frame_delay,
+        }
+    }
+}
+
+/// Width and height of a new window, points: fits a small laptop's screen.
+const SIZE: [f32; 2] = [1280.0, 780.0];
+
+/// Minimum width and height, points; below it parts of the window would be cut off.
+const SIZE_LEAST: [f32; 2] = [960.0, 640.0];
+
+/// Opens the window; returns when it is closed.
+///
+/// # Errors
+/// A message with the reason why the window cannot be opened, and the remedy.
+pub fn open_window(options: AppOptions) -> Result<(), String> {
+    let viewport = egui::ViewportBuilder::default()
+        .with_title("Typodont")
+        .with_app_id("typodont")
+        .with_inner_size(SIZE)
+        .with_min_inner_size(SIZE_LEAST);
+    // With rendering in software, dithering takes a large part of the time of a frame, and pages have few flat colours.
+    let native = eframe::NativeOptions { viewport, dithering: false, ..Default::default() };
+    let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
+        Ok(Box::new(App::new(context, options)))
+    });
+    eframe::run_native("typodont", native, made).map_err(|error| {
+        let message = error.to_string();
+        // winit's message begins with a line of its own source, which is of no use to the user.
+        let after_place = message.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+        let why = after_place.map_or(message.as_str(), |(_, why)| why).trim_end_matches('.');
+        format!(
+            "no-window: {why}; a window requires a display and a graphics driver (Debian: mesa-vulkan-drivers). \
+             Without them, use `typodont run SCENARIO --headless` in a terminal"
+        )
+    })
+}

@@ -1,0 +1,166 @@
+//! Snapshot of a running session for the window: the newest tick, in a mailbox in which the newest value wins.
+
+use typodont_core::frame::{Quat, Vec3};
+use typodont_core::sim::Step;
+use typodont_core::volume::Label;
+use typodont_devices::servo::TimingSummary;
+
+/// The newest tick, and the progress of the session. World space, mm, N, s.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LessonSnapshot {
+    pub hand: Vec3,
+    /// Orientation of the handle, `world_from_handle`.
+    pub orientation: Quat,
+    pub tip: Vec3,
+    pub force: Vec3,
+    /// The tissue that the instrument touches, if any.
+    pub touch: Option<Label>,
+    /// The spring's part of the force, N.
+    pub spring: f32,
+    pub cutting: bool,
+    pub instrument: u32,
+    pub stage_seconds: f32,
+    /// Share of the decay that has been removed, %.
+    pub cleared_pct: Option<f32>,
+    pub timing: ServoTiming,
+}
+
+/// Timing of the servo, µs and counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ServoTiming {
+    pub ticks: u32,
+    pub late_p99: u32,
+    pub late_max: u32,
+    pub missed: u32,
+    pub dropped: u32,
+}
+
+/// Number of words in the mailbox.
+pub const SNAPSHOT_WORDS: usize = 24;
+
+/// Encodes an absent share.
+const NO_SHARE: f32 = -1.0;
+
+impl LessonSnapshot {
+    pub fn new(
+        step: &Step,
+        orientation: Quat,
+        stage_seconds: f64,
+        cleared_pct: Option<f64>,
+        timing: Option<TimingSummary>,
+    ) -> LessonSnapshot {
+        LessonSnapshot {
+            hand: step.hand,
+            orientation,
+            tip: step.tip,
+            force: step.force,
+            touch: step.touch.map(|t| t.label),
+            spring: step.touch.map_or(0.0, |t| t.spring),
+            cutting: step.cutting,
+            instrument: step.instrument as u32,
+            stage_seconds: stage_seconds as f32,
+            cleared_pct: cleared_pct.map(|pct| pct as f32),
+            timing: timing.map(ServoTiming::from).unwrap_or_default(),
+        }
+    }
+
+    pub fn encode(&self) -> [u32; SNAPSHOT_WORDS] {
+        let [a, b, c] = self.hand.to_array().map(f32::to_bits);
+        let [d, e, f] = self.tip.to_array().map(f32::to_bits);
+        let [g, h, i] = self.force.to_array().map(f32::to_bits);
+        let [p, q, r, s] = self.orientation.to_array().map(f32::to_bits);
+        let touch = self.touch.map_or(0, |label| u32::from(label.0));
+        let [spring, seconds] = [self.spring, self.stage_seconds].map(f32::to_bits);
+        let cleared = self.cleared_pct.unwrap_or(NO_SHARE).to_bits();
+        let ServoTiming { ticks, late_p99, late_max, missed, dropped } = self.timing;
+        let cutting = u32::from(self.cutting);
+        [
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            g,
+            h,
+            i,
+            touch,
+            spring,
+            cutting,
+            self.instrument,
+            seconds,
+            cleared,
+            ticks,
+            late_p99,
+            late_max,
+            missed,
+            dropped,
+            p,
+            q,
+            r,
+            s,
+        ]
+    }
+
+    pub fn decode(words: [u32; SNAPSHOT_WORDS]) -> LessonSnapshot {
+        let vector = |at: usize| Vec3::from_array([0, 1, 2].map(|i| f32::from_bits(words[at + i])));
+        let cleared = f32::from_bits(words[14]);
+        LessonSnapshot {
+            hand: vector(0),
+            orientation: Quat::from_array([20, 21, 22, 23].map(|i| f32::from_bits(words[i]))),
+            tip: vector(3),
+            force: vector(6),
+            touch: (words[9] != 0).then_some(Label(words[9] as u8)),
+            spring: f32::from_bits(words[10]),
+            cutting: words[11] != 0,
+            instrument: words[12],
+            stage_seconds: f32::from_bits(words[13]),
+            cleared_pct: (cleared >= 0.0).then_some(cleared),
+            timing: ServoTiming {
+                ticks: words[15],
+                late_p99: words[16],
+                late_max: words[17],
+                missed: words[18],
+                dropped: words[19],
+            },
+        }
+    }
+}
+
+impl From<TimingSummary> for ServoTiming {
+    fn from(summary: TimingSummary) -> ServoTiming {
+        let count = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+        ServoTiming {
+            ticks: count(summary.ticks),
+            late_p99: count(summary.late_p99.as_micros() as u64),
+            late_max: count(summary.late_max.as_micros() as u64),
+            missed: count(summary.missed),
+            dropped: count(summary.dropped_events),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_put_into_the_box_comes_out() {
+        let seen = LessonSnapshot {
+            hand: Vec3::new(1.0, -2.0, 3.5),
+            orientation: Quat::from_xyzw(0.5, 0.5, -0.5, 0.5),
+            tip: Vec3::new(0.1, 0.2, 0.3),
+            force: Vec3::new(-0.5, 1.5, 0.25),
+            touch: Some(Label(4)),
+            spring: 1.25,
+            cutting: true,
+            instrument: 2,
+            stage_seconds: 12.5,
+            cleared_pct: Some(33.0),
+            timing: ServoTiming { ticks: 9, late_p99: 8, late_max: 7, missed: 6, dropped: 5 },
+        };
+        assert_eq!(LessonSnapshot::decode(seen.encode()), seen);
+        let nothing = LessonSnapshot { touch: None, cleared_pct: None, ..seen };
+        assert_eq!(LessonSnapshot::decode(nothing.encode()), nothing);
+    }
+}

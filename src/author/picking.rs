@@ -1,0 +1,108 @@
+//! The conversion of a point selected on the tooth to the position of decay in the scenario.
+
+use typodont_core::frame::Vec3;
+use typodont_core::volume::{ISO, Volume};
+use typodont_exercise::scenario::ToothBounds;
+use typodont_exercise::scenario::file::SurfaceFile;
+
+/// A position on one of a tooth's five surfaces, as in a scenario.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceLocation {
+    pub surface: SurfaceFile,
+    /// Offset from the centre of the surface along its two directions, mm, rounded to 0.1.
+    pub offset: [f32; 2],
+}
+
+/// Returns the first point of matter along a ray and the outward normal there; tooth space, mm. `along` is a unit
+/// vector.
+pub fn raycast(volume: &Volume, from: Vec3, along: Vec3) -> Option<(Vec3, Vec3)> {
+    /// Maximum length of the ray, mm: more than the distance of any viewpoint.
+    const FARTHEST: f32 = 700.0;
+    let step = 0.5 * volume.grid().spacing.min_element();
+    let [low, high] = volume.grid().extent();
+    // The search begins at the point at which the ray enters the grid.
+    let (a, b) = ((low - from) / along, (high - from) / along);
+    let enters = a.min(b).max_element().max(0.0);
+    let leaves = a.max(b).min_element().min(FARTHEST);
+    let steps = ((leaves - enters).max(0.0) / step) as u32;
+    let point = |i: u32| from + along * (enters + i as f32 * step);
+    let hit = (0..steps).map(point).find(|&p| volume.density_at(p) >= ISO)?;
+    let outward = -volume.density_and_gradient_at(hit).1;
+    Some((hit, outward.normalize_or(-along)))
+}
+
+/// Returns the surface of a tooth on which a point lies, determined by the outward normal there, and the position on
+/// that surface.
+pub fn surface_location(tooth: &ToothBounds, point_in_tooth: Vec3, outward: Vec3) -> SurfaceLocation {
+    /// Weight of the occlusal surface: because cusps are steep, slopes of up to 56° from horizontal belong to it.
+    const CUSPS: f32 = 1.5;
+    let distal = tooth.distal();
+    let candidates = [
+        (SurfaceFile::O, Vec3::Z, [Vec3::X, distal]),
+        (SurfaceFile::B, Vec3::X, [distal, Vec3::Z]),
+        (SurfaceFile::L, Vec3::NEG_X, [distal, Vec3::Z]),
+        (SurfaceFile::D, distal, [Vec3::X, Vec3::Z]),
+        (SurfaceFile::M, -distal, [Vec3::X, Vec3::Z]),
+    ];
+    let facing =
+        |way: &(SurfaceFile, Vec3, [Vec3; 2])| outward.dot(way.1) * if way.0 == SurfaceFile::O { CUSPS } else { 1.0 };
+    // The list is not empty.
+    let (surface, _, axes) =
+        candidates.into_iter().max_by(|a, b| facing(a).total_cmp(&facing(b))).unwrap_or(candidates[0]);
+    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let from_middle = point_in_tooth - middle;
+    SurfaceLocation { surface, offset: axes.map(|axis| (from_middle.dot(axis) * 10.0).round() / 10.0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ExerciseDraft, new_exercise};
+    use serde_json::json;
+    use typodont_exercise::scenario::{ResolveMode, Workpiece, resolve};
+    use typodont_formats::Library;
+    use typodont_formats::diagnostic::SourceText;
+
+    fn workpiece(draft: &ExerciseDraft) -> Workpiece {
+        let scenario =
+            resolve(SourceText::new("a.json", draft.text()), &Library::shipped(), ResolveMode::ReadScans).unwrap();
+        Workpiece::make(&scenario, 0).unwrap()
+    }
+
+    #[test]
+    fn a_decay_lies_where_somebody_pointed() {
+        // Aim: the selected point, the written position and the generated decay agree, for teeth of both handednesses.
+        // Method: rays from above, from buccal and from the side onto a generated tooth; the centre of the decay at the
+        // written position is compared with the point.
+        for fdi in [36, 46] {
+            let mut draft = ExerciseDraft::new(new_exercise("t", "s", "i", ["a", "b", "c"], "d"));
+            draft.set("/scene/jaw/tooth/fdi", &json!(fdi)).unwrap();
+            draft.set("/scene/jaw/tooth/form/procedural/spacing_mm", &json!(0.2)).unwrap();
+            draft.set("/scene/jaw/tooth/decay/0/depth_mm", &json!(0)).unwrap();
+            let made = workpiece(&draft);
+            let place = &made.teeth[0];
+            let distal = place.distal();
+            let rays = [
+                (Vec3::new(1.5, 1.0, 40.0), Vec3::NEG_Z, SurfaceFile::O),
+                (Vec3::new(40.0, 1.0, place.crown_high.z - 3.0), Vec3::NEG_X, SurfaceFile::B),
+                (distal * 40.0 + Vec3::Z * (place.crown_high.z - 3.0), -distal, SurfaceFile::D),
+            ];
+            for (from, along, surface) in rays {
+                let (point, outward) = raycast(&made.volume, from, along).unwrap();
+                let spot = surface_location(place, point, outward);
+                assert_eq!(spot.surface, surface, "{fdi}: {outward}");
+                let at = "/scene/jaw/tooth/decay/0";
+                draft.set(&format!("{at}/surface"), &json!(format!("{surface:?}"))).unwrap();
+                draft
+                    .set(
+                        &format!("{at}/at"),
+                        &json!({ "offset_mm": spot.offset.map(|o| (f64::from(o) * 10.0).round() / 10.0) }),
+                    )
+                    .unwrap();
+                let lesion = &workpiece(&draft).lesions[0];
+                assert!(lesion.centre.distance(point) < 0.3, "{fdi} {surface:?}: {} for {point}", lesion.centre);
+            }
+            assert_eq!(raycast(&made.volume, Vec3::new(30.0, 30.0, 40.0), Vec3::NEG_Z), None);
+        }
+    }
+}

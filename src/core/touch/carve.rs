@@ -1,0 +1,471 @@
+//! Removal of matter by a bur or blade in one tick.
+//!
+//! Takes the tool's tip, the contact force and the tissues' cutting thresholds. Gives the changed voxels, in order.
+//!
+//! Two laws determine the advance. The rate law is in `wear`. The threshold law is that of the thesis (5.3), made
+//! smooth: where the spring force exceeds the threshold of a tissue, the bur advances into that tissue until the
+//! force is back at the threshold; after a dwell on one spot a third of the threshold suffices, because the bur
+//! rotates. The thesis set whole voxels to zero; here the bur's surface is cut into the density itself, so that the
+//! removed volume does not depend on voxel size. Neither does the speed: the advance per tick is limited in
+//! millimetres, never in voxels.
+
+use super::body::Body;
+use super::contact_spring::ContactForce;
+use super::instrument::Instrument;
+use super::material::Materials;
+use super::wear::{WearRate, WorkBudget};
+use crate::frame::{Quat, Vec3};
+use crate::tick::TICK_S;
+use crate::volume::{Density, Edit, Label, Volume, Voxel, density_at_distance};
+
+/// Parameters of the cutting laws, from the scenario.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CarvingParameters {
+    /// Dwell time on one spot after which less force suffices, s.
+    pub dwell: f32,
+    /// Fraction of the threshold that suffices after the dwell; 1/3 in the thesis.
+    pub dwell_share: f32,
+    /// Fastest advance into matter, mm/s: the rate at which a bur can clear chips.
+    pub max_feed: f32,
+    pub law: CuttingLaw,
+}
+
+/// Law that determines the advance of a bur.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum CuttingLaw {
+    /// Force thresholds with dwell, as in the thesis.
+    #[default]
+    Threshold,
+    /// Removal in proportion to the bur's work and in inverse proportion to the tissue's hardness.
+    Rate(WearRate),
+}
+
+/// Hand motion below which the hand counts as dwelling, mm: it neither wanders nor pushes in.
+const DWELL_RADIUS: f32 = 0.2;
+
+/// Run-out of a rotating bur, mm: it cuts wider than itself by this much. Handpieces have 0.01–0.03. Without run-out
+/// a bur would jam in the very groove it has cut.
+const RUN_OUT: f32 = 0.01;
+
+/// Distance behind its centre up to which a bur still clears its sides, as a fraction of its radius.
+const REAR_CLEARANCE: f32 = 0.2;
+
+/// Minimum cosine between the tool's surface normal and the feed direction for that part of the surface to cut. The
+/// sides of a plunging fissure bur do not cut: the hole that its tip has opened is wide enough, and cutting again
+/// with every tremor of the hand would ream it out.
+const MIN_FACING_COSINE: f32 = 0.02;
+
+/// Ticks over which a cut increment is spread, each cutting every third row of voxels: a bur at full contact changes
+/// thousands of small voxels, too many for a single tick. Rows interleave, so that the surface recedes evenly.
+const INTERLEAVE: u32 = 3;
+
+/// Maximum number of voxels changed in one tick. At 512×512×322 a bur of 1.2 mm radius changes about 7 000 per tick,
+/// a third of its increment.
+const EDITS_MAX: usize = 1 << 15;
+
+/// Cutting state: dwell, the increment in progress and the edits of this tick.
+#[derive(Clone, Debug)]
+pub struct Carver {
+    carving: CarvingParameters,
+    dwell_point: Vec3,
+    dwell_ticks: u32,
+    /// Cut increment in progress, and the number of its phases that are done.
+    increment: Option<(CutIncrement, u32)>,
+    /// Tip position that the last increment should have made reachable, tooth space.
+    carry: Option<Vec3>,
+    /// Work available to the rate law.
+    work_budget: WorkBudget,
+    edits: Vec<Edit>,
+    /// Advance into each tissue in this increment, mm, by label.
+    advance: [f32; 256],
+}
+
+impl Carver {
+    pub fn new(carving: CarvingParameters) -> Carver {
+        Carver {
+            carving,
+            dwell_point: Vec3::ZERO,
+            dwell_ticks: 0,
+            increment: None,
+            carry: None,
+            work_budget: WorkBudget::default(),
+            edits: Vec::with_capacity(EDITS_MAX),
+            advance: [0.0; 256],
+        }
+    }
+
+    /// Voxels changed in this tick, in the order of their changes.
+    pub fn edits(&self) -> &[Edit] {
+        &self.edits
+    }
+
+    /// Resets the state for a tick without contact.
+    pub fn reset(&mut self) {
+        self.edits.clear();
+        self.dwell_ticks = 0;
+        self.increment = None;
+        self.carry = None;
+        self.work_budget.reset();
+    }
+
+    /// Cuts with a tip in contact; returns true while matter is being cut.
+    pub fn cut(
+        &mut self,
+        volume: &mut Volume,
+        instrument: &Instrument,
+        materials: &Materials,
+        load: &ToolLoad,
+    ) -> bool {
+        self.edits.clear();
+        // A blade does not rotate: it needs the whole threshold force and follows the threshold law.
+        let threshold_share = if instrument.is_rotary { self.threshold_share(load.hand) } else { 1.0 };
+        let cutting_law = self.cutting_law(instrument);
+        let is_wearing = match cutting_law {
+            CuttingLaw::Threshold => false,
+            // A tissue that cannot be cut does not wear either, whatever the force.
+            CuttingLaw::Rate(_) if materials.get(load.label).cut_force.is_none() => {
+                self.work_budget.reset();
+                return false;
+            }
+            CuttingLaw::Rate(rate) => {
+                self.work_budget.accumulate(&rate, instrument.head_radius(), load.contact_force.spring)
+            }
+        };
+        let planned = self
+            .increment
+            .or_else(|| Some((self.plan_increment(volume, instrument, materials, load, threshold_share)?, 0)));
+        let Some((increment, phase)) = planned else { return is_wearing };
+        match instrument.body() {
+            None => self.carve_ball(volume, &increment, phase),
+            Some(body) => self.carve_body(volume, body, &increment, phase),
+        }
+        if let CuttingLaw::Rate(_) = cutting_law {
+            self.work_budget.spend(&self.edits, materials, volume.grid().voxel_mm3() as f32);
+        }
+        self.increment = (phase + 1 < INTERLEAVE).then_some((increment, phase + 1));
+        true
+    }
+
+    fn cutting_law(&self, instrument: &Instrument) -> CuttingLaw {
+        if instrument.is_rotary { self.carving.law } else { CuttingLaw::Threshold }
+    }
+
+    /// Plans the next increment, if the force suffices for any tissue.
+    fn plan_increment(
+        &mut self,
+        volume: &Volume,
+        instrument: &Instrument,
+        materials: &Materials,
+        load: &ToolLoad,
+        threshold_share: f32,
+    ) -> Option<CutIncrement> {
+        let ToolLoad { tip, hand, orientation, contact_force, .. } = *load;
+        let cutting_law = self.cutting_law(instrument);
+        let (deepest, run_out) = match cutting_law {
+            CuttingLaw::Threshold => (self.plan_advance(materials, &contact_force, threshold_share), RUN_OUT),
+            CuttingLaw::Rate(_) => {
+                let max_advance = self.max_advance();
+                let deepest = self.work_budget.plan_advance(&mut self.advance, materials, max_advance);
+                // The matter cleared by run-out is charged to the budget as well: a slow increment clears less of it.
+                (deepest, RUN_OUT.min(deepest))
+            }
+        };
+        if deepest <= 0.0 {
+            self.carry = None;
+            return None;
+        }
+        let feed = (hand - tip).normalize_or_zero() * deepest + self.carried_over(tip, volume.half_band());
+        // The work budget of the rate law already carries the unused part of an increment.
+        self.carry = matches!(cutting_law, CuttingLaw::Threshold).then_some(tip + feed);
+        Some(CutIncrement { tip, feed, deepest, run_out, radius: instrument.radius() + run_out, orientation })
+    }
+
+    /// Carried-over advance of the last increment: the part that was too small to change a stored density.
+    ///
+    /// Without it a bur that is mostly dragged sideways would never sink into coarse voxels.
+    fn carried_over(&self, tip: Vec3, band: f32) -> Vec3 {
+        let quantum = 2.0 * band / f32::from(u8::MAX);
+        self.carry.map_or(Vec3::ZERO, |owed| (owed - tip).clamp_length_max(2.0 * quantum))
+    }
+
+    /// Returns the dwell fraction of the threshold once the hand has dwelt long enough, otherwise 1.
+    fn threshold_share(&mut self, hand: Vec3) -> f32 {
+        if self.dwell_ticks == 0 || hand.distance(self.dwell_point) > DWELL_RADIUS {
+            self.dwell_point = hand;
+            self.dwell_ticks = 0;
+        }
+        self.dwell_ticks += 1;
+        let dwelt = self.dwell_ticks as f32 * TICK_S as f32;
+        if dwelt > self.carving.dwell { self.carving.dwell_share } else { 1.0 }
+    }
+
+    /// Greatest advance of an increment, mm.
+    fn max_advance(&self) -> f32 {
+        self.carving.max_feed * TICK_S as f32 * INTERLEAVE as f32
+    }
+
+    /// Fills `advance` for every tissue by the threshold law; returns the greatest.
+    fn plan_advance(&mut self, materials: &Materials, contact_force: &ContactForce, threshold_share: f32) -> f32 {
+        let max_advance = self.max_advance();
+        let stiffness = contact_force.stiffness.max(1e-6);
+        let mut deepest = 0.0;
+        for (label, material) in materials.labelled() {
+            let excess_force =
+                material.cut_force.map_or(0.0, |threshold| contact_force.spring - threshold * threshold_share);
+            let advance = (excess_force / stiffness).clamp(0.0, max_advance);
+            self.advance[usize::from(label.0)] = advance;
+            deepest = f32::max(deepest, advance);
+        }
+        deepest
+    }
+
+    /// Carries out one phase of an increment with a ball.
+    fn carve_ball(&mut self, volume: &mut Volume, increment: &CutIncrement, phase: u32) {
+        let CutIncrement { tip, feed, radius, .. } = *increment;
+        let (grid, band) = (*volume.grid(), volume.half_band());
+        let centre = tip + feed;
+        let reach = Vec3::splat(radius + band);
+        let [xs, ys, zs] = grid.cells_within(centre - reach, centre + reach);
+        if xs.is_empty() {
+            return;
+        }
+        let to_steps = grid.spacing.x.recip();
+        let ahead = feed.normalize_or_zero();
+        for z in zs {
+            for y in ys.clone().filter(|y| (y + z) % INTERLEAVE == phase) {
+                // Vector from the bur's advanced centre to the first voxel of the row.
+                let first = grid.centre([xs.start, y, z]) - centre;
+                let aside_squared = first.y * first.y + first.z * first.z;
+                let half_squared = reach.x * reach.x - aside_squared;
+                if half_squared <= 0.0 {
+                    continue;
+                }
+                let half = half_squared.sqrt();
+                let (mut low, mut high) = (-half, half);
+                // The bur already occupies its position: matter well behind its centre needs no clearing.
+                let behind = -REAR_CLEARANCE * radius - first.y * ahead.y - first.z * ahead.z;
+                match ahead.x {
+                    x if x > 1e-3 => low = low.max(behind / x),
+                    x if x < -1e-3 => high = high.min(behind / x),
+                    _ if behind > 0.0 => continue,
+                    _ => {}
+                }
+                if low >= high {
+                    continue;
+                }
+                let step_at = |x: f32| (((x - first.x) * to_steps).max(-1.0) + 1.0) as u32;
+                let row = VoxelRow { cell: [xs.start, y, z], first_x: first.x, aside_squared };
+                self.carve_ball_row(volume, increment, &row, step_at(low)..step_at(high).min(xs.len() as u32));
+            }
+        }
+    }
+
+    /// Carries out one phase of an increment with a body.
+    fn carve_body(&mut self, volume: &mut Volume, body: &Body, increment: &CutIncrement, phase: u32) {
+        let (grid, band) = (*volume.grid(), volume.half_band());
+        let cylinder = SweptCylinder::of(body, increment, increment.run_out + band);
+        let [low, high] = cylinder.extent();
+        let [xs, ys, zs] = grid.cells_within(low, high);
+        if xs.is_empty() {
+            return;
+        }
+        let to_steps = grid.spacing.x.recip();
+        for z in zs {
+            for y in ys.clone().filter(|y| (y + z) % INTERLEAVE == phase) {
+                let first = grid.centre([xs.start, y, z]);
+                let Some([low, high]) = cylinder.clip_row(first) else { continue };
+                let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
+                let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
+                self.carve_body_row(volume, body, increment, [xs.start, y, z], steps);
+            }
+        }
+    }
+
+    /// Cuts a part of a row; `steps` counts from the cell `row`.
+    fn carve_body_row(
+        &mut self,
+        volume: &mut Volume,
+        body: &Body,
+        increment: &CutIncrement,
+        row: [u32; 3],
+        steps: std::ops::Range<u32>,
+    ) {
+        let start = volume.grid().index(row);
+        let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
+        if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
+            return;
+        }
+        let [x, y, z] = row;
+        let (grid, band) = (*volume.grid(), volume.half_band());
+        let handle_from_tooth = glam::Mat3::from_quat(increment.orientation.conjugate());
+        let first = handle_from_tooth * (grid.centre(row) - increment.tip - increment.feed);
+        let along = handle_from_tooth.x_axis * grid.spacing.x;
+        // In a harder tissue the bur advances less: it is set back along the feed in proportion to the missing
+        // advance.
+        let back = handle_from_tooth * increment.feed;
+        let far = increment.feed.length();
+        for step in steps {
+            if volume.densities()[start + step as usize] == Density::EMPTY {
+                continue;
+            }
+            let before = volume.voxel(start + step as usize);
+            let advance = self.advance[usize::from(before.label.0)];
+            if advance <= 0.0 {
+                continue;
+            }
+            let share = advance / increment.deepest;
+            let here = first + along * step as f32;
+            let distance = body.head_distance(here + back * (1.0 - share));
+            let remaining = density_at_distance(increment.run_out - distance, band);
+            if remaining >= before.density || self.edits.len() >= EDITS_MAX {
+                continue;
+            }
+            let clearance_gain = body.head_distance(here + back) - distance;
+            if clearance_gain > MIN_FACING_COSINE * far * share {
+                self.edits.push(volume.set_cell([x + step, y, z], Voxel { density: remaining, ..before }));
+            }
+        }
+    }
+
+    /// Cuts a part of a row; `steps` counts from the first voxel of the row.
+    fn carve_ball_row(
+        &mut self,
+        volume: &mut Volume,
+        increment: &CutIncrement,
+        row: &VoxelRow,
+        steps: std::ops::Range<u32>,
+    ) {
+        let (spacing, band) = (volume.grid().spacing.x, volume.half_band());
+        let [x, y, z] = row.cell;
+        let start = volume.grid().index(row.cell);
+        // A bur that only grazes the row gives an empty or reversed range.
+        let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
+        if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
+            return;
+        }
+        // A voxel loses density if the bur's surface leaves less than it has, that is, if it is nearer to the bur's
+        // centre than a distance given by its density. Distances are compared squared, to avoid a square root per
+        // voxel. The margin of half a density step covers rounding.
+        let (base, rise) =
+            (increment.radius - band * (1.0 + 1.0 / f32::from(u8::MAX)), 2.0 * band / f32::from(u8::MAX));
+        for step in steps {
+            let density = volume.densities()[start + step as usize].bits();
+            let along = row.first_x + step as f32 * spacing;
+            let squared = along * along + row.aside_squared;
+            let nearer_than = (base + rise * f32::from(density)).max(0.0);
+            if density > 0 && squared < nearer_than * nearer_than {
+                self.carve_voxel(volume, increment, [x + step, y, z], squared.sqrt());
+            }
+        }
+    }
+
+    /// `distance`: from the bur's centre at full advance to the centre of the voxel, mm.
+    fn carve_voxel(&mut self, volume: &mut Volume, increment: &CutIncrement, cell: [u32; 3], distance: f32) {
+        let before = volume.voxel(volume.grid().index(cell));
+        let advance = self.advance[usize::from(before.label.0)];
+        let distance = match advance {
+            0.0 => return,
+            a if a == increment.deepest => distance,
+            // In a harder tissue the bur advances less.
+            a => (volume.grid().centre(cell) - increment.tip - increment.feed * (a / increment.deepest)).length(),
+        };
+        let remaining = density_at_distance(increment.radius - distance, volume.half_band());
+        if remaining < before.density && self.edits.len() < EDITS_MAX {
+            self.edits.push(volume.set_cell(cell, Voxel { density: remaining, ..before }));
+        }
+    }
+}
+
+/// Load on the tool in a tick; positions in tooth space, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct ToolLoad {
+    /// Centre of the ball, or origin of the body.
+    pub tip: Vec3,
+    /// Position of the hand, inside matter: the bur advances toward it.
+    pub hand: Vec3,
+    /// `tooth_from_handle`.
+    pub orientation: Quat,
+    pub contact_force: ContactForce,
+    /// Tissue that carries most of the contact force.
+    pub label: Label,
+}
+
+/// Row of voxels along x, relative to the bur's advanced centre.
+#[derive(Clone, Copy)]
+struct VoxelRow {
+    /// First voxel of the row.
+    cell: [u32; 3],
+    /// Coordinate of that voxel's centre along x, mm.
+    first_x: f32,
+    /// Squared distance of the row from the bur's centre, mm².
+    aside_squared: f32,
+}
+
+/// Cut increment: removes everything inside the bur after its advance.
+#[derive(Clone, Copy, Debug)]
+struct CutIncrement {
+    tip: Vec3,
+    /// Advance vector into the softest tissue, mm; in harder tissues a fraction of it.
+    feed: Vec3,
+    /// Length of the advance as determined by the law, mm.
+    deepest: f32,
+    /// Radius of a ball including run-out, mm.
+    radius: f32,
+    /// Run-out, mm.
+    run_out: f32,
+    /// `tooth_from_handle`.
+    orientation: Quat,
+}
+
+/// Cylinder about the shaft that contains everything an increment of a body can reach, tooth space.
+struct SweptCylinder {
+    middle: Vec3,
+    /// Unit.
+    axis: Vec3,
+    radius: f32,
+    half_length: f32,
+}
+
+impl SweptCylinder {
+    fn of(body: &Body, increment: &CutIncrement, margin: f32) -> SweptCylinder {
+        let (radius, [low, high]) = body.head_cylinder();
+        let axis = increment.orientation * Vec3::Z;
+        // In a harder tissue the body advances less, so the cylinder is centred at half the advance.
+        let middle = increment.tip + increment.feed * 0.5 + axis * (0.5 * (low + high));
+        let margin = margin + 0.5 * increment.feed.length();
+        SweptCylinder { middle, axis, radius: radius + margin, half_length: 0.5 * (high - low) + margin }
+    }
+
+    /// Lowest and highest corner of the bounding box.
+    fn extent(&self) -> [Vec3; 2] {
+        let aside = |along: f32| self.half_length * along.abs() + self.radius * (1.0 - along * along).max(0.0).sqrt();
+        let half = Vec3::new(aside(self.axis.x), aside(self.axis.y), aside(self.axis.z));
+        [self.middle - half, self.middle + half]
+    }
+
+    /// Entry and exit of a line along x through `from`, as signed distances from that point.
+    fn clip_row(&self, from: Vec3) -> Option<[f32; 2]> {
+        let out = from - self.middle;
+        let (along, climb) = (out.dot(self.axis), self.axis.x);
+        let aside = out - self.axis * along;
+        let drift = Vec3::X - self.axis * climb;
+        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+        let (a, b, c) = (drift.length_squared(), drift.dot(aside), aside.length_squared() - self.radius * self.radius);
+        if a > 1e-6 {
+            let inside = b * b - a * c;
+            if inside <= 0.0 {
+                return None;
+            }
+            (low, high) = ((-b - inside.sqrt()) / a, (-b + inside.sqrt()) / a);
+        } else if c > 0.0 {
+            return None;
+        }
+        if climb.abs() > 1e-4 {
+            let (near, far) = ((-self.half_length - along) / climb, (self.half_length - along) / climb);
+            (low, high) = (low.max(near.min(far)), high.min(near.max(far)));
+        } else if along.abs() > self.half_length {
+            return None;
+        }
+        (low < high).then_some([low, high])
+    }
+}

@@ -1,0 +1,96 @@
+//! Sub-box of a grid for local work; it may extend beyond the border of the grid.
+
+use crate::frame::Vec3;
+use crate::volume::{Density, Grid, Label};
+
+/// Empty voxels kept around the requested box, for sampling and surfaces.
+const SURFACE_MARGIN: u32 = 3;
+
+/// Box of voxels of a grid, padded with empty voxels beyond its border.
+pub struct SubGrid {
+    /// Grid of the box.
+    pub grid: Grid,
+    whole: Grid,
+    /// Index of the box's first voxel in the whole grid; negative beyond its border.
+    offset: [i64; 3],
+    /// Additional voxels on every side that are needed during the work only.
+    extra_margin: [u32; 3],
+}
+
+impl SubGrid {
+    /// Creates the box of the voxels from `low` to `high`, with room for the surface and `extra_margin` voxels on
+    /// every side.
+    pub fn around(whole: &Grid, low: [u32; 3], high: [u32; 3], extra_margin: [u32; 3]) -> SubGrid {
+        let margin = extra_margin.map(|n| SURFACE_MARGIN + n);
+        let offset = std::array::from_fn(|axis| i64::from(low[axis]) - i64::from(margin[axis]));
+        let dims = std::array::from_fn(|axis| high[axis] - low[axis] + 1 + 2 * margin[axis]);
+        SubGrid { grid: shifted(whole, offset, dims), whole: *whole, offset, extra_margin }
+    }
+
+    /// Extracts the box from one value per voxel of the whole grid; voxels beyond its border are `empty`.
+    pub fn crop<T: Copy>(&self, values: Vec<T>, empty: T) -> Vec<T> {
+        if self.grid == self.whole {
+            return values;
+        }
+        let value = |cell| self.to_whole(cell).map_or(empty, |cell| values[self.whole.index(cell)]);
+        self.grid.cells().map(value).collect()
+    }
+
+    /// Returns the box in the whole grid, empty elsewhere; the grid is enlarged where the box, without
+    /// `extra_margin`, extends beyond its border.
+    pub fn paste(&self, density: Vec<Density>, label: Vec<Label>) -> (Grid, Vec<Density>, Vec<Label>) {
+        let low = |axis: usize| self.offset[axis] + i64::from(self.extra_margin[axis]);
+        let high =
+            |axis: usize| self.offset[axis] + i64::from(self.grid.dims[axis]) - i64::from(self.extra_margin[axis]);
+        let before: [i64; 3] = std::array::from_fn(|axis| low(axis).min(0));
+        let end = |axis: usize| high(axis).max(i64::from(self.whole.dims[axis]));
+        let grid = shifted(&self.whole, before, std::array::from_fn(|axis| (end(axis) - before[axis]) as u32));
+        if grid == self.grid {
+            return (grid, density, label);
+        }
+        let mut all_density = vec![Density::EMPTY; grid.len()];
+        let mut all_label = vec![Label::AIR; grid.len()];
+        for (from, cell) in self.grid.cells().enumerate() {
+            let to: [i64; 3] = std::array::from_fn(|axis| i64::from(cell[axis]) + self.offset[axis] - before[axis]);
+            if (0..3).all(|axis| (0..i64::from(grid.dims[axis])).contains(&to[axis])) {
+                let to = grid.index(to.map(|n| n as u32));
+                (all_density[to], all_label[to]) = (density[from], label[from]);
+            }
+        }
+        (grid, all_density, all_label)
+    }
+
+    fn to_whole(&self, cell: [u32; 3]) -> Option<[u32; 3]> {
+        let cell: [i64; 3] = std::array::from_fn(|axis| self.offset[axis] + i64::from(cell[axis]));
+        let is_in = (0..3).all(|axis| (0..i64::from(self.whole.dims[axis])).contains(&cell[axis]));
+        is_in.then(|| cell.map(|n| n as u32))
+    }
+}
+
+/// Grid of another size, aligned with the voxels of `grid`.
+fn shifted(grid: &Grid, first: [i64; 3], dims: [u32; 3]) -> Grid {
+    let [x, y, z] = first.map(|n| n as f32);
+    Grid { dims, spacing: grid.spacing, origin: grid.origin + grid.spacing * Vec3::new(x, y, z) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_cut_out_goes_back_to_its_place() {
+        // Aim: a voxel keeps its position in space through crop and paste. Method: a box over one corner of a grid.
+        let whole = Grid::centred([7, 6, 5], Vec3::new(0.5, 0.25, 1.0));
+        let values: Vec<usize> = (1..=whole.len()).collect();
+        let window = SubGrid::around(&whole, [1, 2, 1], [3, 4, 4], [2; 3]);
+        let cut = window.crop(values, 0);
+        let label: Vec<Label> = cut.iter().map(|&v| Label(v as u8)).collect();
+        let (grid, _, label) = window.paste(vec![Density::FULL; label.len()], label);
+        assert_eq!(grid.dims, [9, 9, 10]);
+        for (index, cell) in grid.cells().enumerate().filter(|&(i, _)| label[i] != Label::AIR) {
+            let from = whole.nearest(grid.centre(cell)).unwrap();
+            assert_eq!(usize::from(label[index].0), whole.index(from) + 1);
+        }
+        assert_eq!(label.iter().filter(|&&l| l != Label::AIR).count(), whole.len(), "the box holds the whole grid");
+    }
+}

@@ -1,0 +1,246 @@
+//! HID reports: finding devices, opening them, reading and writing.
+//!
+//! Takes a vendor, products and a usage page. Gives an open [`Transport`], or an error that says what to install.
+//! Never interprets a report. Reads block, so each caller uses a thread of its own.
+
+use crate::{FoundDevice, OpenError};
+use hidapi::{HidApi, HidDevice, HidError};
+use std::ffi::CString;
+use std::time::Duration;
+use typodont_core::device::DeviceError;
+
+/// Length of the longest report of any supported device, including the id byte.
+pub const REPORT_MAX: usize = 65;
+
+/// Reports discarded at most while looking for the newest one. The deepest queue of any system is 64 (hidraw); a
+/// device that sends faster than it is read must not block its reader.
+const DRAIN_MAX: usize = 128;
+
+/// Channel for reports: a pair of endpoints of a device, or that of a test.
+pub trait Transport: Send + 'static {
+    /// Reads the next report in the queue, waiting up to `wait`. Zero bytes mean that none came in time, never that
+    /// the device has gone.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`DeviceError::Lost`] if reading fails.
+    fn read(&mut self, report: &mut [u8], wait: Duration) -> Result<usize, DeviceError>;
+
+    /// Sends a report; its first byte is the report id, 0 for a device without ids.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`DeviceError::Lost`] if writing fails.
+    fn write(&mut self, report: &[u8]) -> Result<(), DeviceError>;
+
+    /// Reads the newest report, waiting up to `wait` for the first one. Older reports are discarded: systems queue 30
+    /// to 64 reports, and a reader that once fell behind would stay late for ever.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`DeviceError::Lost`] if reading fails.
+    fn read_newest(&mut self, report: &mut [u8], wait: Duration) -> Result<usize, DeviceError> {
+        let mut length = self.read(report, wait)?;
+        let mut newer = [0; REPORT_MAX];
+        for _ in 0..DRAIN_MAX {
+            if length == 0 {
+                break;
+            }
+            match self.read(&mut newer, Duration::ZERO)? {
+                0 => break,
+                n => {
+                    length = n.min(report.len());
+                    report[..length].copy_from_slice(&newer[..length]);
+                }
+            }
+        }
+        Ok(length)
+    }
+}
+
+/// Selection of the devices that a driver supports.
+#[derive(Clone, Copy, Debug)]
+pub struct HidMatch {
+    pub vendor: u16,
+    /// Empty: all products of the vendor.
+    pub products: &'static [u16],
+    /// Usage page and usage of the top-level collection: a device may have several, of which only one is ours.
+    pub usage: Option<(u16, u16)>,
+}
+
+/// A connected HID device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HidDeviceInfo {
+    pub vendor: u16,
+    pub product: u16,
+    pub usage: (u16, u16),
+    /// Product name that the device reports; empty if it reports none.
+    pub title: String,
+    pub serial: String,
+    path: CString,
+}
+
+impl HidMatch {
+    pub fn matches(&self, info: &HidDeviceInfo) -> bool {
+        info.vendor == self.vendor
+            && (self.products.is_empty() || self.products.contains(&info.product))
+            && self.usage.is_none_or(|usage| usage == info.usage)
+    }
+}
+
+/// Lists the connected devices that match one of `kinds`. Opens nothing.
+///
+/// # Errors
+///
+/// Returns an error if the system cannot list its HID devices.
+pub fn find(kinds: &[HidMatch]) -> Result<Vec<HidDeviceInfo>, OpenError> {
+    let api = HidApi::new().map_err(enumeration_error)?;
+    let plugged = api.device_list().map(|d| HidDeviceInfo {
+        vendor: d.vendor_id(),
+        product: d.product_id(),
+        usage: (d.usage_page(), d.usage()),
+        title: d.product_string().unwrap_or_default().trim().into(),
+        serial: d.serial_number().unwrap_or_default().trim().into(),
+        path: d.path().into(),
+    });
+    Ok(plugged.filter(|p| kinds.iter().any(|kind| kind.matches(p))).collect())
+}
+
+fn enumeration_error(error: HidError) -> OpenError {
+    OpenError::new(
+        format!("cannot list the HID devices: {error}"),
+        "unplug the device and plug it in again; on Linux the kernel needs hidraw (CONFIG_HIDRAW)",
+    )
+}
+
+/// Converts devices to the list for `typodont devices`: their serial numbers tell them apart.
+pub fn found_devices(found: Vec<HidDeviceInfo>) -> Vec<FoundDevice> {
+    found.into_iter().map(|p| FoundDevice { title: p.title, argument: p.serial }).collect()
+}
+
+/// Returns the device with a serial number, or the first one.
+///
+/// # Errors
+///
+/// Returns an error, with `title` and `help`, if there is none.
+pub fn select(
+    found: Vec<HidDeviceInfo>,
+    serial: Option<&str>,
+    title: &str,
+    help: &str,
+) -> Result<HidDeviceInfo, OpenError> {
+    found.into_iter().find(|p| serial.is_none_or(|serial| p.serial == serial)).ok_or_else(|| {
+        let which = serial.map_or(String::new(), |serial| format!(" with the serial number {serial}"));
+        OpenError::new(format!("no {title}{which} is connected"), help)
+    })
+}
+
+/// Opens a device returned by [`find`].
+///
+/// # Errors
+///
+/// Returns an error if the system denies access or another program uses the device.
+pub fn open(info: &HidDeviceInfo) -> Result<HidTransport, OpenError> {
+    let api = HidApi::new().map_err(enumeration_error)?;
+    let device = api.open_path(&info.path).map_err(|error| open_error(info, &error.to_string()))?;
+    Ok(HidTransport { device })
+}
+
+/// Returns the error for a device that is present but cannot be opened. On Linux only root may open it unless a udev
+/// rule grants access, and hidapi gives the reason only as text.
+pub fn open_error(info: &HidDeviceInfo, reason: &str) -> OpenError {
+    let HidDeviceInfo { vendor, title, .. } = info;
+    let what = format!("cannot open {title} ({vendor:04x}:{:04x}): {reason}", info.product);
+    let help = match reason.to_lowercase().contains("permission denied") {
+        true => format!(
+            "copy content/devices/70-typodont.rules to /etc/udev/rules.d/, or create a file there with the line {}; then \
+             run `sudo udevadm control --reload` and plug the device in again",
+            udev_rule(*vendor)
+        ),
+        false => {
+            "close other programs that use it (such as a vendor's background service), then plug it in again".into()
+        }
+    };
+    OpenError::new(what, help)
+}
+
+/// Returns the udev rule that gives the user at the machine access to the devices of a vendor.
+pub fn udev_rule(vendor: u16) -> String {
+    format!("KERNEL==\"hidraw*\", ATTRS{{idVendor}}==\"{vendor:04x}\", MODE=\"0660\", TAG+=\"uaccess\"")
+}
+
+/// A device on a real cable.
+pub struct HidTransport {
+    device: HidDevice,
+}
+
+impl Transport for HidTransport {
+    fn read(&mut self, report: &mut [u8], wait: Duration) -> Result<usize, DeviceError> {
+        // A negative time-out would wait for ever.
+        let wait_ms = wait.as_millis().min(1000) as i32;
+        self.device
+            .read_timeout(report, wait_ms)
+            .map_err(|e| device_lost("reading from it failed; is it plugged in?", &e))
+    }
+
+    fn write(&mut self, report: &[u8]) -> Result<(), DeviceError> {
+        // The returned count is ignored: the back-ends of hidapi pad reports, and one returns 0 on success.
+        self.device.write(report).map(|_| ()).map_err(|e| device_lost("writing to it failed; is it plugged in?", &e))
+    }
+}
+
+fn device_lost(why: &'static str, error: &HidError) -> DeviceError {
+    let code = match error {
+        HidError::IoError { error } => error.raw_os_error().unwrap_or(0),
+        _ => 0,
+    };
+    DeviceError::Lost { why, code }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plugged(vendor: u16, product: u16, usage: (u16, u16)) -> HidDeviceInfo {
+        HidDeviceInfo {
+            vendor,
+            product,
+            usage,
+            title: "SpaceNavigator".into(),
+            serial: String::new(),
+            path: c"/x".into(),
+        }
+    }
+
+    #[test]
+    fn a_device_matches_by_vendor_product_and_usage() {
+        let kind = HidMatch { vendor: 0x046d, products: &[0xc626], usage: Some((1, 8)) };
+        assert!(kind.matches(&plugged(0x046d, 0xc626, (1, 8))));
+        assert!(!kind.matches(&plugged(0x046d, 0xc626, (12, 1))), "another collection of the same device");
+        assert!(!kind.matches(&plugged(0x046d, 0xc077, (1, 8))), "a plain mouse of the same vendor");
+        assert!(!kind.matches(&plugged(0x256f, 0xc626, (1, 8))));
+        assert!(HidMatch { products: &[], usage: None, ..kind }.matches(&plugged(0x046d, 1, (0, 0))));
+    }
+
+    #[test]
+    fn a_device_that_may_not_be_opened_names_the_rule_to_install() {
+        let device = plugged(0x046d, 0xc626, (1, 8));
+        let error =
+            open_error(&device, "failed to open device with path /dev/hidraw3: Permission denied (os error 13)");
+        assert!(error.message.contains("046d:c626"), "{error}");
+        assert!(error.help.contains(r#"ATTRS{idVendor}=="046d", MODE="0660", TAG+="uaccess""#), "{error}");
+        let busy = open_error(&device, "Device or resource busy (os error 16)");
+        assert!(!busy.help.contains("udev"), "{busy}");
+    }
+
+    #[test]
+    fn the_rules_that_are_shipped_cover_every_hid_device() {
+        // Aim: the rules that the error message recommends cover each vendor. Method: the file contains the rule of
+        // each vendor.
+        let rules = include_str!("../../content/devices/70-typodont.rules");
+        let kinds = [crate::spacemouse::HID_MATCHES, crate::polhem::HID_MATCHES, &[crate::open_handle::HID_MATCH]];
+        for kind in kinds.into_iter().flatten() {
+            assert!(rules.contains(&udev_rule(kind.vendor)), "{:04x}", kind.vendor);
+        }
+    }
+}

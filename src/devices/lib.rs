@@ -1,0 +1,54 @@
+//! Drivers for haptic devices, and the servo that steps a simulation with one of them at 1 kHz.
+//!
+//! Takes a simulation and an open device. Gives readings and, in order, everything that the servo did. Units and axes
+//! are converted inside each driver. Never lets a result depend on a clock: a monotonic clock is read only to keep
+//! the rate.
+//!
+//! # Examples
+//!
+//! A device that works without hardware is the mouse, which a window normally moves:
+//!
+//! ```
+//! use typodont_core::device::{Device, Wrench};
+//! use typodont_core::frame::{Quat, Vec3};
+//! use typodont_devices::driver_by_name;
+//! use typodont_devices::mouse::Mouse;
+//!
+//! assert!(driver_by_name("mouse").is_some());
+//!
+//! // The pointer moves 100 pixels to the right; the device's hand follows within a second.
+//! let (mouse, mut device) = Mouse::new();
+//! mouse.move_by_pixels(100.0, 0.0, Quat::IDENTITY);
+//! for _ in 0..1000 {
+//!     device.exchange(&Wrench::ZERO).unwrap();
+//! }
+//! let reading = device.exchange(&Wrench::ZERO).unwrap();
+//! assert!(reading.pose.position.distance(Vec3::X * 10.0) < 0.01);
+//! ```
+
+mod coupling;
+mod driver;
+mod forcedimension;
+mod haply;
+pub mod hid;
+mod link;
+pub mod mouse;
+pub mod open_handle;
+mod openhaptics;
+pub mod polhem;
+pub mod realtime;
+mod registry;
+mod relay;
+pub mod servo;
+mod shared_library;
+pub mod spacemouse;
+mod stream;
+mod force_slot;
+mod report_filter;
+
+pub use coupling::{Coupling, CouplingParams, DelayedPosition};
+pub use driver::{Driver, FoundDevice, OpenError};
+pub use force_slot::FORCE_LIFE;
+pub use link::{HandLink, LinkedHand};
+pub use registry::{DRIVERS, driver_by_name};
+pub use relay::{DeviceReport, Protocol, Relay};

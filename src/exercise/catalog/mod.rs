@@ -1,0 +1,18 @@
+//! The catalogue: tables of tissues, instruments and touch factors, as a school can edit them.
+//!
+//! Takes JSON texts. Gives checked tables, or every diagnostic.
+
+mod coefficient;
+mod tissues;
+mod hand_instruments;
+mod instruments;
+mod touch_factors;
+
+pub use coefficient::CoefficientName;
+pub use hand_instruments::{BladeEntry, CleoidEntry, PluggerEntry, SpoonEntry};
+pub use instruments::{
+    BentExplorerEntry, InstrumentEntry, InstrumentTable, MirrorEntry, PackingActionEntry, ProbeEntry, ToolKind,
+    WorkingEndEntry,
+};
+pub use tissues::{PackingEntry, TissueEntry, TissueRole, TissueTable, parse_color};
+pub use touch_factors::{AgeBand, TouchFactorTable};

@@ -1,0 +1,364 @@
+//! The JSON parts of a recording. Readers ignore unknown keys.
+
+use crate::catalog::CoefficientName;
+use crate::scenario::Scenario;
+use crate::session::{AnswerValue, ChartInput, EndedBy, Input};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use typodont_core::device::DeviceSpec;
+use typodont_core::frame::Vec3;
+use typodont_core::sim::{Command, Simulation};
+use typodont_core::tick::TICK_S;
+use typodont_core::touch::Coefficient;
+use typodont_core::volume::Label;
+
+/// Version of the recording format. A reader refuses a newer version, and replays an older one as its program did:
+/// version 1 has no torque, no force ramp at the start of contact and no second hand.
+pub const VERSION: u32 = 2;
+
+/// Name of the metadata record written before the first tick.
+pub(super) const HEAD: &str = "session";
+/// Name of the metadata record written after the last tick.
+pub(super) const END: &str = "end";
+
+/// Metadata known before the first tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordingHeadFile {
+    pub version: u32,
+    pub typodont_version: String,
+    pub scenario_id: String,
+    pub scenario_sha256: String,
+    /// Code of the participant, never a name.
+    pub participant: String,
+    pub seed: u64,
+    /// Duration of a tick, s.
+    pub tick_s: f64,
+    /// Start of the session, RFC 3339; for information, not used by the score.
+    pub started: String,
+    /// Id of the scripted operator; `None` for a person.
+    pub operator: Option<String>,
+    /// True for a session with a person: the session ran on a thread other than the servo's, and a command was
+    /// carried out some ticks after it was issued.
+    #[serde(default)]
+    pub live: bool,
+    pub device: DeviceSpecFile,
+    /// SHA-256 of the files from which the session was made, by name.
+    pub digests: BTreeMap<String, String>,
+}
+
+impl RecordingHeadFile {
+    /// Returns the head of a session run by this program. Participant, operator and start are left empty.
+    pub fn of(scenario: &Scenario, device: &DeviceSpec, seed: u64) -> RecordingHeadFile {
+        RecordingHeadFile {
+            version: VERSION,
+            typodont_version: env!("CARGO_PKG_VERSION").to_string(),
+            scenario_id: scenario.id.clone(),
+            scenario_sha256: scenario.sha256.clone(),
+            participant: String::new(),
+            seed,
+            tick_s: TICK_S,
+            started: String::new(),
+            operator: None,
+            live: false,
+            device: DeviceSpecFile::from(device),
+            digests: BTreeMap::new(),
+        }
+    }
+}
+
+/// Metadata known after the last tick.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RecordingEndFile {
+    /// "complete", or the reason for an early end of the session.
+    pub reason: String,
+    pub servo: ServoStatsFile,
+}
+
+/// Counts and timing of the servo; times in µs. A headless run has no clock and therefore no times.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ServoStatsFile {
+    pub ticks: u64,
+    #[serde(default)]
+    pub late_p50_us: Option<f64>,
+    pub late_p99_us: Option<f64>,
+    pub late_max_us: Option<f64>,
+    /// Longest computation of a tick.
+    #[serde(default)]
+    pub work_max_us: Option<f64>,
+    /// Number of missed servo cycles.
+    pub missed: u64,
+    /// Number of ticks that did not reach the session; if not 0, the recording is incomplete.
+    pub dropped: u64,
+    /// Number of times the forces were switched off because a servo cycle was too late.
+    #[serde(default)]
+    pub let_go: u64,
+    /// Number of times the device was absent or not ready during the session; no ticks ran meanwhile.
+    #[serde(default)]
+    pub interruptions: u64,
+    /// Number of times a person paused the session.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pauses: u64,
+    /// Number of refused readings and of forces that were not finite.
+    pub faults: u64,
+    /// Number of forces clamped to the device's limit.
+    pub clamped: u64,
+    /// Number of torques clamped to the device's limit.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub clamped_torques: u64,
+}
+
+/// Returns true for a count that is omitted, so that files stay identical to those written before the count existed.
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+impl ServoStatsFile {
+    /// Returns the counts of a simulation, without timing.
+    pub fn of(simulation: &Simulation) -> ServoStatsFile {
+        let gate = simulation.gate();
+        ServoStatsFile {
+            ticks: simulation.tick().0,
+            faults: gate.faults(),
+            clamped: gate.clamped_forces,
+            clamped_torques: gate.clamped_torques,
+            ..ServoStatsFile::default()
+        }
+    }
+
+    /// Returns true if the counts of both simulations are equal, whatever their timing.
+    pub fn has_same_counts(&self, other: &ServoStatsFile) -> bool {
+        let counts = |file: &ServoStatsFile| (file.ticks, file.faults, file.clamped, file.clamped_torques);
+        counts(self) == counts(other)
+    }
+}
+
+/// Device specification; each key names its unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceSpecFile {
+    pub name: String,
+    pub max_force_n: f32,
+    pub continuous_force_n: f32,
+    #[serde(default)]
+    pub max_torque_nmm: f32,
+    pub max_stiffness_n_per_mm: f32,
+    pub max_damping_n_s_per_mm: f32,
+    pub resolution_mm: f32,
+    pub workspace_half_mm: [f32; 3],
+    pub apparent_mass_kg: f32,
+}
+
+impl From<&DeviceSpec> for DeviceSpecFile {
+    fn from(spec: &DeviceSpec) -> DeviceSpecFile {
+        DeviceSpecFile {
+            name: spec.name.clone(),
+            max_force_n: spec.max_force,
+            continuous_force_n: spec.continuous_force,
+            max_torque_nmm: spec.max_torque,
+            max_stiffness_n_per_mm: spec.max_stiffness,
+            max_damping_n_s_per_mm: spec.max_damping,
+            resolution_mm: spec.resolution,
+            workspace_half_mm: spec.workspace_half.to_array(),
+            apparent_mass_kg: spec.apparent_mass,
+        }
+    }
+}
+
+impl From<&DeviceSpecFile> for DeviceSpec {
+    fn from(file: &DeviceSpecFile) -> DeviceSpec {
+        DeviceSpec {
+            name: file.name.clone(),
+            max_force: file.max_force_n,
+            continuous_force: file.continuous_force_n,
+            max_torque: file.max_torque_nmm,
+            max_stiffness: file.max_stiffness_n_per_mm,
+            max_damping: file.max_damping_n_s_per_mm,
+            resolution: file.resolution_mm,
+            workspace_half: Vec3::from_array(file.workspace_half_mm),
+            apparent_mass: file.apparent_mass_kg,
+        }
+    }
+}
+
+/// A message on `/event`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EventFile {
+    /// Tick before whose step the event happened.
+    pub tick: u64,
+    #[serde(flatten)]
+    pub what: EventKindFile,
+}
+
+/// Content of an event.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EventKindFile {
+    /// Input of a person.
+    Input(InputFile),
+    /// Command applied to the simulation.
+    Command(CommandFile),
+    StageStarted {
+        stage: String,
+    },
+    StageEnded {
+        stage: String,
+        by: String,
+    },
+    StagesOver {},
+    /// An input was refused.
+    Refused {
+        why: String,
+    },
+}
+
+/// File form of [`Input`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum InputFile {
+    Take { instrument: usize },
+    AnswerWord { question: String, value: String },
+    AnswerQuadrant { question: String, value: u8 },
+    AnswerYesNo { question: String, value: bool },
+    AnswerNumber { question: String, value: f64 },
+    Adjust { label: u8, coefficient: CoefficientName, value: f32 },
+    Chart { sign: ChartInputFile },
+    Confirm {},
+    Rate { item: String, value: u8 },
+    Abort {},
+}
+
+/// File form of [`ChartInput`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ChartInputFile {
+    Depth,
+    Calculus,
+}
+
+impl From<&Input> for InputFile {
+    fn from(input: &Input) -> InputFile {
+        match input.clone() {
+            Input::Take { instrument } => InputFile::Take { instrument },
+            Input::Answer { question, value } => match value {
+                AnswerValue::Word(value) => InputFile::AnswerWord { question, value },
+                AnswerValue::Quadrant(value) => InputFile::AnswerQuadrant { question, value },
+                AnswerValue::YesNo(value) => InputFile::AnswerYesNo { question, value },
+                AnswerValue::Number(value) => InputFile::AnswerNumber { question, value },
+            },
+            Input::Adjust { label, coefficient, value } => {
+                InputFile::Adjust { label: label.0, coefficient: coefficient.into(), value }
+            }
+            Input::Chart(ChartInput::Depth) => InputFile::Chart { sign: ChartInputFile::Depth },
+            Input::Chart(ChartInput::Calculus) => InputFile::Chart { sign: ChartInputFile::Calculus },
+            Input::Confirm => InputFile::Confirm {},
+            Input::Rate { item, value } => InputFile::Rate { item, value },
+            Input::Abort => InputFile::Abort {},
+        }
+    }
+}
+
+impl From<InputFile> for Input {
+    fn from(file: InputFile) -> Input {
+        match file {
+            InputFile::Take { instrument } => Input::Take { instrument },
+            InputFile::AnswerWord { question, value } => Input::Answer { question, value: AnswerValue::Word(value) },
+            InputFile::AnswerQuadrant { question, value } => {
+                Input::Answer { question, value: AnswerValue::Quadrant(value) }
+            }
+            InputFile::AnswerYesNo { question, value } => Input::Answer { question, value: AnswerValue::YesNo(value) },
+            InputFile::AnswerNumber { question, value } => {
+                Input::Answer { question, value: AnswerValue::Number(value) }
+            }
+            InputFile::Adjust { label, coefficient, value } => {
+                Input::Adjust { label: Label(label), coefficient: coefficient.into(), value }
+            }
+            InputFile::Chart { sign: ChartInputFile::Depth } => Input::Chart(ChartInput::Depth),
+            InputFile::Chart { sign: ChartInputFile::Calculus } => Input::Chart(ChartInput::Calculus),
+            InputFile::Confirm {} => Input::Confirm,
+            InputFile::Rate { item, value } => Input::Rate { item, value },
+            InputFile::Abort {} => Input::Abort,
+        }
+    }
+}
+
+/// File form of [`Command`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CommandFile {
+    Take {
+        instrument: usize,
+    },
+    /// Change of a stiffness. It has its own name because it is older than changes of other coefficients.
+    SetStiffness {
+        label: u8,
+        stiffness: f32,
+    },
+    Set {
+        label: u8,
+        coefficient: CoefficientName,
+        value: f32,
+    },
+    RunBur {
+        running: bool,
+    },
+    Guide {
+        guidance: Option<usize>,
+    },
+    Fill {
+        label: Option<u8>,
+    },
+}
+
+impl From<&Command> for CommandFile {
+    fn from(command: &Command) -> CommandFile {
+        match *command {
+            Command::SelectInstrument { instrument } => CommandFile::Take { instrument },
+            Command::SetCoefficient { label, coefficient: Coefficient::Stiffness, value } => {
+                CommandFile::SetStiffness { label: label.0, stiffness: value }
+            }
+            Command::SetCoefficient { label, coefficient, value } => {
+                CommandFile::Set { label: label.0, coefficient: coefficient.into(), value }
+            }
+            Command::RunBur { running } => CommandFile::RunBur { running },
+            Command::SetGuidance { guidance } => CommandFile::Guide { guidance },
+            Command::SetFilling { label } => CommandFile::Fill { label: label.map(|l| l.0) },
+        }
+    }
+}
+
+impl From<&CommandFile> for Command {
+    fn from(file: &CommandFile) -> Command {
+        match *file {
+            CommandFile::Take { instrument } => Command::SelectInstrument { instrument },
+            CommandFile::SetStiffness { label, stiffness } => {
+                Command::SetCoefficient { label: Label(label), coefficient: Coefficient::Stiffness, value: stiffness }
+            }
+            CommandFile::Set { label, coefficient, value } => {
+                Command::SetCoefficient { label: Label(label), coefficient: coefficient.into(), value }
+            }
+            CommandFile::RunBur { running } => Command::RunBur { running },
+            CommandFile::Guide { guidance } => Command::SetGuidance { guidance },
+            CommandFile::Fill { label } => Command::SetFilling { label: label.map(Label) },
+        }
+    }
+}
+
+/// A message on `/digest`: the running digest.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DigestFile {
+    /// Number of ticks covered.
+    pub tick: u64,
+    /// SHA-256 over the head, the attachments, all tick messages, all events and all changed voxels so far; the last
+    /// digest also covers the end metadata. Hexadecimal.
+    pub sha256: String,
+}
+
+/// Returns the name of a stage's end as written in recordings and results.
+pub fn ended_by_name(by: EndedBy) -> &'static str {
+    match by {
+        EndedBy::Time => "time",
+        EndedBy::Answer => "answer",
+        EndedBy::Confirmation => "confirmation",
+        EndedBy::Cleared => "cleared",
+        EndedBy::Abort => "abort",
+    }
+}

@@ -1,0 +1,26 @@
+//! Recordings of sessions on disk, and their replay.
+//!
+//! Takes a session's readings, inputs and forces while it runs. Gives them back in order, and verifies that a replay
+//! produces the same forces and the same volume. Never scores: that is the task of `score`.
+//!
+//! A recording is an MCAP file (<https://mcap.dev>): the scenario's text, the tables it used and the initial volume
+//! as attachments; one `/haptic` message per tick; inputs, commands and stages as JSON on `/event`; once a second, on
+//! `/digest`, a digest of everything so far. The file is appended to while the session runs, so that a killed session
+//! loses only its last moments.
+
+mod tick_record;
+mod file;
+mod mcap_walk;
+mod reader;
+mod replay;
+mod volume;
+mod writer;
+
+pub use file::{DeviceSpecFile, RecordingEndFile, RecordingHeadFile, ServoStatsFile, VERSION, ended_by_name};
+pub use reader::{Recording, RecordingError};
+pub use replay::{Difference, Replay, ReplayCheck, replay};
+pub use tick_record::TickRecord;
+pub use writer::{Recorder, RecorderError};
+
+/// Name of the recording within a bundle.
+pub const FILE_NAME: &str = "recording.mcap";

@@ -1,0 +1,292 @@
+//! The replay of a recording, and its comparison with what was recorded.
+
+use super::file::{DeviceSpecFile, END, ServoStatsFile};
+use super::reader::Recording;
+use super::tick_record::{TickLayout, TickRecord};
+use super::writer::DIGEST_TICKS;
+use crate::scenario::Workpiece;
+use crate::session::{COMMAND_LAG_TICKS, Effect, Session, SessionEvent, SessionOutcome};
+use sha2::{Digest, Sha256};
+use std::collections::VecDeque;
+use std::fmt;
+use typodont_core::device::{Device, DeviceSpec, PlaybackDevice, Wrench};
+use typodont_core::sim::{Command, Simulation, Step};
+use typodont_core::tick::Tick;
+use typodont_core::volume::{Edit, Volume};
+
+/// Digest of everything in a recording so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct RunningDigest(Sha256);
+
+impl RunningDigest {
+    pub fn new() -> RunningDigest {
+        RunningDigest(Sha256::new())
+    }
+
+    /// Adds the head, an attachment or the end metadata.
+    pub fn part(&mut self, name: &str, bytes: &[u8]) {
+        for part in [name.as_bytes(), bytes] {
+            self.0.update((part.len() as u64).to_le_bytes());
+            self.0.update(part);
+        }
+    }
+
+    /// Adds an `/event` message.
+    pub fn event(&mut self, bytes: &[u8]) {
+        self.0.update(b"E");
+        self.0.update(bytes);
+    }
+
+    /// Adds a `/haptic` message and the edits of its tick.
+    pub fn tick(&mut self, bytes: &[u8], edits: &[Edit]) {
+        self.0.update(b"T");
+        self.0.update(bytes);
+        for edit in edits {
+            self.0.update(edit.bytes());
+        }
+    }
+
+    /// Returns the SHA-256 so far, hexadecimal.
+    pub fn sha256(&self) -> String {
+        crate::scenario::hex(&self.0.clone().finalize())
+    }
+}
+
+/// Result of a replay.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    pub workpiece: Workpiece,
+    /// The volume at the end of the session.
+    pub volume: Volume,
+    pub outcome: SessionOutcome,
+    /// First difference between the replay and the recording; `None` if none was found or nothing was compared.
+    pub difference: Option<Difference>,
+}
+
+/// Difference between a replay and its recording.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Difference {
+    /// The step of this tick gives a different result, in the part named by `what`.
+    Tick { tick: Tick, what: &'static str },
+    /// The digest at this tick differs.
+    Digest { tick: Tick },
+    /// The session's command at this tick differs from the recorded one.
+    Command { tick: Tick },
+    /// The counts of ticks and faults at the end differ.
+    Counts,
+    /// The recording has more events or digests than a session produces.
+    UnexpectedRecords,
+    /// The recording has no end.
+    Unsealed,
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let at = |tick: &Tick| format!("tick {} ({:.3} s)", tick.0, tick.seconds());
+        match self {
+            Difference::Tick { tick, what } => write!(f, "{}: the {what} differs from the recording", at(tick)),
+            Difference::Digest { tick } => write!(f, "{}: the running digest differs from the recording", at(tick)),
+            Difference::Command { tick } => write!(f, "{}: the command differs from the recording", at(tick)),
+            Difference::Counts => f.write_str("the final counts of ticks and faults differ from the recording"),
+            Difference::UnexpectedRecords => f.write_str("the recording contains unexpected events or digests"),
+            Difference::Unsealed => f.write_str("the recording is cut off before its end"),
+        }
+    }
+}
+
+/// Extent of the comparison during a replay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReplayCheck {
+    /// Compares every force, command and digest: for verification.
+    Full,
+    /// Compares nothing: for scoring a recording that is verified separately.
+    Skip,
+}
+
+/// Replays a recording and passes every tick to `visit`.
+///
+/// `workpiece` is the recording's own. After the first difference the replay continues without further comparison.
+pub fn replay(
+    recording: &Recording,
+    workpiece: Workpiece,
+    check: ReplayCheck,
+    mut visit: impl FnMut(&TickRecord, &Step, &[Edit], &Session),
+) -> Replay {
+    let spec = DeviceSpec::from(&recording.head.device as &DeviceSpecFile);
+    let mut setup = crate::session::setup(&recording.scenario, &workpiece, spec.clone());
+    if recording.head.version < 2 {
+        setup.ramp = 0;
+    }
+    let mut simulation = Simulation::new(setup);
+    let mut session = Session::new(recording.scenario.clone(), &workpiece);
+    let lag = if recording.head.live { COMMAND_LAG_TICKS } else { 0 };
+    let mut expected_commands = ExpectedCommands { expected: VecDeque::new(), lag };
+    expected_commands.push_effects(Tick::ZERO, &session.begin());
+    let mut verifier = ReplayVerifier::new(recording, check);
+    let mut hand = PlaybackDevice::new(spec, recording.ticks.iter().map(|t| t.reading));
+    let mut output = Wrench::default();
+    let mut inputs = recording.inputs.iter().peekable();
+    let mut commands = recording.commands.iter().peekable();
+    for haptic in &recording.ticks {
+        let tick = haptic.tick;
+        while let Some((_, input)) = inputs.next_if(|(at, _)| *at <= tick) {
+            expected_commands.push_effects(tick, &session.advance(SessionEvent::Input(input)));
+        }
+        while let Some((at, command)) = commands.next_if(|(at, _)| *at <= tick) {
+            verifier.command(tick, expected_commands.take_matching(*at, command));
+            simulation.apply(command);
+        }
+        let Ok(reading) = hand.exchange(&output) else { break };
+        simulation.set_coupling_force(haptic.lead);
+        let step = simulation.step(&reading);
+        output = step.wrench();
+        verifier.tick(haptic, &step, simulation.edits());
+        visit(haptic, &step, simulation.edits(), &session);
+        expected_commands
+            .push_effects(tick.next(), &session.advance(SessionEvent::Tick { step: &step, edits: simulation.edits() }));
+    }
+    let last = Tick(recording.ticks.len() as u64);
+    for (_, input) in inputs {
+        expected_commands.push_effects(last, &session.advance(SessionEvent::Input(input)));
+    }
+    for (at, command) in commands {
+        verifier.command(last, expected_commands.take_matching(*at, command));
+    }
+    let counted = ServoStatsFile::of(&simulation);
+    let is_counted = recording.end.as_ref().is_none_or(|end| end.servo.has_same_counts(&counted));
+    let difference = verifier.finish(last, expected_commands.is_empty(), is_counted);
+    Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference }
+}
+
+/// Commands issued by the replayed session that must still be found in the recording, in the same order.
+struct ExpectedCommands {
+    expected: VecDeque<(Tick, Command)>,
+    /// Maximum number of ticks by which a recorded command may be later: 0 unless the session was live.
+    lag: u64,
+}
+
+impl ExpectedCommands {
+    /// Appends the commands among the effects.
+    fn push_effects(&mut self, at: Tick, effects: &[Effect]) {
+        let commands =
+            effects.iter().filter_map(|e| if let Effect::Command(command) = e { Some(*command) } else { None });
+        self.expected.extend(commands.map(|command| (at, command)));
+    }
+
+    /// Removes the next expected command and returns true if it equals the recorded one within the permitted lag.
+    fn take_matching(&mut self, at: Tick, command: &Command) -> bool {
+        let Some((given, expected)) = self.expected.pop_front() else { return false };
+        expected == *command && (given..=Tick(given.0 + self.lag)).contains(&at)
+    }
+
+    fn is_empty(&self) -> bool {
+        self.expected.is_empty()
+    }
+}
+
+/// Comparison of a replay with its recording, up to the first difference.
+struct ReplayVerifier<'a> {
+    recording: &'a Recording,
+    check: ReplayCheck,
+    layout: TickLayout,
+    running_digest: RunningDigest,
+    events_done: usize,
+    digests_done: usize,
+    difference: Option<Difference>,
+}
+
+impl<'a> ReplayVerifier<'a> {
+    fn new(recording: &'a Recording, check: ReplayCheck) -> ReplayVerifier<'a> {
+        ReplayVerifier {
+            recording,
+            check,
+            layout: TickLayout::of(recording.head.version),
+            running_digest: recording.initial_digest.clone(),
+            events_done: 0,
+            digests_done: 0,
+            difference: None,
+        }
+    }
+
+    fn is_comparing(&self) -> bool {
+        self.check == ReplayCheck::Full && self.difference.is_none()
+    }
+
+    fn command(&mut self, tick: Tick, matches: bool) {
+        if self.is_comparing() && !matches {
+            self.difference = Some(Difference::Command { tick });
+        }
+    }
+
+    fn tick(&mut self, recorded: &TickRecord, step: &Step, edits: &[Edit]) {
+        if !self.is_comparing() {
+            return;
+        }
+        let tick = recorded.tick;
+        self.digest_events(tick);
+        let again = TickRecord::of(&recorded.reading, step);
+        if let Some(what) = differing_part(recorded, &again) {
+            self.difference = Some(Difference::Tick { tick, what });
+            return;
+        }
+        self.running_digest.tick(&again.bytes(self.layout), edits);
+        let ticks_done = tick.0 + 1;
+        if ticks_done.is_multiple_of(DIGEST_TICKS) {
+            self.check_digest(Tick(ticks_done));
+        }
+    }
+
+    fn digest_events(&mut self, tick: Tick) {
+        let events = &self.recording.events[self.events_done..];
+        for (_, bytes) in events.iter().take_while(|(at, _)| *at <= tick) {
+            self.running_digest.event(bytes);
+            self.events_done += 1;
+        }
+    }
+
+    fn check_digest(&mut self, tick: Tick) {
+        let recorded = self.recording.digests.get(self.digests_done);
+        self.digests_done += 1;
+        if recorded.is_none_or(|d| d.tick != tick.0 || d.sha256 != self.running_digest.sha256()) {
+            self.difference = Some(Difference::Digest { tick });
+        }
+    }
+
+    fn finish(mut self, last: Tick, are_all_commands_given: bool, is_counted: bool) -> Option<Difference> {
+        if !self.is_comparing() {
+            return self.difference;
+        }
+        self.digest_events(last);
+        if self.recording.end.is_none() {
+            return Some(Difference::Unsealed);
+        }
+        self.running_digest.part(END, &self.recording.end_bytes);
+        self.check_digest(last);
+        let is_whole =
+            self.events_done == self.recording.events.len() && self.digests_done == self.recording.digests.len();
+        let missing_command = if are_all_commands_given { None } else { Some(Difference::Command { tick: last }) };
+        let counts = if is_counted { None } else { Some(Difference::Counts) };
+        self.difference.or(missing_command).or(counts).or(if is_whole {
+            None
+        } else {
+            Some(Difference::UnexpectedRecords)
+        })
+    }
+}
+
+/// Returns the name of the first part of a tick that differs in any bit.
+fn differing_part(recorded: &TickRecord, again: &TickRecord) -> Option<&'static str> {
+    let bits = |v: typodont_core::frame::Vec3| v.to_array().map(f32::to_bits);
+    let parts = [
+        (bits(recorded.force) != bits(again.force), "force"),
+        (bits(recorded.torque) != bits(again.torque), "torque"),
+        (bits(recorded.lead) != bits(again.lead), "coupling force"),
+        (bits(recorded.tip) != bits(again.tip), "position of the tip"),
+        (recorded.spring.to_bits() != again.spring.to_bits(), "spring force"),
+        (recorded.removed != again.removed, "number of removed voxels"),
+        (recorded.touched != again.touched, "touched tissue"),
+        (recorded.instrument != again.instrument, "instrument"),
+        (recorded.cutting != again.cutting, "cutting state"),
+    ];
+    parts.into_iter().find_map(|(differs, name)| differs.then_some(name))
+}

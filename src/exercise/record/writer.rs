@@ -1,0 +1,203 @@
+//! The writer of a recording, which appends to its file while the session runs.
+
+use super::file::{
+    CommandFile, DigestFile, END, EventFile, EventKindFile, HEAD, InputFile, RecordingEndFile, RecordingHeadFile,
+    ended_by_name,
+};
+use super::tick_record::{self, TickLayout, TickRecord};
+use super::{replay::RunningDigest, volume};
+use crate::scenario::{Scenario, Workpiece};
+use crate::session::{Effect, Input, Observer, Session};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, McapError, WriteOptions, Writer};
+use serde::Serialize;
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use typodont_core::device::Reading;
+use typodont_core::sim::{Command, Step};
+use typodont_core::tick::{TICK_S, Tick};
+use typodont_core::volume::Edit;
+
+/// Number of ticks between two writes to disk, which bounds the loss of a killed session.
+const FLUSH_TICKS: u64 = 100;
+
+/// Number of ticks between two digests.
+pub(super) const DIGEST_TICKS: u64 = 1000;
+
+/// Reason for which a recording cannot be written.
+#[derive(Debug)]
+pub struct RecorderError {
+    path: PathBuf,
+    why: String,
+}
+
+impl fmt::Display for RecorderError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "cannot write the recording — {} — {}", self.why, self.path.display())
+    }
+}
+
+impl std::error::Error for RecorderError {}
+
+/// Writer of one recording.
+pub struct Recorder {
+    path: PathBuf,
+    writer: Writer<File>,
+    tick_channel: u16,
+    event_channel: u16,
+    digest_channel: u16,
+    sequence: u32,
+    running_digest: RunningDigest,
+}
+
+impl Recorder {
+    /// Creates a recording and writes everything that is known before the first tick.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be created or written, or if a volume cannot be encoded.
+    pub fn create(
+        path: &Path,
+        head: &RecordingHeadFile,
+        scenario: &Scenario,
+        workpiece: &Workpiece,
+    ) -> Result<Recorder, RecorderError> {
+        let failed = |why: String| RecorderError { path: path.to_path_buf(), why };
+        let (density, label) = volume::bytes(&workpiece.volume).map_err(|e| failed(e.to_string()))?;
+        let original = workpiece.original.as_ref().map(|o| volume::bytes(o)).transpose();
+        let original = original.map_err(|e| failed(e.to_string()))?;
+        let file = File::create(path).map_err(|e| failed(e.to_string()))?;
+        // One thread and chunks buffered in memory: equal sessions give equal bytes, and a killed one complete
+        // chunks.
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("typodont ", env!("CARGO_PKG_VERSION")))
+            .chunk_size(None)
+            .disable_seeking(true);
+        #[cfg(not(target_family = "wasm"))]
+        let options = options.compression_threads(0);
+        let attempt = || -> Result<Recorder, McapError> {
+            let mut writer = options.create(file)?;
+            let mut running = RunningDigest::new();
+            running.part(HEAD, &json(head));
+            writer.write_metadata(&metadata(HEAD, head))?;
+            let mut attach = |name: &str, media_type: &str, data: &[u8]| {
+                running.part(name, data);
+                let (name, media_type) = (name.to_string(), media_type.to_string());
+                writer.attach(&Attachment { log_time: 0, create_time: 0, name, media_type, data: Cow::Borrowed(data) })
+            };
+            attach("scenario.json", "application/json", scenario.text.as_bytes())?;
+            for (name, bytes) in &scenario.files {
+                attach(name, "application/octet-stream", bytes)?;
+            }
+            attach(volume::DENSITY, "application/x-nrrd", &density)?;
+            attach(volume::LABEL, "application/x-nrrd", &label)?;
+            if let Some((density, label)) = &original {
+                attach(volume::ORIGINAL_DENSITY, "application/x-nrrd", density)?;
+                attach(volume::ORIGINAL_LABEL, "application/x-nrrd", label)?;
+            }
+            let schema = writer.add_schema(tick_record::SCHEMA_NAME, "ros2msg", tick_record::SCHEMA.as_bytes())?;
+            let none = BTreeMap::new();
+            let tick_channel = writer.add_channel(schema, "/haptic", "cdr", &none)?;
+            let event_channel = writer.add_channel(0, "/event", "json", &none)?;
+            let digest_channel = writer.add_channel(0, "/digest", "json", &none)?;
+            let path = path.to_path_buf();
+            Ok(Recorder {
+                path,
+                writer,
+                tick_channel,
+                event_channel,
+                digest_channel,
+                sequence: 0,
+                running_digest: running,
+            })
+        };
+        attempt().map_err(|e| failed(e.to_string()))
+    }
+
+    fn write(&mut self, channel_id: u16, tick: Tick, data: &[u8]) -> Result<(), RecorderError> {
+        let time = (tick.0 as f64 * TICK_S * 1e9).round() as u64;
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+        self.sequence = self.sequence.wrapping_add(1);
+        self.writer.write_to_known_channel(&header, data).map_err(|e| self.failed(e))
+    }
+
+    fn failed(&self, error: McapError) -> RecorderError {
+        RecorderError { path: self.path.clone(), why: error.to_string() }
+    }
+
+    fn write_event(&mut self, tick: Tick, what: EventKindFile) -> Result<(), RecorderError> {
+        let bytes = json(&EventFile { tick: tick.0, what });
+        self.running_digest.event(&bytes);
+        self.write(self.event_channel, tick, &bytes)
+    }
+
+    /// Writes the last digest and the end metadata, and closes the file.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn finish(mut self, end: &RecordingEndFile) -> Result<(), RecorderError> {
+        let tick = Tick(end.servo.ticks);
+        self.running_digest.part(END, &json(end));
+        let digest = DigestFile { tick: tick.0, sha256: self.running_digest.sha256() };
+        self.write(self.digest_channel, tick, &json(&digest))?;
+        let done = self.writer.write_metadata(&metadata(END, end)).and_then(|()| self.writer.finish().map(drop));
+        done.map_err(|e| self.failed(e))
+    }
+}
+
+/// Serializes a value as one line of JSON. Serialization of the types used here cannot fail.
+fn json(value: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(value).unwrap_or_default()
+}
+
+fn metadata(name: &str, value: &impl Serialize) -> Metadata {
+    let text = String::from_utf8(json(value)).unwrap_or_default();
+    Metadata { name: name.into(), metadata: BTreeMap::from([("json".to_string(), text)]) }
+}
+
+impl Observer for Recorder {
+    type Error = RecorderError;
+
+    fn input(&mut self, tick: Tick, input: &Input) -> Result<(), RecorderError> {
+        self.write_event(tick, EventKindFile::Input(InputFile::from(input)))
+    }
+
+    fn command(&mut self, tick: Tick, command: &Command) -> Result<(), RecorderError> {
+        self.write_event(tick, EventKindFile::Command(CommandFile::from(command)))
+    }
+
+    fn effect(&mut self, tick: Tick, effect: &Effect, session: &Session) -> Result<(), RecorderError> {
+        let id = |stage: usize| session.scenario().stages[stage].id.clone();
+        let what = match effect {
+            Effect::StageStarted { stage } => EventKindFile::StageStarted { stage: id(*stage) },
+            Effect::StageEnded { stage, by } => {
+                EventKindFile::StageEnded { stage: id(*stage), by: ended_by_name(*by).into() }
+            }
+            Effect::StagesOver => EventKindFile::StagesOver {},
+            Effect::Refused { why } => EventKindFile::Refused { why: why.to_string() },
+            // Commands are recorded by `command`; steps, answers and chart entries follow from commands and inputs.
+            Effect::Command(_) | Effect::StepStarted { .. } | Effect::Answered { .. } | Effect::Charted { .. } => {
+                return Ok(());
+            }
+        };
+        self.write_event(tick, what)
+    }
+
+    fn tick_completed(&mut self, reading: &Reading, step: &Step, edits: &[Edit]) -> Result<(), RecorderError> {
+        let bytes = TickRecord::of(reading, step).bytes(TickLayout::NEWEST);
+        self.running_digest.tick(&bytes, edits);
+        self.write(self.tick_channel, step.tick, &bytes)?;
+        let ticks_done = step.tick.0 + 1;
+        if ticks_done.is_multiple_of(DIGEST_TICKS) {
+            let digest = DigestFile { tick: ticks_done, sha256: self.running_digest.sha256() };
+            self.write(self.digest_channel, step.tick, &json(&digest))?;
+        }
+        if ticks_done.is_multiple_of(FLUSH_TICKS) {
+            self.writer.flush().map_err(|e| self.failed(e))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,68 @@
+//! The dental arches around the tooth in the scenario file. They are displayed; the only key that changes what can be
+//! touched is `missing`, which removes a neighbouring tooth.
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// Positions of the teeth in both jaws. Omitted values are those of the average adult.
+#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArchFile {
+    /// Form of the upper arch.
+    #[serde(default)]
+    pub upper: ArchFormFile,
+    /// Form of the lower arch.
+    #[serde(default)]
+    pub lower: ArchFormFile,
+    /// Position of the lower first molar relative to the upper one (Angle's classification): normal, distal or mesial.
+    #[serde(default)]
+    pub angle_class: AngleClassFile,
+    /// Missing teeth, by their FDI numbers.
+    #[serde(default)]
+    #[schemars(length(max = 27))]
+    pub missing: Vec<u8>,
+    /// Teeth that are rotated about their own axes.
+    #[serde(default)]
+    #[schemars(length(max = 27))]
+    pub rotated: Vec<RotatedFile>,
+}
+
+/// Form of one jaw's arch, by the beta function of Braun.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ArchFormFile {
+    /// Width between the centres of the second molars, mm: 40 to 62. Average: 54 in the upper jaw, 50.3 in the lower
+    /// jaw.
+    #[serde(default)]
+    #[schemars(range(min = 40.0, max = 62.0))]
+    pub width_mm: Option<f32>,
+    /// Depth from the incisors to the centres of the second molars, mm: 28 to 52. If omitted, it follows from the
+    /// widths of the teeth.
+    #[serde(default)]
+    #[schemars(range(min = 28.0, max = 52.0))]
+    pub depth_mm: Option<f32>,
+}
+
+/// Class of occlusion (Angle).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+pub enum AngleClassFile {
+    /// The mesiobuccal cusp of the upper first molar occludes with the buccal groove of the lower first molar.
+    #[default]
+    I,
+    /// The lower arch is distal by the width of a cusp.
+    II,
+    /// The lower arch is mesial by the width of a cusp.
+    III,
+}
+
+/// A rotated tooth.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RotatedFile {
+    /// FDI number of the tooth.
+    #[schemars(range(min = 11, max = 48))]
+    pub fdi: u8,
+    /// Rotation, degrees: -60 to 60. At a positive angle the mesial side is turned toward the lip or the cheek.
+    #[schemars(range(min = -60.0, max = 60.0))]
+    pub degrees: f32,
+}

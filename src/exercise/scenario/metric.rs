@@ -1,0 +1,553 @@
+//! The measures that a rubric can refer to: their names, units and formulae.
+//!
+//! The names are a contract (`session.json`); the values are computed in `score`, from a recording alone.
+
+use std::fmt;
+
+/// Direction in which a measure improves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Better {
+    Higher,
+    Lower,
+    /// A descriptive measure: neither a higher nor a lower value is better.
+    Neither,
+}
+
+/// Description of a measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MetricInfo {
+    pub name: &'static str,
+    pub title: &'static str,
+    /// Unit shown after the value; empty for counts and ratios.
+    pub unit: &'static str,
+    pub better: Better,
+    /// Formula, with its rule for empty sets. R is the set of removed voxels, D the decay at the start, T the target
+    /// zone.
+    pub formula: &'static str,
+}
+
+/// A measure of the table, with its argument if it takes one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Metric {
+    pub info: &'static MetricInfo,
+    pub argument: Option<MetricArgument>,
+}
+
+/// Argument in the brackets of a measure's name.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MetricArgument {
+    Zone(String),
+    ToleranceMm(f32),
+}
+
+/// Measures that have no meaning without tissue to be removed: by their rules for empty sets, they would then report a
+/// good result.
+const OF_TARGET: [&str; 13] = [
+    "decay_cleared_pct",
+    "healthy_per_decay_pct",
+    "efficiency_pct_s",
+    "dice",
+    "jaccard",
+    "precision",
+    "recall",
+    "hausdorff_mm",
+    "hausdorff95_mm",
+    "overcut_depth_max_mm",
+    "undercut_depth_max_mm",
+    "surface_within_tol",
+    "time_to_clear_s",
+];
+
+/// Feature of an exercise without which a measure has no value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RequiredFeature {
+    /// A tooth with caries.
+    Decay,
+    /// A prepared cavity, and a stage in which it is filled.
+    Filling,
+    /// A question about which tooth has the caries.
+    ToothQuestion,
+    /// A question about the quadrant of the caries.
+    QuadrantQuestion,
+    /// A question with a correct answer.
+    JudgedQuestion,
+    StiffnessSteps,
+    /// A stage in which probing depths are charted.
+    DepthChart,
+    /// A stage in which calculus is charted.
+    CalculusChart,
+    /// A tooth with calculus.
+    Calculus,
+}
+
+/// Features that measures require, in the order in which they are checked. [`OF_FILLINGS`] and [`CHARTING`] require
+/// one each, unless they are in this table.
+const REQUIRED_FEATURES: &[(&str, &[RequiredFeature])] = &[
+    ("decay_cleared_pct", &[RequiredFeature::Decay]),
+    ("healthy_per_decay_pct", &[RequiredFeature::Decay]),
+    ("efficiency_pct_s", &[RequiredFeature::Decay]),
+    ("detect_tooth", &[RequiredFeature::ToothQuestion]),
+    ("detect_level", &[RequiredFeature::ToothQuestion, RequiredFeature::StiffnessSteps]),
+    ("detect_level_time_s", &[RequiredFeature::ToothQuestion]),
+    ("detect_quadrant", &[RequiredFeature::QuadrantQuestion]),
+    ("detect_quadrant_time_s", &[RequiredFeature::QuadrantQuestion]),
+    ("questions_right_pct", &[RequiredFeature::JudgedQuestion]),
+    ("calculus_found_pct", &[RequiredFeature::CalculusChart, RequiredFeature::Calculus]),
+    ("calculus_false_alarms", &[RequiredFeature::CalculusChart]),
+];
+
+impl MetricInfo {
+    pub fn is_of_target(&self) -> bool {
+        OF_TARGET.contains(&self.name)
+    }
+
+    /// Returns the features that an exercise must have for this measure, in the order in which they are checked.
+    pub fn required_features(&self) -> &'static [RequiredFeature] {
+        let is_of = |table: &[MetricInfo]| table.iter().any(|about| about.name == self.name);
+        match REQUIRED_FEATURES.iter().find(|(name, _)| *name == self.name) {
+            Some((_, features)) => features,
+            None if is_of(CHARTING) => &[RequiredFeature::DepthChart],
+            None if is_of(OF_FILLINGS) => &[RequiredFeature::Filling],
+            None => &[],
+        }
+    }
+}
+
+use Better::{Higher, Lower, Neither};
+
+const fn info(
+    name: &'static str,
+    title: &'static str,
+    unit: &'static str,
+    better: Better,
+    formula: &'static str,
+) -> MetricInfo {
+    MetricInfo { name, title, unit, better, formula }
+}
+
+/// Measures without an argument, in the order of reports.
+pub const PLAIN: &[MetricInfo] = &[
+    info("decay_cleared_pct", "Caries removed", "%", Higher, "100·|R∩D| / |D|; no value without caries"),
+    info(
+        "healthy_per_decay_pct",
+        "Sound tissue removed, relative to the caries",
+        "%",
+        Lower,
+        "100·|R∖D| / |D|; the denominator is the caries at the start, so the value may exceed 100; no value \
+         without caries",
+    ),
+    info(
+        "time_to_clear_s",
+        "Duration of the cutting stage",
+        "s",
+        Lower,
+        "end − start of the last stage in which tooth or restoration is cut",
+    ),
+    info(
+        "detect_tooth",
+        "Carious tooth identified",
+        "",
+        Higher,
+        "1 if the tooth named has caries; 0 if another tooth or none was named; no value if not asked",
+    ),
+    info(
+        "detect_level",
+        "Stiffness at which the caries was detected",
+        "",
+        Higher,
+        "stiffness coefficient of the caries at the time of the answer; no value if not asked or not answered",
+    ),
+    info(
+        "detect_level_time_s",
+        "Time to identify the carious tooth",
+        "s",
+        Lower,
+        "from the start of the stiffness step, or of the stage if there are no steps, to the answer; no value \
+         if not answered",
+    ),
+    info(
+        "detect_quadrant",
+        "Quadrant identified",
+        "",
+        Higher,
+        "1 if the quadrant named has caries; 0 if another quadrant or none was named; no value if not asked",
+    ),
+    info(
+        "detect_quadrant_time_s",
+        "Time to identify the quadrant",
+        "s",
+        Lower,
+        "from the start of the stage to the answer; no value if not answered",
+    ),
+    info(
+        "questions_right_pct",
+        "Questions answered correctly",
+        "%",
+        Higher,
+        "100·correct answers / questions with a correct answer, including those left unanswered; no value if there are \
+        none",
+    ),
+    info("dice", "Overlap with the target (Dice)", "", Higher, "2·|R∩T| / (|R|+|T|); 1 if both are empty"),
+    info("jaccard", "Overlap with the target (Jaccard)", "", Higher, "|R∩T| / |R∪T|; 1 if both are empty"),
+    info(
+        "precision",
+        "Proportion of the removed tissue within the target (precision)",
+        "",
+        Higher,
+        "|R∩T| / |R|; if nothing was removed: 1 if T is empty, otherwise 0",
+    ),
+    info(
+        "recall",
+        "Proportion of the target removed (recall)",
+        "",
+        Higher,
+        "|R∩T| / |T|; 1 if there \
+         is no target",
+    ),
+    info(
+        "hausdorff_mm",
+        "Greatest distance between outlines",
+        "mm",
+        Lower,
+        "symmetric, between the borders of R and T; no value if either is empty",
+    ),
+    info(
+        "hausdorff95_mm",
+        "Distance between outlines, 95th percentile",
+        "mm",
+        Lower,
+        "95th percentile of the distances of which hausdorff_mm is the greatest",
+    ),
+    info(
+        "overcut_depth_max_mm",
+        "Deepest cut into sound tissue",
+        "mm",
+        Lower,
+        "greatest distance of a removed sound voxel from D; 0 if none was removed; no value if some were \
+         removed but there is no caries",
+    ),
+    info(
+        "undercut_depth_max_mm",
+        "Greatest depth of remaining caries",
+        "mm",
+        Lower,
+        "greatest distance of a remaining carious voxel from R; 0 if none remains; no value if nothing was removed",
+    ),
+    info(
+        "pulp_exposed",
+        "Pulp exposed",
+        "",
+        Lower,
+        "1 if a pulp voxel was removed or exposed by the removal of an adjacent voxel, otherwise 0",
+    ),
+    info(
+        "remaining_dentine_thickness_min_mm",
+        "Smallest distance between the cavity and the pulp",
+        "mm",
+        Higher,
+        "smallest distance between R without pulp and the pulp; no value if either is empty",
+    ),
+    info(
+        "force_max_n",
+        "Greatest force",
+        "N",
+        Lower,
+        "greatest force on the device in contact, without guidance forces; 0 if never in contact",
+    ),
+    info(
+        "force_mean_n",
+        "Mean force",
+        "N",
+        Lower,
+        "mean force over the cycles in contact, without guidance forces; no value if never in contact",
+    ),
+    info(
+        "speed_max_mm_s",
+        "Greatest speed in contact",
+        "mm/s",
+        Lower,
+        "of the tip, over intervals of 20 ms with any contact, including the end of an approach; no value if \
+         never in contact",
+    ),
+    info(
+        "force_max_near_pulp_n",
+        "Greatest force near the pulp",
+        "N",
+        Lower,
+        "within near_mm of the pulp at the start; 0 if never there",
+    ),
+    info(
+        "force_mean_near_pulp_n",
+        "Mean force near the pulp",
+        "N",
+        Lower,
+        "within near_mm of the pulp at the start; 0 if never there",
+    ),
+    info(
+        "speed_max_near_pulp_mm_s",
+        "Greatest speed near the pulp",
+        "mm/s",
+        Lower,
+        "within near_mm of the pulp at the start; 0 if never there",
+    ),
+    info("path_length_mm", "Path length of the tip", "mm", Neither, "sum of the displacements of the tip over 20 ms"),
+    info("drilling_time_s", "Cutting time", "s", Neither, "cycles in which material was cut"),
+    info("contact_time_s", "Contact time", "s", Neither, "cycles in which anything was touched"),
+    info(
+        "efficiency_pct_s",
+        "Caries removed per second of cutting",
+        "%/s",
+        Higher,
+        "decay_cleared_pct / drilling_time_s; no value if nothing was cut",
+    ),
+    info(
+        "jerk",
+        "Smoothness (log dimensionless jerk)",
+        "",
+        Higher,
+        "−ln(T⁵/L² · ∫|jerk|² dt) of the tip in contact, sampled at 50 Hz; no value for less than 1 s of contact",
+    ),
+    info(
+        "soft_tissue_drilled_s",
+        "Running bur on soft tissue",
+        "s",
+        Lower,
+        "cycles in which a running bur touched gingiva or other soft tissue",
+    ),
+    info(
+        "neighbour_drilled_s",
+        "Running bur on an adjacent tooth",
+        "s",
+        Lower,
+        "cycles in which a running bur touched an adjacent tooth",
+    ),
+    info("session_time_s", "Duration of the session", "s", Neither, "all stages together"),
+];
+
+/// Measures of fillings, for exercises with a prepared cavity. C is the cavity, S the surface at the end, O the tooth's
+/// original contour.
+pub const OF_FILLINGS: &[MetricInfo] = &[
+    info("filled_pct", "Cavity filled", "%", Higher, "100·|filled∩C| / |C|"),
+    info(
+        "contour_mean_mm",
+        "Mean distance from the original contour",
+        "mm",
+        Lower,
+        "mean distance of S from O along the normals of O, over the mouth of the cavity and wherever material \
+         lies on the tooth",
+    ),
+    info(
+        "contour_p95_mm",
+        "Distance from the original contour, 95th percentile",
+        "mm",
+        Lower,
+        "95th percentile of the distances of S from O whose mean is contour_mean_mm",
+    ),
+    info(
+        "contour_max_mm",
+        "Greatest distance from the original contour",
+        "mm",
+        Lower,
+        "greatest of the distances of S from O whose mean is contour_mean_mm",
+    ),
+    info(
+        "overhang_max_mm",
+        "Greatest overhang",
+        "mm",
+        Lower,
+        "greatest distance by which S lies outside O; 0 \
+         if nowhere",
+    ),
+    info(
+        "deficit_max_mm",
+        "Greatest deficiency",
+        "mm",
+        Lower,
+        "greatest distance by which S lies inside O; 0 if nowhere",
+    ),
+    info(
+        "overhang_mm3",
+        "Material outside the original contour",
+        "mm³",
+        Lower,
+        "volume placed outside O, from voxel densities",
+    ),
+    info("void_mm3", "Voids in the restoration", "mm³", Lower, "volume of air in C enclosed by material on all sides"),
+];
+
+/// Measures of a periodontal chart, computed if a stage asks for one. The sites are the six sites of the tooth.
+pub const CHARTING: &[MetricInfo] = &[
+    info("sites_read_pct", "Sites probed", "%", Higher, "100·sites with a reading / 6"),
+    info(
+        "probing_within_1mm_pct",
+        "Readings within 1 mm",
+        "%",
+        Higher,
+        "100·sites with |reading − true depth| ≤ 1 mm / 6; a site without a reading does not count",
+    ),
+    info(
+        "probing_error_mm",
+        "Mean error of the readings",
+        "mm",
+        Lower,
+        "mean of |reading − true depth| over the sites with a reading; no value without readings",
+    ),
+    info(
+        "probing_bias_mm",
+        "Mean over- or under-reading",
+        "mm",
+        Neither,
+        "mean of reading − true depth over the sites with a reading; positive values are too deep; no value \
+         without readings",
+    ),
+    info(
+        "probing_force_max_n",
+        "Greatest probing force",
+        "N",
+        Lower,
+        "greatest force at the time of a reading; no value without readings",
+    ),
+    info(
+        "probing_force_high",
+        "Readings with excessive force",
+        "",
+        Lower,
+        "readings at which the probe was pressed with more than 0.35 N (0.25 N is taught); no value without readings",
+    ),
+    info(
+        "calculus_found_pct",
+        "Calculus detected",
+        "%",
+        Higher,
+        "100·sites with calculus that were recorded / sites with calculus; no value without calculus or if not asked",
+    ),
+    info(
+        "calculus_false_alarms",
+        "Calculus recorded where there is none",
+        "",
+        Lower,
+        "sites that were recorded but have no calculus; no value if not asked, or if there is calculus and no \
+         site was recorded",
+    ),
+];
+
+/// Measures with an argument in brackets.
+pub const WITH_ARGUMENT: &[MetricInfo] = &[
+    info("zone_removed_pct", "Zone removed", "%", Neither, "100·|R∩Z| / |Z|; no value if the zone is empty"),
+    info(
+        "surface_within_tol",
+        "Agreement of outlines",
+        "",
+        Higher,
+        "proportion of the borders of R and T within the tolerance of each other; no value if either is empty",
+    ),
+];
+
+/// Reason for which a measure's name is not accepted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum MetricParseError {
+    /// There is no measure of this name.
+    Name(String),
+    /// The argument in brackets is missing, invalid or not permitted.
+    Argument(&'static str),
+}
+
+impl Metric {
+    /// Parses a name such as `dice`, `zone_removed_pct(target)` or `surface_within_tol(0.3)`.
+    ///
+    /// # Errors
+    /// Returns an error if there is no measure of this name, or if its argument is missing, invalid or not permitted.
+    pub fn parse(written: &str) -> Result<Metric, MetricParseError> {
+        let (name, inner) = match written.split_once('(') {
+            Some((name, rest)) => match rest.strip_suffix(')') {
+                Some(inner) => (name, Some(inner.trim())),
+                None => return Err(MetricParseError::Argument("the bracket is not closed")),
+            },
+            None => (written, None),
+        };
+        if let Some(info) = without_argument().find(|a| a.name == name) {
+            return match inner {
+                None => Ok(Metric { info, argument: None }),
+                Some(_) => Err(MetricParseError::Argument("this measure takes no argument in brackets")),
+            };
+        }
+        let info =
+            WITH_ARGUMENT.iter().find(|a| a.name == name).ok_or_else(|| MetricParseError::Name(name.to_string()))?;
+        let argument = match (name, inner) {
+            ("zone_removed_pct", Some(zone)) if !zone.is_empty() => MetricArgument::Zone(zone.to_string()),
+            ("zone_removed_pct", _) => {
+                return Err(MetricParseError::Argument("name a zone in brackets: zone_removed_pct(target)"));
+            }
+            (_, Some(number)) => match number.parse() {
+                Ok(mm) if mm > 0.0 && mm < 10.0 => MetricArgument::ToleranceMm(mm),
+                _ => {
+                    return Err(MetricParseError::Argument(
+                        "give a tolerance in mm in brackets: surface_within_tol(0.3)",
+                    ));
+                }
+            },
+            (_, None) => {
+                return Err(MetricParseError::Argument("give a tolerance in mm in brackets: surface_within_tol(0.3)"));
+            }
+        };
+        Ok(Metric { info, argument: Some(argument) })
+    }
+
+    /// Returns the measure's full name, as accepted by [`Metric::parse`] and written to `session.json`.
+    pub fn name(&self) -> String {
+        match &self.argument {
+            None => self.info.name.to_string(),
+            Some(MetricArgument::Zone(zone)) => format!("{}({zone})", self.info.name),
+            Some(MetricArgument::ToleranceMm(mm)) => format!("{}({mm})", self.info.name),
+        }
+    }
+
+    /// Returns a measure without an argument.
+    pub fn plain(info: &'static MetricInfo) -> Metric {
+        Metric { info, argument: None }
+    }
+}
+
+impl fmt::Display for Metric {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.name())
+    }
+}
+
+/// Returns every measure without an argument, in the order of reports.
+pub fn without_argument() -> impl Iterator<Item = &'static MetricInfo> + Clone {
+    PLAIN.iter().chain(OF_FILLINGS).chain(CHARTING)
+}
+
+/// Returns every measure.
+pub fn all() -> impl Iterator<Item = &'static MetricInfo> + Clone {
+    without_argument().chain(WITH_ARGUMENT)
+}
+
+/// Returns the names of all measures, without arguments, for diagnostics.
+pub fn names() -> impl Iterator<Item = &'static str> + Clone {
+    all().map(|a| a.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_round_trip() {
+        for name in ["dice", "zone_removed_pct(target)", "surface_within_tol(0.3)"] {
+            assert_eq!(Metric::parse(name).map(|m| m.name()), Ok(name.to_string()));
+        }
+        for about in without_argument() {
+            assert!(Metric::parse(about.name).is_ok(), "{}", about.name);
+        }
+    }
+
+    #[test]
+    fn wrong_names_say_what_is_missing() {
+        assert_eq!(Metric::parse("dise"), Err(MetricParseError::Name("dise".into())));
+        for name in ["zone_removed_pct", "zone_removed_pct()", "surface_within_tol(x)", "dice(1)", "dice("] {
+            assert!(matches!(Metric::parse(name), Err(MetricParseError::Argument(_))), "{name}");
+        }
+    }
+}

@@ -1,0 +1,472 @@
+//! Scenarios: the files that authors write, and the checked exercises made from them.
+//!
+//! Takes a scenario's text and the files it names. Gives a complete, valid [`Scenario`] or every diagnostic, and the
+//! [`Workpiece`] from which a session starts. Never runs anything.
+
+mod arch_file;
+mod cavity;
+mod cavity_file;
+mod decay_file;
+mod periodontium_file;
+mod calculus_and_fillings;
+pub mod file;
+mod lesion;
+pub mod metric;
+mod questionnaire;
+mod resolve;
+mod schema;
+mod tooth_bounds;
+mod workpiece;
+
+pub use cavity::{PreparedCavity, ProximalBox};
+pub use lesion::Lesion;
+pub use metric::Metric;
+pub use questionnaire::{Questionnaire, QuestionnaireCategory, QuestionnaireItem};
+pub use resolve::{ResolveMode, hex, resolve};
+pub use schema::schema_text;
+pub use tooth_bounds::{ToothBounds, anatomy_tissues};
+pub use typodont_anatomy::periodontium::{Periodontium, Pockets, ProbingSite};
+pub use workpiece::{Workpiece, WorkpieceError};
+
+use crate::catalog::{InstrumentEntry, TissueTable};
+use file::{AngleClassFile, SurfaceFile, ZoneRole};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use typodont_anatomy::caries::LesionDepth;
+use typodont_core::frame::Vec3;
+use typodont_core::touch::{CarvingParameters, Collider, Guidance, MaterialScales, Vibration};
+use typodont_core::volume::{Label, Volume};
+
+/// A complete, valid exercise, as returned by [`resolve`]. No later code checks for missing parts.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    pub id: String,
+    pub title: String,
+    pub summary: String,
+    /// The text of the scenario file.
+    pub text: Arc<str>,
+    /// SHA-256 of that text, hexadecimal.
+    pub sha256: String,
+    /// The tables and other files from which the scenario was made, by name: a recording must contain them in order to
+    /// be scored again. Scans are not among them; the volume made from a scan is part of the recording.
+    pub files: BTreeMap<String, Arc<[u8]>>,
+    pub scene: Scene,
+    pub tissues: TissueTable,
+    pub carving: CarvingParameters,
+    pub vibration: Vibration,
+    pub operating_field: OperatingField,
+    /// Instruments of the tray. Stages and results refer to them by index.
+    pub instruments: Vec<InstrumentEntry>,
+    /// Factors by which each instrument and the patient's age change the tissues' tactile properties, one entry per
+    /// instrument.
+    pub factors: Vec<MaterialScales>,
+    pub zones: Vec<Zone>,
+    /// Haptic guidances. Stages refer to them by index.
+    pub guidances: Vec<Guidance>,
+    pub stages: Vec<Stage>,
+    pub measures: MeasureParams,
+    pub rubric: Option<Rubric>,
+    pub questionnaire: Option<Questionnaire>,
+}
+
+/// Visible effects of drilling. They are drawn only, and do not influence any measure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OperatingField {
+    pub dust: bool,
+    pub water_spray: bool,
+    pub suction: bool,
+}
+
+impl OperatingField {
+    /// Returns true if debris or water is drawn.
+    pub fn is_any(self) -> bool {
+        self.dust || self.water_spray
+    }
+}
+
+/// The tooth or teeth of an exercise and their surroundings.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub layout: SceneLayout,
+    /// One tooth, or two from left to right.
+    pub teeth: Vec<ToothSpec>,
+    /// Objects around a tooth in its jaw, tooth space; `None` for simple shapes of average size.
+    pub surroundings: Option<Vec<Collider>>,
+    /// Gingiva with pockets; `None` outside a jaw.
+    pub pockets: Option<Pockets>,
+    pub arch: DentalArches,
+}
+
+/// Positions of the teeth in both jaws; mm.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DentalArches {
+    pub upper: ArchForm,
+    pub lower: ArchForm,
+    pub angle_class: AngleClassFile,
+    /// FDI numbers of missing teeth.
+    pub missing: Vec<u8>,
+    /// FDI numbers of rotated teeth, each with its rotation, degrees.
+    pub rotated: Vec<(u8, f32)>,
+    /// Age shown by teeth and gingiva, years; `None` for unworn teeth with the pulp and the gingiva of an adult of 30
+    /// years.
+    pub age: Option<f32>,
+}
+
+/// Arch form of one jaw, mm; `None` for the average.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ArchForm {
+    pub width: Option<f32>,
+    pub depth: Option<f32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SceneLayout {
+    Single,
+    /// Two teeth side by side; `gap` is the distance between them, mm.
+    Pair {
+        gap: f32,
+    },
+    /// A tooth with gingiva and neighbouring teeth.
+    Jaw,
+}
+
+/// Specification of a tooth.
+#[derive(Clone, Debug)]
+pub struct ToothSpec {
+    pub id: String,
+    pub fdi: u8,
+    pub source: ToothSource,
+    pub decay: Vec<Decay>,
+    /// Stains: discoloured but sound places.
+    pub stains: Vec<Decay>,
+    /// Cavity cut before the session begins.
+    pub cavity: Option<PreparedCavity>,
+    pub calculus: Vec<Calculus>,
+    pub fillings: Vec<OldFilling>,
+}
+
+/// A deposit of calculus on a root; lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Calculus {
+    pub id: String,
+    pub label: Label,
+    pub site: ProbingSite,
+    /// Distance of the deposit's centre below the gingival margin.
+    pub below_margin: f32,
+    pub thickness: f32,
+    pub width: f32,
+    pub height: f32,
+}
+
+/// An existing filling in the occlusal surface; lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OldFilling {
+    pub id: String,
+    pub label: Label,
+    /// Offset of the filling's centre from the centre of the crown: buccal and distal.
+    pub offset: [f32; 2],
+    pub size: [f32; 2],
+    pub depth: f32,
+}
+
+/// Unit vector toward distal in the tooth space of the tooth with this FDI number: +y or −y.
+pub fn distal(fdi: u8) -> Vec3 {
+    Vec3::Y * typodont_anatomy::teeth::distal_sign(fdi)
+}
+
+/// Source of a tooth's shape.
+#[derive(Clone, Debug)]
+pub enum ToothSource {
+    /// Generated by the program from the tooth's FDI number; voxel size in mm, age in years.
+    Procedural { spacing: f32, age: Option<f32> },
+    /// Read from a file: crown up, tissues labelled.
+    Given(Arc<Volume>),
+    /// Taken from a recording; nothing is generated.
+    Recorded,
+}
+
+/// Decay to be placed in a tooth; lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Decay {
+    pub id: String,
+    pub label: Label,
+    pub shape: DecayShape,
+    pub surface: SurfaceFile,
+    pub place: DecayPlace,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum DecayShape {
+    Ellipsoid {
+        /// Semi-axes: buccolingual, mesiodistal, occlusoapical.
+        radii: [f32; 3],
+        /// Depth of the centre below the surface.
+        depth: f32,
+    },
+    Grown(GrownDecay),
+}
+
+/// Decay that follows the tooth's tissues; see [`typodont_anatomy::caries`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrownDecay {
+    pub origin: DecayOrigin,
+    /// Possible depths, of which the session's seed selects one.
+    pub depths: Vec<LesionDepth>,
+    pub spread: f32,
+    /// Tissue of the rim, and its extent from the border toward the core, 0 to 1.
+    pub rim: Option<(Label, f32)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DecayOrigin {
+    Fissure {
+        length: f32,
+    },
+    /// Semi-axes on the surface.
+    Smooth {
+        half: [f32; 2],
+    },
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum DecayPlace {
+    Centre,
+    RandomQuadrant,
+    Random,
+    /// Quadrant, 1–4 as seen from above.
+    Quadrant(u8),
+    Offset([f32; 2]),
+}
+
+/// A named region.
+#[derive(Clone, Debug)]
+pub struct Zone {
+    pub id: String,
+    pub title: String,
+    pub role: ZoneRole,
+    pub region: ZoneRegion,
+}
+
+/// Voxels that belong to a zone; points in tooth space, mm.
+#[derive(Clone, Debug)]
+pub enum ZoneRegion {
+    Tissue(Label),
+    Around { label: Label, within: f32 },
+    Sphere { centre: [f32; 3], radius: f32 },
+    Box { min: [f32; 3], max: [f32; 3] },
+    Cylinder { from: [f32; 3], to: [f32; 3], radius: f32 },
+    Mask(Arc<Mask>),
+}
+
+impl ZoneRegion {
+    /// Returns the corners of the smallest box around a geometric region, tooth space, mm; `None` for a region defined
+    /// by tissues or a label map.
+    pub fn bounding_box(&self) -> Option<[Vec3; 2]> {
+        let around = |a: [f32; 3], b: [f32; 3], radius: f32| {
+            let (a, b) = (Vec3::from(a), Vec3::from(b));
+            [a.min(b) - radius, a.max(b) + radius]
+        };
+        match self {
+            ZoneRegion::Sphere { centre, radius } => Some(around(*centre, *centre, *radius)),
+            ZoneRegion::Box { min, max } => Some(around(*min, *max, 0.0)),
+            ZoneRegion::Cylinder { from, to, radius } => Some(around(*from, *to, *radius)),
+            ZoneRegion::Tissue(_) | ZoneRegion::Around { .. } | ZoneRegion::Mask(_) => None,
+        }
+    }
+
+    /// Returns true for a point (tooth space, mm) within a geometric region; false for a region defined by tissues or a
+    /// label map.
+    pub fn contains(&self, point_in_tooth: Vec3) -> bool {
+        let p = point_in_tooth;
+        match self {
+            ZoneRegion::Sphere { centre, radius } => p.distance_squared(Vec3::from(*centre)) <= radius * radius,
+            ZoneRegion::Box { min, max } => p.cmpge(Vec3::from(*min)).all() && p.cmple(Vec3::from(*max)).all(),
+            ZoneRegion::Cylinder { from, to, radius } => {
+                let (from, axis) = (Vec3::from(*from), Vec3::from(*to) - Vec3::from(*from));
+                let along = (p - from).dot(axis) / axis.length_squared();
+                (0.0..=1.0).contains(&along) && (p - from - axis * along).length_squared() <= radius * radius
+            }
+            ZoneRegion::Tissue(_) | ZoneRegion::Around { .. } | ZoneRegion::Mask(_) => false,
+        }
+    }
+
+    /// Returns the size of the label map that defines the region, in voxels; `None` for other regions.
+    pub fn map_dims(&self) -> Option<[u32; 3]> {
+        if let ZoneRegion::Mask(mask) = self { Some(mask.dims) } else { None }
+    }
+}
+
+/// Marked voxels of a label map, on the label map's own grid.
+#[derive(Clone, Debug)]
+pub struct Mask {
+    pub dims: [u32; 3],
+    pub is_inside: Vec<bool>,
+}
+
+/// A stage of an exercise.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub id: String,
+    pub title: String,
+    pub instruction: String,
+    /// Time limit, s.
+    pub time_limit: Option<f64>,
+    /// Indices into [`Scenario::instruments`]; never empty.
+    pub instruments: Vec<usize>,
+    pub cutting: bool,
+    /// Filling material that carriers place.
+    pub filling: Option<Label>,
+    pub show_decay: bool,
+    /// True if the trainee may change the tissues' coefficients.
+    pub is_adjustable: bool,
+    pub steps: Option<StiffnessSteps>,
+    /// Index into [`Scenario::guidances`].
+    pub guidance: Option<usize>,
+    pub chart: ChartScope,
+    pub ask: Vec<Question>,
+    pub ends: EndConditions,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct StiffnessSteps {
+    pub label: Label,
+    /// Coefficients, one step after the other; never empty.
+    pub coefficients: Vec<f32>,
+    /// Duration of a step, s.
+    pub step_time: f64,
+}
+
+/// Findings to be recorded in the periodontal chart during a stage.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ChartScope {
+    pub depths: bool,
+    pub calculus: bool,
+}
+
+/// Conditions that end a stage, besides its time limit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EndConditions {
+    pub answered: bool,
+    pub confirmed: bool,
+    /// Share of the decay to be removed, %.
+    pub cleared: Option<f64>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Question {
+    pub id: String,
+    pub text: String,
+    pub kind: QuestionKind,
+}
+
+/// Kind of answer, and the correct answer.
+#[derive(Clone, Debug, PartialEq)]
+pub enum QuestionKind {
+    /// The tooth that has the decay with this id.
+    ToothWith {
+        decay: String,
+    },
+    /// The quadrant in which the decay with this id lies.
+    QuadrantOf {
+        decay: String,
+    },
+    Choice {
+        options: Vec<(String, String)>,
+        correct: Option<String>,
+    },
+    YesNo {
+        correct: Option<bool>,
+    },
+    Number {
+        unit: String,
+        correct: Option<f64>,
+        tolerance: f64,
+    },
+    Text,
+}
+
+/// Parameters of the measures, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MeasureParams {
+    pub pulp_proximity: f32,
+    pub leeway: f32,
+    pub tolerance: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rubric {
+    pub pass_points: f64,
+    pub items: Vec<RubricItem>,
+    pub hard_fails: Vec<HardFail>,
+}
+
+impl Rubric {
+    /// Returns every measure of the rubric, those of critical errors last.
+    pub fn metrics(&self) -> impl Iterator<Item = &Metric> {
+        self.items.iter().map(|item| &item.metric).chain(self.hard_fails.iter().map(|fail| &fail.metric))
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct RubricItem {
+    pub title: String,
+    pub metric: Metric,
+    pub points: f64,
+    pub full_at: f64,
+    pub zero_at: f64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub struct HardFail {
+    pub title: String,
+    pub metric: Metric,
+    pub when: Limit,
+}
+
+/// Condition on a measure under which an exercise is failed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Limit {
+    Above(f64),
+    Below(f64),
+}
+
+impl QuestionKind {
+    /// Returns true if an answer can be correct or incorrect.
+    pub fn is_judged(&self) -> bool {
+        match self {
+            QuestionKind::ToothWith { .. } | QuestionKind::QuadrantOf { .. } => true,
+            QuestionKind::Choice { correct, .. } => correct.is_some(),
+            QuestionKind::YesNo { correct } => correct.is_some(),
+            QuestionKind::Number { correct, .. } => correct.is_some(),
+            QuestionKind::Text => false,
+        }
+    }
+}
+
+impl Scenario {
+    /// Returns the index of the last stage in which burs run.
+    pub fn cutting_stage(&self) -> Option<usize> {
+        self.stages.iter().rposition(|s| s.cutting)
+    }
+
+    /// Returns true if something is to be removed: decay, or tissue in a target zone.
+    pub fn has_target(&self) -> bool {
+        let has_zone = self.zones.iter().any(|zone| zone.role == ZoneRole::Target);
+        has_zone || self.scene.teeth.iter().any(|tooth| !tooth.decay.is_empty())
+    }
+
+    /// Returns true if a tooth has a prepared cavity, so that a filling can be compared with the tooth's contour.
+    pub fn has_cavity(&self) -> bool {
+        self.scene.teeth.iter().any(|tooth| tooth.cavity.is_some())
+    }
+
+    /// Returns true if a prepared cavity is to be filled.
+    pub fn has_filling(&self) -> bool {
+        self.has_cavity() && self.stages.iter().any(|stage| stage.filling.is_some())
+    }
+
+    /// Returns every decay with the index of its tooth.
+    pub fn decay(&self) -> impl Iterator<Item = (usize, &Decay)> {
+        self.scene.teeth.iter().enumerate().flat_map(|(tooth, t)| t.decay.iter().map(move |d| (tooth, d)))
+    }
+}

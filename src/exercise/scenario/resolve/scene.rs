@@ -1,0 +1,443 @@
+//! The teeth of a scene with their shapes and decay, and their surroundings.
+
+use super::{ResolveMode, Resolver, tooth_path};
+
+use crate::scenario::file;
+use crate::scenario::tooth_bounds::anatomy_tissues;
+use crate::scenario::{
+    ArchForm, Calculus, Decay, DecayOrigin, DecayPlace, DecayShape, DentalArches, GrownDecay, OldFilling, Pockets,
+    PreparedCavity, ProximalBox, Scene, SceneLayout, ToothSource, ToothSpec,
+};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use typodont_anatomy::age;
+use typodont_anatomy::caries::LesionDepth;
+use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::touch;
+use typodont_core::touch::{ClosedMesh, Collider};
+use typodont_core::volume::{Label, Volume};
+use typodont_formats::pointer;
+
+/// Minimum half-width of a cavity's opening, mm, so that a carrier can place material through it.
+const NARROWEST: f32 = 0.25;
+
+impl Resolver<'_> {
+    /// Returns the age that the anatomy is to show, years; `None` for no age.
+    pub(super) fn age_shown(&mut self, written: &file::ScenarioFile) -> Option<f32> {
+        let age = written.patient.as_ref().filter(|patient| patient.shows_age)?.age_years;
+        if !(age::MIN_AGE..=age::MAX_AGE).contains(&age) {
+            let message =
+                format!("the anatomy cannot show an age of {age} years: expected {} to {}", age::MIN_AGE, age::MAX_AGE);
+            let help = "remove \"shows_age\": the age then changes only the tactile properties of the tissues";
+            self.complain("/patient/age_years", "out-of-range", message, help);
+        }
+        Some(age)
+    }
+
+    pub(super) fn scene(&mut self, written: &file::SceneFile, age: Option<f32>) -> Option<Scene> {
+        let (layout, teeth) = match written {
+            file::SceneFile::Tooth(tooth) => (SceneLayout::Single, vec![tooth]),
+            file::SceneFile::Pair(pair) => (SceneLayout::Pair { gap: pair.gap_mm }, vec![&pair.left, &pair.right]),
+            file::SceneFile::Jaw(jaw) => (SceneLayout::Jaw, vec![&jaw.tooth]),
+        };
+        let paths: Vec<String> = (0..teeth.len()).map(|i| tooth_path(written, i)).collect();
+        self.unique(teeth.iter().zip(&paths).map(|(t, p)| (t.id.as_str(), format!("{p}/id"))));
+        let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
+        let decay = decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id")));
+        let stains =
+            teeth.iter().zip(&paths).flat_map(|(t, p)| t.stains.iter().enumerate().map(move |(i, s)| (s, p, i)));
+        let stains = stains.map(|(s, p, i)| (s.id.as_str(), format!("{p}/stains/{i}/id")));
+        let deposits =
+            teeth.iter().zip(&paths).flat_map(|(t, p)| t.calculus.iter().enumerate().map(move |(i, c)| (c, p, i)));
+        let deposits = deposits.map(|(c, p, i)| (c.id.as_str(), format!("{p}/calculus/{i}/id")));
+        let fillings =
+            teeth.iter().zip(&paths).flat_map(|(t, p)| t.old_fillings.iter().enumerate().map(move |(i, f)| (f, p, i)));
+        let fillings = fillings.map(|(f, p, i)| (f.id.as_str(), format!("{p}/old_fillings/{i}/id")));
+        self.unique(decay.chain(stains).chain(deposits).chain(fillings));
+        let teeth: Vec<Option<ToothSpec>> =
+            teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path, age)).collect();
+        let around = match written {
+            file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+        };
+        let pockets = match written {
+            file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(|gum| pockets(gum, age)),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+        };
+        if pockets.is_some() && around.is_some() {
+            let help = "remove \"around\": a jaw with \"periodontium\" has its own adjacent teeth";
+            let message = "gingiva with pockets cannot be combined with meshes in \"around\"";
+            self.complain("/scene/jaw/periodontium", "two-gums", message, help);
+        }
+        let arch = match written {
+            file::SceneFile::Jaw(jaw) => self.arch(&jaw.arch, jaw.tooth.fdi, age),
+            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => DentalArches { age, ..DentalArches::default() },
+        };
+        let with_calculus = teeth.iter().position(|tooth| tooth.as_ref().is_some_and(|t| !t.calculus.is_empty()));
+        if let Some(tooth) = with_calculus.filter(|_| pockets.is_none()) {
+            let help = "put the tooth into a \"jaw\" with \"periodontium\": {}";
+            let message = "calculus is placed in relation to the gingival margin, but there is no gingiva";
+            self.complain(&format!("{}/calculus", tooth_path(written, tooth)), "no-gum", message, help);
+        }
+        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, surroundings: around, pockets, arch })
+    }
+
+    fn arch(&mut self, written: &file::ArchFile, own: u8, age: Option<f32>) -> DentalArches {
+        let missing = written.missing.iter().enumerate().map(|(i, fdi)| (*fdi, format!("/scene/jaw/arch/missing/{i}")));
+        let rotated = written.rotated.iter().enumerate();
+        let rotated = rotated.map(|(i, r)| (r.fdi, format!("/scene/jaw/arch/rotated/{i}/fdi")));
+        let mut named = BTreeSet::new();
+        for (fdi, path) in missing.chain(rotated) {
+            if !named.insert(fdi) {
+                let help = "list each tooth once, either as missing or as rotated";
+                self.complain(&path, "duplicate-tooth", format!("tooth {fdi} is listed more than once"), help);
+            } else if typodont_anatomy::teeth::tooth(fdi).is_none() {
+                let help = "the FDI number must be one of 11–18, 21–28, 31–38 or 41–48";
+                self.complain(&path, "unknown-tooth", format!("there is no tooth {fdi}"), help);
+            } else if fdi == own {
+                let message = format!("tooth {fdi} is the tooth of the exercise");
+                self.complain(&path, "wrong-tooth", message, "give one of the surrounding teeth");
+            }
+        }
+        let form = |f: file::ArchFormFile| ArchForm { width: f.width_mm, depth: f.depth_mm };
+        DentalArches {
+            upper: form(written.upper),
+            lower: form(written.lower),
+            angle_class: written.angle_class,
+            missing: written.missing.clone(),
+            rotated: written.rotated.iter().map(|r| (r.fdi, r.degrees)).collect(),
+            age,
+        }
+    }
+
+    /// Returns the objects around a tooth. An object that cannot be read is reported and omitted.
+    fn obstacles(&mut self, written: &[file::ObstacleFile]) -> Vec<Collider> {
+        let mut shapes = Vec::new();
+        for (index, obstacle) in written.iter().enumerate() {
+            let path = format!("/scene/jaw/around/{index}");
+            let label = self.label(&obstacle.tissue, &format!("{path}/tissue"));
+            let Some(form) = self.mesh(&obstacle.mesh, &format!("{path}/mesh")) else { continue };
+            let position = Vec3::from(obstacle.position_mm.map(|c| c.0));
+            let [x, y, z] = obstacle.orientation_deg.map(|a| a.0.to_radians());
+            let orientation = Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x);
+            shapes.push(Collider { label, tooth_from_collider: Pose { position, orientation }, geometry: form });
+        }
+        shapes
+    }
+
+    /// Reads a mesh and keeps its bytes for the recording.
+    fn mesh(&mut self, name: &str, path: &str) -> Option<touch::ColliderGeometry> {
+        let open_mesh_error = typodont_formats::obj::ObjError::Open { edges: 0 };
+        let read = self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
+            let mesh = typodont_formats::obj::parse(&bytes).map_err(describe)?;
+            let obstacle = ClosedMesh::new(&mesh).ok_or_else(|| describe(open_mesh_error))?;
+            Ok((bytes, obstacle))
+        });
+        fn describe(error: typodont_formats::obj::ObjError) -> (&'static str, String, Option<String>) {
+            (error.code(), error.to_string(), Some(error.help().into()))
+        }
+        match read {
+            Ok((bytes, obstacle)) => {
+                self.files.insert(name.to_string(), bytes);
+                Some(touch::ColliderGeometry::Mesh(Arc::new(obstacle)))
+            }
+            Err((code, message, help)) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
+        }
+    }
+
+    fn tooth(&mut self, written: &file::ToothFile, path: &str, age: Option<f32>) -> Option<ToothSpec> {
+        if typodont_anatomy::teeth::tooth(written.fdi).is_none() {
+            let message = format!("there is no tooth {}", written.fdi);
+            self.complain(
+                &format!("{path}/fdi"),
+                "unknown-tooth",
+                message,
+                "the FDI number must be one of 11–18, 21–28, 31–38 or 41–48",
+            );
+        }
+        let form = self.form(&written.form, path, age);
+        let decay =
+            written.decay.iter().enumerate().map(|(i, d)| self.decay(d, &format!("{path}/decay/{i}"))).collect();
+        let stains =
+            written.stains.iter().enumerate().map(|(i, s)| self.stain(s, &format!("{path}/stains/{i}"))).collect();
+        let cavity = written.cavity.as_ref().map(|c| self.cavity(c, &format!("{path}/cavity")));
+        let calculus = written.calculus.iter().enumerate();
+        let calculus = calculus.map(|(i, c)| self.calculus(c, &format!("{path}/calculus/{i}"))).collect();
+        let fillings = written.old_fillings.iter().enumerate();
+        let fillings = fillings.map(|(i, f)| self.old_filling(f, &format!("{path}/old_fillings/{i}"))).collect();
+        Some(ToothSpec {
+            id: written.id.clone(),
+            fdi: written.fdi,
+            source: form?,
+            decay,
+            stains,
+            cavity,
+            calculus,
+            fillings,
+        })
+    }
+
+    fn form(&mut self, written: &file::ToothSourceFile, path: &str, age: Option<f32>) -> Option<ToothSource> {
+        match written {
+            _ if self.mode == ResolveMode::FromRecording => Some(ToothSource::Recorded),
+            file::ToothSourceFile::Procedural(made) => Some(ToothSource::Procedural { spacing: made.spacing_mm, age }),
+            file::ToothSourceFile::Ct(scan) => {
+                let path = format!("{path}/form/ct/file");
+                let spacing = scan.spacing_mm.map(|s| s.map(|s| s.0));
+                let volume = self.read_scan(&scan.file, &path, |image, tissues| {
+                    crate::tooth_import::segmented(image, spacing, tissues).map_err(|e| e.to_string())
+                })?;
+                Some(ToothSource::Given(Arc::new(volume)))
+            }
+            file::ToothSourceFile::Labels(map) => {
+                let numbers = self.numbers(&map.tissues, &format!("{path}/form/labels/tissues"));
+                let path = format!("{path}/form/labels/file");
+                let spacing = map.spacing_mm.map(|s| s.map(|s| s.0));
+                let volume = self.read_scan(&map.file, &path, |image, _| {
+                    crate::tooth_import::labelled(image, spacing, &numbers).map_err(|e| e.to_string())
+                })?;
+                Some(ToothSource::Given(Arc::new(volume)))
+            }
+        }
+    }
+
+    fn read_scan(
+        &mut self,
+        name: &str,
+        path: &str,
+        make: impl FnOnce(&typodont_formats::nrrd::VoxelImage, &typodont_anatomy::TissueLabels) -> Result<Volume, String>,
+    ) -> Option<Volume> {
+        let image =
+            self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
+                typodont_formats::nrrd::parse(&bytes).map_err(|e| ("wrong-volume", e.to_string(), None))
+            });
+        let tissues = anatomy_tissues(&self.tissues);
+        match image.and_then(|image| make(&image, &tissues).map_err(|e| ("wrong-volume", e, None))) {
+            Ok(volume) => Some(volume),
+            Err((code, message, help)) => {
+                self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
+                None
+            }
+        }
+    }
+
+    /// Returns the label for each number of a label map.
+    fn numbers(&mut self, written: &BTreeMap<String, String>, path: &str) -> BTreeMap<u8, Label> {
+        let mut numbers = BTreeMap::new();
+        for (number, tissue) in written {
+            let at = pointer::child(path, number);
+            let label = self.label(tissue, &at);
+            match number.parse::<u8>() {
+                Ok(number) if number > 0 => {
+                    numbers.insert(number, label);
+                }
+                _ => self.complain(
+                    &at,
+                    "wrong-number",
+                    format!("\"{number}\" is not a valid number of a label map"),
+                    "use \"1\" to \"255\"; 0 is air",
+                ),
+            }
+        }
+        if numbers.is_empty() {
+            self.complain(
+                path,
+                "no-tissues",
+                "no tissue is assigned to any number",
+                "{ \"1\": \"enamel\", \"2\": \"dentine\", \"3\": \"pulp\" }",
+            );
+        }
+        numbers
+    }
+
+    fn decay(&mut self, written: &file::DecayFile, path: &str) -> Decay {
+        let patch =
+            WrittenPatch { shape: &written.shape, surface: written.surface, at: written.at, depth: written.depth_mm };
+        let place = self.patch_place(&patch, path);
+        let label = self.tissue_with(&written.tissue, crate::catalog::TissueRole::Decay, &format!("{path}/tissue"));
+        let mut shape = self.patch_shape(&patch, path);
+        match (&mut shape, &written.rim) {
+            (_, None) => {}
+            (DecayShape::Grown(grown), Some(rim)) => {
+                let label =
+                    self.tissue_with(&rim.tissue, crate::catalog::TissueRole::Decay, &format!("{path}/rim/tissue"));
+                grown.rim = Some((label, rim.share));
+            }
+            (DecayShape::Ellipsoid { .. }, Some(_)) => {
+                let message = "a sphere or an ellipsoid cannot have a rim";
+                let help = "use \"fissure\" or \"smooth\", or two decay entries, the inner one first";
+                self.complain(&format!("{path}/rim"), "no-rim", message, help);
+            }
+        }
+        Decay { id: written.id.clone(), label, shape, surface: written.surface, place }
+    }
+
+    fn stain(&mut self, written: &file::StainFile, path: &str) -> Decay {
+        let patch =
+            WrittenPatch { shape: &written.shape, surface: written.surface, at: written.at, depth: written.depth_mm };
+        let place = self.patch_place(&patch, path);
+        let label = self.tissue_with(&written.tissue, crate::catalog::TissueRole::Sound, &format!("{path}/tissue"));
+        let shape = self.patch_shape(&patch, path);
+        Decay { id: written.id.clone(), label, shape, surface: written.surface, place }
+    }
+
+    fn cavity(&mut self, written: &file::CavityFile, path: &str) -> PreparedCavity {
+        let shape = file::DecayShapeFile::Sphere(file::SphereFile { radius_mm: 1.0 });
+        let patch = WrittenPatch { shape: &shape, surface: file::SurfaceFile::O, at: written.at, depth: 0.0 };
+        let place = self.patch_place(&patch, path);
+        if let Some(proximal) = &written.proximal
+            && proximal.depth_mm < written.depth_mm
+        {
+            let message = "the gingival floor of the box is above the floor of the cavity";
+            let help = "set depth_mm of the proximal box to at least that of the cavity";
+            self.complain(&format!("{path}/proximal/depth_mm"), "shallow-box", message, help);
+        }
+        let mouth =
+            0.5 * written.width_mm.min(written.length_mm) + written.depth_mm * written.walls_deg.to_radians().tan();
+        if mouth < NARROWEST {
+            let message = "the walls converge so far that the cavity has no opening";
+            let help = "make the cavity wider or shallower, or reduce the inclination of the walls (walls_deg)";
+            self.complain(&format!("{path}/walls_deg"), "closed-cavity", message, help);
+        }
+        let proximal = written.proximal.as_ref().map(|p| ProximalBox {
+            is_distal: p.side == file::ProximalSide::D,
+            width: p.width_mm,
+            axial: p.axial_mm,
+            depth: p.depth_mm,
+        });
+        PreparedCavity {
+            place,
+            length: written.length_mm,
+            width: written.width_mm,
+            depth: written.depth_mm,
+            taper: written.walls_deg.to_radians(),
+            corner: written.corner_mm,
+            proximal,
+        }
+    }
+
+    fn calculus(&mut self, written: &file::CalculusFile, path: &str) -> Calculus {
+        Calculus {
+            id: written.id.clone(),
+            label: self.tissue_with(&written.tissue, crate::catalog::TissueRole::Deposit, &format!("{path}/tissue")),
+            site: written.site.into(),
+            below_margin: written.below_margin_mm,
+            thickness: written.thickness_mm,
+            width: written.width_mm,
+            height: written.height_mm,
+        }
+    }
+
+    fn old_filling(&mut self, written: &file::FillingFile, path: &str) -> OldFilling {
+        OldFilling {
+            id: written.id.clone(),
+            label: self.tissue_with(&written.tissue, crate::catalog::TissueRole::Material, &format!("{path}/tissue")),
+            offset: written.offset_mm.map(|o| o.0),
+            size: written.size_mm.map(|s| s.0),
+            depth: written.depth_mm,
+        }
+    }
+
+    fn patch_place(&mut self, patch: &WrittenPatch, path: &str) -> DecayPlace {
+        let place = match patch.at {
+            file::DecayPlaceFile::Centre => DecayPlace::Centre,
+            file::DecayPlaceFile::RandomQuadrant => DecayPlace::RandomQuadrant,
+            file::DecayPlaceFile::Random => DecayPlace::Random,
+            file::DecayPlaceFile::Quadrant(quadrant) => DecayPlace::Quadrant(quadrant),
+            file::DecayPlaceFile::OffsetMm(offset) => DecayPlace::Offset(offset.map(|o| o.0)),
+        };
+        let by_quadrant = matches!(place, DecayPlace::RandomQuadrant | DecayPlace::Quadrant(_));
+        if by_quadrant && patch.surface != file::SurfaceFile::O {
+            let message = "quadrants are defined on the occlusal surface only";
+            let help = "set \"surface\" to \"O\", or give the position as offset_mm";
+            self.complain(&format!("{path}/at"), "wrong-place", message, help);
+        }
+        place
+    }
+
+    fn patch_shape(&mut self, patch: &WrittenPatch, path: &str) -> DecayShape {
+        let (entry, reaches, spread) = match patch.shape {
+            file::DecayShapeFile::Sphere(sphere) => {
+                return DecayShape::Ellipsoid { radii: [sphere.radius_mm; 3], depth: patch.depth };
+            }
+            file::DecayShapeFile::Ellipsoid(ellipsoid) => {
+                return DecayShape::Ellipsoid { radii: ellipsoid.radii_mm.map(|r| r.0), depth: patch.depth };
+            }
+            file::DecayShapeFile::Fissure(fissure) => {
+                if patch.surface != file::SurfaceFile::O {
+                    let message = "\"fissure\" is possible on the occlusal surface only";
+                    let help = "set \"surface\" to \"O\", or use \"smooth\" for another surface";
+                    self.complain(&format!("{path}/surface"), "wrong-place", message, help);
+                }
+                (DecayOrigin::Fissure { length: fissure.length_mm }, &fissure.reaches, fissure.spread_mm)
+            }
+            file::DecayShapeFile::Smooth(smooth) => {
+                let half = [0.5 * smooth.width_mm, 0.5 * smooth.height_mm];
+                (DecayOrigin::Smooth { half }, &smooth.reaches, smooth.spread_mm)
+            }
+        };
+        if patch.depth != 0.0 {
+            let help = "remove it: \"reaches\" gives the depth of this shape";
+            self.complain(
+                &format!("{path}/depth_mm"),
+                "two-depths",
+                "this shape begins at the surface and does not \
+            use depth_mm",
+                help,
+            );
+        }
+        let reaches = reaches.iter().copied().map(lesion_depth).collect();
+        DecayShape::Grown(GrownDecay { origin: entry, depths: reaches, spread, rim: None })
+    }
+
+    /// Returns the label of a tissue, which must have the given role in scoring.
+    fn tissue_with(&mut self, name: &str, role: crate::catalog::TissueRole, path: &str) -> Label {
+        let label = self.label(name, path);
+        if self.tissues.role(label).is_some_and(|own| own != role) {
+            let fits = |e: &&crate::catalog::TissueEntry| e.role == role;
+            let names: Vec<&str> = self.tissues.entries().iter().filter(fits).map(|e| e.name.as_str()).collect();
+            let (role, kind) = match role {
+                crate::catalog::TissueRole::Decay => ("decay", "a carious tissue"),
+                crate::catalog::TissueRole::Deposit => ("deposit", "a deposit"),
+                crate::catalog::TissueRole::Material => ("material", "a filling material"),
+                _ => ("sound", "a sound tissue"),
+            };
+            let help = format!("tissues with the role \"{role}\": {}", names.join(", "));
+            self.complain(path, "wrong-tissue", format!("\"{name}\" is not {kind}"), help);
+        }
+        label
+    }
+}
+
+/// Returns the pockets as written; omitted sites are healthy for the age (years).
+fn pockets(written: &file::PeriodontiumFile, age: Option<f32>) -> Pockets {
+    let healthy = age::healthy_pockets(age);
+    let filled = |written: [Option<f32>; 6], healthy: [f32; 6]| {
+        std::array::from_fn(|site| written[site].unwrap_or(healthy[site]))
+    };
+    Pockets {
+        depth: filled(written.pocket_mm.at_sites(), healthy.depth),
+        recession: filled(written.recession_mm.at_sites(), healthy.recession),
+    }
+}
+
+/// The keys that decay and stains have in common.
+struct WrittenPatch<'a> {
+    shape: &'a file::DecayShapeFile,
+    surface: file::SurfaceFile,
+    at: file::DecayPlaceFile,
+    depth: f32,
+}
+
+fn lesion_depth(written: file::LesionDepthFile) -> LesionDepth {
+    match written {
+        file::LesionDepthFile::OuterEnamel => LesionDepth::OuterEnamel,
+        file::LesionDepthFile::InnerEnamel => LesionDepth::InnerEnamel,
+        file::LesionDepthFile::OuterDentine => LesionDepth::OuterDentine,
+        file::LesionDepthFile::MiddleDentine => LesionDepth::MiddleDentine,
+        file::LesionDepthFile::InnerDentine => LesionDepth::InnerDentine,
+    }
+}

@@ -1,0 +1,516 @@
+//! The workpiece from which a session starts, and its ground truth.
+//!
+//! Takes a scenario and a seed, or a scenario and the volume of an earlier session. Gives the volume with its decay,
+//! the position of each tooth and each lesion, and the surroundings. The same inputs give the same voxels.
+
+use super::calculus_and_fillings::{apply_calculus, apply_old_filling};
+use super::cavity::CavityError;
+use super::lesion::{DecayPlacementError, Lesion, apply_decay, locate_lesion};
+use super::tooth_bounds::{PairHalf, ToothBounds, anatomy_tissues};
+use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec};
+
+use crate::catalog::TissueTable;
+use std::fmt;
+use std::sync::Arc;
+use typodont_anatomy::periodontium::{Periodontium, Pockets, ToothContext};
+use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::touch;
+use typodont_core::touch::{ClosedMesh, Collider, Compliance, SdfGrid};
+use typodont_core::volume::{Grid, Label, Volume, surface};
+
+/// The workpiece of a session.
+#[derive(Clone, Debug)]
+pub struct Workpiece {
+    pub volume: Arc<Volume>,
+    /// The volume before its cavities were cut, with its decay: the original contour. `None` without a cavity.
+    pub original: Option<Arc<Volume>>,
+    pub teeth: Vec<ToothBounds>,
+    pub lesions: Vec<Lesion>,
+    /// Gingiva and neighbouring teeth.
+    pub surroundings: Vec<Collider>,
+    /// Gingiva with a sulcus; `None` without pockets.
+    pub periodontium: Option<Arc<Periodontium>>,
+    /// Positions of the teeth in both jaws.
+    pub arch: DentalArches,
+    pub world_from_tooth: Pose,
+}
+
+/// Reason for which a workpiece cannot be made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WorkpieceError {
+    /// A decay contains no hard tissue: tooth and decay by index.
+    DecayOutside { tooth: usize, decay: usize },
+    /// A decay that follows a groove finds none: tooth and decay by index.
+    NoGroove { tooth: usize, decay: usize },
+    /// A stain contains no sound tissue, or finds no groove to follow: tooth and stain by index.
+    StainOutside { tooth: usize, stain: usize },
+    /// A cavity contains no tissue: tooth by index.
+    CavityOutside { tooth: usize },
+    /// A cavity opens the pulp: tooth by index.
+    CavityInPulp { tooth: usize },
+    /// There is no root at the site of a deposit: tooth and deposit by index.
+    NoRoot { tooth: usize, calculus: usize },
+    /// An existing filling contains no hard tissue: tooth and filling by index.
+    FillingOutside { tooth: usize, filling: usize },
+    /// A pocket extends below the root: excess of the deepest pocket, tenths of a millimetre.
+    PocketTooDeep { tenths: u32 },
+    /// Two teeth of a pair have different voxel sizes.
+    UnequalSpacing,
+    /// A tooth has no enamel, so that its crown cannot be determined.
+    NoEnamel { tooth: usize },
+    /// A zone's label map differs in size from the workpiece: zone by index, size of the map and of the workpiece in
+    /// voxels.
+    ZoneSize { zone: usize, map: [u32; 3], workpiece: [u32; 3] },
+    /// The volume would have too many voxels.
+    TooLarge { voxels: u64 },
+    /// There is no tooth of this number.
+    NoSuchTooth { fdi: u8 },
+    /// The teeth's shapes were not read, since the volume is to be taken from a recording.
+    OnlyRecorded,
+}
+
+impl fmt::Display for WorkpieceError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            WorkpieceError::DecayOutside { .. } => f.write_str("the caries is outside the tooth's hard tissue"),
+            WorkpieceError::NoGroove { .. } => {
+                f.write_str("there is no fissure in the occlusal surface near the position of the caries")
+            }
+            WorkpieceError::StainOutside { .. } => f.write_str("the stain is outside the tooth's sound tissue"),
+            WorkpieceError::CavityOutside { .. } => f.write_str("the cavity is outside the tooth"),
+            WorkpieceError::CavityInPulp { .. } => f.write_str("the cavity exposes the pulp"),
+            WorkpieceError::NoRoot { .. } => f.write_str("there is no tooth surface at the position of the calculus"),
+            WorkpieceError::FillingOutside { .. } => f.write_str("the old filling is outside the crown's hard tissue"),
+            WorkpieceError::PocketTooDeep { tenths } => {
+                write!(f, "the deepest pocket extends {:.1} mm beyond the apex of the root", f64::from(*tenths) / 10.0)
+            }
+            WorkpieceError::UnequalSpacing => f.write_str("the two teeth have different voxel sizes"),
+            WorkpieceError::NoEnamel { .. } => f.write_str("the tooth has no enamel, so its crown cannot be located"),
+            WorkpieceError::ZoneSize { map, workpiece, .. } => write!(
+                f,
+                "the zone's label map has {}×{}×{} voxels, but the workpiece has {}×{}×{}",
+                map[0], map[1], map[2], workpiece[0], workpiece[1], workpiece[2]
+            ),
+            WorkpieceError::NoSuchTooth { fdi } => write!(f, "there is no tooth {fdi}"),
+            WorkpieceError::OnlyRecorded => f.write_str("the shapes of the teeth are available only in the recording"),
+            WorkpieceError::TooLarge { voxels } => {
+                write!(f, "the volume would have {voxels} voxels, which is too many")
+            }
+        }
+    }
+}
+
+impl std::error::Error for WorkpieceError {}
+
+/// Maximum number of voxels of a workpiece: one and a half times 512×512×322, about 1 GiB of memory in use.
+const VOXELS_MAX: u64 = 130_000_000;
+
+impl Workpiece {
+    /// Makes the workpiece of a scenario; the seed determines everything that the scenario leaves to chance.
+    ///
+    /// # Errors
+    /// Returns an error if a tooth or one of its lesions, fillings, deposits or cavities cannot be made.
+    pub fn make(scenario: &Scenario, seed: u64) -> Result<Workpiece, WorkpieceError> {
+        // The volumes before their cavities were cut; not needed if no tooth has a cavity.
+        let (mut parts, mut wholes) = (Vec::new(), Vec::new());
+        let has_cavity = scenario.has_cavity();
+        for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
+            let mut volume = tooth_volume(tooth, &scenario.tissues)?;
+            let place =
+                bounds_of(tooth, &volume, &scenario.tissues).ok_or(WorkpieceError::NoEnamel { tooth: index })?;
+            for (number, decay) in tooth.decay.iter().enumerate() {
+                volume =
+                    apply_decay(volume, decay, &place, &scenario.tissues, seed).map_err(|reason| match reason {
+                        DecayPlacementError::Outside => WorkpieceError::DecayOutside { tooth: index, decay: number },
+                        DecayPlacementError::NoGroove => WorkpieceError::NoGroove { tooth: index, decay: number },
+                    })?;
+            }
+            for (stain, patch) in tooth.stains.iter().enumerate() {
+                volume = apply_decay(volume, patch, &place, &scenario.tissues, seed)
+                    .map_err(|_| WorkpieceError::StainOutside { tooth: index, stain })?;
+            }
+            for (filling, written) in tooth.fillings.iter().enumerate() {
+                volume = apply_old_filling(volume, written, &place, &scenario.tissues)
+                    .ok_or(WorkpieceError::FillingOutside { tooth: index, filling })?;
+            }
+            if let Some(pockets) = scenario.scene.pockets.filter(|_| !tooth.calculus.is_empty()) {
+                let gum = periodontium(&volume, &place, pockets, &scenario.tissues);
+                for (calculus, deposit) in tooth.calculus.iter().enumerate() {
+                    volume = apply_calculus(&volume, &gum, deposit)
+                        .ok_or(WorkpieceError::NoRoot { tooth: index, calculus })?;
+                }
+            }
+            if has_cavity {
+                wholes.push(volume.clone());
+            }
+            if let Some(cavity) = &tooth.cavity {
+                volume = cavity.cut(volume, &place, &scenario.tissues, seed).map_err(|reason| match reason {
+                    CavityError::Outside => WorkpieceError::CavityOutside { tooth: index },
+                    CavityError::Pulp => WorkpieceError::CavityInPulp { tooth: index },
+                })?;
+            }
+            parts.push(volume);
+        }
+        let (volume, original) = match scenario.scene.layout {
+            // Both teeth keep their positions: a proximal box may remove a tooth's outermost point.
+            SceneLayout::Pair { gap } if has_cavity => {
+                (side_by_side(&parts, &wholes, gap)?, Some(side_by_side(&wholes, &wholes, gap)?))
+            }
+            SceneLayout::Pair { gap } => (side_by_side(&parts, &parts, gap)?, None),
+            SceneLayout::Single | SceneLayout::Jaw => (parts.swap_remove(0), wholes.pop()),
+        };
+        let original = original.map(Arc::new);
+        if volume.grid().len() as u64 > VOXELS_MAX {
+            return Err(WorkpieceError::TooLarge { voxels: volume.grid().len() as u64 });
+        }
+        for (zone, region) in scenario.zones.iter().map(|z| &z.region).enumerate() {
+            if let Some(map) = region.map_dims().filter(|map| *map != volume.grid().dims) {
+                return Err(WorkpieceError::ZoneSize { zone, map, workpiece: volume.grid().dims });
+            }
+        }
+        Workpiece::from_volume(scenario, Arc::new(volume), original, seed)
+    }
+
+    /// Returns the workpiece of a session whose initial volume is known from a recording; `original` is given if the
+    /// teeth have cavities.
+    ///
+    /// # Errors
+    /// Returns an error if a tooth in the volume has no enamel, or if a pocket extends below its root.
+    pub fn from_volume(
+        scenario: &Scenario,
+        volume: Arc<Volume>,
+        original: Option<Arc<Volume>>,
+        seed: u64,
+    ) -> Result<Workpiece, WorkpieceError> {
+        let whole = original.as_ref().unwrap_or(&volume);
+        let mut teeth = Vec::new();
+        let mut lesions = Vec::new();
+        for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
+            let side = PairHalf::of(scenario.scene.layout, index);
+            let place = bounds_within(tooth, whole, &scenario.tissues, side);
+            let place = place.ok_or(WorkpieceError::NoEnamel { tooth: index })?;
+            lesions.extend(tooth.decay.iter().map(|decay| locate_lesion(decay, index, &place, whole, side, seed)));
+            teeth.push(place);
+        }
+        let gum = scenario.scene.pockets.map(|pockets| periodontium(&volume, &teeth[0], pockets, &scenario.tissues));
+        if let Some(gum) = &gum {
+            let beyond = teeth[0].low.z - gum.lowest_floor();
+            if beyond > 0.0 {
+                return Err(WorkpieceError::PocketTooDeep { tenths: (10.0 * beyond).ceil() as u32 });
+            }
+        }
+        let around = match (scenario.scene.layout, &scenario.scene.surroundings) {
+            (SceneLayout::Jaw, Some(meshes)) => meshes.clone(),
+            (SceneLayout::Jaw, None) => surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues),
+            (SceneLayout::Single | SceneLayout::Pair { .. }, _) => Vec::new(),
+        };
+        let low = teeth.iter().map(|t| t.crown_low).reduce(Vec3::min).unwrap_or_default();
+        let high = teeth.iter().map(|t| t.crown_high).reduce(Vec3::max).unwrap_or_default();
+        let world_from_tooth =
+            world_from_tooth_above(Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z));
+        let periodontium = gum.map(Arc::new);
+        let arch = scenario.scene.arch.clone();
+        Ok(Workpiece { volume, original, teeth, lesions, surroundings: around, periodontium, arch, world_from_tooth })
+    }
+
+    /// Unit vector toward distal of the first tooth, tooth space.
+    pub fn distal(&self) -> Vec3 {
+        self.teeth.first().map_or(Vec3::Y, ToothBounds::distal)
+    }
+}
+
+/// Returns the pose of tooth space in world space, as the trainee sees it: the tooth stands upright, an upper tooth
+/// too, as in a model jaw on the bench. Its buccal side faces away from the trainee; +x of world space is −y of tooth
+/// space (mesial in the upper right and the lower left, distal elsewhere); the given point of tooth space is the centre
+/// of the device's workspace.
+fn world_from_tooth_above(origin_in_tooth: Vec3) -> Pose {
+    // x right = -y, y up = occlusal (z), z toward the user = lingual (-x).
+    let orientation = Quat::from_xyzw(-0.5, 0.5, 0.5, 0.5);
+    Pose { position: -(orientation * origin_in_tooth), orientation }
+}
+
+fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, WorkpieceError> {
+    match &tooth.source {
+        ToothSource::Given(volume) => Ok(volume.as_ref().clone()),
+        ToothSource::Recorded => Err(WorkpieceError::OnlyRecorded),
+        ToothSource::Procedural { spacing, age } => {
+            let form = typodont_anatomy::teeth::tooth_of_age(tooth.fdi, *age)
+                .ok_or(WorkpieceError::NoSuchTooth { fdi: tooth.fdi })?;
+            let grid = typodont_anatomy::grid_of_spacing(&form, *spacing);
+            Ok(typodont_anatomy::grow(&form, grid, &anatomy_tissues(tissues)))
+        }
+    }
+}
+
+fn bounds_of(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable) -> Option<ToothBounds> {
+    bounds_within(tooth, volume, tissues, PairHalf::All)
+}
+
+fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, side: PairHalf) -> Option<ToothBounds> {
+    let enamel = anatomy_tissues(tissues).enamel;
+    let grid = volume.grid();
+    let mut whole = PointBounds::EMPTY;
+    let mut crown = PointBounds::EMPTY;
+    let [nx, ny, nz] = grid.dims;
+    for [y, z] in (0..nz).flat_map(|z| (0..ny).map(move |y| [y, z])) {
+        let centre = |x: u32| grid.centre([x, y, z]);
+        if !side.contains(centre(0)) {
+            continue;
+        }
+        // The ends of each row are sufficient to determine the bounds.
+        let first = grid.index([0, y, z]);
+        let tissue = |x: u32| volume.tissue(first + x as usize);
+        let ends = |bounds: &mut PointBounds, is_meant: &dyn Fn(Label) -> bool| {
+            if let Some(low) = (0..nx).find(|&x| is_meant(tissue(x))) {
+                let high = (low..nx).rfind(|&x| is_meant(tissue(x))).unwrap_or(low);
+                bounds.add(centre(low));
+                bounds.add(centre(high));
+            }
+        };
+        ends(&mut whole, &|label| label != Label::AIR);
+        ends(&mut crown, &|label| label == enamel);
+    }
+    let PointBounds { low, high } = whole;
+    let (crown_low, crown_high) = (crown.low, crown.high);
+    let place = ToothBounds { id: tooth.id.clone(), fdi: tooth.fdi, low, high, crown_low, crown_high };
+    crown_low.cmple(crown_high).all().then_some(place)
+}
+
+#[derive(Clone, Copy)]
+struct PointBounds {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl PointBounds {
+    const EMPTY: PointBounds = PointBounds { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
+
+    fn add(&mut self, point: Vec3) {
+        self.low = self.low.min(point);
+        self.high = self.high.max(point);
+    }
+}
+
+/// Combines two teeth in one volume, the first on the left (y > 0). Each tooth is placed so that its `whole` form
+/// stands `gap`/2 mm from the plane between them.
+fn side_by_side(teeth: &[Volume], whole: &[Volume], gap: f32) -> Result<Volume, WorkpieceError> {
+    let spacing = teeth[0].grid().spacing;
+    if teeth.iter().any(|t| (t.grid().spacing - spacing).abs().max_element() > 1e-6) {
+        return Err(WorkpieceError::UnequalSpacing);
+    }
+    // Each tooth is moved by whole voxels, so that its densities need no resampling.
+    let mut moves = Vec::new();
+    for (index, tooth) in whole.iter().enumerate() {
+        let [low, high] = tight_extent(tooth);
+        let middle = 0.5 * (low + high);
+        let aside = if index == 0 { 0.5 * gap - low.y } else { -0.5 * gap - high.y };
+        let wanted = Vec3::new(-middle.x, aside, 0.0);
+        let origin = tooth.grid().origin;
+        // The grids coincide if both origins are a whole number of voxels from zero.
+        moves.push(((origin + wanted) / spacing).round() * spacing - origin);
+    }
+    let low = whole.iter().zip(&moves).map(|(t, m)| tight_extent(t)[0] + *m).fold(Vec3::INFINITY, Vec3::min);
+    let high = whole.iter().zip(&moves).map(|(t, m)| tight_extent(t)[1] + *m).fold(Vec3::NEG_INFINITY, Vec3::max);
+    let low = (low / spacing).round() * spacing;
+    let grid = Grid::covering(low, high, spacing, 4);
+    let voxels = grid.dims.iter().map(|&n| u64::from(n)).product();
+    if voxels > VOXELS_MAX {
+        return Err(WorkpieceError::TooLarge { voxels });
+    }
+    let mut density = vec![Default::default(); grid.len()];
+    let mut label = vec![Label::AIR; grid.len()];
+    for (tooth, shift) in teeth.iter().zip(&moves) {
+        for (index, cell) in tooth.grid().cells().enumerate() {
+            let voxel = tooth.voxel(index);
+            if let Some(to) = grid.nearest(tooth.grid().centre(cell) + *shift).filter(|_| voxel.label != Label::AIR) {
+                density[grid.index(to)] = voxel.density;
+                label[grid.index(to)] = voxel.label;
+            }
+        }
+    }
+    Ok(Volume::new(grid, teeth[0].half_band(), density, label, Label(1)))
+}
+
+fn tight_extent(volume: &Volume) -> [Vec3; 2] {
+    match volume.bounding_box() {
+        Some([low, high]) => [volume.grid().centre(low), volume.grid().centre(high)],
+        None => volume.grid().extent(),
+    }
+}
+
+/// Distance between neighbouring crowns, mm: in contact, except for the clearance that the run-out of a bur needs.
+const CONTACT_GAP: f32 = 0.05;
+
+/// Returns the gingiva and two neighbouring teeth around a tooth, as simple shapes of average size.
+fn surroundings(
+    tooth: &ToothBounds,
+    periodontium: Option<&Periodontium>,
+    arch: &DentalArches,
+    tissues: &TissueTable,
+) -> Vec<Collider> {
+    /// Rounding of a crown, mm.
+    const ROUNDING: f32 = 1.8;
+    let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
+    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let (neck, top) = (tooth.crown_low.z, tooth.crown_high.z);
+    // Across and along the arch, mm.
+    let own = sizes(tooth.fdi).map_or([10.5, 11.0], |s| [s.buccolingual[0], s.mesiodistal[0]]);
+    let neighbour = |fdi: u8, toward: Vec3| {
+        if periodontium.is_some() {
+            return anatomical_neighbour(fdi, toward, tooth, arch.age, label("neighbour"));
+        }
+        let sizes = sizes(fdi)?;
+        let half = Vec3::new(0.5 * sizes.buccolingual[0], 0.5 * sizes.mesiodistal[0], 4.5);
+        let side = match toward.y < 0.0 {
+            true => tooth.crown_low.y - CONTACT_GAP - half.y,
+            false => tooth.crown_high.y + CONTACT_GAP + half.y,
+        };
+        Some(Collider {
+            label: label("neighbour"),
+            tooth_from_collider: Pose::at(Vec3::new(middle.x, side, top - 0.3 - half.z)),
+            geometry: touch::ColliderGeometry::RoundBox { half, rounding: ROUNDING.min(0.6 * half.min_element()) },
+        })
+    };
+    let [mesial, distal] = adjacent_teeth(tooth.fdi).map(|fdi| fdi.filter(|fdi| !arch.missing.contains(fdi)));
+    let gone = arch.age.map_or(0.0, |years| typodont_anatomy::age::recession(years).iter().sum::<f32>() / 6.0);
+    let gum_half = Vec3::new(0.5 * own[0] + 1.25, 22.0, 8.0);
+    let gum = Collider {
+        label: label("gingiva"),
+        tooth_from_collider: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gone - gum_half.z)),
+        geometry: touch::ColliderGeometry::RoundBox { half: gum_half, rounding: 4.0 },
+    };
+    let mesial = mesial.and_then(|fdi| neighbour(fdi, -tooth.distal()));
+    let distal = distal.and_then(|fdi| neighbour(fdi, tooth.distal()));
+    let gum = match periodontium {
+        Some(periodontium) => gum_with_pockets(tooth, periodontium, gum, label("attachment")),
+        None => vec![gum],
+    };
+    mesial.into_iter().chain(distal).chain(gum).collect()
+}
+
+/// Returns a neighbouring tooth with its anatomical form, so that a probe finds the same space beside it as in a mouth.
+fn anatomical_neighbour(
+    fdi: u8,
+    toward: Vec3,
+    tooth: &ToothBounds,
+    age: Option<f32>,
+    label: Label,
+) -> Option<Collider> {
+    /// Voxel size, mm: coarse, since neighbouring teeth are touched only from the side and need no fissures.
+    const SPACING: f32 = 0.3;
+    /// Length of root kept below the neck, mm: no probe reaches deeper.
+    const ROOT: f32 = 7.0;
+    let form = typodont_anatomy::teeth::tooth_of_age(fdi, age)?;
+    let whole = typodont_anatomy::grid_of_spacing(&form, SPACING);
+    let cut = (((-ROOT - whole.origin.z) / SPACING).max(0.0) as u32).min(whole.dims[2] - 2);
+    let [nx, ny, nz] = whole.dims;
+    let origin = whole.origin + Vec3::Z * (cut as f32 * SPACING);
+    let grid = Grid { dims: [nx, ny, nz - cut], origin, ..whole };
+    let labels = typodont_anatomy::TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
+    let mesh = surface::extract(&typodont_anatomy::grow(&form, grid, &labels));
+    let extent = mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
+    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let along = match toward.y < 0.0 {
+        true => tooth.crown_low.y - CONTACT_GAP - extent[1].y,
+        false => tooth.crown_high.y + CONTACT_GAP - extent[0].y,
+    };
+    let place = Vec3::new(middle.x, along, tooth.crown_high.z - 0.3 - extent[1].z);
+    let form = touch::ColliderGeometry::Mesh(Arc::new(ClosedMesh::new(&mesh)?));
+    Some(Collider { label, tooth_from_collider: Pose::at(place), geometry: form })
+}
+
+/// Returns the gingiva next to the tooth by [`Periodontium`], simple gingiva beyond it, and the attachment that closes
+/// the sulcus.
+fn gum_with_pockets(
+    tooth: &ToothBounds,
+    periodontium: &Periodontium,
+    plain: Collider,
+    attachment: Label,
+) -> Vec<Collider> {
+    /// Extent of the gingiva next to the tooth beyond its crown, along the arch and across it, mm.
+    const ALONG: f32 = 2.5;
+    const ACROSS: f32 = 2.0;
+    /// Distance between samples, mm: a margin is rounded by half a millimetre.
+    const SPACING: f32 = 0.2;
+    let (low, high) = (tooth.crown_low, tooth.crown_high);
+    let beside = Vec3::new(ACROSS, ALONG, 0.0);
+    let (from, to) =
+        ((low - beside).with_z(periodontium.lowest_floor() - 2.5), (high + beside).with_z(low.z + GUM_HIGH));
+    let grid = Grid::covering(from, to, Vec3::splat(SPACING), 1);
+    let field = |yields: Compliance, at: &dyn Fn(Vec3) -> f32| {
+        touch::ColliderGeometry::Sdf(Arc::new(SdfGrid::from_fn(grid, yields, at)))
+    };
+    let near = Collider {
+        label: plain.label,
+        tooth_from_collider: Pose::IDENTITY,
+        geometry: field(Compliance::default(), &|p| periodontium.gum_sdf_probing(p)),
+    };
+    let floor = Collider {
+        label: attachment,
+        tooth_from_collider: Pose::IDENTITY,
+        geometry: field(ATTACHMENT_COMPLIANCE, &|p| periodontium.attachment_sdf(p)),
+    };
+    let touch::ColliderGeometry::RoundBox { half, rounding } = plain.geometry else { return vec![near, floor] };
+    let beyond = |toward: f32| {
+        let edge = if toward < 0.0 { low.y - ALONG } else { high.y + ALONG };
+        let far = plain.tooth_from_collider.position.y + toward * half.y;
+        let half = Vec3::new(half.x, 0.5 * (far - edge).abs(), half.z);
+        let position = plain.tooth_from_collider.position.with_y(0.5 * (far + edge));
+        let form = touch::ColliderGeometry::RoundBox { half, rounding: rounding.min(0.9 * half.y) };
+        Collider { label: plain.label, tooth_from_collider: Pose::at(position), geometry: form }
+    };
+    vec![near, floor, beyond(-1.0), beyond(1.0)]
+}
+
+/// Maximum height of the gingiva above the lowest enamel, mm.
+const GUM_HIGH: f32 = 6.0;
+
+/// Compliance of the floor of a sulcus. It resists 0.25 N, the force that is taught for probing; a higher force moves
+/// the probe deeper: in studies with graded forces, readings increase by half a millimetre to a millimetre from 0.25 to
+/// 0.75 N (U. van der Velden, *Probing force and the relationship of the probe tip to the periodontal tissues*, 1979,
+/// and later studies). 0.7 to 2 mm/N is plausible.
+const ATTACHMENT_COMPLIANCE: Compliance = Compliance { from_force: 0.25, per_newton: 1.4, max_depth: 2.5 };
+
+fn periodontium(volume: &Volume, place: &ToothBounds, pockets: Pockets, tissues: &TissueTable) -> Periodontium {
+    let enamel = anatomy_tissues(tissues).enamel;
+    let tooth_context =
+        ToothContext { volume, enamel, crown: [place.crown_low, place.crown_high], distal: place.distal().y };
+    Periodontium::around(&tooth_context, pockets)
+}
+
+fn sizes(fdi: u8) -> Option<typodont_anatomy::form::Sizes> {
+    typodont_anatomy::teeth::tooth(fdi).map(|form| form.sizes)
+}
+
+/// Returns the mesial and the distal neighbour of a tooth in a jaw of 28 teeth; the mesial neighbour of a third molar
+/// is the second molar.
+fn adjacent_teeth(fdi: u8) -> [Option<u8>; 2] {
+    let (quadrant, position) = (fdi / 10, fdi % 10);
+    // Across the midline: 11 is beside 21, 31 beside 41.
+    let other = [0, 2, 1, 4, 3].get(usize::from(quadrant)).map(|q| 10 * q + 1);
+    let mesial = if position == 1 { other } else { Some(fdi - 1) };
+    [mesial, (position < 7).then_some(fdi + 1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tooth_without_its_contact_point_stands_where_it_stood() {
+        // Aim: a cavity cut into one of two teeth before they are placed moves neither. Method: two blocks, one of them
+        // shorter on the side of the other; it was once moved to the middle of the gap.
+        let grid = Grid::centred([20, 20, 20], Vec3::splat(0.5));
+        let block = |back: f32| {
+            Volume::from_distance(grid, 0.75, |p| ((p.abs().max_element() - 3.0).max(back - p.y), Label(1)))
+        };
+        let whole = [block(-9.0), block(-9.0)];
+        let before = side_by_side(&whole, &whole, 1.0).unwrap();
+        let after = side_by_side(&[block(-1.5), block(-9.0)], &whole, 1.0).unwrap();
+        assert_eq!(before.grid(), after.grid());
+        let pairs = || before.densities().iter().zip(after.densities());
+        assert!(pairs().all(|(was, is)| was.is_solid() || !is.is_solid()), "nothing stands where nothing stood");
+        let gone = pairs().filter(|(was, is)| was.is_solid() && !is.is_solid()).count();
+        assert_eq!(gone, 3 * 12 * 12, "1.5 mm of 6 mm by 6 mm");
+    }
+}

@@ -1,0 +1,364 @@
+//! Every measure of a session, with its evidence.
+
+use super::charting::{self, SiteResult};
+use super::process::{PeakValue, ProcessStats};
+use super::removal_comparison::{RemovalComparison, VoxelDistance};
+use super::restoration::Restoration;
+use crate::record::{Recording, Replay};
+use crate::scenario::metric::{CHARTING, MetricArgument, OF_FILLINGS, PLAIN};
+use crate::scenario::{Metric, QuestionKind, Rubric};
+use crate::session::{AnswerRecord, StageResult};
+use typodont_core::frame::Vec3;
+use typodont_core::tick::{TICK_S, Tick};
+
+/// The measures of a session, in the order of the table.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Measures {
+    pub all: Vec<Measure>,
+}
+
+/// One computed measure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measure {
+    pub metric: Metric,
+    /// Value; `None` if the measure has no value by its own rule.
+    pub value: Option<f64>,
+    pub evidence: Option<Evidence>,
+}
+
+/// Place and time at which a value arose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Evidence {
+    pub at: Option<Tick>,
+    /// Position, tooth space, mm.
+    pub place: Vec3,
+}
+
+impl Measures {
+    /// Returns a measure's value by its full name; `None` if it has no value or was not computed.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.get(name).and_then(|m| m.value)
+    }
+
+    pub fn get(&self, name: &str) -> Option<&Measure> {
+        self.all.iter().find(|m| m.metric.name() == name)
+    }
+}
+
+/// A computed value with its evidence.
+#[derive(Clone, Copy, Debug, Default)]
+struct ComputedValue {
+    value: Option<f64>,
+    evidence: Option<Evidence>,
+}
+
+impl From<Option<f64>> for ComputedValue {
+    fn from(value: Option<f64>) -> ComputedValue {
+        ComputedValue { value, evidence: None }
+    }
+}
+
+impl From<f64> for ComputedValue {
+    fn from(value: f64) -> ComputedValue {
+        ComputedValue::from(Some(value))
+    }
+}
+
+impl From<Option<PeakValue>> for ComputedValue {
+    fn from(moment: Option<PeakValue>) -> ComputedValue {
+        let evidence = moment.map(|m| Evidence { at: Some(m.at), place: m.place });
+        ComputedValue { value: moment.map(|m| m.value), evidence }
+    }
+}
+
+/// Computes every measure of the table, and the measures with an argument that the scenario uses.
+pub fn all(
+    recording: &Recording,
+    replay: &Replay,
+    process: &ProcessStats,
+    comparison: &RemovalComparison,
+    restoration: Option<&Restoration>,
+    chart: Option<&[SiteResult]>,
+) -> Measures {
+    let scenario = &recording.scenario;
+    let source = MeasureSource {
+        recording,
+        replay,
+        process,
+        comparison,
+        restoration,
+        chart,
+        outlines: comparison.outline_distances(),
+    };
+    // Sessions without a cavity have no filling to measure, and those without a chart no readings to compare.
+    let of_fillings = if restoration.is_some() { OF_FILLINGS } else { &[] };
+    let charting = if chart.is_some() { CHARTING } else { &[] };
+    let mut metrics: Vec<Metric> = PLAIN.iter().chain(of_fillings).chain(charting).map(Metric::plain).collect();
+    let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
+    let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
+    metrics.extend(zones.chain([tolerance]).flatten());
+    let asked = scenario.rubric.iter().flat_map(Rubric::metrics);
+    for metric in asked {
+        if !metrics.contains(metric) {
+            metrics.push(metric.clone());
+        }
+    }
+    let compute = |metric: Metric| {
+        let ComputedValue { value, evidence } = source.compute(&metric);
+        Measure { metric, value, evidence }
+    };
+    Measures { all: metrics.into_iter().map(compute).collect() }
+}
+
+struct MeasureSource<'a> {
+    recording: &'a Recording,
+    replay: &'a Replay,
+    process: &'a ProcessStats,
+    comparison: &'a RemovalComparison,
+    restoration: Option<&'a Restoration>,
+    chart: Option<&'a [SiteResult]>,
+    /// Distances between the borders of R and T, mm, ascending.
+    outlines: Option<Vec<f32>>,
+}
+
+impl MeasureSource<'_> {
+    fn compute(&self, metric: &Metric) -> ComputedValue {
+        let name = metric.info.name;
+        match (name, &metric.argument) {
+            ("surface_within_tol", Some(MetricArgument::ToleranceMm(tolerance))) => {
+                self.outline_share(*tolerance).into()
+            }
+            ("zone_removed_pct", Some(MetricArgument::Zone(id))) => self.zone_removed_pct(id).into(),
+            _ => self
+                .of_stages(name)
+                .or_else(|| self.of_removed_volume(name))
+                .or_else(|| self.of_removal_depth(name))
+                .or_else(|| self.of_process(name))
+                .unwrap_or_else(|| self.of_filling_or_chart(name)),
+        }
+    }
+
+    /// Computes a measure of the stages and their questions; `None` for other measures.
+    fn of_stages(&self, name: &str) -> Option<ComputedValue> {
+        Some(match name {
+            "time_to_clear_s" => self.cutting_stage().map(|s| s.ended.seconds_since(s.started)).into(),
+            "detect_tooth" => self.answered_correctly(is_tooth).into(),
+            "detect_level" => {
+                self.last_answer(is_tooth).and_then(|(_, g)| Some(f64::from(g.step?.0))).map(rounded).into()
+            }
+            "detect_level_time_s" => {
+                let since =
+                    |(stage, given): (&StageResult, &AnswerRecord)| given.step.map_or(stage.started, |(_, at)| at);
+                self.last_answer(is_tooth).map(|found| found.1.at.seconds_since(since(found))).into()
+            }
+            "detect_quadrant" => self.answered_correctly(is_quadrant).into(),
+            "detect_quadrant_time_s" => {
+                self.last_answer(is_quadrant).map(|(stage, given)| given.at.seconds_since(stage.started)).into()
+            }
+            "questions_right_pct" => self.questions_right_pct().into(),
+            _ => return None,
+        })
+    }
+
+    /// Computes a measure of the removed volume, from numbers of voxels; `None` for other measures.
+    fn of_removed_volume(&self, name: &str) -> Option<ComputedValue> {
+        let counts = &self.comparison.counts;
+        let share = |part: usize, whole: usize| (whole > 0).then(|| part as f64 / whole as f64);
+        let (removed, target, both) = (counts.removed, counts.target, counts.removed_target);
+        let cleared_pct = || share(counts.removed_decay, counts.decay).map(|s| 100.0 * s);
+        Some(match name {
+            "decay_cleared_pct" => cleared_pct().into(),
+            "healthy_per_decay_pct" => share(counts.removed_other, counts.decay).map(|s| 100.0 * s).into(),
+            "efficiency_pct_s" => {
+                let drilling_ticks = self.process.drilling_ticks;
+                cleared_pct().filter(|_| drilling_ticks > 0).map(|c| c / seconds(drilling_ticks)).into()
+            }
+            "dice" => share(2 * both, removed + target).unwrap_or(1.0).into(),
+            "jaccard" => share(both, removed + target - both).unwrap_or(1.0).into(),
+            "precision" => share(both, removed).unwrap_or(if target == 0 { 1.0 } else { 0.0 }).into(),
+            "recall" => share(both, target).unwrap_or(1.0).into(),
+            _ => return None,
+        })
+    }
+
+    /// Computes a measure of distances at the removed volume; `None` for other measures.
+    fn of_removal_depth(&self, name: &str) -> Option<ComputedValue> {
+        Some(match name {
+            "hausdorff_mm" => self.outline_percentile(1.0).into(),
+            "hausdorff95_mm" => self.outline_percentile(0.95).into(),
+            "overcut_depth_max_mm" => self.overcut(),
+            "undercut_depth_max_mm" => self.undercut(),
+            "pulp_exposed" => {
+                let voxel = self.comparison.exposed();
+                let evidence = voxel.map(|v| self.evidence_at(v));
+                ComputedValue { value: Some(if voxel.is_some() { 1.0 } else { 0.0 }), evidence }
+            }
+            "remaining_dentine_thickness_min_mm" => {
+                self.deepest(self.comparison.nearest(|s| s.removed() && !s.vulnerable(), |s| s.vulnerable()), None)
+            }
+            _ => return None,
+        })
+    }
+
+    /// Computes a measure of force, movement or time; `None` for other measures.
+    fn of_process(&self, name: &str) -> Option<ComputedValue> {
+        let stats = self.process;
+        Some(match name {
+            "force_max_n" => highest_or_zero(stats.force.highest),
+            "force_mean_n" => stats.force.mean().into(),
+            "speed_max_mm_s" => stats.speed.highest.into(),
+            "force_max_near_pulp_n" => highest_or_zero(stats.force_near.highest),
+            "force_mean_near_pulp_n" => stats.force_near.mean().unwrap_or(0.0).into(),
+            "speed_max_near_pulp_mm_s" => highest_or_zero(stats.speed_near.highest),
+            "path_length_mm" => stats.path_mm.into(),
+            "drilling_time_s" => seconds(stats.drilling_ticks).into(),
+            "contact_time_s" => seconds(stats.contact_ticks).into(),
+            "jerk" => stats.smoothness.into(),
+            "soft_tissue_drilled_s" => seconds(stats.soft_ticks).into(),
+            "neighbour_drilled_s" => seconds(stats.neighbour_ticks).into(),
+            "session_time_s" => seconds(stats.ticks).into(),
+            _ => return None,
+        })
+    }
+
+    /// Computes a measure of a filling or of a periodontal chart; other measures have no value.
+    fn of_filling_or_chart(&self, name: &str) -> ComputedValue {
+        if OF_FILLINGS.iter().any(|about| about.name == name) {
+            return self.restoration.map_or(ComputedValue::default(), |r| of_filling(r, name));
+        }
+        self.chart.and_then(|chart| charting::measure(name, chart)).into()
+    }
+
+    fn zone_removed_pct(&self, id: &str) -> Option<f64> {
+        let zone = self.recording.scenario.zones.iter().position(|z| z.id == id)?;
+        self.comparison.zone_removed_pct(zone)
+    }
+
+    fn cutting_stage(&self) -> Option<&StageResult> {
+        self.replay.outcome.stages.get(self.recording.scenario.cutting_stage()?)
+    }
+
+    /// Returns every question that was asked, with the result of its stage and its answer.
+    fn asked(&self) -> impl Iterator<Item = (&StageResult, &QuestionKind, Option<&AnswerRecord>)> {
+        let stages = self.recording.scenario.stages.iter().zip(&self.replay.outcome.stages);
+        stages.flat_map(|(stage, result)| {
+            let questions = stage.ask.iter().zip(&result.answers);
+            questions.map(move |(question, given)| (result, &question.kind, given.as_ref()))
+        })
+    }
+
+    /// Returns 1 if the last answer to questions of a kind is correct, 0 if it is incorrect or missing; `None` if no
+    /// such question was asked.
+    fn answered_correctly(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<f64> {
+        let is_asked = self.asked().any(|(_, kind, _)| is_meant(kind));
+        is_asked.then(|| self.last_answer(is_meant).map_or(0.0, |(_, given)| flag(given.correct)))
+    }
+
+    /// Returns the last answer to questions of a kind, with the result of its stage.
+    fn last_answer(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<(&StageResult, &AnswerRecord)> {
+        self.asked().filter(|(_, kind, _)| is_meant(kind)).filter_map(|(stage, _, given)| Some((stage, given?))).last()
+    }
+
+    fn questions_right_pct(&self) -> Option<f64> {
+        let judged = self.asked().filter(|(_, kind, _)| kind.is_judged());
+        let (right, all) = judged.fold((0u32, 0u32), |(right, all), (_, _, given)| {
+            (right + u32::from(given.is_some_and(|g| g.correct == Some(true))), all + 1)
+        });
+        (all > 0).then(|| 100.0 * f64::from(right) / f64::from(all))
+    }
+
+    /// Returns a percentile (nearest rank) of the distances between outlines, mm; `share` is 0 to 1.
+    fn outline_percentile(&self, share: f64) -> Option<f64> {
+        let distances = self.outlines.as_ref()?;
+        let rank = (share * distances.len() as f64).ceil() as usize;
+        Some(f64::from(distances[rank.clamp(1, distances.len()) - 1]))
+    }
+
+    fn outline_share(&self, tolerance: f32) -> Option<f64> {
+        let distances = self.outlines.as_ref()?;
+        let within = distances.partition_point(|&d| d <= tolerance);
+        Some(within as f64 / distances.len() as f64)
+    }
+
+    fn overcut(&self) -> ComputedValue {
+        let any = self.comparison.flags.iter().any(|s| s.removed() && s.sound());
+        let farthest = self.comparison.farthest(|s| s.removed() && s.sound(), |s| s.decay());
+        self.deepest(farthest, if any { None } else { Some(0.0) })
+    }
+
+    fn undercut(&self) -> ComputedValue {
+        let any = self.comparison.flags.iter().any(|s| s.decay() && !s.removed());
+        let farthest = self.comparison.farthest(|s| s.decay() && !s.removed(), |s| s.removed());
+        self.deepest(farthest, if any { None } else { Some(0.0) })
+    }
+
+    fn deepest(&self, found: Option<VoxelDistance>, otherwise: Option<f64>) -> ComputedValue {
+        match found {
+            Some(VoxelDistance { mm, voxel }) => {
+                ComputedValue { value: Some(f64::from(mm)), evidence: Some(self.evidence_at(voxel)) }
+            }
+            None => otherwise.into(),
+        }
+    }
+
+    fn evidence_at(&self, voxel: usize) -> Evidence {
+        let grid = &self.comparison.grid;
+        Evidence { at: self.process.removals.at(voxel), place: grid.centre(grid.cell(voxel)) }
+    }
+}
+
+/// Computes a measure of a filling. The evidence of a distance is its position, without a time, since a surface results
+/// from many strokes.
+fn of_filling(restoration: &Restoration, name: &str) -> ComputedValue {
+    let at =
+        |value: f64, place: Vec3| ComputedValue { value: Some(value), evidence: Some(Evidence { at: None, place }) };
+    match name {
+        "filled_pct" if restoration.cavity > 0 => {
+            (100.0 * restoration.filled as f64 / restoration.cavity as f64).into()
+        }
+        "contour_mean_mm" => restoration.mean().into(),
+        "contour_p95_mm" => restoration.percentile(0.95).into(),
+        "contour_max_mm" => {
+            let farthest = [restoration.highest(), restoration.lowest()];
+            let farthest = farthest.into_iter().flatten().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+            farthest.map_or(ComputedValue::default(), |(mm, place)| at(f64::from(mm.abs()), place))
+        }
+        "overhang_max_mm" => restoration.highest().map_or(ComputedValue::default(), |(mm, place)| match mm > 0.0 {
+            true => at(f64::from(mm), place),
+            false => 0.0.into(),
+        }),
+        "deficit_max_mm" => restoration.lowest().map_or(ComputedValue::default(), |(mm, place)| match mm < 0.0 {
+            true => at(f64::from(-mm), place),
+            false => 0.0.into(),
+        }),
+        "overhang_mm3" => restoration.overhang_mm3.into(),
+        "void_mm3" => restoration.void_mm3.into(),
+        _ => ComputedValue::default(),
+    }
+}
+
+fn is_tooth(kind: &QuestionKind) -> bool {
+    matches!(kind, QuestionKind::ToothWith { .. })
+}
+
+fn is_quadrant(kind: &QuestionKind) -> bool {
+    matches!(kind, QuestionKind::QuadrantOf { .. })
+}
+
+/// Returns the maximum, or 0 if the event never occurred.
+fn highest_or_zero(highest: Option<PeakValue>) -> ComputedValue {
+    if highest.is_none() { 0.0.into() } else { highest.into() }
+}
+
+fn flag(right: Option<bool>) -> f64 {
+    if right == Some(true) { 1.0 } else { 0.0 }
+}
+
+fn seconds(ticks: u64) -> f64 {
+    ticks as f64 * TICK_S
+}
+
+/// Rounds a coefficient to its written value: 0.7, not 0.699999988079071.
+fn rounded(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}

@@ -1,0 +1,256 @@
+//! The process of the work: force, speed and path, tick by tick.
+
+use super::removal_comparison::ProximityField;
+use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
+use crate::catalog::TissueRole;
+use crate::record::{Recording, TickRecord};
+use crate::scenario::Workpiece;
+use crate::session::Session;
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::sim::Step;
+use typodont_core::tick::{TICK_S, Tick};
+use typodont_core::volume::{Edit, Label};
+
+/// Number of ticks over which speed and path are measured: over a single tick of 1 ms, a coarse encoder alone reads as
+/// 55 mm/s.
+const SPAN: u64 = 20;
+
+/// Time in contact below which smoothness has no meaning, s.
+const SMOOTHNESS_LEAST_S: f64 = 1.0;
+
+/// A value with the tick and the position of its occurrence.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PeakValue {
+    pub value: f64,
+    pub at: Tick,
+    /// Position, tooth space, mm.
+    pub place: Vec3,
+}
+
+/// Maximum and mean of a quantity over ticks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RunningStats {
+    pub highest: Option<PeakValue>,
+    sum: f64,
+    count: u64,
+}
+
+impl RunningStats {
+    fn add(&mut self, value: f64, at: Tick, place: Vec3) {
+        if self.highest.is_none_or(|h| value > h.value) {
+            self.highest = Some(PeakValue { value, at, place });
+        }
+        self.sum += value;
+        self.count += 1;
+    }
+
+    pub fn mean(&self) -> Option<f64> {
+        (self.count > 0).then(|| self.sum / self.count as f64)
+    }
+}
+
+/// Process statistics of a whole session.
+#[derive(Clone, Debug)]
+pub struct ProcessStats {
+    pub ticks: u64,
+    pub force: RunningStats,
+    pub speed: RunningStats,
+    pub force_near: RunningStats,
+    pub speed_near: RunningStats,
+    pub path_mm: f64,
+    pub drilling_ticks: u64,
+    pub contact_ticks: u64,
+    pub soft_ticks: u64,
+    pub neighbour_ticks: u64,
+    /// Number of ticks in which another person guided the trainee's hand, by stage.
+    pub led_ticks: Vec<u64>,
+    /// Log dimensionless jerk; `None` if there was too little contact.
+    pub smoothness: Option<f64>,
+    pub removals: VoxelRemovals,
+    pub trace: Trace,
+}
+
+/// One sample of the curves in a report.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TraceSample {
+    pub at: Tick,
+    /// Maximum force since the last sample, N.
+    pub force: f32,
+    /// Speed, mm/s.
+    pub speed: f32,
+    /// Share of the decay removed, %.
+    pub cleared: f32,
+    pub touched: bool,
+    pub cutting: bool,
+}
+
+/// Force, speed and progress over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Trace {
+    /// Samples, one every [`Trace::SPAN_TICKS`] ticks.
+    pub samples: Vec<TraceSample>,
+}
+
+impl Trace {
+    /// Number of ticks from one sample to the next.
+    pub const SPAN_TICKS: u64 = 100;
+}
+
+/// Collects the process statistics during a replay.
+pub struct ProcessObserver {
+    tooth_from_world: Pose,
+    roles: [Option<TissueRole>; 256],
+    is_rotary: Vec<bool>,
+    proximity: ProximityField,
+    stats: ProcessStats,
+    last_place: Option<Vec3>,
+    was_touched: bool,
+    now: TraceSample,
+    /// Positions of the tip in contact, every [`SPAN`] ticks, by uninterrupted period of contact.
+    contact_runs: Vec<Vec<Vec3>>,
+    /// Voxels that became air, in order of time.
+    removal_log: Vec<(u32, VoxelRemoval)>,
+}
+
+impl ProcessObserver {
+    pub fn new(recording: &Recording, workpiece: &Workpiece) -> ProcessObserver {
+        let scenario = &recording.scenario;
+        let roles = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
+        let now = TraceSample { at: Tick::ZERO, force: 0.0, speed: 0.0, cleared: 0.0, touched: false, cutting: false };
+        ProcessObserver {
+            tooth_from_world: workpiece.world_from_tooth.inverse(),
+            roles,
+            is_rotary: scenario.instruments.iter().map(|i| i.is_bur()).collect(),
+            proximity: ProximityField::around(scenario, &workpiece.volume, scenario.measures.pulp_proximity),
+            stats: ProcessStats {
+                ticks: 0,
+                force: RunningStats::default(),
+                speed: RunningStats::default(),
+                force_near: RunningStats::default(),
+                speed_near: RunningStats::default(),
+                path_mm: 0.0,
+                drilling_ticks: 0,
+                contact_ticks: 0,
+                soft_ticks: 0,
+                neighbour_ticks: 0,
+                led_ticks: vec![0; scenario.stages.len()],
+                smoothness: None,
+                removals: VoxelRemovals::default(),
+                trace: Trace::default(),
+            },
+            last_place: None,
+            was_touched: false,
+            now,
+            contact_runs: Vec::new(),
+            removal_log: Vec::new(),
+        }
+    }
+
+    pub fn observe(&mut self, haptic: &TickRecord, step: &Step, edits: &[Edit], session: &Session) {
+        let tick = haptic.tick;
+        let place = self.tooth_from_world * step.tip;
+        self.stats.ticks = tick.0 + 1;
+        // Forces of guidance by the exercise or an instructor are not forces of the trainee.
+        let led = step.guidance + step.coupling_force;
+        let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
+        let removal = VoxelRemoval { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
+        self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
+        self.stats.drilling_ticks += u64::from(step.cutting);
+        self.now.cutting |= step.cutting;
+        self.was_touched |= step.touch.is_some();
+        if step.coupling_force != Vec3::ZERO
+            && let Some((stage, _)) = session.stage()
+        {
+            self.stats.led_ticks[stage] += 1;
+        }
+        if let Some(touch) = &step.touch {
+            let force = f64::from(pressed.length());
+            self.stats.contact_ticks += 1;
+            self.stats.force.add(force, tick, place);
+            if self.proximity.is_near(place) {
+                self.stats.force_near.add(force, tick, place);
+            }
+            self.now.force = self.now.force.max(pressed.length());
+            self.now.touched = true;
+            let is_running = self.is_rotary[step.instrument] && session.stage().is_some_and(|(_, s)| s.cutting);
+            match self.roles[usize::from(touch.label.0)] {
+                Some(TissueRole::Soft) if is_running => self.stats.soft_ticks += 1,
+                Some(TissueRole::Neighbour) if is_running => self.stats.neighbour_ticks += 1,
+                _ => {}
+            }
+        }
+        if tick.0.is_multiple_of(SPAN) {
+            self.observe_span(tick, place);
+        }
+        if (tick.0 + 1).is_multiple_of(Trace::SPAN_TICKS) {
+            let cleared = session.cleared_pct().unwrap_or(0.0) as f32;
+            self.stats.trace.samples.push(TraceSample { at: tick.next(), cleared, ..self.now });
+            self.now = TraceSample { force: 0.0, touched: false, cutting: false, ..self.now };
+        }
+    }
+
+    /// Updates path, speed and the track for smoothness, once every [`SPAN`] ticks.
+    fn observe_span(&mut self, tick: Tick, place: Vec3) {
+        let step_length = self.last_place.map_or(0.0, |last| f64::from(place.distance(last)));
+        let speed = step_length / (SPAN as f64 * TICK_S);
+        self.stats.path_mm += step_length;
+        self.now.speed = speed as f32;
+        if self.was_touched && self.last_place.is_some() {
+            self.stats.speed.add(speed, tick, place);
+            if self.proximity.is_near(place) {
+                self.stats.speed_near.add(speed, tick, place);
+            }
+            match self.contact_runs.last_mut() {
+                Some(spell) if !spell.is_empty() => spell.push(place),
+                _ => self.contact_runs.push(vec![place]),
+            }
+        } else if self.contact_runs.last().is_some_and(|s| !s.is_empty()) {
+            self.contact_runs.push(Vec::new());
+        }
+        self.was_touched = false;
+        self.last_place = Some(place);
+    }
+
+    pub fn finish(mut self) -> ProcessStats {
+        self.stats.removals = VoxelRemovals::sorted(self.removal_log);
+        self.stats.smoothness = log_dimensionless_jerk(&self.contact_runs);
+        self.stats
+    }
+}
+
+/// Returns −ln(T⁵/L² · ∫|jerk|² dt) over all periods of contact (Hogan & Sternad 2009); a value nearer to zero is
+/// smoother.
+fn log_dimensionless_jerk(contact_runs: &[Vec<Vec3>]) -> Option<f64> {
+    let dt = SPAN as f64 * TICK_S;
+    let (mut seconds, mut length, mut jerk_squared) = (0.0, 0.0, 0.0);
+    for spell in contact_runs {
+        seconds += spell.len() as f64 * dt;
+        length += spell.windows(2).map(|w| f64::from(w[0].distance(w[1]))).sum::<f64>();
+        let third = spell
+            .windows(4)
+            .map(|w| ((w[3] - w[2] * 3.0 + w[1] * 3.0 - w[0]).as_dvec3() / (dt * dt * dt)).length_squared());
+        jerk_squared += third.sum::<f64>() * dt;
+    }
+    let measure = (seconds * seconds * seconds * seconds * seconds) / (length * length) * jerk_squared;
+    (seconds >= SMOOTHNESS_LEAST_S && measure.is_finite() && measure > 0.0).then(|| -libm::log(measure))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_smooth_stroke_beats_a_shaky_one() {
+        let track = |shake: f32| -> Vec<Vec3> {
+            (0..200)
+                .map(|i| {
+                    let t = i as f32 * 0.02;
+                    Vec3::new((t * 1.5).sin() * 3.0, shake * (t * 60.0).sin(), 0.0)
+                })
+                .collect()
+        };
+        let [smooth, shaky] = [0.0, 0.05].map(|shake| log_dimensionless_jerk(&[track(shake)]));
+        assert!(smooth > shaky, "{smooth:?} {shaky:?}");
+        assert_eq!(log_dimensionless_jerk(&[track(0.0)[..10].to_vec()]), None);
+    }
+}

@@ -1,0 +1,225 @@
+//! The comparison of the removed tissue with the tissue to be removed.
+
+use super::cropped_grid::CroppedGrid;
+use super::voxel_set::VoxelSet;
+use super::zones;
+use crate::catalog::TissueRole;
+use crate::record::Replay;
+use crate::scenario::Scenario;
+use crate::scenario::file::ZoneRole;
+use typodont_core::volume::{Grid, Label, Volume, distance};
+
+/// Sets of voxels of the workpiece, and the measures that follow from them. R is the removed tissue, D the decay at the
+/// start, T the tissue to be removed: the target zones, or D if there are none.
+#[derive(Clone, Debug)]
+pub struct RemovalComparison {
+    pub grid: Grid,
+    /// Flags of each voxel.
+    pub flags: Vec<VoxelFlags>,
+    /// The scenario's zones, in their order.
+    pub zones: Vec<VoxelSet>,
+    pub counts: RemovalCounts,
+}
+
+/// Properties of one voxel, one bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct VoxelFlags(u8);
+
+impl VoxelFlags {
+    const REMOVED: u8 = 1;
+    const DECAY: u8 = 2;
+    const TARGET: u8 = 4;
+    const SOUND: u8 = 8;
+    const VULNERABLE: u8 = 16;
+
+    fn with(self, bit: u8, holds: bool) -> VoxelFlags {
+        VoxelFlags(if holds { self.0 | bit } else { self.0 })
+    }
+
+    pub fn removed(self) -> bool {
+        self.0 & VoxelFlags::REMOVED != 0
+    }
+
+    pub fn decay(self) -> bool {
+        self.0 & VoxelFlags::DECAY != 0
+    }
+
+    pub fn target(self) -> bool {
+        self.0 & VoxelFlags::TARGET != 0
+    }
+
+    /// Returns true for tissue to be removed: decay or target.
+    pub fn wanted(self) -> bool {
+        self.0 & (VoxelFlags::DECAY | VoxelFlags::TARGET) != 0
+    }
+
+    pub fn sound(self) -> bool {
+        self.0 & VoxelFlags::SOUND != 0
+    }
+
+    pub fn vulnerable(self) -> bool {
+        self.0 & VoxelFlags::VULNERABLE != 0
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RemovalCounts {
+    pub removed: usize,
+    pub decay: usize,
+    pub target: usize,
+    pub removed_decay: usize,
+    pub removed_other: usize,
+    pub removed_target: usize,
+}
+
+/// A distance, and the voxel at which it was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelDistance {
+    pub mm: f32,
+    pub voxel: usize,
+}
+
+impl RemovalComparison {
+    pub fn of(scenario: &Scenario, replay: &Replay) -> RemovalComparison {
+        let initial = &replay.workpiece.volume;
+        let zones: Vec<VoxelSet> = scenario.zones.iter().map(|z| zones::mask(z, initial)).collect();
+        let targets: Vec<usize> = (0..zones.len()).filter(|&z| scenario.zones[z].role == ZoneRole::Target).collect();
+        let role: [Option<TissueRole>; 256] = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
+        let mut counts = RemovalCounts::default();
+        let after = replay.volume.tissues();
+        let sets = initial.tissues().zip(after).enumerate().map(|(index, (before, after))| {
+            if before == Label::AIR {
+                return VoxelFlags::default();
+            }
+            let role = role[usize::from(before.0)];
+            let decay = role == Some(TissueRole::Decay);
+            let target = if targets.is_empty() { decay } else { targets.iter().any(|&z| zones[z].contains(index)) };
+            let set = VoxelFlags::default()
+                .with(VoxelFlags::REMOVED, after == Label::AIR)
+                .with(VoxelFlags::DECAY, decay)
+                .with(VoxelFlags::TARGET, target)
+                .with(VoxelFlags::SOUND, role == Some(TissueRole::Sound))
+                .with(VoxelFlags::VULNERABLE, role == Some(TissueRole::Vulnerable));
+            counts.add(set);
+            set
+        });
+        let flags = sets.collect();
+        RemovalComparison { grid: *initial.grid(), flags, zones, counts }
+    }
+
+    fn indices(&self, holds: impl Fn(VoxelFlags) -> bool) -> impl Iterator<Item = usize> {
+        self.flags.iter().enumerate().filter(move |(_, s)| holds(**s)).map(|(i, _)| i)
+    }
+
+    /// Returns the voxel of one set that is farthest from another set; `None` if either is empty.
+    pub fn farthest(
+        &self,
+        of: impl Fn(VoxelFlags) -> bool,
+        from: impl Fn(VoxelFlags) -> bool,
+    ) -> Option<VoxelDistance> {
+        self.extreme(of, from, |a, b| a > b)
+    }
+
+    /// Returns the voxel of one set that is nearest to another set; `None` if either is empty.
+    pub fn nearest(&self, of: impl Fn(VoxelFlags) -> bool, to: impl Fn(VoxelFlags) -> bool) -> Option<VoxelDistance> {
+        self.extreme(of, to, |a, b| a < b)
+    }
+
+    fn extreme(
+        &self,
+        of: impl Fn(VoxelFlags) -> bool,
+        from: impl Fn(VoxelFlags) -> bool,
+        beats: impl Fn(f32, f32) -> bool,
+    ) -> Option<VoxelDistance> {
+        let crop = CroppedGrid::around(&self.grid, 0, self.indices(|s| of(s) || from(s)))?;
+        let distances = distance::to_set(&crop.grid, |i| from(self.flags[crop.whole_index(i)]));
+        let mut best: Option<VoxelDistance> = None;
+        for (index, &mm) in distances.iter().enumerate().filter(|(_, d)| d.is_finite()) {
+            let voxel = crop.whole_index(index);
+            if of(self.flags[voxel]) && best.is_none_or(|b| beats(mm, b.mm)) {
+                best = Some(VoxelDistance { mm, voxel });
+            }
+        }
+        best
+    }
+
+    /// Returns the distances between the borders of R and T in both directions, mm, in ascending order; `None` if
+    /// either is empty.
+    pub fn outline_distances(&self) -> Option<Vec<f32>> {
+        let crop = CroppedGrid::around(&self.grid, 1, self.indices(|s| s.removed() || s.target()))?;
+        let at = |i: usize| self.flags[crop.whole_index(i)];
+        let is_border = |i: usize, holds: &dyn Fn(VoxelFlags) -> bool| {
+            // A voxel on the border of the box has neighbours outside, which belong to no set.
+            holds(at(i)) && (crop.grid.neighbours(i).count() < 6 || crop.grid.neighbours(i).any(|n| !holds(at(n))))
+        };
+        let of_removed: Vec<bool> = (0..crop.grid.len()).map(|i| is_border(i, &|s| s.removed())).collect();
+        let of_target: Vec<bool> = (0..crop.grid.len()).map(|i| is_border(i, &|s| s.target())).collect();
+        if !of_removed.contains(&true) || !of_target.contains(&true) {
+            return None;
+        }
+        let to_removed = distance::to_set(&crop.grid, |i| of_removed[i]);
+        let to_target = distance::to_set(&crop.grid, |i| of_target[i]);
+        let from_removed = of_removed.iter().zip(&to_target).filter(|(b, _)| **b).map(|(_, d)| *d);
+        let from_target = of_target.iter().zip(&to_removed).filter(|(b, _)| **b).map(|(_, d)| *d);
+        let mut distances: Vec<f32> = from_removed.chain(from_target).collect();
+        distances.sort_by(f32::total_cmp);
+        Some(distances)
+    }
+
+    /// Returns the first vulnerable voxel that [is exposed](RemovalComparison::is_exposed).
+    pub fn exposed(&self) -> Option<usize> {
+        self.indices(|s| s.vulnerable()).find(|&voxel| self.is_exposed(voxel))
+    }
+
+    /// Returns true for a vulnerable voxel that was removed or is next to a removed one.
+    pub fn is_exposed(&self, voxel: usize) -> bool {
+        self.flags[voxel].vulnerable()
+            && (self.flags[voxel].removed() || self.grid.neighbours(voxel).any(|n| self.flags[n].removed()))
+    }
+
+    /// Returns 100·|R∩Z| / |Z| for the zone Z with this index; `None` for an empty zone.
+    pub fn zone_removed_pct(&self, zone: usize) -> Option<f64> {
+        let all = self.zones[zone].count();
+        let removed = self.zones[zone].iter().filter(|&v| self.flags[v].removed()).count();
+        (all > 0).then(|| 100.0 * removed as f64 / all as f64)
+    }
+}
+
+impl RemovalCounts {
+    fn add(&mut self, set: VoxelFlags) {
+        let (removed, decay, target) = (set.removed(), set.decay(), set.target());
+        self.removed += usize::from(removed);
+        self.decay += usize::from(decay);
+        self.target += usize::from(target);
+        self.removed_decay += usize::from(removed && decay);
+        self.removed_other += usize::from(removed && !decay);
+        self.removed_target += usize::from(removed && target);
+    }
+}
+
+/// Distance to the vulnerable tissue of a volume, up to a maximum distance.
+pub struct ProximityField {
+    crop: Option<CroppedGrid>,
+    distances: Vec<f32>,
+    within: f32,
+}
+
+impl ProximityField {
+    pub fn around(scenario: &Scenario, initial: &Volume, within: f32) -> ProximityField {
+        let is_vulnerable = |i: usize| scenario.tissues.role(initial.tissue(i)) == Some(TissueRole::Vulnerable);
+        let grid = initial.grid();
+        let margin = (within / grid.spacing.min_element()).ceil() as u32 + 1;
+        let crop = CroppedGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_vulnerable(i)));
+        let distances = match &crop {
+            Some(crop) => distance::to_set(&crop.grid, |i| is_vulnerable(crop.whole_index(i))),
+            None => Vec::new(),
+        };
+        ProximityField { crop, distances, within }
+    }
+
+    /// Returns true for a point (tooth space, mm) within the maximum distance.
+    pub fn is_near(&self, point_in_tooth: typodont_core::frame::Vec3) -> bool {
+        let place = self.crop.and_then(|crop| Some(crop.grid.index(crop.grid.nearest(point_in_tooth)?)));
+        place.is_some_and(|i| self.distances[i] <= self.within)
+    }
+}

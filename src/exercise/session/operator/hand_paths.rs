@@ -1,0 +1,146 @@
+//! Positions on the visible surface, and hand paths through the air to them.
+
+use crate::session::operator::file::{CarveFile, CutFile, PlaceFile};
+use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT, TOUCH_SPEED, TRAVEL_HEIGHT};
+use typodont_core::device::Move;
+use typodont_core::frame::Vec3;
+use typodont_core::volume::ISO;
+
+/// Parameters with which a hand leads a tip along a path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct StrokeParams {
+    /// Speed along the path, mm/s.
+    speed: f32,
+    /// Maximum distance of the hand beyond the tip's target, mm.
+    lean: f32,
+    /// Maximum force, N.
+    force: f32,
+    /// Maximum waiting time where the tip lags behind, s.
+    patience: f32,
+    /// True if the hand backs off at once when the tip is beyond the path.
+    yields: bool,
+}
+
+impl From<&CutFile> for StrokeParams {
+    fn from(file: &CutFile) -> StrokeParams {
+        let CutFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
+        StrokeParams { speed, lean, force, patience, yields: false }
+    }
+}
+
+impl From<&CarveFile> for StrokeParams {
+    fn from(file: &CarveFile) -> StrokeParams {
+        let CarveFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
+        StrokeParams { speed, lean, force, patience, yields: true }
+    }
+}
+
+impl Operator {
+    pub(super) fn in_world(&self, point_in_tooth: Vec3) -> Vec3 {
+        self.workpiece.world_from_tooth * point_in_tooth
+    }
+
+    /// Returns the distance by which an instrument's working end extends below the device's tip, mm.
+    pub(super) fn radius(&self, instrument: usize) -> f32 {
+        self.scenario.instruments[instrument].to_instrument().radius()
+    }
+
+    /// Returns the index of the tooth, a point of its surface (mm) and the unit normal there, in tooth space.
+    pub(super) fn locate(&self, place: &PlaceFile) -> (usize, Vec3, Vec3) {
+        let teeth = &self.workpiece.teeth;
+        let tooth = match place {
+            PlaceFile::Tooth(id) => teeth.iter().position(|t| t.id == *id).unwrap_or(0),
+            PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(0, |l| l.tooth),
+            PlaceFile::Crown | PlaceFile::Quadrant(_) => 0,
+        };
+        let (low, high) = (teeth[tooth].crown_low, teeth[tooth].crown_high);
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let over = match place {
+            PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(middle, |l| l.centre),
+            PlaceFile::Quadrant(quadrant) => {
+                let buccal = if *quadrant <= 2 { 0.42 } else { -0.42 };
+                let distal = if quadrant % 2 == 1 { 0.42 } else { -0.42 };
+                middle + Vec3::new(half.x * buccal, half.y * distal, 0.0)
+            }
+            PlaceFile::Crown | PlaceFile::Tooth(_) => middle,
+        };
+        let (surface, normal) = self.surface_at(over.x, over.y, high.z).unwrap_or((over, Vec3::Z));
+        (tooth, surface, normal)
+    }
+
+    /// Returns the uppermost surface point at (x, y) and its unit normal; tooth space, mm.
+    ///
+    /// Searches downward from 1 mm above `top` over 12 mm.
+    pub(super) fn surface_at(&self, x: f32, y: f32, top: f32) -> Option<(Vec3, Vec3)> {
+        let volume = &self.workpiece.volume;
+        let step = 0.5 * volume.grid().spacing.min_element();
+        let point = |i: u32| Vec3::new(x, y, top + 1.0 - i as f32 * step);
+        let hit = (0..(12.0 / step) as u32).map(point).find(|&p| volume.density_at(p) >= ISO)?;
+        let (_, gradient) = volume.density_and_gradient_at(hit);
+        Some((hit, (-gradient).try_normalize().unwrap_or(Vec3::Z)))
+    }
+
+    /// Returns the height of the highest crown, tooth space, mm.
+    pub(super) fn top(&self) -> f32 {
+        self.workpiece.teeth.iter().map(|t| t.crown_high.z).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// Plans a move straight up to travelling height from the hand's position at that time.
+    pub(super) fn lift_off(&mut self) {
+        let up = self.rise_task();
+        self.plan.push_back(up);
+    }
+
+    /// Plans moves up, across and down to a point in tooth space, mm.
+    pub(super) fn travel_to(&mut self, point_in_tooth: Vec3) {
+        let tasks = self.travel_tasks(point_in_tooth);
+        self.plan.extend(tasks);
+    }
+
+    /// Returns a move straight up to travelling height. Its start is the position of the hand when the move begins.
+    pub(super) fn rise_task(&self) -> OperatorTask {
+        let height = (self.workpiece.world_from_tooth * (Vec3::Z * (self.top() + TRAVEL_HEIGHT))).y;
+        OperatorTask::Move(Move::Rise { to_height: height, speed: self.file.hand.speed_mm_s })
+    }
+
+    /// Returns moves up, across and down to a point in tooth space, mm.
+    pub(super) fn travel_tasks(&self, point_in_tooth: Vec3) -> Vec<OperatorTask> {
+        let speed = self.file.hand.speed_mm_s;
+        let above = Vec3::new(point_in_tooth.x, point_in_tooth.y, self.top() + TRAVEL_HEIGHT);
+        let (above, to) = (self.in_world(above), self.in_world(point_in_tooth));
+        vec![
+            self.rise_task(),
+            OperatorTask::Move(Move::Reach { to: above, speed }),
+            OperatorTask::Move(Move::Reach { to, speed }),
+        ]
+    }
+
+    /// Returns tasks that lead the tip from above onto a path in tooth space and along it. `radius` is the distance
+    /// by which the working end extends below the tip, mm. Empty for an empty path.
+    pub(super) fn stroke_tasks(&self, stroke: StrokeParams, radius: f32, path: Vec<Vec3>) -> Vec<OperatorTask> {
+        let Some(first) = path.first() else { return Vec::new() };
+        let above = first.with_z(self.top() + radius + TOUCH_HEIGHT);
+        let mut tasks = self.travel_tasks(above);
+        tasks.push(self.guide_task(stroke, [above].into_iter().chain(path)));
+        tasks
+    }
+
+    /// Returns a task that leads the tip along a path in tooth space, mm.
+    pub(super) fn guide_task(&self, stroke: StrokeParams, path_in_tooth: impl Iterator<Item = Vec3>) -> OperatorTask {
+        let path = path_in_tooth.map(|place| self.in_world(place)).collect();
+        let StrokeParams { speed, lean, force, patience, yields } = stroke;
+        OperatorTask::Move(Move::TrackTip { path, speed, max_lead: lean, force, max_wait: patience, backs_off: yields })
+    }
+
+    /// Returns moves up, across, and down onto a point whose surface lies at about `height` (tooth space, mm);
+    /// `force` in N, `hold` in s.
+    pub(super) fn press_down(&self, place: Vec3, height: f32, force: f32, hold: f32) -> [Move; 4] {
+        let speed = self.file.hand.speed_mm_s;
+        let top = self.top() + 1.0;
+        let rise = Move::Rise { to_height: self.in_world(place.with_z(top)).y, speed };
+        let above = Move::Reach { to: self.in_world(place.with_z(top)), speed };
+        let before = Move::Reach { to: self.in_world(place.with_z((height + TOUCH_HEIGHT).min(top))), speed };
+        let along = self.workpiece.world_from_tooth.rotate(Vec3::NEG_Z);
+        [rise, above, before, Move::Press { along, force, hold, reach: 15.0, speed: TOUCH_SPEED.min(speed) }]
+    }
+}

@@ -1,0 +1,137 @@
+//! The files of a session, by name: shipped with the program, from a folder, or from a recording.
+
+use crate::diagnostic::{Diagnostic, SourceText};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+/// Maximum size of a file that is read into memory, bytes: one and a half times a scan of 512×512×512 voxels of 16
+/// bits.
+const FILE_MAX: u64 = 400 << 20;
+
+/// Source of files: those in memory, such as the shipped tables, and then folders on disk.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    /// Files in memory, by name; they take precedence over folders.
+    in_memory: BTreeMap<String, Arc<[u8]>>,
+    /// Folders that names are relative to, searched in order.
+    folders: Vec<PathBuf>,
+}
+
+/// Tables that are shipped with the program.
+const SHIPPED: &[(&str, &str)] = &[
+    ("content/tissues.json", include_str!("../../content/tissues.json")),
+    ("content/instruments.json", include_str!("../../content/instruments.json")),
+    ("content/touch.json", include_str!("../../content/touch.json")),
+    ("content/operators/careful.json", include_str!("../../content/operators/careful.json")),
+    ("content/operators/expert.json", include_str!("../../content/operators/expert.json")),
+    ("content/operators/hasty.json", include_str!("../../content/operators/hasty.json")),
+    ("content/operators/timid.json", include_str!("../../content/operators/timid.json")),
+    ("content/questionnaires/simulator.json", include_str!("../../content/questionnaires/simulator.json")),
+];
+
+impl Library {
+    /// Creates a library of the shipped files only.
+    pub fn shipped() -> Library {
+        let in_memory = SHIPPED.iter().map(|(name, text)| (name.to_string(), Arc::from(text.as_bytes()))).collect();
+        Library { in_memory, folders: Vec::new() }
+    }
+
+    /// Creates an empty library, for example to be filled from a recording.
+    pub fn empty() -> Library {
+        Library::default()
+    }
+
+    /// Adds a folder, which is searched for every file that is not in memory.
+    pub fn with_folder(mut self, folder: impl Into<PathBuf>) -> Library {
+        self.folders.push(folder.into());
+        self
+    }
+
+    /// Adds a file to memory and replaces any file of the same name there.
+    pub fn insert(&mut self, name: impl Into<String>, bytes: impl Into<Arc<[u8]>>) {
+        self.in_memory.insert(name.into(), bytes.into());
+    }
+
+    /// Returns every file in memory, ordered by name.
+    pub fn files_in_memory(&self) -> impl Iterator<Item = (&str, &[u8])> {
+        self.in_memory.iter().map(|(name, bytes)| (name.as_str(), bytes.as_ref()))
+    }
+
+    /// Returns the bytes of a file. The name is relative and must not lead out of the folder.
+    ///
+    /// # Errors
+    /// Fails when the name leads out of the folder, or when the file is missing, unreadable or too large.
+    pub fn bytes(&self, name: &str) -> Result<Arc<[u8]>, Diagnostic> {
+        if let Some(bytes) = self.in_memory.get(name) {
+            return Ok(bytes.clone());
+        }
+        let is_inside = Path::new(name).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        if !is_inside {
+            let help = "give a path below the folder of the file that names it".to_string();
+            return Err(Diagnostic::about_file(name, "outside-folder", "the path is outside the folder", Some(help)));
+        }
+        for folder in &self.folders {
+            let path = folder.join(name);
+            if path.is_file() {
+                return read_file(&path).map(Arc::from);
+            }
+        }
+        let looked = self.folders.iter().map(|f| f.display().to_string()).collect::<Vec<_>>().join(", ");
+        let help = if looked.is_empty() { None } else { Some(format!("looked in: {looked}")) };
+        Err(Diagnostic::about_file(name, "missing-file", "the file does not exist", help))
+    }
+
+    /// Returns a file as text.
+    ///
+    /// # Errors
+    /// Fails like [`Library::bytes`], or when the file is not UTF-8.
+    pub fn text(&self, name: &str) -> Result<Arc<SourceText>, Diagnostic> {
+        decode_text(name, self.bytes(name)?.to_vec())
+    }
+}
+
+/// Reads a file that the user named; the path is relative to the current folder and may lead anywhere on disk.
+///
+/// # Errors
+/// Fails when the path does not lead to a readable file, or when the file is too large.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, Diagnostic> {
+    let name = path.display().to_string();
+    let refused = |what: String| Diagnostic::about_file(&name, "unreadable-file", what, None);
+    let meta = fs::metadata(path).map_err(|error| refused(format!("the file cannot be read: {error}")))?;
+    if !meta.is_file() {
+        return Err(refused("this is not a file".into()));
+    }
+    if meta.len() > FILE_MAX {
+        return Err(refused(format!(
+            "the file has {} MiB, and the maximum is {} MiB",
+            meta.len() >> 20,
+            FILE_MAX >> 20
+        )));
+    }
+    fs::read(path).map_err(|error| refused(format!("the file cannot be read: {error}")))
+}
+
+/// Reads a text file that the user named.
+///
+/// # Errors
+/// Fails like [`read_file`], or when the file is not UTF-8.
+pub fn read_text(path: &Path) -> Result<Arc<SourceText>, Diagnostic> {
+    decode_text(&path.display().to_string(), read_file(path)?)
+}
+
+/// Decodes bytes as UTF-8 text and strips a byte order mark.
+///
+/// # Errors
+/// Fails when the bytes are not UTF-8.
+pub fn decode_text(name: &str, bytes: Vec<u8>) -> Result<Arc<SourceText>, Diagnostic> {
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(SourceText::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text))),
+        Err(error) => {
+            let at = error.utf8_error().valid_up_to();
+            let help = Some("save the file as UTF-8".to_string());
+            Err(Diagnostic::about_file(name, "not-text", format!("byte {at} is not UTF-8 text"), help))
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Grade tables in the CSV formats that Moodle and Canvas import.
+//!
+//! Moodle identifies students by `Email address` or `ID number`; grades and their feedback must both be mapped, or
+//! grades are lost (docs.moodle.org, "Grade import"). Canvas requires its own columns and a row `Points Possible`,
+//! and reads a number in round brackets at the end of a title as an assignment id.
+
+use std::collections::BTreeMap;
+use typodont_report::cohort::Cohort;
+use typodont_report::{GradeFile, SessionFile, Translator, csv, sanitize_display};
+
+/// Learning management system that imports the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lms {
+    Moodle,
+    Canvas,
+}
+
+/// Rule that selects the graded session when a participant has several of one exercise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AttemptPolicy {
+    Last,
+    Best,
+    First,
+}
+
+/// Contents of a grade table.
+#[derive(Clone, Copy, Debug)]
+pub struct GradebookOptions<'a> {
+    pub lms: Lms,
+    pub policy: AttemptPolicy,
+    /// Identities of the students; without them, participant codes are written to `ID number` (Moodle) or
+    /// `SIS User ID` (Canvas).
+    pub students: Option<&'a StudentTable>,
+    /// Translator into the language of the feedback. The titles of the columns are the same in every language.
+    pub translator: Translator<'a>,
+}
+
+/// Grade table and the warnings raised while it was built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gradebook {
+    pub csv: String,
+    /// Number of student rows.
+    pub students: usize,
+    /// One sentence per warning: sessions or participants left out, and grades that the target system cannot
+    /// represent.
+    pub warnings: Vec<String>,
+}
+
+/// The school's own identification of students: maps a participant code to the cells of the identifying columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudentTable {
+    columns: Vec<String>,
+    cells: BTreeMap<String, Vec<String>>,
+}
+
+/// Columns by which Canvas identifies students, in the order it requires.
+const CANVAS: [&str; 5] = ["Student", "ID", "SIS User ID", "SIS Login ID", "Section"];
+
+/// Maximum lengths, characters, of a title and of a feedback text: as much as gradebooks display.
+const TITLE_MAX: usize = 120;
+const FEEDBACK_MAX: usize = 1000;
+
+impl StudentTable {
+    /// Reads a CSV table with the column `participant` and one or more identifying columns, which are copied before
+    /// the grades.
+    ///
+    /// `name` is the file name used in error messages.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when the text is not a CSV table, lacks one of these columns, or lists a participant twice.
+    pub fn read(name: &str, text: &str) -> Result<StudentTable, String> {
+        let rows = csv::parse_rows(text).map_err(|e| format!("{name}: wrong-table: {e}"))?;
+        let (head, lines) = rows.split_first().ok_or(format!("{name}: wrong-table: the file is empty"))?;
+        let code = head.iter().position(|c| c.trim().eq_ignore_ascii_case("participant"));
+        let code =
+            code.ok_or(format!("{name}: wrong-table: the first line must contain the column \"participant\""))?;
+        let others: Vec<usize> = (0..head.len()).filter(|c| *c != code).collect();
+        if others.is_empty() {
+            return Err(format!(
+                "{name}: wrong-table: besides \"participant\", the table needs a column that identifies students"
+            ));
+        }
+        let cell =
+            |row: &Vec<String>, column: usize| row.get(column).map_or_else(String::new, |c| c.trim().to_string());
+        let mut cells = BTreeMap::new();
+        for (number, row) in (2..).zip(lines) {
+            let own = others.iter().map(|c| cell(row, *c)).collect();
+            if cells.insert(cell(row, code), own).is_some() {
+                let duplicate = sanitize_display(&cell(row, code), 40);
+                return Err(format!("{name}: row {number}: duplicate-participant: \"{duplicate}\" is listed twice"));
+            }
+        }
+        Ok(StudentTable { columns: others.iter().map(|c| head[*c].trim().to_string()).collect(), cells })
+    }
+
+    /// Returns a participant's cells in the given columns, empty for columns that the table lacks; `None` for an
+    /// unlisted participant.
+    fn of(&self, participant: &str, columns: &[String]) -> Option<Vec<String>> {
+        let own = self.cells.get(participant)?;
+        let place = |column: &String| self.columns.iter().position(|c| c.eq_ignore_ascii_case(column));
+        Some(columns.iter().map(|c| place(c).map_or_else(String::new, |p| own[p].clone())).collect())
+    }
+}
+
+/// Builds the grade table of a cohort: one row per participant, one column per exercise (for Moodle also its
+/// feedback).
+pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
+    let GradebookOptions { lms, policy, students, translator } = *options;
+    let graded: Vec<(&SessionFile, &GradeFile)> =
+        cohort.sessions.iter().filter_map(|(_, s)| Some((s, s.grade.as_ref()?))).collect();
+    let mut warnings = Vec::new();
+    let mut exercises: Vec<&SessionFile> = Vec::new();
+    let mut people: Vec<&str> = Vec::new();
+    for (session, _) in &graded {
+        if !exercises.iter().any(|e| e.scenario.id == session.scenario.id) {
+            exercises.push(session);
+        }
+        if !session.participant.is_empty() && !people.contains(&session.participant.as_str()) {
+            people.push(&session.participant);
+        }
+    }
+    people.sort_unstable();
+    let nameless = graded.iter().filter(|(s, _)| s.participant.is_empty()).count();
+    if nameless > 0 {
+        warnings.push(format!("{nameless} graded sessions have no participant code and were left out"));
+    }
+    let identity_columns = match (lms, students) {
+        (Lms::Canvas, _) => CANVAS.map(String::from).to_vec(),
+        (Lms::Moodle, Some(students)) => students.columns.clone(),
+        (Lms::Moodle, None) => vec!["ID number".to_string()],
+    };
+    let mut head = identity_columns.clone();
+    let mut possible = vec![String::new(); identity_columns.len()];
+    for exercise in &exercises {
+        let plain = |e: &SessionFile| title(e, lms);
+        let is_alone = exercises.iter().filter(|e| plain(e) == plain(exercise)).count() == 1;
+        // A learning management system would treat two columns of the same name as one assignment.
+        let title = match is_alone {
+            true => plain(exercise),
+            false => format!("{} · {}", plain(exercise), sanitize_display(&exercise.scenario.id, TITLE_MAX)),
+        };
+        head.push(title.clone());
+        if lms == Lms::Moodle {
+            head.push(format!("{title} (feedback)"));
+        }
+        let max_points: Vec<f64> =
+            graded.iter().filter(|(s, _)| s.scenario.id == exercise.scenario.id).map(|(_, g)| g.max_points).collect();
+        if max_points.iter().any(|m| *m != max_points[0]) {
+            warnings.push(format!("the sessions of \"{title}\" have different maximum points: export them separately"));
+        }
+        possible.push(max_points.iter().copied().fold(0.0, f64::max).to_string());
+    }
+    let mut table = csv::format_row(&head);
+    if lms == Lms::Canvas {
+        possible[0] = "    Points Possible".into();
+        table += &csv::format_row(&possible);
+    }
+    let mut count = 0;
+    let mut critical_errors = 0;
+    for person in people {
+        let identity =
+            match students {
+                Some(students) => students.of(person, &identity_columns),
+                None => Some(
+                    identity_columns
+                        .iter()
+                        .map(|c| {
+                            if ["ID number", "SIS User ID"].contains(&c.as_str()) {
+                                person.into()
+                            } else {
+                                String::new()
+                            }
+                        })
+                        .collect(),
+                ),
+            };
+        let Some(mut line) = identity else {
+            warnings
+                .push(format!("\"{}\" is not in the table of students and was left out", sanitize_display(person, 40)));
+            continue;
+        };
+        for exercise in &exercises {
+            let own = graded.iter().filter(|(s, _)| s.participant == person && s.scenario.id == exercise.scenario.id);
+            let grade = select_grade(&own.copied().collect::<Vec<_>>(), policy);
+            critical_errors += usize::from(grade.is_some_and(|g| !g.hard_fails.is_empty()));
+            line.push(grade.map_or_else(String::new, |g| g.points.to_string()));
+            if lms == Lms::Moodle {
+                line.push(grade.map_or_else(String::new, |g| feedback(g, translator)));
+            }
+        }
+        table += &csv::format_row(&line);
+        count += 1;
+    }
+    if critical_errors > 0 {
+        warnings.push(format!(
+            "{critical_errors} of these grades failed because of a critical error, whatever their points, which a \
+             gradebook cannot show"
+        ));
+    }
+    Gradebook { csv: table, students: count, warnings }
+}
+
+/// Returns the column title of an exercise; for Canvas, a final number in round brackets is put in square brackets.
+fn title(session: &SessionFile, lms: Lms) -> String {
+    let title = if session.scenario.title.is_empty() { &session.scenario.id } else { &session.scenario.title };
+    let title = sanitize_display(title, TITLE_MAX);
+    let number =
+        title.strip_suffix(')').and_then(|t| t.rsplit_once('(')).filter(|(_, n)| n.chars().all(|c| c.is_ascii_digit()));
+    match (lms, number) {
+        (Lms::Canvas, Some((before, number))) => format!("{before}[{number}]"),
+        _ => title,
+    }
+}
+
+/// Selects a grade from one participant's `sessions`, which are in chronological order; among equally good ones the
+/// last counts.
+fn select_grade<'a>(sessions: &[(&'a SessionFile, &'a GradeFile)], policy: AttemptPolicy) -> Option<&'a GradeFile> {
+    let of = |session: &(&'a SessionFile, &'a GradeFile)| session.1;
+    match policy {
+        AttemptPolicy::First => sessions.first().map(of),
+        AttemptPolicy::Last => sessions.last().map(of),
+        AttemptPolicy::Best => {
+            sessions.iter().map(of).max_by(|a, b| a.passed.cmp(&b.passed).then(a.points.total_cmp(&b.points)))
+        }
+    }
+}
+
+/// Summarises a grade as the feedback text of a gradebook.
+fn feedback(grade: &GradeFile, translator: Translator) -> String {
+    let key = if grade.passed { "gradebook.passed" } else { "gradebook.not_passed" };
+    let (points, most) = (round(grade.points), round(grade.max_points));
+    let mut sentences =
+        vec![translator.text(key, &[("points", points), ("most", most), ("needed", round(grade.pass_points))])];
+    if !grade.finished {
+        sentences.push(translator.text("gradebook.unfinished", &[]));
+    }
+    if !grade.hard_fails.is_empty() {
+        sentences.push(translator.text("gradebook.critical_errors", &[("titles", grade.hard_fails.join("; "))]));
+    }
+    sentences.extend(grade.items.iter().map(|item| {
+        let (points, most) = (round(item.points), round(item.max_points));
+        translator.text("gradebook.item", &[("title", item.title.clone()), ("points", points), ("most", most)])
+    }));
+    sanitize_display(&sentences.join(" "), FEEDBACK_MAX)
+}
+
+/// Formats points, rounded to one decimal place.
+fn round(points: f64) -> String {
+    ((points * 10.0).round() / 10.0).to_string()
+}

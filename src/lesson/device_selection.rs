@@ -1,0 +1,34 @@
+//! Choice of the device that a person holds, by name.
+
+use super::LessonError;
+use typodont_core::device::Device;
+use typodont_devices::Driver;
+
+/// An open device, with its driver and argument for opening it again.
+pub struct OpenDevice {
+    /// Name as it was requested.
+    pub name: String,
+    pub device: Box<dyn Device + Send>,
+    pub driver: &'static dyn Driver,
+    pub argument: Option<String>,
+}
+
+/// Opens the device that `NAME[:WHICH]` names.
+///
+/// # Errors
+///
+/// [`LessonError::UnknownDevice`] for an unknown name, [`LessonError::NoDevice`] if the device cannot be opened.
+pub fn open_device(device_name: &str) -> Result<OpenDevice, LessonError> {
+    let (name, argument) = match device_name.split_once(':') {
+        Some((name, argument)) => (name, Some(argument.to_string())),
+        None => (device_name, None),
+    };
+    let Some(driver) = typodont_devices::driver_by_name(name) else {
+        let known = typodont_devices::DRIVERS.iter().map(|d| d.name()).collect::<Vec<_>>().join(", ");
+        return Err(LessonError::UnknownDevice { name: name.to_string(), known });
+    };
+    let opened = driver.open(argument.as_deref());
+    let device =
+        opened.map_err(|trouble| LessonError::NoDevice { name: name.to_string(), why: trouble.to_string() })?;
+    Ok(OpenDevice { name: device_name.to_string(), device, driver, argument })
+}

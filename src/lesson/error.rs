@@ -1,0 +1,86 @@
+//! Errors of a lesson.
+
+use std::fmt;
+use std::path::PathBuf;
+use typodont_exercise::record::RecorderError;
+use typodont_exercise::scenario::WorkpieceError;
+use typodont_formats::diagnostic::Diagnostic;
+use typodont_report::bundle::{BundleError, PartialBundle};
+
+/// Error that prevents a lesson from beginning or continuing.
+#[derive(Debug)]
+pub enum LessonError {
+    /// The exercise cannot be built with this seed or this scan.
+    ImpossibleScene { scenario: String, why: WorkpieceError },
+    /// The recording could not be created; no session began.
+    RecordingNotStarted(RecorderError),
+    /// The bundle's folder cannot be made or filled.
+    Bundle(BundleError),
+    /// The session stopped; `folder` holds its recording up to then.
+    Stopped { why: String, folder: PathBuf },
+    /// No device of that name; `known` lists the valid names.
+    UnknownDevice { name: String, known: String },
+    /// The device cannot be opened.
+    NoDevice { name: String, why: String },
+    /// The second device is the same as the first.
+    SameDevice { name: String },
+    /// The lesson cannot listen on that address.
+    NoListener { at: String, why: String },
+    /// A file that is not a valid scan of a tooth.
+    WrongVolume { path: PathBuf, why: String },
+    /// A file that cannot be read.
+    Unreadable(Diagnostic),
+    /// A folder that holds no exercise, or cannot be read.
+    NoScenarios { folder: PathBuf, why: String },
+}
+
+impl LessonError {
+    pub(super) fn stopped(partial_bundle: &PartialBundle, why: &dyn fmt::Display) -> LessonError {
+        let recording = partial_bundle.recording_path();
+        let folder = recording.parent().unwrap_or(&recording).to_path_buf();
+        LessonError::Stopped { why: why.to_string(), folder }
+    }
+}
+
+impl fmt::Display for LessonError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            LessonError::ImpossibleScene { scenario, why } => write!(f, "{scenario}: impossible-scene: {why}"),
+            LessonError::RecordingNotStarted(error) => error.fmt(f),
+            LessonError::Bundle(unmade) => unmade.fmt(f),
+            LessonError::Stopped { why, folder } => {
+                write!(
+                    f,
+                    "{why}\nthe recording up to this point is in {}; `typodont finish` makes a bundle from it",
+                    folder.display()
+                )
+            }
+            LessonError::UnknownDevice { name, known } => write!(
+                f,
+                "unknown-device: there is no device \"{name}\"; known: scripted, {known} (see `typodont devices`)"
+            ),
+            LessonError::NoDevice { name, why } => write!(f, "{name}: no-device: {why}"),
+            LessonError::SameDevice { name } => {
+                write!(f, "same-device: {name} is the first device; give another one, NAME:WHICH, as the second")
+            }
+            LessonError::NoListener { at, why } => {
+                write!(f, "{at}: cannot-listen: {why}; give an address of this computer")
+            }
+            LessonError::WrongVolume { path, why } => write!(f, "{}: wrong-volume: {why}", path.display()),
+            LessonError::Unreadable(found) => f.write_str(&found.headline()),
+            LessonError::NoScenarios { folder, why } => write!(f, "{}: {why}", folder.display()),
+        }
+    }
+}
+
+impl From<Diagnostic> for LessonError {
+    fn from(found: Diagnostic) -> LessonError {
+        LessonError::Unreadable(found)
+    }
+}
+
+impl From<BundleError> for LessonError {
+    fn from(unmade: BundleError) -> LessonError {
+        LessonError::Bundle(unmade)
+    }
+}

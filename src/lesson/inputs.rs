@@ -1,0 +1,56 @@
+//! Files of an exercise, and the codes and seeds of a session.
+
+use super::LessonError;
+use std::path::{Path, PathBuf};
+use typodont_exercise::scenario;
+use typodont_exercise::scenario::{ResolveMode, Scenario};
+use typodont_formats::Library;
+use typodont_formats::diagnostic::Diagnostic;
+
+/// Reads an exercise.
+///
+/// # Errors
+///
+/// All faults found in the file.
+pub fn read_scenario(path: &Path, forms: ResolveMode) -> Result<Scenario, Vec<Diagnostic>> {
+    scenario::resolve(typodont_formats::read_text(path).map_err(|d| vec![d])?, &library_for(path), forms)
+}
+
+/// The tables that ship with the program, and the files beside a scenario.
+pub fn library_for(scenario: &Path) -> Library {
+    let folder = scenario.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    Library::shipped().with_folder(folder)
+}
+
+/// All scenario files of a folder, sorted by name; for the path of a file, that file.
+///
+/// # Errors
+///
+/// When the folder cannot be read or contains no scenario.
+pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_path_buf()]);
+    }
+    let wrong = |why: String| LessonError::NoScenarios { folder: path.to_path_buf(), why };
+    let entries = std::fs::read_dir(path).map_err(|e| wrong(format!("unreadable-folder: {e}")))?;
+    let is_scenario = |p: &PathBuf| {
+        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        name.ends_with(".json") && !name.ends_with(".schema.json")
+    };
+    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(is_scenario).collect();
+    files.sort();
+    match files.is_empty() {
+        true => Err(wrong("no-scenarios: the folder contains no scenario (*.json)".to_string())),
+        false => Ok(files),
+    }
+}
+
+/// True for a valid participant code: at most 64 ASCII letters, digits, "-", "_" and ".". The empty code is valid, too.
+pub fn is_valid_participant_code(text: &str) -> bool {
+    text.len() <= 64 && text.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+}
+
+/// Seed from the time at which a lesson begins; below 2⁵³, so that every JSON reader keeps it exactly.
+pub fn seed_from_time(started: jiff::Timestamp) -> u64 {
+    (started.as_nanosecond() as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11
+}

@@ -1,0 +1,157 @@
+//! A session with a person at a device, recorded while it runs.
+
+use super::live::{LiveError, LiveEvent, LiveSession};
+use super::preparation::{PreparedSession, RecordedSession};
+use super::{LessonError, PendingSecondHand};
+use typodont_core::device::{Device, Reading, UPRIGHT};
+use typodont_core::frame::Quat;
+use typodont_core::sim::{Command, Simulation, Step};
+use typodont_core::tick::Tick;
+use typodont_core::volume::Edit;
+use typodont_devices::servo::{SecondHandEvent, SecondHandServo};
+use typodont_exercise::record::{Recorder, RecorderError, RecordingEndFile};
+use typodont_exercise::session::{Effect, Input, Observer, Session};
+use typodont_report::Templates;
+use typodont_report::bundle::PartialBundle;
+
+/// A running session with a person, recorded continuously.
+pub struct Lesson {
+    session: Session,
+    live: LiveSession,
+    /// Servo of the second device, if it is connected to this machine.
+    assist: Option<SecondHandServo>,
+    observer: RecordingObserver,
+    partial_bundle: PartialBundle,
+    templates: Templates,
+}
+
+impl Lesson {
+    /// Starts the servo with a device, and with a second device if one joins. Returns the first events.
+    pub(super) fn begin(
+        prepared: PreparedSession,
+        simulation: Simulation,
+        device: Box<dyn Device + Send>,
+        second: Option<PendingSecondHand>,
+    ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
+        let PreparedSession { scenario, workpiece, recorder, partial_bundle, templates, .. } = prepared;
+        let mut session = Session::new(scenario, &workpiece);
+        let mut observer = RecordingObserver { recorder, edits: Vec::new(), handle_orientation: UPRIGHT };
+        let (second, assist) = second.map_or((None, None), |hand| (Some(hand.servo_hand), hand.assist));
+        let started = LiveSession::begin(&mut session, simulation, device, second, &mut observer);
+        let (live, events) = started.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
+        Ok((Lesson { session, live, assist, observer, partial_bundle, templates }, events))
+    }
+
+    /// Returns the events since the last call, in order; [`Lesson::edits`] then holds the edits of that time.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::Stopped`] if the recording cannot be written or the servo failed.
+    pub fn poll(&mut self) -> Result<Vec<LiveEvent>, LessonError> {
+        self.observer.edits.clear();
+        let events = self.live.poll(&mut self.session, &mut self.observer);
+        events.map_err(|broken| stopped_error(&self.partial_bundle, &broken))
+    }
+
+    /// Next event of a second device that is connected to this machine, in order; `None` if there is none.
+    pub fn next_assist_event(&mut self) -> Option<SecondHandEvent> {
+        self.assist.as_mut()?.next_event()
+    }
+
+    /// Passes an input of the person to the session, as of the last tick that was received.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::Stopped`] if the recording cannot be written.
+    pub fn submit(&mut self, input: &Input) -> Result<Vec<LiveEvent>, LessonError> {
+        let events = self.live.submit(input, &mut self.session, &mut self.observer);
+        events.map_err(|broken| stopped_error(&self.partial_bundle, &broken))
+    }
+
+    /// Pauses or resumes the session. During a pause, the simulation stops and the force is switched off.
+    pub fn set_paused(&mut self, is_paused: bool) {
+        self.live.set_paused(is_paused);
+    }
+
+    /// Continues after the device was disconnected. Returns false if `device` is not the device with which the lesson
+    /// began.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::Stopped`] if the servo cannot be started.
+    pub fn resume_with(&mut self, device: Box<dyn Device + Send>) -> Result<bool, LessonError> {
+        self.live
+            .resume_with::<RecordingObserver>(device)
+            .map_err(|broken| stopped_error(&self.partial_bundle, &broken))
+    }
+
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    pub fn live(&self) -> &LiveSession {
+        &self.live
+    }
+
+    /// Edits that the last [`Lesson::poll`] received, in order.
+    pub fn edits(&self) -> &[Edit] {
+        &self.observer.edits
+    }
+
+    /// Orientation of the handle at the newest tick, `world_from_handle`.
+    pub fn handle_orientation(&self) -> Quat {
+        self.observer.handle_orientation
+    }
+
+    /// Stops the servo and closes the recording.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::Stopped`] if the servo failed or the recording cannot be completed.
+    pub fn end(self) -> Result<RecordedSession, LessonError> {
+        let Lesson { session, live, observer, partial_bundle, templates, .. } = self;
+        let reason = if session.outcome().aborted { "aborted" } else { "complete" };
+        let summary = live.end::<RecordingObserver>().map_err(|broken| stopped_error(&partial_bundle, &broken))?;
+        let end = RecordingEndFile { reason: reason.into(), servo: summary.servo_file() };
+        RecordedSession::close(observer.recorder, &end, partial_bundle, templates)
+    }
+}
+
+/// Error of a live session that stopped, with the folder of its recording.
+fn stopped_error(partial_bundle: &PartialBundle, live_error: &LiveError<RecorderError>) -> LessonError {
+    match live_error {
+        LiveError::Observer(error) => LessonError::stopped(partial_bundle, error),
+        LiveError::Servo(what) => LessonError::stopped(partial_bundle, what),
+    }
+}
+
+/// Records everything, and keeps the values that a window draws.
+struct RecordingObserver {
+    recorder: Recorder,
+    edits: Vec<Edit>,
+    handle_orientation: Quat,
+}
+
+impl Observer for RecordingObserver {
+    type Error = RecorderError;
+
+    fn input(&mut self, tick: Tick, input: &Input) -> Result<(), RecorderError> {
+        self.recorder.input(tick, input)
+    }
+
+    fn command(&mut self, tick: Tick, command: &Command) -> Result<(), RecorderError> {
+        self.recorder.command(tick, command)
+    }
+
+    fn effect(&mut self, tick: Tick, effect: &Effect, session: &Session) -> Result<(), RecorderError> {
+        self.recorder.effect(tick, effect, session)
+    }
+
+    fn tick_completed(&mut self, reading: &Reading, step: &Step, edits: &[Edit]) -> Result<(), RecorderError> {
+        self.edits.extend_from_slice(edits);
+        if reading.pose.is_valid() {
+            self.handle_orientation = reading.pose.orientation;
+        }
+        self.recorder.tick_completed(reading, step, edits)
+    }
+}

@@ -1,0 +1,168 @@
+//! Preparation of a session from an exercise, and the completion of its recording to a bundle.
+
+use super::LessonError;
+#[cfg(feature = "devices")]
+use super::{Lesson, PendingSecondHand, live::LiveEvent};
+use jiff::Timestamp;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+#[cfg(feature = "devices")]
+use typodont_core::device::Device;
+use typodont_core::device::DeviceSpec;
+use typodont_core::sim::Simulation;
+use typodont_exercise::record::{Recorder, RecordingEndFile, RecordingHeadFile, ServoStatsFile};
+use typodont_exercise::scenario::{Scenario, Workpiece, hex};
+use typodont_exercise::session::{Operator, OperatorFile, RunEnd, Session};
+use typodont_report::Templates;
+use typodont_report::bundle::PartialBundle;
+
+/// Configuration of a session.
+pub struct SessionConfig<'a> {
+    pub scenario: Arc<Scenario>,
+    /// Seed of all random choices of the exercise; at most 2⁵³, the largest whole number that every JSON reader keeps
+    /// exactly.
+    pub seed: u64,
+    /// A code of up to 64 letters; never a name.
+    pub participant: &'a str,
+    /// Folder in which the bundle is made.
+    pub out: &'a Path,
+    /// SHA-256 of files that the scenario does not name, by name.
+    pub digests: BTreeMap<String, String>,
+    /// Templates of the bundle's pages.
+    pub templates: Templates,
+    /// Time at which the session begins.
+    pub started: Timestamp,
+}
+
+/// A session whose workpiece is made and whose recording is open; the simulation does not run yet.
+pub struct PreparedSession {
+    pub(super) scenario: Arc<Scenario>,
+    pub(super) workpiece: Arc<Workpiece>,
+    pub(super) recorder: Recorder,
+    pub(super) partial_bundle: PartialBundle,
+    pub(super) templates: Templates,
+    spec: DeviceSpec,
+    seed: u64,
+}
+
+impl SessionConfig<'_> {
+    /// Makes the volume and its surroundings.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::ImpossibleScene`] if the exercise cannot be made with this seed.
+    pub fn make_workpiece(&self) -> Result<Arc<Workpiece>, LessonError> {
+        let made = Workpiece::make(&self.scenario, self.seed);
+        made.map(Arc::new).map_err(|why| LessonError::ImpossibleScene { scenario: self.scenario.id.clone(), why })
+    }
+
+    /// Creates the bundle's folder and opens the recording, for a device and for the script that operates it, if there
+    /// is one.
+    ///
+    /// # Errors
+    ///
+    /// When the folder or the recording cannot be created.
+    pub fn prepare(
+        self,
+        workpiece: Arc<Workpiece>,
+        spec: DeviceSpec,
+        operator: Option<&OperatorFile>,
+    ) -> Result<PreparedSession, LessonError> {
+        let SessionConfig { scenario, seed, participant, out, digests, templates, started } = self;
+        let head = RecordingHeadFile {
+            participant: participant.to_string(),
+            started: format!("{started:.0}"),
+            live: operator.is_none(),
+            operator: operator.map(|o| o.id.clone()),
+            digests,
+            ..RecordingHeadFile::of(&scenario, &spec, seed)
+        };
+        let partial_bundle = PartialBundle::create(out, &bundle_name(&head, started))?;
+        match Recorder::create(&partial_bundle.recording_path(), &head, &scenario, &workpiece) {
+            Ok(recorder) => {
+                Ok(PreparedSession { scenario, workpiece, recorder, partial_bundle, templates, spec, seed })
+            }
+            Err(error) => {
+                partial_bundle.abandon();
+                Err(LessonError::RecordingNotStarted(error))
+            }
+        }
+    }
+}
+
+/// Name `exercise_time_digest`: it sorts by exercise and time, differs for two sessions of the same second, and
+/// contains no participant code.
+fn bundle_name(head: &RecordingHeadFile, started: Timestamp) -> String {
+    let digest = Sha256::digest(format!("{}/{}/{}/{started}", head.participant, head.seed, std::process::id()));
+    format!("{}_{}_{}", head.scenario_id, started.strftime("%Y%m%dT%H%M%SZ"), hex(&digest[..4]))
+}
+
+impl PreparedSession {
+    /// Begins a session with a device that a person operates, in real time. Returns the first events.
+    ///
+    /// # Errors
+    ///
+    /// When the servo cannot be started or the recording cannot be written.
+    #[cfg(feature = "devices")]
+    pub fn begin(
+        self,
+        device: Box<dyn Device + Send>,
+        second: Option<PendingSecondHand>,
+    ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
+        let simulation = self.simulation();
+        Lesson::begin(self, simulation, device, second)
+    }
+
+    /// Performs the whole session with a scripted operator, as fast as the machine can.
+    ///
+    /// # Errors
+    ///
+    /// When the recording cannot be written.
+    pub fn run_script(self, operator: OperatorFile) -> Result<RecordedSession, LessonError> {
+        let mut simulation = self.simulation();
+        let PreparedSession { scenario, workpiece, mut recorder, partial_bundle, templates, spec, seed } = self;
+        let mut session = Session::new(scenario.clone(), &workpiece);
+        let mut trainee = Operator::new(operator, scenario, workpiece, spec, seed);
+        let progress = typodont_exercise::session::run(&mut session, &mut simulation, &mut trainee, &mut recorder);
+        let reason = match progress.map_err(|e| LessonError::stopped(&partial_bundle, &e))? {
+            RunEnd::Complete if session.outcome().aborted => "aborted".to_string(),
+            RunEnd::Complete => "complete".to_string(),
+            RunEnd::DeviceGone(gone) => gone.to_string(),
+        };
+        let end = RecordingEndFile { reason, servo: ServoStatsFile::of(&simulation) };
+        RecordedSession::close(recorder, &end, partial_bundle, templates)
+    }
+
+    fn simulation(&self) -> Simulation {
+        Simulation::new(typodont_exercise::session::setup(&self.scenario, &self.workpiece, self.spec.clone()))
+    }
+}
+
+/// A recorded session that is not scored yet.
+pub struct RecordedSession {
+    partial_bundle: PartialBundle,
+    templates: Templates,
+}
+
+impl RecordedSession {
+    pub(super) fn close(
+        recorder: Recorder,
+        end: &RecordingEndFile,
+        partial_bundle: PartialBundle,
+        templates: Templates,
+    ) -> Result<RecordedSession, LessonError> {
+        recorder.finish(end).map_err(|e| LessonError::stopped(&partial_bundle, &e))?;
+        Ok(RecordedSession { partial_bundle, templates })
+    }
+
+    /// Scores the recording and writes all files of the bundle; returns its folder.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::Bundle`] if the recording cannot be scored or a file cannot be written.
+    pub fn complete(self) -> Result<PathBuf, LessonError> {
+        Ok(self.partial_bundle.complete(&self.templates)?)
+    }
+}

@@ -1,0 +1,153 @@
+//! CPU twins of all passes, with the same names and formulas.
+//!
+//! Takes a scene and an eye. Gives the picture that the shaders give, for machines without a graphics adapter and for
+//! tests that compare both. Never reads a clock, a file or an adapter.
+
+mod iso_pass;
+mod light;
+mod volume_sampler;
+mod mirror_pass;
+mod raster;
+mod fxaa_pass;
+mod particle_pass;
+mod stereo_pass;
+mod surface_pass;
+mod volume_pass;
+
+pub use stereo_pass::stereo_pass;
+pub use volume_sampler::appearance_at;
+
+use super::eye::Eye;
+use super::mirror::{self, PlaneMirror};
+use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
+use super::{ambient_occlusion::OcclusionVolume, empty_space::EmptySpaceMap};
+use typodont_core::image::RgbaImage;
+use typodont_core::parallel::{available_threads, par_rows};
+use volume_sampler::VolumeSampler;
+
+/// CPU renderer, with the data that it keeps between pictures of the same volume.
+#[derive(Default)]
+pub struct CpuRenderer {
+    cached: Option<CachedVolume>,
+}
+
+struct CachedVolume {
+    dims: [u32; 3],
+    empty_space: EmptySpaceMap,
+    occlusion: OcclusionVolume,
+}
+
+impl CpuRenderer {
+    /// Applies the changes of the scene's tooth. Must be called once before the scene is drawn, for any number of eyes.
+    pub fn prepare(&mut self, scene: &RenderScene) {
+        let Some(tooth) = &scene.tooth else { return };
+        let VolumeInstance { volume, changes, mode, .. } = tooth;
+        let dims = volume.grid().dims;
+        match (&mut self.cached, changes) {
+            (Some(known), Changes::Bricks(changed)) if known.dims == dims => {
+                known.empty_space.set_mode(mode);
+                known.empty_space.update(volume, changed);
+                known.occlusion.update(volume, changed);
+            }
+            _ => {
+                self.cached = Some(CachedVolume {
+                    dims,
+                    empty_space: EmptySpaceMap::new(volume, mode),
+                    occlusion: OcclusionVolume::new(volume),
+                });
+            }
+        }
+    }
+
+    /// The scene through one eye.
+    pub fn draw(&self, scene: &RenderScene, eye: &Eye, [width, height]: [u32; 2]) -> RgbaImage {
+        let mirrored = scene.mirror.as_ref().and_then(|mirror| Some((mirror, mirror.reflected_eye(eye)?)));
+        let reflected = mirrored.map(|(mirror, image)| {
+            (mirror, self.draw_scene(&mirror.with_reflected_light(scene), None, &image, [mirror::PICTURE_SIZE; 2]))
+        });
+        let drawn =
+            self.draw_scene(scene, reflected.as_ref().map(|(mirror, seen)| (*mirror, seen)), eye, [width, height]);
+        if scene.is_antialiased { fxaa_pass::fxaa_pass(&drawn) } else { drawn }
+    }
+
+    /// Draws the whole scene through one eye; a mirror shows the picture that is passed with it.
+    fn draw_scene(
+        &self,
+        scene: &RenderScene,
+        mirror: Option<(&PlaneMirror, &RgbaImage)>,
+        eye: &Eye,
+        [width, height]: [u32; 2],
+    ) -> RgbaImage {
+        let view = CpuView { eye: *eye, lights: scene.lights, width, height };
+        let mut framebuffer = Framebuffer::with_background(&scene.background, width, height);
+        for solid in &scene.solids {
+            surface_pass::solid(solid, &view, &mut framebuffer);
+        }
+        particle_pass::opaque(scene.opaque_particles, &view, &mut framebuffer);
+        if let Some((mirror, reflected)) = mirror {
+            mirror_pass::mirror_pass(mirror, reflected, &view, &mut framebuffer);
+        }
+        if let (Some(tooth), Some(known)) = (&scene.tooth, &self.cached) {
+            let sampler = VolumeSampler::new(tooth, &known.empty_space, &known.occlusion);
+            match &tooth.mode {
+                RenderMode::Surface => surface_pass::tooth(&sampler, &view, &mut framebuffer),
+                RenderMode::Iso => iso_pass::iso_pass(&sampler, &view, &mut framebuffer),
+                RenderMode::Volume(function) => volume_pass::volume_pass(&sampler, function, &view, &mut framebuffer),
+            }
+        }
+        particle_pass::translucent(scene.translucent_particles, &view, &mut framebuffer);
+        framebuffer.to_image()
+    }
+}
+
+/// One eye, the lamps, and the picture's size in pixels.
+struct CpuView {
+    eye: Eye,
+    lights: Lights,
+    width: u32,
+    height: u32,
+}
+
+/// Colours with the depth buffer's values.
+struct Framebuffer {
+    width: u32,
+    height: u32,
+    pixels: Vec<Pixel>,
+}
+
+#[derive(Clone, Copy)]
+struct Pixel {
+    colour: Rgb,
+    depth: f32,
+}
+
+impl Framebuffer {
+    fn with_background(background: &Background, width: u32, height: u32) -> Framebuffer {
+        let mut pixels = vec![Pixel { colour: background.top, depth: 1.0 }; (width * height) as usize];
+        for (y, row) in pixels.chunks_mut(width as usize).enumerate() {
+            let share = (y as f32 + 0.5) / height as f32;
+            let colour =
+                std::array::from_fn(|c| background.top[c] + (background.bottom[c] - background.top[c]) * share);
+            row.fill(Pixel { colour, depth: 1.0 });
+        }
+        Framebuffer { width, height, pixels }
+    }
+
+    /// Asks for each pixel, given its middle (x right, y down).
+    fn for_each_pixel(&mut self, paint: impl Fn(f32, f32, &mut Pixel) + Sync) {
+        par_rows(&mut self.pixels, self.width, available_threads(), |y, row| {
+            for (x, pixel) in row.iter_mut().enumerate() {
+                paint(x as f32 + 0.5, y as f32 + 0.5, pixel);
+            }
+        });
+    }
+
+    fn to_image(&self) -> RgbaImage {
+        let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
+        let rgba = self.pixels.iter().flat_map(|p| {
+            let [r, g, b] = p.colour.map(byte);
+            [r, g, b, u8::MAX]
+        });
+        RgbaImage { width: self.width, height: self.height, rgba: rgba.collect() }
+    }
+}

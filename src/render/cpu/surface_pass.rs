@@ -1,0 +1,66 @@
+//! Triangles with light per pixel. Twin of `surface_pass.wgsl`.
+
+use super::raster::{self, ShadedVertex};
+use super::volume_sampler::VolumeSampler;
+use super::{CpuView, Framebuffer};
+use crate::scene::{Appearance, MeshInstance};
+use crate::surface_mesh;
+use crate::vertex::Vertex;
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::volume::surface;
+
+pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer) {
+    let vertices = surface_mesh::instance_vertices(solid);
+    let own = solid.appearance;
+    triangles(
+        &vertices,
+        &solid.mesh.triangles,
+        solid.world_from_solid,
+        view,
+        framebuffer,
+        |_, normal, finish, point| {
+            let colour = std::array::from_fn(|c| finish.colour[c] * own.colour[c]);
+            view.shade(Appearance { colour, gloss: finish.gloss * own.gloss }, 1.0, point, normal)
+        },
+    );
+}
+
+pub fn tooth(sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Framebuffer) {
+    let mesh = surface::extract(sampler.volume);
+    let vertices = surface_mesh::tooth_vertices(sampler.volume, sampler.palette, &mesh);
+    let grid = sampler.volume.grid();
+    triangles(&vertices, &mesh.triangles, sampler.world_from_tooth, view, framebuffer, |own, normal, finish, point| {
+        let open = sampler.openness(grid.from_tooth(own), normal);
+        view.shade(finish, open, point, normal)
+    });
+}
+
+/// Draws triangles; `shade` is given the place in the solid's space, the unit normal, the finish and the place in the world.
+fn triangles(
+    vertices: &[Vertex],
+    triangles: &[[u32; 3]],
+    world_from_solid: Pose,
+    view: &CpuView,
+    framebuffer: &mut Framebuffer,
+    shade: impl Fn(Vec3, Vec3, Appearance, Vec3) -> [f32; 3] + Sync,
+) {
+    let clip_from_world = view.eye.clip_from_world();
+    let corner = |vertex: &Vertex| {
+        let own = vertex.position();
+        let point = world_from_solid * own;
+        let normal = world_from_solid.rotate(vertex.normal());
+        let [r, g, b] = vertex.colour();
+        let clip = std::array::from_fn(|row| {
+            let [x, y, z, w] = clip_from_world.map(|column| column[row]);
+            x * point.x + y * point.y + z * point.z + w
+        });
+        let vary = [own.x, own.y, own.z, normal.x, normal.y, normal.z, r, g, b, vertex.gloss()];
+        ShadedVertex { clip, varying: vary }
+    };
+    let corners: Vec<ShadedVertex> = vertices.iter().map(corner).collect();
+    raster::draw(&corners, triangles, framebuffer, |[x, y, z, nx, ny, nz, r, g, b, gloss]| {
+        let own = Vec3::new(x, y, z);
+        let normal = Vec3::new(nx, ny, nz).normalize_or_zero();
+        shade(own, normal, Appearance { colour: [r, g, b], gloss }, world_from_solid * own)
+    });
+}

@@ -1,0 +1,137 @@
+//! The carved tooth as a volume, for the passes that look into it. Twin of `tooth.wgsl`.
+
+use super::CpuView;
+use crate::ambient_occlusion::OcclusionVolume;
+use crate::bounds_of_matter;
+use crate::empty_space;
+use crate::empty_space::EmptySpaceMap;
+use crate::scene::{Appearance, LabelPalette, VolumeInstance};
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::volume::{BRICK, Volume};
+
+/// Share of a voxel that surely leads across a border between bricks, however numbers are rounded.
+const NUDGE: f32 = 0.004;
+
+pub struct VolumeSampler<'a> {
+    pub volume: &'a Volume,
+    pub palette: &'a LabelPalette,
+    pub world_from_tooth: Pose,
+    empty_space: &'a EmptySpaceMap,
+    occlusion: &'a OcclusionVolume,
+    low: Vec3,
+    high: Vec3,
+}
+
+/// A ray in voxel steps: `start + along * z` lies at depth z mm.
+#[derive(Clone, Copy)]
+pub struct Ray {
+    pub start: Vec3,
+    pub along: Vec3,
+}
+
+impl Ray {
+    pub fn at(&self, z: f32) -> Vec3 {
+        self.start + self.along * z
+    }
+}
+
+impl<'a> VolumeSampler<'a> {
+    pub fn new(
+        tooth: &VolumeInstance<'a>,
+        empty_space: &'a EmptySpaceMap,
+        occlusion: &'a OcclusionVolume,
+    ) -> VolumeSampler<'a> {
+        let VolumeInstance { volume, world_from_tooth, palette, .. } = *tooth;
+        let [low, high] = bounds_of_matter(volume);
+        VolumeSampler { volume, palette, world_from_tooth, empty_space, occlusion, low, high }
+    }
+
+    /// The ray through a pixel, with its way in world space.
+    pub fn ray(&self, view: &CpuView, x: f32, y: f32) -> (Ray, Vec3) {
+        let direction = view.ray(x, y);
+        let tooth_from_world = self.world_from_tooth.inverse();
+        let grid = self.volume.grid();
+        let start = grid.from_tooth(tooth_from_world * view.eye.position);
+        (Ray { start, along: tooth_from_world.rotate(direction) / grid.spacing }, direction)
+    }
+
+    pub fn density(&self, at: Vec3) -> f32 {
+        self.volume.density_in_grid(at)
+    }
+
+    /// Depths, mm, at which the ray enters and leaves the box of matter.
+    pub fn span(&self, ray: &Ray) -> [f32; 2] {
+        let (mut first, mut last) = (f32::NEG_INFINITY, f32::INFINITY);
+        for axis in 0..3 {
+            let pace = if ray.along[axis].abs() < 1e-9 { 1e-9 } else { ray.along[axis] };
+            let (a, b) = ((self.low[axis] - ray.start[axis]) / pace, (self.high[axis] - ray.start[axis]) / pace);
+            first = first.max(a.min(b));
+            last = last.min(a.max(b));
+        }
+        [first, last]
+    }
+
+    /// The entry of the brick around a place, and how far on the ray leaves the cube of bricks in which there is no other.
+    pub fn leap(&self, at: Vec3, along: Vec3) -> (u8, f32) {
+        let dims = self.empty_space.dims();
+        let brick: [u32; 3] =
+            std::array::from_fn(|a| ((at[a] / BRICK as f32).floor().max(0.0) as u32).min(dims[a] - 1));
+        let entry = self.empty_space.entries()[((brick[2] * dims[1] + brick[1]) * dims[0] + brick[0]) as usize];
+        let reach = f32::from(empty_space::distance(entry).max(1));
+        let mut exit = f32::INFINITY;
+        for axis in 0..3 {
+            // The first brick goes on where the grid has ended.
+            let first = brick[axis] as f32 + 1.0 - reach;
+            let low = if first <= 0.0 { -1.0 } else { first } * BRICK as f32;
+            let high = (brick[axis] as f32 + reach) * BRICK as f32;
+            let room = if along[axis] > 0.0 { high - at[axis] } else { at[axis] - low };
+            exit = exit.min((room.max(0.0) + NUDGE) / along[axis].abs().max(1e-9));
+        }
+        (entry, exit)
+    }
+
+    /// Gradient of the density, per mm in world space.
+    pub fn gradient(&self, at: Vec3) -> Vec3 {
+        let corners = [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::ONE];
+        let rise: Vec3 = corners.map(|corner| corner * self.density(at + corner)).into_iter().sum();
+        self.world_from_tooth.rotate(rise * 0.25 / self.volume.grid().spacing)
+    }
+
+    /// Outward unit normal in world space; where density does not change, `otherwise`.
+    pub fn normal(&self, at: Vec3, otherwise: Vec3) -> Vec3 {
+        let downhill = -self.gradient(at);
+        if downhill.length() > 1e-6 { downhill.normalize() } else { otherwise.normalize() }
+    }
+
+    /// Share of light that reaches a surface with this normal in world space.
+    pub fn openness(&self, at: Vec3, normal: Vec3) -> f32 {
+        let outward = self.world_from_tooth.inverse().rotate(normal) / self.volume.grid().spacing;
+        self.occlusion.openness(at, outward)
+    }
+
+    pub fn appearance(&self, at: Vec3) -> Appearance {
+        appearance_at(self.volume, self.palette, at)
+    }
+}
+
+/// Colour and gloss of the matter around a place, by how much there is of each.
+pub fn appearance_at(volume: &Volume, palette: &LabelPalette, at: Vec3) -> Appearance {
+    let grid = volume.grid();
+    let base = at.floor();
+    let part = at - base;
+    let last = Vec3::from(grid.dims.map(|n| n as f32 - 1.0));
+    let (mut colour, mut gloss, mut total) = (Vec3::ZERO, 0.0, 0.0);
+    for n in 0..8u32 {
+        let corner = Vec3::from([0, 1, 2].map(|a| (n >> a & 1) as f32));
+        let cell = (base + corner).clamp(Vec3::ZERO, last);
+        let voxel = volume.voxel(grid.index([cell.x as u32, cell.y as u32, cell.z as u32]));
+        let near = (Vec3::ONE - part) + (part - (Vec3::ONE - part)) * corner;
+        let weight = near.x * near.y * near.z * voxel.density.unit();
+        let own = palette.appearance(voxel.label);
+        colour += Vec3::from(own.colour) * weight;
+        gloss += own.gloss * weight;
+        total += weight;
+    }
+    let total = f32::max(total, 1e-6);
+    Appearance { colour: (colour / total).to_array(), gloss: gloss / total }
+}

@@ -1,0 +1,221 @@
+//! Renders the carved tooth and its surroundings, in mono or stereo.
+//!
+//! Takes a plain [`RenderScene`] and a [`Viewpoint`]. Gives pixels: [`Renderer`] draws into the target of a window, and
+//! [`OffscreenRenderer`] returns images without a window, from a GPU or from the CPU ([`cpu`]) with the same formulas.
+//! Never knows a scenario, a simulation, the name of a tissue or a clock.
+//!
+//! An image without a window:
+//!
+//! ```
+//! use typodont_core::frame::Vec3;
+//! use typodont_render::{OffscreenRenderer, Orbit, RenderScene};
+//!
+//! let viewpoint = Orbit::around(Vec3::ZERO, 15.0).viewpoint();
+//! let image = OffscreenRenderer::cpu().draw(&RenderScene::empty(), &viewpoint, None, [64, 48])?;
+//! assert_eq!((image.width, image.height), (64, 48));
+//! # Ok::<(), typodont_render::RenderError>(())
+//! ```
+//!
+//! In a window, each frame (feature `gpu`):
+//!
+//! ```no_run
+//! # #[cfg(feature = "gpu")]
+//! # mod window {
+//! # use typodont_core::frame::{Pose, Vec3};
+//! # use typodont_core::volume::Volume;
+//! # use typodont_render::*;
+//! # fn frame(
+//! #     renderer: &mut Renderer,
+//! #     volume: &mut Volume,
+//! #     palette: &LabelPalette,
+//! #     target: RenderTarget,
+//! # ) -> Result<(), RenderError> {
+//! // Once: `Renderer::new(&device, &queue, format)`, and `DeviceErrorListener::attach(&device)` to detect device loss.
+//! let changed = volume.take_dirty();
+//! let scene = RenderScene {
+//!     tooth: Some(VolumeInstance {
+//!         volume,
+//!         changes: Changes::Bricks(&changed),
+//!         world_from_tooth: Pose::IDENTITY,
+//!         palette,
+//!         mode: RenderMode::Iso,
+//!     }),
+//!     ..RenderScene::empty()
+//! };
+//! let orbit = Orbit::around(Vec3::ZERO, 15.0);
+//! renderer.draw(&scene, &orbit.viewpoint(), None, target)?;
+//! # Ok(())
+//! # }
+//! # }
+//! ```
+
+#[cfg(feature = "gpu")]
+mod brick_surfaces;
+mod camera;
+#[cfg(feature = "gpu")]
+mod downsampled;
+mod empty_space;
+mod error;
+mod eye;
+#[cfg(feature = "gpu")]
+mod gpu;
+#[cfg(feature = "gpu")]
+mod gpu_offscreen;
+mod ambient_occlusion;
+#[cfg(feature = "gpu")]
+mod iso_pass;
+mod mirror;
+#[cfg(feature = "gpu")]
+mod mirror_pass;
+mod offscreen;
+#[cfg(feature = "gpu")]
+mod passes;
+#[cfg(feature = "gpu")]
+mod renderer;
+#[cfg(feature = "gpu")]
+mod resources;
+mod scene;
+#[cfg(feature = "gpu")]
+mod fxaa_pass;
+#[cfg(feature = "gpu")]
+mod particle_pass;
+mod stereo;
+#[cfg(feature = "gpu")]
+mod stereo_pass;
+mod surface_mesh;
+#[cfg(feature = "gpu")]
+mod surface_pass;
+#[cfg(feature = "gpu")]
+mod tooth;
+pub mod transfer_function;
+mod vertex;
+#[cfg(feature = "gpu")]
+mod view;
+#[cfg(feature = "gpu")]
+mod volume_pass;
+pub mod cpu;
+
+pub use camera::{Orbit, Quadrant, Viewpoint};
+pub use error::RenderError;
+pub use eye::{Eye, FrustumWindow};
+#[cfg(feature = "gpu")]
+pub use gpu::{DeviceErrorListener, Gpu};
+#[cfg(feature = "gpu")]
+pub use gpu_offscreen::GpuOffscreenRenderer;
+pub use mirror::PlaneMirror;
+pub use offscreen::OffscreenRenderer;
+#[cfg(feature = "gpu")]
+pub use renderer::{RenderTarget, Renderer};
+pub use scene::{
+    Appearance, Background, Changes, LabelPalette, Lamp, Lights, MeshInstance, Particle, RenderMode, RenderScene, Rgb,
+    VolumeInstance,
+};
+pub use stereo::{Stereo, StereoLayout};
+#[cfg(feature = "gpu")]
+pub use tooth::Uploads;
+pub use transfer_function::{TransferFunction, TransferTable};
+pub use typodont_core::image::RgbaImage;
+
+use typodont_core::frame::Vec3;
+use typodont_core::volume::{BRICK, Volume};
+
+/// The WGSL source of a shader, and the structs that it shares with Rust: name in WGSL and size in bytes.
+#[cfg(feature = "gpu")]
+pub struct Shader {
+    pub name: &'static str,
+    pub source: String,
+    pub structs: Vec<(&'static str, usize)>,
+}
+
+/// Returns all shaders.
+#[cfg(feature = "gpu")]
+pub fn shaders() -> Vec<Shader> {
+    let shared = [
+        ("Lamp", size_of::<view::gpu::LampUniform>()),
+        ("View", size_of::<view::gpu::ViewUniform>()),
+        ("Tooth", size_of::<tooth::gpu::ToothUniform>()),
+    ];
+    let shader = |name, own: &str, structs: &[(&'static str, usize)]| Shader {
+        name,
+        source: passes::full_source(own),
+        structs: [&shared, structs].concat(),
+    };
+    vec![
+        shader("surface_pass", surface_pass::SOURCE, &[("Solid", size_of::<surface_pass::gpu::SolidUniform>())]),
+        shader("iso_pass", iso_pass::SOURCE, &[]),
+        shader("volume_pass", volume_pass::SOURCE, &[]),
+        shader("particle_pass", particle_pass::SOURCE, &[("Speck", size_of::<particle_pass::gpu::ParticleInstance>())]),
+        shader("fxaa_pass", fxaa_pass::SOURCE, &[]),
+        shader("mirror_pass", mirror_pass::SOURCE, &[("Mirror", size_of::<mirror_pass::gpu::MirrorUniform>())]),
+        Shader {
+            name: "stereo_pass",
+            source: stereo_pass::SOURCE.to_string(),
+            structs: vec![("Pair", size_of::<stereo_pass::gpu::StereoUniform>())],
+        },
+    ]
+}
+
+/// Returns the box in which rays are traced, in voxel coordinates: whole bricks around all matter. Because the box is
+/// aligned to bricks, a ray enters a brick at the same point and takes the same steps whatever was cut elsewhere.
+fn bounds_of_matter(volume: &Volume) -> [Vec3; 2] {
+    let Some([low, high]) = volume.bounding_box() else { return [Vec3::ZERO, Vec3::ZERO] };
+    let first = low.map(|v| v.saturating_sub(1) / BRICK * BRICK);
+    // Interpolation extends matter at the border by one voxel beyond the grid.
+    let low = first.map(|v| if v == 0 { -1.0 } else { v as f32 });
+    let last = std::array::from_fn(|a| ((high[a] / BRICK + 1) * BRICK).min(volume.grid().dims[a]) as f32);
+    [Vec3::from(low), Vec3::from(last)]
+}
+
+/// Returns the integration step of direct volume rendering, mm: the smallest voxel spacing, so that no voxel is
+/// skipped.
+fn integration_step(volume: &Volume) -> f32 {
+    volume.grid().spacing.min_element()
+}
+
+/// Returns [`RenderError::Impossible`] if no image can be rendered; `limit` is the maximum width and height, pixels.
+fn validate(
+    scene: &RenderScene,
+    viewpoint: &Viewpoint,
+    stereo: Option<Stereo>,
+    [width, height]: [u32; 2],
+    limit: u32,
+) -> Result<(), RenderError> {
+    let impossible = |why: String| Err(RenderError::Impossible { why });
+    if width == 0 || height == 0 || width > limit || height > limit {
+        return impossible(format!("image size {width}x{height} is out of range: 1 to {limit} pixels each way"));
+    }
+    if !viewpoint.is_valid() {
+        return impossible(format!("invalid viewpoint: {viewpoint:?}"));
+    }
+    if let Some(Stereo { eye_distance, .. }) = stereo.filter(|s| !(0.0..=80.0).contains(&s.eye_distance)) {
+        return impossible(format!("eye distance {eye_distance} mm is out of range: 0 to 80 mm"));
+    }
+    if scene.tooth.as_ref().is_some_and(|tooth| !tooth.world_from_tooth.is_valid()) {
+        return impossible("invalid pose of the tooth".into());
+    }
+    if scene.mirror.is_some_and(|mirror| !mirror.is_valid()) {
+        return impossible(format!("invalid mirror: {:?}", scene.mirror));
+    }
+    if let Some(particle) =
+        scene.opaque_particles.iter().chain(scene.translucent_particles).find(|particle| !particle.is_valid())
+    {
+        return impossible(format!("invalid particle: {particle:?}"));
+    }
+    match scene.solids.iter().position(|solid| !solid.world_from_solid.is_valid()) {
+        Some(index) => impossible(format!("invalid pose of mesh instance {index}")),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod phantom {
+    //! Test volumes.
+    use typodont_core::frame::Vec3;
+    use typodont_core::volume::{Grid, Label, Volume};
+
+    pub fn ball(dims: [u32; 3], spacing: Vec3, radius: f32) -> Volume {
+        let grid = Grid::centred(dims, spacing);
+        let band = 2.0 * spacing.max_element();
+        Volume::from_distance(grid, band, |p| (p.length() - radius, Label(1)))
+    }
+}

@@ -1,0 +1,97 @@
+//! Results in words: titles, formulae, places and answers as [`Message`]s, which every language file translates.
+
+use super::display_format;
+use super::language::Message;
+use super::session_file::{AnswerResultFile, CriticalErrorFile, EvidenceFile};
+use serde_json::Value as Json;
+use typodont_exercise::scenario::metric::MetricArgument;
+use typodont_exercise::scenario::{Metric, distal};
+
+/// Value of a measure with its unit. A word such as "right" is translated; "95.2 %" is the same in every language.
+pub fn value(metric: &str, value: Option<f64>) -> Message {
+    value_text(display_format::measure(metric, value))
+}
+
+/// Title of a measure, with its zone or tolerance where it has one.
+pub fn measure(metric: &Metric) -> Message {
+    let title = Message::text_or(format!("measure.{}", metric.info.name), metric.info.title);
+    match &metric.argument {
+        None => title,
+        Some(MetricArgument::Zone(zone)) => {
+            Message::text("measures.zone", &[("title", title), ("zone", Message::plain(zone))])
+        }
+        Some(MetricArgument::ToleranceMm(mm)) => {
+            Message::text("measures.within", &[("title", title), ("mm", Message::plain(mm.to_string()))])
+        }
+    }
+}
+
+/// Title of the measure of a name; the name itself for an unknown measure.
+pub fn measure_title(name: &str) -> Message {
+    Metric::parse(name).map_or_else(|_| Message::plain(name), |metric| measure(&metric))
+}
+
+/// Formula of a measure, in words; empty for an unknown measure.
+pub fn formula(metric: &str) -> Message {
+    let info = Metric::parse(metric).map(|m| m.info);
+    info.map_or(Message::plain(""), |a| Message::text_or(format!("formula.{}", a.name), a.formula))
+}
+
+/// Place (directions and mm from the crown's centre) and time at which a measure arose. `tooth_fdi` is the FDI number
+/// of the tooth; without it, y is taken for distal.
+pub fn place(evidence: &EvidenceFile, tooth_fdi: Option<u8>) -> Message {
+    let part = |v: f64, positive: &str, negative: &str| {
+        let direction = if v >= 0.0 { positive } else { negative };
+        Message::text(format!("way.{direction}"), &[("mm", Message::plain(format!("{:.1}", v.abs())))])
+    };
+    let [x, y, z] = evidence.place_mm;
+    let distal = y * f64::from(tooth_fdi.map_or(1.0, |fdi| distal(fdi).y));
+    let place =
+        [("x", part(x, "buccal", "lingual")), ("y", part(distal, "distal", "mesial")), ("z", part(z, "up", "down"))];
+    let place = Message::text("place.at", &place);
+    match evidence.at_s {
+        Some(at) => {
+            Message::text("place.when", &[("at", Message::plain(display_format::duration(at))), ("place", place)])
+        }
+        None => place,
+    }
+}
+
+/// Limit beyond which a critical error fails the exercise.
+pub fn limit(fail: &CriticalErrorFile) -> Message {
+    match (fail.above, fail.below) {
+        (Some(_), _) if fail.metric == "pulp_exposed" => Message::text_or("limit.it_is", "it is"),
+        (Some(limit), _) => Message::text("limit.more", &[("value", value(&fail.metric, Some(limit)))]),
+        (_, Some(limit)) => Message::text("limit.less", &[("value", value(&fail.metric, Some(limit)))]),
+        _ => Message::plain(""),
+    }
+}
+
+/// Reason for the end of a stage: time, answer, confirmation or cleared decay; anything else counts as broken off.
+pub fn ended_by(what: &str) -> Message {
+    match what {
+        known @ ("time" | "answer" | "confirmation" | "cleared") => Message::text_or(format!("ended.{known}"), known),
+        other => Message::text_or("ended.broken_off", other),
+    }
+}
+
+/// Answer of the trainee: a text, a number, or yes/no.
+pub fn answer(value: &Json) -> Message {
+    match value {
+        Json::String(text) => Message::plain(text),
+        Json::Bool(yes) => value_text(display_format::yes_no(*yes).into()),
+        other => Message::plain(other.to_string()),
+    }
+}
+
+/// Judgement of an answer, with the correct one if it was wrong; `None` if the question has no correct answer.
+pub fn correctness(given: &AnswerResultFile) -> Option<Message> {
+    match given.right? {
+        true => Some(Message::text("value.right", &[])),
+        false => Some(Message::text("answer.wrong", &[("truth", answer(&given.truth))])),
+    }
+}
+
+fn value_text(text: String) -> Message {
+    Message::text_or(format!("value.{text}"), text)
+}

@@ -1,0 +1,261 @@
+//! Authentication: a one-time login link or a shared password.
+//!
+//! A logged-in browser sends a cookie that scripts cannot read (`HttpOnly`) and that other sites cannot make it send
+//! (`SameSite=Strict`). Every form contains a CSRF token, which only the application's own pages show.
+
+use super::crypto;
+use std::collections::BTreeMap;
+use std::net::IpAddr;
+use typodont_exercise::scenario::hex;
+
+/// Minimum length of a password, characters. It can be tried from every machine of the local network.
+pub const PASSWORD_MIN: usize = 12;
+
+/// Time after which an idle login expires, s: the length of an examination day.
+const SESSION_TTL: i64 = 12 * 3600;
+
+/// Maximum number of concurrent logins. The one that has been idle longest is removed first.
+const LOGINS_MAX: usize = 200;
+
+/// Delay after the first wrong password from an address, s. It doubles with each further one, up to `BACKOFF_MAX`.
+const BACKOFF: i64 = 2;
+const BACKOFF_MAX: i64 = 60;
+
+/// Maximum number of wrong passwords per minute from all addresses together, after which logins are refused until the
+/// next minute. A password of 12 characters withstands this rate.
+const FAILURES_PER_MINUTE_MAX: u32 = 60;
+
+/// Number of addresses whose failed attempts are tracked.
+const TRACKED_ADDRESSES_MAX: usize = 1000;
+
+/// Method of logging in.
+#[derive(Clone)]
+pub enum AuthMode {
+    /// One-time link printed at the terminal.
+    OneTimeLink,
+    /// Password shared by the examiners.
+    Password(String),
+}
+
+/// Logins and failed attempts. Tokens, cookies and the password are kept only as HMAC tags under a random key.
+pub struct Auth {
+    key: [u8; 32],
+    /// Tag of the password, if one is set.
+    password_tag: Option<[u8; 32]>,
+    /// Tag of the login token that is valid, and of those already used.
+    active_token_tag: [u8; 32],
+    spent_token_tags: Vec<[u8; 32]>,
+    logins: BTreeMap<[u8; 32], Login>,
+    failed_attempts: BTreeMap<IpAddr, FailedAttempts>,
+    failures_this_minute: (i64, u32),
+}
+
+/// Logged-in browser.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Login {
+    /// CSRF token of the browser's forms.
+    pub csrf_token: String,
+    /// Examiner's name as last entered, offered as the default in forms.
+    pub display_name: String,
+    last_seen: i64,
+}
+
+#[derive(Clone, Copy, Default)]
+struct FailedAttempts {
+    count: u32,
+    /// Time before which no further attempt is accepted, s since 1970.
+    locked_until: i64,
+}
+
+/// Result of opening a login link.
+#[derive(Debug, PartialEq, Eq)]
+pub enum TokenLogin {
+    /// The link was valid; contains the session cookie.
+    LoggedIn(String),
+    /// The link was used before; contains a new login token, to be printed at the terminal.
+    Spent(String),
+    Rejected,
+}
+
+/// Result of a login with a password.
+#[derive(Debug, PartialEq, Eq)]
+pub enum PasswordLogin {
+    /// The password was right; contains the session cookie.
+    LoggedIn(String),
+    WrongPassword,
+    /// Too many wrong passwords; contains the seconds until the next attempt is accepted.
+    RateLimited(i64),
+}
+
+impl Auth {
+    /// Creates the state and returns it with the first login token.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when the system's random number generator fails.
+    pub fn new(mode: &AuthMode) -> Result<(Auth, String), String> {
+        let key = crypto::random_bytes()?;
+        let password = match mode {
+            AuthMode::OneTimeLink => None,
+            AuthMode::Password(password) => Some(crypto::hmac_tag(&key, password.as_bytes())),
+        };
+        let mut auth = Auth {
+            key,
+            password_tag: password,
+            active_token_tag: [0; 32],
+            spent_token_tags: Vec::new(),
+            logins: BTreeMap::new(),
+            failed_attempts: BTreeMap::new(),
+            failures_this_minute: (0, 0),
+        };
+        let first = auth.issue_token()?;
+        Ok((auth, first))
+    }
+
+    pub fn has_password(&self) -> bool {
+        self.password_tag.is_some()
+    }
+
+    fn issue_token(&mut self) -> Result<String, String> {
+        let token = hex(&crypto::random_bytes()?);
+        self.active_token_tag = crypto::hmac_tag(&self.key, token.as_bytes());
+        Ok(token)
+    }
+
+    /// Logs in with the token of a login link. `now` is in seconds since 1970, here and below.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when the system's random number generator fails.
+    pub fn log_in_with_token(&mut self, token: &str, now: i64) -> Result<TokenLogin, String> {
+        if self.password_tag.is_some() {
+            return Ok(TokenLogin::Rejected);
+        }
+        if crypto::verify_tag(&self.key, token.as_bytes(), &self.active_token_tag) {
+            self.spent_token_tags.push(self.active_token_tag);
+            // The new token stays secret until somebody opens the used link; only then is a token printed at the
+            // terminal.
+            self.issue_token()?;
+            return Ok(TokenLogin::LoggedIn(self.create_session(now)?));
+        }
+        match self.spent_token_tags.iter().any(|spent| crypto::verify_tag(&self.key, token.as_bytes(), spent)) {
+            true => Ok(TokenLogin::Spent(self.issue_token()?)),
+            false => Ok(TokenLogin::Rejected),
+        }
+    }
+
+    /// Logs in with the password, unless attempts from `peer`, or from everywhere, are rate-limited.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when the system's random number generator fails.
+    pub fn log_in_with_password(&mut self, given: &str, peer: IpAddr, now: i64) -> Result<PasswordLogin, String> {
+        let Some(password) = self.password_tag else { return Ok(PasswordLogin::WrongPassword) };
+        let minute = now.div_euclid(60);
+        if self.failures_this_minute.0 != minute {
+            self.failures_this_minute = (minute, 0);
+        }
+        let until = self.failed_attempts.get(&peer).map_or(0, |t| t.locked_until);
+        let until =
+            if self.failures_this_minute.1 >= FAILURES_PER_MINUTE_MAX { until.max(60 * (minute + 1)) } else { until };
+        if now < until {
+            return Ok(PasswordLogin::RateLimited(until - now));
+        }
+        if crypto::verify_tag(&self.key, given.as_bytes(), &password) {
+            self.failed_attempts.remove(&peer);
+            return Ok(PasswordLogin::LoggedIn(self.create_session(now)?));
+        }
+        self.failures_this_minute.1 += 1;
+        if self.failed_attempts.len() >= TRACKED_ADDRESSES_MAX {
+            self.failed_attempts.retain(|_, attempts| now < attempts.locked_until);
+        }
+        let attempts = self.failed_attempts.entry(peer).or_default();
+        let pause = (BACKOFF << attempts.count.min(10)).min(BACKOFF_MAX);
+        *attempts = FailedAttempts { count: attempts.count + 1, locked_until: now + pause };
+        Ok(PasswordLogin::WrongPassword)
+    }
+
+    fn create_session(&mut self, now: i64) -> Result<String, String> {
+        let cookie = hex(&crypto::random_bytes()?);
+        let csrf_token = hex(&crypto::random_bytes()?);
+        self.logins.retain(|_, login| now - login.last_seen < SESSION_TTL);
+        if self.logins.len() >= LOGINS_MAX
+            && let Some(oldest) = self.logins.iter().min_by_key(|(_, login)| login.last_seen).map(|(tag, _)| *tag)
+        {
+            self.logins.remove(&oldest);
+        }
+        let login = Login { csrf_token, display_name: String::new(), last_seen: now };
+        self.logins.insert(crypto::hmac_tag(&self.key, cookie.as_bytes()), login);
+        Ok(cookie)
+    }
+
+    /// Returns the login that belongs to a cookie and resets its idle time, or `None` if there is none or it has
+    /// expired.
+    pub fn authenticate(&mut self, cookie: &str, now: i64) -> Option<Login> {
+        // Logins are keyed by the tag of their cookie, so the lookup time reveals nothing about the cookie itself.
+        let login = self.logins.get_mut(&crypto::hmac_tag(&self.key, cookie.as_bytes()))?;
+        if now - login.last_seen >= SESSION_TTL {
+            return None;
+        }
+        login.last_seen = now;
+        Some(login.clone())
+    }
+
+    /// Returns true if a form contains the CSRF token of this login.
+    pub fn verify_csrf(&self, login: &Login, token_given: &str) -> bool {
+        crypto::verify_tag(&self.key, token_given.as_bytes(), &crypto::hmac_tag(&self.key, login.csrf_token.as_bytes()))
+    }
+
+    pub fn set_display_name(&mut self, cookie: &str, name: &str) {
+        if let Some(login) = self.logins.get_mut(&crypto::hmac_tag(&self.key, cookie.as_bytes())) {
+            login.display_name = name.to_string();
+        }
+    }
+
+    pub fn log_out(&mut self, cookie: &str) {
+        self.logins.remove(&crypto::hmac_tag(&self.key, cookie.as_bytes()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+
+    #[test]
+    fn a_login_link_works_once() {
+        let (mut auth, first) = Auth::new(&AuthMode::OneTimeLink).unwrap();
+        let TokenLogin::LoggedIn(cookie) = auth.log_in_with_token(&first, 0).unwrap() else {
+            panic!("the link does not log in")
+        };
+        let login = auth.authenticate(&cookie, 10).unwrap();
+        assert!(auth.verify_csrf(&login, &login.csrf_token) && !auth.verify_csrf(&login, &cookie));
+        let TokenLogin::Spent(next) = auth.log_in_with_token(&first, 20).unwrap() else {
+            panic!("the link logs in twice")
+        };
+        assert_eq!(auth.log_in_with_token("", 20), Ok(TokenLogin::Rejected));
+        assert!(matches!(auth.log_in_with_token(&next, 30), Ok(TokenLogin::LoggedIn(_))));
+        assert_eq!(auth.authenticate("", 30), None);
+        assert_eq!(auth.authenticate(&cookie, 10 + SESSION_TTL), None, "an idle login expires");
+        auth.log_out(&cookie);
+        assert_eq!(auth.authenticate(&cookie, 30), None);
+    }
+
+    #[test]
+    fn wrong_passwords_are_rate_limited() {
+        let (mut auth, token) = Auth::new(&AuthMode::Password("correct horse battery".into())).unwrap();
+        assert_eq!(auth.log_in_with_token(&token, 0), Ok(TokenLogin::Rejected), "a password disables login links");
+        assert_eq!(auth.log_in_with_password("wrong", HERE, 100), Ok(PasswordLogin::WrongPassword));
+        assert_eq!(auth.log_in_with_password("correct horse battery", HERE, 100), Ok(PasswordLogin::RateLimited(2)));
+        assert_eq!(auth.log_in_with_password("wrong", HERE, 102), Ok(PasswordLogin::WrongPassword));
+        assert_eq!(auth.log_in_with_password("wrong", HERE, 103), Ok(PasswordLogin::RateLimited(3)));
+        assert!(matches!(
+            auth.log_in_with_password("correct horse battery", HERE, 106),
+            Ok(PasswordLogin::LoggedIn(_))
+        ));
+        // The number of attempts per minute is also limited for all addresses together.
+        let attempts = (0..200u8).map(|n| auth.log_in_with_password("wrong", [10, 0, 0, n].into(), 240).unwrap());
+        assert_eq!(attempts.filter(|t| *t == PasswordLogin::WrongPassword).count(), FAILURES_PER_MINUTE_MAX as usize);
+    }
+}

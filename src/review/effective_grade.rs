@@ -1,0 +1,180 @@
+//! Effective grade: the scorer's grade combined with the examiners' overrides.
+//!
+//! An overridden item counts with the examiner's points. The grade is a pass under the exercise's own rules: enough
+//! points, no critical error, and the session finished. An override of the whole grade replaces both points and
+//! result.
+
+use super::overrides::{LogSnapshot, OverrideEntry};
+use typodont_report::GradeFile;
+
+/// Grade after overrides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EffectiveGrade<'a> {
+    /// Override in effect for each item, in the rubric's order.
+    pub items: Vec<Option<&'a OverrideEntry>>,
+    /// Override in effect for the whole grade.
+    pub whole: Option<&'a OverrideEntry>,
+    /// Resulting points; the scorer's without overrides.
+    pub points: f64,
+    pub passed: bool,
+    /// Number of overrides of items that this grade does not have, because the session was rescored with another
+    /// rubric.
+    pub orphaned: usize,
+}
+
+impl EffectiveGrade<'_> {
+    /// Returns the number of overrides in effect.
+    pub fn overrides(&self) -> usize {
+        self.items.iter().flatten().count() + usize::from(self.whole.is_some())
+    }
+}
+
+/// Computes the effective grade of a session.
+pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a LogSnapshot) -> EffectiveGrade<'a> {
+    let mut items: Vec<Option<&OverrideEntry>> = vec![None; grade.items.len()];
+    let mut whole = None;
+    let mut orphaned = vec![];
+    for entry in log.valid_entries().filter(|entry| entry.draft.session == session) {
+        let judged = entry.draft.examiner.is_some().then_some(entry);
+        match &entry.draft.item {
+            None => whole = judged,
+            Some(item) => match grade.items.get(item.index).filter(|own| own.metric == item.metric) {
+                Some(_) => items[item.index] = judged,
+                None => {
+                    orphaned.retain(|index| *index != item.index);
+                    orphaned.extend(judged.map(|_| item.index));
+                }
+            },
+        }
+    }
+    let more = grade.items.iter().zip(&items).filter_map(|(item, entry)| {
+        let judged = entry.as_ref()?.draft.examiner?;
+        Some(judged.points - item.points)
+    });
+    let more: Vec<f64> = more.collect();
+    let mut points = grade.points;
+    let mut passed = grade.passed;
+    if !more.is_empty() {
+        points = tidy(grade.points + more.iter().sum::<f64>()).min(grade.max_points).max(0.0);
+        passed = grade.finished && grade.hard_fails.is_empty() && points >= grade.pass_points;
+    }
+    if let Some(judged) = whole.and_then(|entry| entry.draft.examiner) {
+        points = judged.points;
+        passed = judged.passed.unwrap_or(passed);
+    }
+    EffectiveGrade { items, whole, points, passed, orphaned: orphaned.len() }
+}
+
+/// Returns the grade with all overrides applied, for consumers that take a single grade, and the number of overrides
+/// in effect.
+pub fn with_overrides(grade: &GradeFile, session: &str, log: &LogSnapshot) -> (GradeFile, usize) {
+    let effective = effective_grade(grade, session, log);
+    let mut overridden = grade.clone();
+    for (item, entry) in overridden.items.iter_mut().zip(&effective.items) {
+        if let Some(judged) = entry.and_then(|entry| entry.draft.examiner) {
+            item.points = judged.points;
+        }
+    }
+    (overridden.points, overridden.passed) = (effective.points, effective.passed);
+    if effective.passed {
+        // Only an override of the whole grade can pass a session with a critical error.
+        overridden.hard_fails.clear();
+    }
+    (overridden, effective.overrides())
+}
+
+/// Rounds to nine decimals, as in `session.json`: 62.2 instead of 62.2000000001.
+fn tidy(points: f64) -> f64 {
+    (points * 1e9).round() / 1e9
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::overrides::{GivenPoints, LogLine, OverrideDraft, RubricItemRef};
+    use typodont_report::ItemResultFile;
+
+    fn grade() -> GradeFile {
+        let item = |metric: &str, points: f64| ItemResultFile {
+            title: metric.into(),
+            metric: metric.into(),
+            value: None,
+            points,
+            max_points: 50.0,
+            full_at: 1.0,
+            zero_at: 0.0,
+        };
+        GradeFile {
+            points: 60.0,
+            max_points: 100.0,
+            pass_points: 70.0,
+            finished: true,
+            passed: false,
+            hard_fails: vec![],
+            items: vec![item("dice", 25.0), item("jerk", 35.0)],
+            hard_fail_checks: vec![],
+        }
+    }
+
+    /// Override of an item, given by index and metric, or of the whole grade.
+    type TestOverride = (Option<(usize, &'static str)>, Option<GivenPoints>);
+
+    /// Builds a log with these overrides, in order.
+    fn log_of(judged: &[TestOverride]) -> LogSnapshot {
+        let line = |(number, (item, examiner)): (usize, &TestOverride)| LogLine {
+            is_invalid: false,
+            entry: OverrideEntry {
+                version: 1,
+                number: number as u64 + 1,
+                previous: String::new(),
+                at: String::new(),
+                draft: OverrideDraft {
+                    session: "s".into(),
+                    recording: String::new(),
+                    item: item.map(|(index, m)| RubricItemRef { index, metric: m.into(), title: m.into() }),
+                    machine: GivenPoints { points: 0.0, passed: None },
+                    examiner: *examiner,
+                    reason: "r".into(),
+                    name: "n".into(),
+                },
+            },
+        };
+        LogSnapshot { lines: judged.iter().enumerate().map(line).collect(), ..LogSnapshot::default() }
+    }
+
+    fn points(points: f64) -> Option<GivenPoints> {
+        Some(GivenPoints { points, passed: None })
+    }
+
+    #[test]
+    fn the_grade_follows_from_the_overrides_in_effect() {
+        let check = |log: LogSnapshot, expected: (f64, bool, usize)| {
+            let now = effective_grade(&grade(), "s", &log);
+            assert_eq!((now.points, now.passed, now.overrides()), expected, "{log:?}");
+        };
+        let dice = Some((0, "dice"));
+        check(log_of(&[]), (60.0, false, 0));
+        check(log_of(&[(dice, points(34.5))]), (69.5, false, 1));
+        check(log_of(&[(dice, points(35.0))]), (70.0, true, 1));
+        check(log_of(&[(dice, points(35.0)), (dice, points(30.0))]), (65.0, false, 1));
+        check(log_of(&[(dice, points(35.0)), (dice, None)]), (60.0, false, 0));
+        check(
+            log_of(&[(dice, points(50.0)), (None, Some(GivenPoints { points: 69.0, passed: Some(true) }))]),
+            (69.0, true, 2),
+        );
+        // After rescoring with a rubric whose first item is a different one.
+        check(log_of(&[(Some((0, "jaccard")), points(50.0))]), (60.0, false, 0));
+        assert_eq!(effective_grade(&grade(), "s", &log_of(&[(Some((7, "x")), points(1.0))])).orphaned, 1);
+        assert_eq!(effective_grade(&grade(), "another", &log_of(&[(dice, points(50.0))])).points, 60.0);
+    }
+
+    #[test]
+    fn points_do_not_outweigh_a_critical_error() {
+        let mut failed = grade();
+        failed.hard_fails = vec!["Pulp exposed".into()];
+        let more = log_of(&[(Some((0, "dice")), points(50.0))]);
+        assert!(!effective_grade(&failed, "s", &more).passed);
+        let whole = log_of(&[(None, Some(GivenPoints { points: 80.0, passed: Some(true) }))]);
+        assert!(effective_grade(&failed, "s", &whole).passed, "an override of the whole grade passes it");
+    }
+}

@@ -1,0 +1,51 @@
+//! Web application in which examiners list, compare and override graded sessions.
+//!
+//! Takes a folder of bundles and HTTP requests as plain values. Gives responses as plain values (pages, tables, files
+//! of a bundle) and appends examiners' overrides to an append-only log. Never opens a socket or reads a clock (the
+//! command line does), and never changes a bundle.
+//!
+//! ```
+//! use typodont_review::{LogSnapshot, route_name};
+//!
+//! // Requests are logged by route name, never by address, which may contain what a person wrote.
+//! assert_eq!(route_name("/session/2ed6657d-e927-568b-95e1-2665a8aea6a2/report"), "report");
+//! assert_eq!(route_name("/../etc/passwd"), "nothing");
+//! // An empty log overrides nothing.
+//! assert_eq!(LogSnapshot::default().valid_entries().count(), 0);
+//! ```
+
+mod http;
+mod request_handler;
+mod router;
+mod origin;
+mod auth;
+mod crypto;
+mod bundle;
+mod pseudonyms;
+mod query;
+mod index;
+mod overrides;
+mod effective_grade;
+mod page_renderer;
+mod app;
+mod list;
+mod session_page;
+mod compare;
+mod export;
+mod override_form;
+mod history;
+
+pub use app::{ReviewApp, ReviewOptions};
+pub use auth::{AuthMode, PASSWORD_MIN};
+pub use effective_grade::{EffectiveGrade, with_overrides};
+pub use http::{BODY_MAX, Request, Response};
+pub use overrides::{
+    AppendError, FILE_NAME as OVERRIDES, GivenPoints, IntegrityIssue, LogSnapshot, OverrideEntry, OverrideLog,
+};
+pub use page_renderer::PageRenderer;
+
+/// Returns the name under which a request's path is logged: the name of its route, or `nothing` for an unknown path.
+/// The name contains no part of the path.
+pub fn route_name(path: &str) -> &'static str {
+    router::Route::parse(path).map_or("nothing", |route| route.name())
+}

@@ -1,0 +1,95 @@
+//! Solids around the tooth, drawn as they are touched.
+
+use super::jaw::compute_normals;
+use super::palette::GLOSS;
+use std::sync::Arc;
+use typodont_core::frame::Vec3;
+use typodont_core::mesh::Mesh;
+use typodont_core::touch::{Collider, ColliderGeometry, Compliance, SdfGrid};
+use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_exercise::catalog::TissueTable;
+use typodont_exercise::scenario::Workpiece;
+use typodont_render::{Appearance, MeshInstance};
+
+/// Distance between samples of a solid, mm: its curvature radii are larger.
+const SPACING: f32 = 0.4;
+
+/// The same for gingiva with a modelled margin.
+const GUM_SPACING: f32 = 0.25;
+
+/// Depth to which the gingiva is lowered at its ends, and the distance over which it is lowered, mm.
+const DIVE: f32 = 1.0;
+const FADE: f32 = 2.2;
+
+/// Distance from the tooth up to which a mesh around it is drawn, mm.
+const REACH: f32 = 12.0;
+
+/// Gingiva and neighbouring teeth as they are touched, world space.
+pub fn surrounding_solids(workpiece: &Workpiece, tissues: &TissueTable) -> Vec<MeshInstance> {
+    workpiece
+        .surroundings
+        .iter()
+        .filter(|shape| is_visible(shape, tissues))
+        .map(|s| solid_of_shape(s, workpiece, tissues))
+        .collect()
+}
+
+/// False for a hidden collider: the floor of a sulcus.
+pub(super) fn is_visible(shape: &Collider, tissues: &TissueTable) -> bool {
+    let gum = tissues.by_name("gingiva").map(|e| e.label());
+    !matches!(shape.geometry, ColliderGeometry::Sdf(_)) || Some(shape.label) == gum
+}
+
+pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &TissueTable) -> MeshInstance {
+    let colour = tissues.by_label(shape.label).map_or([0.8; 3], |e| e.rgb());
+    let mesh = Arc::new(shape_mesh(shape, workpiece));
+    MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS })
+}
+
+/// A shape's surface in tooth space.
+fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
+    let middle = shape.tooth_from_collider.position;
+    let [low, high] = match &shape.geometry {
+        ColliderGeometry::Ball { radius } => [middle - *radius, middle + *radius],
+        // However it is turned.
+        ColliderGeometry::RoundBox { half, .. } if is_upright(shape) => [middle - *half, middle + *half],
+        ColliderGeometry::RoundBox { half, .. } => [middle - half.length(), middle + half.length()],
+        ColliderGeometry::Capsule { half_length, radius } => {
+            [middle - (half_length + radius), middle + (half_length + radius)]
+        }
+        ColliderGeometry::Sdf(field) => field.extent(),
+        ColliderGeometry::Mesh(_) => {
+            let low = workpiece.teeth.iter().map(|t| t.low).fold(Vec3::INFINITY, Vec3::min);
+            let high = workpiece.teeth.iter().map(|t| t.high).fold(Vec3::NEG_INFINITY, Vec3::max);
+            [low - REACH, high + REACH]
+        }
+    };
+    if let (ColliderGeometry::Mesh(obstacle), Some(_)) = (&shape.geometry, &workpiece.periodontium) {
+        // A neighbour that was grown is as fine as it needs to be.
+        let mut mesh = obstacle.mesh();
+        mesh.positions.iter_mut().for_each(|p| *p = shape.tooth_from_collider * *p);
+        compute_normals(&mut mesh);
+        return mesh;
+    }
+    if let (ColliderGeometry::Sdf(field), Some(gum)) = (&shape.geometry, &workpiece.periodontium) {
+        // As the eye sees it: lying on the tooth. A probe finds it a little off.
+        let [low, high] = field.extent();
+        let grid = Grid::covering(low, high, Vec3::splat(GUM_SPACING), 1);
+        // At its ends along the arch and below, the gingiva is lowered under the jaw's own, which is a little deeper.
+        let dive = |p: Vec3| {
+            let inside = (p.y - low.y).min(high.y - p.y).min(p.z - low.z);
+            let share = (1.0 - inside / FADE).clamp(0.0, 1.0);
+            DIVE * share * share * (3.0 - 2.0 * share)
+        };
+        let gum_field = SdfGrid::from_fn(grid, Compliance::default(), |p| gum.gum_sdf_visual(p) + dive(p));
+        return surface::extract(&Volume::from_distance(grid, 2.0 * GUM_SPACING, |p| {
+            (gum_field.distance(p), Label(1))
+        }));
+    }
+    let grid = Grid::covering(low, high, Vec3::splat(SPACING), 3);
+    surface::extract(&Volume::from_distance(grid, 2.0 * SPACING, |p| (shape.distance(p), Label(1))))
+}
+
+fn is_upright(shape: &Collider) -> bool {
+    shape.tooth_from_collider.orientation.w.abs() > 0.9999
+}

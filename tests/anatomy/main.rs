@@ -1,0 +1,8 @@
+//! Teeth, arches and decay, measured.
+
+#[path = "../support/mod.rs"]
+mod support;
+mod age;
+mod arches;
+mod caries;
+mod teeth;

@@ -1,0 +1,22 @@
+//! Drivers against fakes that speak the real protocols, and the servo.
+
+#[path = "../support/mod.rs"]
+mod support;
+mod counting;
+mod devices;
+mod drivers;
+mod haply;
+mod live;
+mod mouse;
+mod native;
+mod open_handle;
+mod pipe;
+mod polhem;
+mod rig;
+mod servo;
+mod simulated;
+mod soak;
+mod spacemouse;
+mod staged;
+mod stream;
+mod suite;

@@ -1,0 +1,11 @@
+//! Exercises: written, checked, played by scripted operators.
+
+#[path = "../support/mod.rs"]
+mod support;
+mod authoring;
+mod broken_scenarios;
+mod charting;
+mod fuzz_scenario;
+mod operators;
+mod restoring;
+mod schema;

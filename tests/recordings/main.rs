@@ -1,0 +1,9 @@
+//! Tests of recordings: bit-exact replay, detection of changes, damaged and interrupted files.
+
+#[path = "../support/mod.rs"]
+mod support;
+mod damaged_recordings;
+mod example;
+mod golden;
+mod killed;
+mod proof;

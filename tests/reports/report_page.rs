@@ -1,0 +1,104 @@
+//! A report in a real browser: opened from the disk, without a network, by mouse and by keyboard.
+//!
+//! Needs `TYPODONT_PLAYWRIGHT` (the folder of playwright-core) and `TYPODONT_CHROMIUM`, as `scripts/test` sets them.
+
+use crate::support::browser;
+use crate::support::bundle;
+use crate::support::folder;
+
+use browser::browser;
+use bundle::*;
+use folder::folder;
+use std::path::Path;
+use std::process::Command;
+
+fn opens(bundle: &Path, pictures: &Path) {
+    let Some([playwright, chromium]) = browser() else { return };
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/report_page.js");
+    let mut node = Command::new("node");
+    node.arg(script).args([playwright, chromium]).arg(bundle).arg(pictures);
+    let output = node.output().unwrap();
+    assert!(output.status.success(), "{}{}", told(&output), complained(&output));
+    println!("{}", told(&output));
+}
+
+#[test]
+fn a_report_is_explored_in_a_browser() {
+    // Aim: time, marks, sections, voxels, keyboard and languages do in Chromium what they promise, at the voxel size of a
+    // micro-CT (0.067 mm, some 10 million voxels), and every voxel that is clicked says what the label maps say.
+    if browser().is_none() {
+        return;
+    }
+    let out = folder("report_page");
+    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let fine = text
+        .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.067")
+        .replace(r#""$schema": "scenario.schema.json","#, "");
+    assert_ne!(fine, text);
+    let scenario = out.join("fine.json");
+    std::fs::write(&scenario, fine).unwrap();
+    let bundle = run(scenario.to_str().unwrap(), "hasty", &out, &["--participant", "P07"]);
+    opens(&bundle, &out);
+}
+
+#[test]
+fn a_hostile_exercise_does_no_harm_in_a_browser() {
+    // Aim: what an author writes is shown and never run, however it is written. Method: markup, right-to-left text and a
+    // word without end in every text of an exercise; the browser reports dialogs, errors and requests.
+    if browser().is_none() {
+        return;
+    }
+    let out = folder("hostile_page");
+    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let mut scenario: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let hostile = "<script>alert(1)</script>";
+    scenario.as_object_mut().unwrap().remove("$schema");
+    scenario["title"] = format!("{hostile}\u{202e}תרגיל").into();
+    scenario["summary"] = format!("</script>{hostile}{}", "w".repeat(1900)).into();
+    scenario["scene"]["jaw"]["tooth"]["form"]["procedural"]["spacing_mm"] = 0.2.into();
+    scenario["stages"][0]["title"] = format!("{hostile}<img src=x onerror=alert(2)>").into();
+    scenario["zones"][0]["title"] = hostile.into();
+    for item in scenario["rubric"]["items"].as_array_mut().unwrap() {
+        item["title"] = format!("{hostile}{}", "w".repeat(90)).into();
+    }
+    let path = out.join("hostile.json");
+    std::fs::write(&path, scenario.to_string()).unwrap();
+    let bundle = run(path.to_str().unwrap(), "hasty", &out, &["--participant", "P07"]);
+    opens(&bundle, &out);
+}
+
+#[test]
+fn a_school_has_its_own_sentences_and_languages() {
+    // Aim: sentences, texts and languages are files; a mistake in them is named before anything is played. Method: a folder of
+    // templates with a rule and a language of its own, and the program started there.
+    let out = folder("school_page");
+    let templates = out.join("reports/templates");
+    std::fs::create_dir_all(templates.join("languages")).unwrap();
+    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let coarse = text
+        .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.25")
+        .replace(r#""$schema": "scenario.schema.json","#, "");
+    std::fs::write(out.join("coarse.json"), coarse).unwrap();
+    let play = |rules: &str| {
+        std::fs::write(templates.join("feedback.json"), rules).unwrap();
+        std::fs::write(
+            templates.join("languages/de.json"),
+            r#"{"language.name": "Deutsch", "result.title": "Ergebnis"}"#,
+        )
+        .unwrap();
+        let mut program = Command::new(env!("CARGO_BIN_EXE_typodont"));
+        program.args(["run", "coarse.json", "--headless", "--operator", "hasty", "--seed", "1", "--out", "out"]);
+        program.current_dir(&out).output().unwrap()
+    };
+    let refused = play(r#"{"rules": [{"metric": "dise", "otherwise": {"en": "x"}}]}"#);
+    let why = complained(&refused);
+    assert!(!refused.status.success() && why.contains("feedback.json:1:23: unknown-metric"), "{why}");
+    assert!(!out.join("out").exists(), "nothing was played");
+    let rule = r#"{"rules": [{"metric": "*", "otherwise": {"en": "Look at {title}.", "de": "Achte auf {title}."}}]}"#;
+    let played = play(rule);
+    assert!(played.status.success(), "{}", complained(&played));
+    let page = std::fs::read_to_string(out.join(told(&played).lines().last().unwrap()).join("report.html")).unwrap();
+    for own in ["Ergebnis", ">Deutsch</button>", "<span lang=\"de\">Achte auf ", "<span lang=\"en\">Look at "] {
+        assert!(page.contains(own), "{own}");
+    }
+}

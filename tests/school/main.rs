@@ -1,0 +1,8 @@
+//! A school's systems: gradebooks, the review pages, stations and their records.
+
+#[path = "../support/mod.rs"]
+mod support;
+mod handover;
+mod review;
+mod review_page;
+mod stations;

@@ -1,0 +1,16 @@
+//! Haptic rendering and cutting.
+
+#[path = "../support/mod.rs"]
+mod support;
+mod adjusting;
+mod allocation;
+mod carving;
+mod continuity;
+mod feel;
+mod force_quality;
+mod friction;
+mod guidance;
+mod obstacles;
+mod packing;
+mod rate_law;
+mod shell;

@@ -1,0 +1,213 @@
+//! Meshes around a tooth feel like what they are drawn as, and a recording needs no file to be replayed.
+
+use crate::support::bundle;
+use crate::support::folder;
+use crate::support::phantom;
+
+use bundle::*;
+use folder::folder;
+use phantom::*;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+use std::sync::Arc;
+use typodont_core::device::Reading;
+use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::sim::{Setup, Simulation};
+use typodont_core::touch::{ClosedMesh, Collider, ColliderGeometry, WorkingEnd};
+use typodont_exercise::scenario;
+use typodont_exercise::scenario::ResolveMode;
+use typodont_formats::diagnostic::SourceText;
+use typodont_formats::{Library, obj};
+
+/// A ball as an OBJ file: rings and slices of triangles.
+fn ball_obj(radius: f32, rings: usize, slices: usize) -> String {
+    let mut text = format!("v 0 0 {radius}\nv 0 0 {}\n", -radius);
+    for ring in 1..rings {
+        for slice in 0..slices {
+            let (t, p) = (
+                ring as f32 / rings as f32 * std::f32::consts::PI,
+                slice as f32 / slices as f32 * std::f32::consts::TAU,
+            );
+            writeln!(text, "v {} {} {}", radius * t.sin() * p.cos(), radius * t.sin() * p.sin(), radius * t.cos())
+                .unwrap();
+        }
+    }
+    let at = |ring: usize, slice: usize| 3 + (ring - 1) * slices + slice % slices;
+    for s in 0..slices {
+        writeln!(text, "f 1 {} {}", at(1, s), at(1, s + 1)).unwrap();
+        writeln!(text, "f 2 {} {}", at(rings - 1, s + 1), at(rings - 1, s)).unwrap();
+        for r in 1..rings - 1 {
+            writeln!(text, "f {} {} {} {}", at(r, s), at(r + 1, s), at(r + 1, s + 1), at(r, s + 1)).unwrap();
+        }
+    }
+    text
+}
+
+/// A block 20 mm long (along y) and wide, its top at z = 0 but for a groove along y of an opening angle, `deep` mm deep.
+fn groove_obj(half_angle: f32, deep: f32) -> String {
+    let half = deep * half_angle.tan();
+    let outline = [(-10.0, -8.0), (10.0, -8.0), (10.0, 0.0), (half, 0.0), (0.0, -deep), (-half, 0.0), (-10.0, 0.0)];
+    let mut text = String::new();
+    for y in [-10.0, 10.0] {
+        outline.iter().for_each(|(x, z)| writeln!(text, "v {x} {y} {z}").unwrap());
+    }
+    let n = outline.len();
+    for i in 0..n {
+        let j = (i + 1) % n;
+        writeln!(text, "f {} {} {} {}", i + 1, i + 1 + n, j + 1 + n, j + 1).unwrap();
+    }
+    // The ends are not convex: fans about the bottom of the groove are.
+    for i in 0..n {
+        let j = (i + 1) % n;
+        if i != 4 && j != 4 {
+            writeln!(text, "f {} {} {}", 5, i + 1, j + 1).unwrap();
+            writeln!(text, "f {} {} {}", 5 + n, j + 1 + n, i + 1 + n).unwrap();
+        }
+    }
+    text
+}
+
+/// A world of one mesh, placed as given, and no voxels near.
+fn around(text: &str, tooth_from_shape: Pose, end: WorkingEnd) -> Setup {
+    let obstacle = ClosedMesh::new(&obj::parse(text.as_bytes()).unwrap()).unwrap();
+    let empty = volume([4, 4, 4], 0.1, |_| (9.0, HARD));
+    let mut setup = setup(empty, end, false);
+    setup.scene.colliders = vec![Collider {
+        label: HARD,
+        tooth_from_collider: tooth_from_shape,
+        geometry: ColliderGeometry::Mesh(Arc::new(obstacle)),
+    }];
+    setup
+}
+
+#[test]
+fn a_mesh_of_a_ball_feels_like_a_ball() {
+    // Aim: force within 3 % and 3° of k·depth along the radius, no jump above 0.08 N at 50 mm/s. Method: a ball of 5 mm
+    // in 80×160 facets, turned and moved, circled over 1 mm deep.
+    let place = Pose { position: Vec3::new(2.0, -1.0, 3.0), orientation: Quat::from_xyzw(0.5, 0.5, -0.5, 0.5) };
+    for end in [WorkingEnd::Point, WorkingEnd::Ball { radius: 0.7 }] {
+        let mut sim = Simulation::new(around(&ball_obj(5.0, 80, 160), place, end.clone()));
+        let reach = 5.0 + if let WorkingEnd::Ball { radius } = end { radius } else { 0.0 };
+        let (u, v) = (Vec3::new(0.8, 0.6, 0.0), Vec3::new(-0.36, 0.48, 0.8));
+        let down = (0..400).map(|i| u * (reach + 0.5 - 1.5 * i as f32 / 399.0));
+        let circle = (0..600).map(|i| {
+            let turn = 50e-3 * i as f32 / (reach - 1.0);
+            (u * turn.cos() + v * turn.sin()) * (reach - 1.0)
+        });
+        let steps = follow(&mut sim, down.chain(circle).map(|p| p + place.position));
+        let sliding = &steps[400..];
+        let off = sliding.iter().map(|s| (s.force.length() - 1.0).abs()).fold(0.0, f32::max);
+        let angle = sliding.iter().map(|s| s.force.angle_between(s.hand - place.position).to_degrees());
+        let angle = angle.fold(0.0, f32::max);
+        let jump = steps[1..].iter().zip(&steps).map(|(a, b)| (a.force - b.force).length()).fold(0.0, f32::max);
+        println!("{end:?}: {off:.4} N, {angle:.2}°, jump {jump:.4} N");
+        assert!(off < 0.03 && angle < 3.0 && jump < 0.08, "{end:?}: {off} N, {angle}°, {jump} N");
+    }
+}
+
+#[test]
+fn a_groove_holds_a_ball_on_both_sides() {
+    // Aim: the ball rests where geometry says, and never falls through, though the hand goes far below, to and fro.
+    for half_angle in [25.0f32, 45.0, 60.0] {
+        let half_angle = half_angle.to_radians();
+        for radius in [0.0, 0.5] {
+            let end = if radius > 0.0 { WorkingEnd::Ball { radius } } else { WorkingEnd::Point };
+            let mut sim = Simulation::new(around(&groove_obj(half_angle, 3.0), Pose::IDENTITY, end));
+            let rest = radius / half_angle.sin() - 3.0;
+            let mut worst = 0.0f32;
+            let mut jump = 0.0f32;
+            let mut last = Vec3::ZERO;
+            for tick in 0..4000 {
+                let depth = (tick as f32 / 1000.0).min(1.0);
+                let hand = Vec3::new(
+                    0.3 * (tick as f32 * 0.01).sin(),
+                    3.0 * (tick as f32 * 0.003).sin(),
+                    2.0 - (2.0 - rest + 1.0) * depth,
+                );
+                let step = sim.step(&Reading::at(hand));
+                jump = jump.max(step.force.distance(last));
+                last = step.force;
+                if tick > 1500 {
+                    worst = worst.max((step.tip.z - rest).abs()).max(step.tip.x.abs());
+                }
+            }
+            println!("{:.0}°, radius {radius}: {worst:.4} mm off, jump {jump:.4} N", half_angle.to_degrees());
+            assert!(worst < 0.01, "{}°, radius {radius}: {worst} mm", half_angle.to_degrees());
+            assert!(jump < 0.05, "{}°, radius {radius}: {jump} N", half_angle.to_degrees());
+        }
+    }
+}
+
+#[test]
+fn touching_a_mesh_never_allocates() {
+    let mut sim = Simulation::new(around(&ball_obj(5.0, 60, 120), Pose::IDENTITY, WorkingEnd::Ball { radius: 0.7 }));
+    let mut touched = 0;
+    let counted = allocation_counter::measure(|| {
+        for tick in 0..4000 {
+            let turn = tick as f32 * 0.003;
+            let out = 5.7 + 2.0 * libm::cosf(turn * 1.7);
+            let hand = Vec3::new(libm::cosf(turn), libm::sinf(turn) * 0.8, libm::sinf(turn) * 0.6) * out;
+            touched += u32::from(sim.step(&Reading::at(hand)).touch.is_some());
+        }
+    });
+    assert!(touched > 1000, "{touched}");
+    assert_eq!(counted.count_total, 0, "{counted:?}");
+}
+
+/// A short exercise in a jaw of one mesh.
+fn exercise(mesh: Value) -> String {
+    let shipped = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let mut scenario: Value = serde_json::from_str(&shipped).unwrap();
+    scenario["scene"]["jaw"]["tooth"]["form"]["procedural"]["spacing_mm"] = json!(0.2);
+    let jaw = scenario["scene"]["jaw"].as_object_mut().unwrap();
+    jaw.remove("periodontium");
+    jaw.insert("around".into(), json!([mesh]));
+    scenario["stages"][0]["time_limit_s"] = json!(4);
+    scenario.as_object_mut().unwrap().remove("questionnaire");
+    scenario.to_string()
+}
+
+#[test]
+fn a_recording_needs_no_mesh_beside_it() {
+    // Aim: the mesh's bytes are in the recording. Method: play, delete the mesh, verify.
+    let folder = folder("obstacles");
+    let (file, mesh) = (folder.join("exercise.json"), folder.join("gum.obj"));
+    let placed =
+        json!({ "mesh": "gum.obj", "tissue": "gingiva", "position_mm": [0, 0, -4.5], "orientation_deg": [0, 0, 90] });
+    std::fs::write(&mesh, ball_obj(6.0, 20, 40)).unwrap();
+    std::fs::write(&file, exercise(placed)).unwrap();
+    let bundle = run(file.to_str().unwrap(), "hasty", &folder, &[]);
+    std::fs::remove_file(&mesh).unwrap();
+    let verified = typodont(&["verify", bundle.to_str().unwrap()]);
+    assert!(verified.status.success(), "{}", complained(&verified));
+    let played = typodont(&["run", file.to_str().unwrap(), "--headless", "--operator", "hasty", "--out", "/dev/null"]);
+    assert!(complained(&played).contains("missing-file"), "a new session does need it");
+}
+
+fn check(folder: &Path, mesh: &str, expected: &[(&str, &str)]) {
+    std::fs::write(folder.join("gum.obj"), mesh).unwrap();
+    let text = exercise(json!({ "mesh": "gum.obj", "tissue": "gingiva" }));
+    let library = Library::shipped().with_folder(folder);
+    let found = scenario::resolve(SourceText::new("exercise.json", text), &library, ResolveMode::MakeWorkpiece)
+        .err()
+        .unwrap_or_default();
+    let pairs: Vec<(&str, &str)> = found.iter().map(|d| (d.code, d.path.as_str())).collect();
+    assert_eq!(pairs, expected);
+    assert!(found.iter().all(|d| d.message.contains("gum.obj") && d.help.is_some()));
+}
+
+#[test]
+fn meshes_that_cannot_be_touched_are_complained_about() {
+    let folder = folder("obstacle_complaints");
+    let whole = ball_obj(6.0, 10, 20);
+    let at = "/scene/jaw/around/0/mesh";
+    let (first, rest) = whole.split_once("\nf ").unwrap();
+    let without_one = format!("{first}\nf {}", rest.split_once("\nf ").unwrap().1);
+    check(&folder, &whole, &[]);
+    check(&folder, &without_one, &[("open-mesh", at)]);
+    check(&folder, &whole.replacen("f 1 3 4", "f 1 4 3", 1), &[("inconsistent-mesh", at)]);
+    check(&folder, &ball_obj(6000.0, 10, 20), &[("wrong-size", at)]);
+    check(&folder, &ball_obj(6.0, 400, 400), &[("too-large", at)]);
+    check(&folder, "no mesh at all", &[("empty-mesh", at)]);
+}

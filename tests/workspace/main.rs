@@ -1,0 +1,8 @@
+//! Rules that the workspace keeps: the crate graph, what portable crates may not use, where network and unsafe code
+//! stand, import circles, names and docs.
+
+mod architecture;
+mod circles;
+mod names;
+mod parts;
+mod sources;
