@@ -22,6 +22,7 @@ pub mod json;
 pub mod pointer;
 mod json_hints;
 mod library;
+pub mod limits;
 pub mod nrrd;
 pub mod imaging;
 pub mod surfaces;

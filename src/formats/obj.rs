@@ -3,14 +3,11 @@
 //! Takes the bytes of a file. Gives one closed mesh in millimetres, facing outward, or the first error; or only the
 //! triangles, for display. Also converts a mesh to a file. Never reads materials and colours.
 
+use crate::limits::DISPLAY_TRIANGLES_MAX;
 use std::collections::BTreeMap;
 use std::fmt;
 use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
-
-/// Maximum number of triangles of a mesh. A scanned arch has about 200 000; more triangles cost memory without a
-/// tactile difference.
-pub const TRIANGLES_MAX: usize = 300_000;
 
 /// Valid lengths of the longest side of a mesh's bounding box, mm: a mesh smaller than a clamp or larger than a head
 /// is in another unit.
@@ -108,7 +105,7 @@ impl std::error::Error for ObjError {}
 pub fn parse(bytes: &[u8]) -> Result<Mesh, ObjError> {
     let models = models(bytes, false)?;
     let triangles = models.iter().map(|m| m.mesh.indices.len() / 3).sum();
-    if triangles > TRIANGLES_MAX {
+    if triangles > DISPLAY_TRIANGLES_MAX {
         return Err(ObjError::TooLarge { triangles });
     }
     let mesh = welded(&models);

@@ -5,6 +5,7 @@
 
 use crate::Library;
 use crate::diagnostic::Diagnostic;
+use crate::limits::DISPLAY_TRIANGLES_MAX;
 use crate::obj;
 use base64::Engine;
 use gltf_json as json;
@@ -28,7 +29,7 @@ const DEPTH_MAX: usize = 32;
 pub fn read(library: &Library, name: &str) -> Result<Mesh, Diagnostic> {
     let wrong = |message: String, help: &str| Diagnostic::about_file(name, "wrong-mesh", message, Some(help.into()));
     let too_large = |count: usize| {
-        let help = format!("reduce it in a mesh program to at most {} triangles", obj::TRIANGLES_MAX);
+        let help = format!("reduce it in a mesh program to at most {} triangles", DISPLAY_TRIANGLES_MAX);
         wrong(format!("the mesh has {count} triangles or more"), &help)
     };
     let bytes = library.bytes(name)?;
@@ -37,7 +38,7 @@ pub fn read(library: &Library, name: &str) -> Result<Mesh, Diagnostic> {
         "obj" => obj::triangles(&bytes).map_err(|e| e.to_string()),
         "glb" | "gltf" => {
             let fetch = |uri: &str| library.bytes(&sibling_path(name, uri)).map(|b| b.to_vec());
-            triangles_of_gltf(&bytes, obj::TRIANGLES_MAX, fetch)
+            triangles_of_gltf(&bytes, DISPLAY_TRIANGLES_MAX, fetch)
         }
         _ => {
             return Err(wrong(
@@ -51,7 +52,7 @@ pub fn read(library: &Library, name: &str) -> Result<Mesh, Diagnostic> {
     if mesh.triangles.is_empty() {
         return Err(wrong("the mesh has no triangles".into(), export));
     }
-    if mesh.triangles.len() > obj::TRIANGLES_MAX {
+    if mesh.triangles.len() > DISPLAY_TRIANGLES_MAX {
         return Err(too_large(mesh.triangles.len()));
     }
     if mesh.positions.iter().any(|p| !p.is_finite()) {

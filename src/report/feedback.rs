@@ -436,7 +436,7 @@ mod tests {
             templates.languages().in_each_language(&deepest.sentences[0].message)["en"].replace('\u{a0}', " ");
         let depth =
             lapses.iter().filter(|l| l.kind == EpisodeKind::Overcut).filter_map(|l| l.depth).fold(0.0, f32::max);
-        assert!(english.contains(&format!("to a depth of {depth:.1} mm")) && english.ends_with(" N."), "{english}");
+        assert!(english.contains(&format!(", {depth:.1} mm deep (")) && english.ends_with(" N)."), "{english}");
     }
 
     #[test]

@@ -676,9 +676,12 @@ mod tests {
             let keys: BTreeSet<String> = keys.map(|key| key.strip_suffix(".one").unwrap_or(key).to_string()).collect();
             assert_eq!(used, keys);
         }
+        // The English texts take precedence over the table of measures: both are the same.
         for about in typodont_exercise::scenario::metric::all() {
-            for kind in ["measure", "formula"] {
-                assert!(turkish.contains_key(&format!("{kind}.{}", about.name)), "tr.json lacks {kind}.{}", about.name);
+            for (kind, text) in [("measure", about.title), ("formula", about.formula)] {
+                let key = format!("{kind}.{}", about.name);
+                assert!(turkish.contains_key(&key), "tr.json lacks {key}");
+                assert_eq!(english.get(&key).map(String::as_str), Some(text), "en.json: {key}");
             }
         }
         assert!(

@@ -12,7 +12,7 @@ use typodont_exercise::scenario::hex;
 pub const PASSWORD_MIN: usize = 12;
 
 /// Time after which an idle login expires, s: the length of an examination day.
-const SESSION_TTL: i64 = 12 * 3600;
+const LOGIN_IDLE_MAX: i64 = 12 * 3600;
 
 /// Maximum number of concurrent logins. The one that has been idle longest is removed first.
 const LOGINS_MAX: usize = 200;
@@ -178,7 +178,7 @@ impl Auth {
     fn create_session(&mut self, now: i64) -> Result<String, String> {
         let cookie = hex(&crypto::random_bytes()?);
         let csrf_token = hex(&crypto::random_bytes()?);
-        self.logins.retain(|_, login| now - login.last_seen < SESSION_TTL);
+        self.logins.retain(|_, login| now - login.last_seen < LOGIN_IDLE_MAX);
         if self.logins.len() >= LOGINS_MAX
             && let Some(oldest) = self.logins.iter().min_by_key(|(_, login)| login.last_seen).map(|(tag, _)| *tag)
         {
@@ -194,7 +194,7 @@ impl Auth {
     pub fn authenticate(&mut self, cookie: &str, now: i64) -> Option<Login> {
         // Logins are keyed by the tag of their cookie, so the lookup time reveals nothing about the cookie itself.
         let login = self.logins.get_mut(&crypto::hmac_tag(&self.key, cookie.as_bytes()))?;
-        if now - login.last_seen >= SESSION_TTL {
+        if now - login.last_seen >= LOGIN_IDLE_MAX {
             return None;
         }
         login.last_seen = now;
@@ -237,7 +237,7 @@ mod tests {
         assert_eq!(auth.log_in_with_token("", 20), Ok(TokenLogin::Rejected));
         assert!(matches!(auth.log_in_with_token(&next, 30), Ok(TokenLogin::LoggedIn(_))));
         assert_eq!(auth.authenticate("", 30), None);
-        assert_eq!(auth.authenticate(&cookie, 10 + SESSION_TTL), None, "an idle login expires");
+        assert_eq!(auth.authenticate(&cookie, 10 + LOGIN_IDLE_MAX), None, "an idle login expires");
         auth.log_out(&cookie);
         assert_eq!(auth.authenticate(&cookie, 30), None);
     }

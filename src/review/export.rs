@@ -79,7 +79,7 @@ fn effective_overrides<'a>(
     })
 }
 
-/// Formats an override: "Decay removed: 25 → 30, the wall was sound (Dr. Öz, 2026-11-22)".
+/// Formats an override: "Caries removed: 25 → 30, the wall was sound (Dr. Öz, 2026-11-22)".
 fn reason(entry: &OverrideEntry) -> String {
     let draft = &entry.draft;
     let of = draft.item.as_ref().map_or("grade", |item| item.title.as_str());

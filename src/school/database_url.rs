@@ -2,7 +2,6 @@
 
 use postgres::Config;
 use postgres::config::{Host, SslMode};
-use std::path::Path;
 
 /// Parses `postgres://user@host/name` or `host=… user=… dbname=…`. TLS is required for every server that is not on
 /// this machine, whatever SSL mode the URL states.
@@ -33,7 +32,7 @@ pub fn is_local(config: &Config) -> bool {
     let host = |host: &Host| match host {
         Host::Tcp(name) => name == "localhost" || name.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback()),
         #[cfg(unix)]
-        Host::Unix(path) => path != Path::new(""),
+        Host::Unix(path) => path != std::path::Path::new(""),
     };
     let addresses = config.get_hostaddrs();
     match addresses.is_empty() {

@@ -181,7 +181,7 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     assert_eq!(desk.until("file", |file| !file.is_empty()), path, "the school's file, not the shipped one");
     desk.write("/title", "Mine");
     desk.until("unsaved", |unsaved| unsaved == "true");
-    fs::write(&file, text.replace("Grinding out the decay", "Theirs")).unwrap();
+    fs::write(&file, text.replace("Caries removal", "Theirs")).unwrap();
     desk.place_of("answer:mine");
     desk.picture("author-16-elsewhere");
     desk.click("answer:mine");
@@ -201,7 +201,7 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     desk.key("ctrl+s");
     desk.until("unsaved", |unsaved| unsaved == "false");
     let saved = fs::read_to_string(&file).unwrap();
-    assert_eq!(saved, text.replace("Grinding out the decay", "Mine"), "only the title has changed");
+    assert_eq!(saved, text.replace("Caries removal", "Mine"), "only the title has changed");
 
     // A new exercise that was begun outlives whoever only looks at it; it was once forgotten then.
     for is_begun in [false, true] {

@@ -392,7 +392,7 @@ fn a_cohorts_page_is_written_in_one_language() {
     let (english, turkish) = (page(&[]), page(&["--language", "tr"]));
     assert_eq!(english, page(&["--language", "en"]));
     assert!(english.contains("<html lang=\"en\">") && turkish.contains("<html lang=\"tr\">"));
-    assert!(english.contains("Caution: 1 session ended early."), "{english}");
+    assert!(english.contains("Caution: 1 session was ended early or interrupted."), "{english}");
     for page in [&english, &turkish] {
         let body = page.split("</style>").nth(1).unwrap();
         assert!(!body.contains("cohort.") && !body.contains('{'), "a bare key or placeholder:\n{body}");

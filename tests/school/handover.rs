@@ -61,7 +61,7 @@ fn moodle_and_canvas_get_the_columns_they_ask_for() {
     let (turkish, _) = run("moodle", &["--language", "tr"]);
     assert_eq!(turkish.lines().next(), Some(lines[0]));
     assert!(
-        turkish.contains("Başarısız: 64 / 100 puan, geçme puanı 70.") && turkish.contains("Decay removed: 25 / 40."),
+        turkish.contains("Başarısız: 64 / 100 puan, geçme puanı 70.") && turkish.contains("Caries removed: 25 / 40."),
         "{turkish}"
     );
     assert!(!turkish.contains("passed") && !turkish.contains("points"), "{turkish}");

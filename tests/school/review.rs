@@ -20,7 +20,7 @@ fn graded(participant: &str, points: [f64; 2]) -> Value {
     let mut one = session("5-grinding", participant, points[0] + points[1]);
     let item = |title: &str, metric: &str, points: f64| json!({ "title": title, "metric": metric, "value": 87.5, "points": points, "max_points": 50.0, "full_at": 98.0, "zero_at": 70.0 });
     one["grade"]["items"] =
-        json!([item("Decay removed", "decay_cleared_pct", points[0]), item("Light hand", "force_max_n", points[1])]);
+        json!([item("Caries removed", "decay_cleared_pct", points[0]), item("Gentle force", "force_max_n", points[1])]);
     one
 }
 
@@ -70,7 +70,7 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
     let browser = desk.browser();
     let id = browser.ids("/").remove(0);
     let page = browser.get(&format!("/session/{id}")).text();
-    for expected in ["anna", "Decay removed", "63.50", "Not passed", "name=\"points\" min=\"0\" max=\"50\""] {
+    for expected in ["anna", "Caries removed", "63.50", "Not passed", "name=\"points\" min=\"0\" max=\"50\""] {
         assert!(page.contains(expected), "{expected}");
     }
     let given = [("points", "31,5"), ("reason", "The wall is sound.\r\nSeen on the map."), ("name", "Dr. Öz")];
@@ -120,7 +120,7 @@ fn an_override_stands_beside_the_grade_in_a_log_that_only_grows() {
     let table = browser.get("/sessions.csv").text();
     let cells = table.lines().nth(1).unwrap();
     assert!(
-        cells.contains("63.5,100,70,not passed,70,passed,1,\"Decay removed: 25 → 31.5, The wall is sound."),
+        cells.contains("63.5,100,70,not passed,70,passed,1,\"Caries removed: 25 → 31.5, The wall is sound."),
         "{cells}"
     );
     let export: Value = serde_json::from_str(&browser.get("/sessions.json").text()).unwrap();
@@ -520,7 +520,7 @@ fn a_gradebook_takes_the_examiners_grade() {
     assert!(
         judged.contains("anna,73.5,")
             && judged.contains("Passed: 73.5 of 100")
-            && judged.contains("Decay removed: 35 of 50"),
+            && judged.contains("Caries removed: 35 of 50"),
         "{judged}"
     );
     assert!(judged.contains("berk,40,"), "{judged}");

@@ -172,9 +172,14 @@ fn create_private_temp_dir() -> std::io::Result<PathBuf> {
     let mut random = [0; 8];
     getrandom::fill(&mut random).map_err(|e| std::io::Error::other(e.to_string()))?;
     let folder = std::env::temp_dir().join(format!("typodont-{}", typodont_exercise::scenario::hex(&random)));
-    let mut builder = std::fs::DirBuilder::new();
+    let builder = std::fs::DirBuilder::new();
     #[cfg(unix)]
-    std::os::unix::fs::DirBuilderExt::mode(&mut builder, 0o700);
+    let builder = {
+        use std::os::unix::fs::DirBuilderExt;
+        let mut private = builder;
+        private.mode(0o700);
+        private
+    };
     builder.create(&folder)?;
     Ok(folder)
 }

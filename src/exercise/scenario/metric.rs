@@ -167,14 +167,14 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "detect_quadrant",
-        "Quadrant identified",
+        "Carious quarter of the occlusal surface identified",
         "",
         Higher,
-        "1 if the quadrant named has caries; 0 if another quadrant or none was named; no value if not asked",
+        "1 if the quarter named has caries; 0 if another quarter or none was named; no value if not asked",
     ),
     info(
         "detect_quadrant_time_s",
-        "Time to identify the quadrant",
+        "Time to identify the carious quarter of the occlusal surface",
         "s",
         Lower,
         "from the start of the stage to the answer; no value if not answered",
@@ -206,14 +206,14 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "hausdorff_mm",
-        "Greatest distance between outlines",
+        "Maximum distance between cavity and target (Hausdorff)",
         "mm",
         Lower,
         "symmetric, between the borders of R and T; no value if either is empty",
     ),
     info(
         "hausdorff95_mm",
-        "Distance between outlines, 95th percentile",
+        "Distance between cavity and target, 95th percentile",
         "mm",
         Lower,
         "95th percentile of the distances of which hausdorff_mm is the greatest",
@@ -228,7 +228,7 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "undercut_depth_max_mm",
-        "Greatest depth of remaining caries",
+        "Maximum distance of remaining caries from the cavity",
         "mm",
         Lower,
         "greatest distance of a remaining carious voxel from R; 0 if none remains; no value if nothing was removed",
@@ -242,14 +242,14 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "remaining_dentine_thickness_min_mm",
-        "Smallest distance between the cavity and the pulp",
+        "Minimum remaining dentine thickness (cavity to pulp)",
         "mm",
         Higher,
         "smallest distance between R without pulp and the pulp; no value if either is empty",
     ),
     info(
         "force_max_n",
-        "Greatest force",
+        "Maximum force",
         "N",
         Lower,
         "greatest force on the device in contact, without guidance forces; 0 if never in contact",
@@ -263,7 +263,7 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "speed_max_mm_s",
-        "Greatest speed in contact",
+        "Maximum speed in contact",
         "mm/s",
         Lower,
         "of the tip, over intervals of 20 ms with any contact, including the end of an approach; no value if \
@@ -271,7 +271,7 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "force_max_near_pulp_n",
-        "Greatest force near the pulp",
+        "Maximum force near the pulp",
         "N",
         Lower,
         "within near_mm of the pulp at the start; 0 if never there",
@@ -285,13 +285,13 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "speed_max_near_pulp_mm_s",
-        "Greatest speed near the pulp",
+        "Maximum speed near the pulp",
         "mm/s",
         Lower,
         "within near_mm of the pulp at the start; 0 if never there",
     ),
     info("path_length_mm", "Path length of the tip", "mm", Neither, "sum of the displacements of the tip over 20 ms"),
-    info("drilling_time_s", "Cutting time", "s", Neither, "cycles in which material was cut"),
+    info("drilling_time_s", "Time spent cutting", "s", Neither, "cycles in which material was cut"),
     info("contact_time_s", "Contact time", "s", Neither, "cycles in which anything was touched"),
     info(
         "efficiency_pct_s",
@@ -309,14 +309,14 @@ pub const PLAIN: &[MetricInfo] = &[
     ),
     info(
         "soft_tissue_drilled_s",
-        "Running bur on soft tissue",
+        "Time with the running bur on soft tissue",
         "s",
         Lower,
         "cycles in which a running bur touched gingiva or other soft tissue",
     ),
     info(
         "neighbour_drilled_s",
-        "Running bur on an adjacent tooth",
+        "Time with the running bur on an adjacent tooth",
         "s",
         Lower,
         "cycles in which a running bur touched an adjacent tooth",
@@ -327,7 +327,7 @@ pub const PLAIN: &[MetricInfo] = &[
 /// Measures of fillings, for exercises with a prepared cavity. C is the cavity, S the surface at the end, O the tooth's
 /// original contour.
 pub const OF_FILLINGS: &[MetricInfo] = &[
-    info("filled_pct", "Cavity filled", "%", Higher, "100·|filled∩C| / |C|"),
+    info("filled_pct", "Cavity filled with restorative material", "%", Higher, "100·|filled∩C| / |C|"),
     info(
         "contour_mean_mm",
         "Mean distance from the original contour",
@@ -345,14 +345,14 @@ pub const OF_FILLINGS: &[MetricInfo] = &[
     ),
     info(
         "contour_max_mm",
-        "Greatest distance from the original contour",
+        "Maximum distance from the original contour",
         "mm",
         Lower,
         "greatest of the distances of S from O whose mean is contour_mean_mm",
     ),
     info(
         "overhang_max_mm",
-        "Greatest overhang",
+        "Maximum overhang",
         "mm",
         Lower,
         "greatest distance by which S lies outside O; 0 \
@@ -360,14 +360,14 @@ pub const OF_FILLINGS: &[MetricInfo] = &[
     ),
     info(
         "deficit_max_mm",
-        "Greatest deficiency",
+        "Maximum deficiency",
         "mm",
         Lower,
         "greatest distance by which S lies inside O; 0 if nowhere",
     ),
     info(
         "overhang_mm3",
-        "Material outside the original contour",
+        "Restorative material outside the original contour",
         "mm³",
         Lower,
         "volume placed outside O, from voxel densities",
@@ -402,7 +402,7 @@ pub const CHARTING: &[MetricInfo] = &[
     ),
     info(
         "probing_force_max_n",
-        "Greatest probing force",
+        "Maximum probing force",
         "N",
         Lower,
         "greatest force at the time of a reading; no value without readings",
@@ -436,7 +436,7 @@ pub const WITH_ARGUMENT: &[MetricInfo] = &[
     info("zone_removed_pct", "Zone removed", "%", Neither, "100·|R∩Z| / |Z|; no value if the zone is empty"),
     info(
         "surface_within_tol",
-        "Agreement of outlines",
+        "Agreement of cavity and target surfaces",
         "",
         Higher,
         "proportion of the borders of R and T within the tolerance of each other; no value if either is empty",

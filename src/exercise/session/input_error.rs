@@ -31,7 +31,7 @@ impl fmt::Display for InputError {
             InputError::NoStage => "no stage is running",
             InputError::NotOnTray => "this instrument is not offered in this stage",
             InputError::NotByConfirmation => "this stage does not end by confirmation",
-            InputError::FixedTissues => "tissues cannot be adjusted in this stage",
+            InputError::FixedTissues => "the tissue properties cannot be adjusted in this stage",
             InputError::SteppedStiffness => "this stiffness changes in steps and cannot be adjusted",
             InputError::OutOfRange => "the value of the coefficient is out of range",
             InputError::NoCoefficient => "no tissue has this coefficient",
@@ -41,7 +41,7 @@ impl fmt::Display for InputError {
             InputError::NoStep => "the rating is not on the scale",
             InputError::NoStatement => "the questionnaire has no such statement",
             InputError::NoChart => "this is not charted in this stage",
-            InputError::NotAtNeck => "the instrument is not at the tooth's neck",
+            InputError::NotAtNeck => "the instrument is not at the cervical margin of the tooth",
             InputError::NoProbe => "a depth can be recorded only with a periodontal probe",
             InputError::NotInSulcus => "the probe is not in the sulcus",
         })

@@ -8,6 +8,7 @@ mod ply;
 
 use crate::diagnostic::Diagnostic;
 use crate::imaging::ScanError;
+use crate::limits::SCAN_TRIANGLES_MAX;
 use crate::visual_mesh::triangles_of_gltf;
 use crate::{obj, read_file};
 use std::path::{Component, Path};
@@ -15,10 +16,6 @@ use typodont_core::mesh::Mesh;
 use typodont_core::volume::solid::Triangle;
 
 pub(super) const DOING: &str = "reading a surface";
-
-/// Maximum number of triangles: a scanned arch has half a million; ten times that is a mistake or needs no more
-/// detail.
-pub const TRIANGLES_MAX: usize = 5_000_000;
 
 /// Extensions of files that are read as surfaces.
 pub const ENDINGS: [&str; 5] = ["stl", "ply", "obj", "glb", "gltf"];
@@ -69,7 +66,7 @@ pub fn parse(
         "ply" => ply::parse(bytes),
         "obj" => obj::triangles(bytes).map_err(|e| wrong(e.to_string(), export)).map(triangle_soup),
         "glb" | "gltf" => {
-            triangles_of_gltf(bytes, TRIANGLES_MAX, fetch).map_err(|e| wrong(e, export)).map(triangle_soup)
+            triangles_of_gltf(bytes, SCAN_TRIANGLES_MAX, fetch).map_err(|e| wrong(e, export)).map(triangle_soup)
         }
         other => Err(wrong(
             format!("\".{other}\" is not a supported surface format"),
@@ -78,8 +75,8 @@ pub fn parse(
     }?;
     match triangles.len() {
         0 => Err(wrong("there are no triangles in it", export)),
-        n if n > TRIANGLES_MAX => {
-            Err(wrong(format!("it has {n} triangles, more than {TRIANGLES_MAX}"), "reduce it in a mesh program"))
+        n if n > SCAN_TRIANGLES_MAX => {
+            Err(wrong(format!("it has {n} triangles, more than {SCAN_TRIANGLES_MAX}"), "reduce it in a mesh program"))
         }
         _ => Ok(triangles),
     }

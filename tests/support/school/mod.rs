@@ -21,7 +21,7 @@ pub fn session(scenario: &str, participant: &str, points: f64) -> Value {
     });
     json!({
         "version": 1, "typodont_version": "0.2.0", "scorer_version": 1,
-        "scenario": { "id": scenario, "title": "Grinding out the decay", "sha256": "ab12" },
+        "scenario": { "id": scenario, "title": "Caries removal", "sha256": "ab12" },
         "participant": participant, "seed": 1, "started": "2026-11-21T12:17:00Z", "ended_because": "complete",
         "stages": [{
             "id": "find", "title": "Find it", "started_s": 0.0, "ended_s": 61.25, "ended_by": "answer",
@@ -35,7 +35,7 @@ pub fn session(scenario: &str, participant: &str, points: f64) -> Value {
         "evidence": { "decay_cleared_pct": { "at_s": 31.5, "place_mm": [1.0, 2.0, 3.0] } },
         "grade": {
             "points": points, "max_points": 100.0, "pass_points": 70.0, "finished": true, "passed": points >= 70.0,
-            "hard_fails": [], "items": [{ "title": "Decay removed", "metric": "decay_cleared_pct", "value": 87.5,
+            "hard_fails": [], "items": [{ "title": "Caries removed", "metric": "decay_cleared_pct", "value": 87.5,
                 "points": 25.0, "max_points": 40.0, "full_at": 98.0, "zero_at": 70.0 }],
         },
         "questionnaire": { "id": "simulator", "items": items, "categories": { "usability": 4.0 } },
