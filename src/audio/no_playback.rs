@@ -27,13 +27,7 @@ impl NoStream {
         match self.0 {}
     }
 
-    pub fn play(
-        self,
-        mut synth: Synth,
-        mut receiver: SoundReceiver,
-        _: &PlaybackState,
-    ) -> (Option<AudioError>, SoundReceiver) {
-        receiver.fill(&mut synth, &mut []);
+    pub fn play(self, _: Synth, _: SoundReceiver, _: &PlaybackState) -> (Option<AudioError>, SoundReceiver) {
         match self.0 {}
     }
 }

@@ -69,6 +69,7 @@ impl SoundSender {
 
 impl SoundReceiver {
     /// Fills a block with the current sound. Never allocates.
+    #[cfg_attr(not(feature = "playback"), expect(dead_code, reason = "only an output asks for sound"))]
     pub(super) fn fill(&mut self, synth: &mut Synth, block: &mut [f32]) {
         while let Some(strength) = self.cries.try_recv() {
             synth.cry(strength);

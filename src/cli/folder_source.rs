@@ -58,12 +58,18 @@ impl FolderSource {
     ///
     /// # Errors
     /// Fails if none is given, or if an option of the part `school` is.
-    pub fn bundle_folder(&self) -> Result<Option<&Path>, CliError> {
+    fn required_folder(&self) -> Result<&Path, CliError> {
         self.school.require_absent()?;
-        match &self.folder {
-            Some(folder) => Ok(Some(folder)),
-            None => Err(CliError::misuse("no-sessions: name a folder that holds bundles")),
-        }
+        self.folder.as_deref().ok_or_else(|| CliError::misuse("no-sessions: name a folder that holds bundles"))
+    }
+
+    /// The folder of bundles, as a build with the part `school` gives it where sessions come from no database.
+    ///
+    /// # Errors
+    /// As for [`FolderSource::read`].
+    #[cfg(feature = "integrations")]
+    pub fn bundle_folder(&self) -> Result<Option<&Path>, CliError> {
+        self.required_folder().map(Some)
     }
 
     /// Reads every session. The removal maps of a folder are always at hand.
@@ -71,7 +77,7 @@ impl FolderSource {
     /// # Errors
     /// Fails if the folder holds no session.
     pub fn read(&self, _maps: bool) -> Result<FolderCohort, CliError> {
-        let folder = self.bundle_folder()?.unwrap_or(Path::new("."));
+        let folder = self.required_folder()?;
         Ok(FolderCohort {
             cohort: cohort::read_folder(folder)?,
             name: folder.display().to_string(),

@@ -102,8 +102,7 @@ impl Crate {
             "super" => from[..from.len().checked_sub(1)?].to_vec(),
             _ => {
                 child(from, &rest[0])?;
-                rest = path;
-                return self.descend(from.clone(), rest, depth);
+                return self.descend(from.clone(), path, depth);
             }
         };
         rest = &rest[1..];
