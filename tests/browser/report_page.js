@@ -135,6 +135,9 @@ function fell(voxel) {
   await photograph('report-clipped.png');
 
   // An adapter that is lost and comes back shows the same picture. Regression: colours by verdict and hatching came back on.
+  // A slow adapter draws fewer pixels, by the time it took: with that time held, every picture has all of them.
+  await page.evaluate(() => { performance.now = () => 0; });
+  for (const share of [0.9, 1]) await slide(share);
   for (const choice of ['tissue', 'verdict']) {
     await settled(() => page.locator(`[name="colours"][value="${choice}"]`).check());
     const shown = await picture('solid');
