@@ -62,6 +62,7 @@ const KEY_ORDER: &[&str] = &[
     "points",
     "full_at",
     "zero_at",
+    "counts_with",
     "when",
     "near_mm",
     "leeway_mm",

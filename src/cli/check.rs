@@ -4,9 +4,11 @@ use super::{CliError, print_line};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use typodont_exercise::scenario::ResolveMode;
-use typodont_formats::diagnostic::Diagnostic;
-use typodont_lesson::{self as lesson, scenario_files};
+use typodont_formats::diagnostic::{Diagnostic, SourceText};
+use typodont_formats::json;
+use typodont_lesson::{self as lesson, ExerciseWarning, scenario_files};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -27,6 +29,8 @@ enum Format {
 /// A complaint in JSON output; line and column are null for a complaint about a whole file.
 #[derive(Serialize)]
 struct ComplaintFile<'a> {
+    /// "error", or "warning" for an exercise that can be run but may not be fair.
+    severity: &'a str,
     file: &'a str,
     line: Option<usize>,
     column: Option<usize>,
@@ -38,31 +42,52 @@ struct ComplaintFile<'a> {
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let mut found = Vec::new();
+    let mut warnings = Vec::new();
     let mut checked = 0;
     for path in &arguments.files {
         let files = scenario_files(path)?;
         checked += files.len();
         for file in files {
-            found.extend(check(&file));
+            match check(&file) {
+                Ok(unfair) => warnings.extend(unfair),
+                Err(complaints) => found.extend(complaints),
+            }
         }
     }
+    if arguments.format == Format::Text {
+        warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+    }
     match arguments.format {
-        Format::Text if found.is_empty() => print_line(format!("{checked} files checked, no problems found"))?,
+        Format::Text if found.is_empty() => {
+            let result = match warnings.len() {
+                0 => "no problems found".to_string(),
+                1 => "no errors, 1 warning".to_string(),
+                count => format!("no errors, {count} warnings"),
+            };
+            print_line(format!("{checked} files checked, {result}"))?;
+        }
         Format::Text => return Err(CliError::Complaints(found)),
-        Format::Json => print_line(to_json(&found))?,
+        Format::Json => print_line(to_json(&found, &warnings))?,
     }
     if found.is_empty() { Ok(()) } else { Err(CliError::AlreadyReported) }
 }
 
-/// All complaints about one scenario.
-fn check(path: &Path) -> Vec<Diagnostic> {
-    lesson::read_scenario(path, ResolveMode::MakeWorkpiece).err().unwrap_or_default()
+/// The warnings about one scenario, or all complaints if it cannot be run.
+fn check(path: &Path) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
+    let scenario = Arc::new(lesson::read_scenario(path, ResolveMode::MakeWorkpiece)?);
+    let name = path.display().to_string();
+    let about_file = |why: String| vec![Diagnostic::about_file(&name, "impossible-scene", why, None)];
+    let warnings = lesson::exercise_warnings(&scenario).map_err(about_file)?;
+    let read = json::read::<serde_json::Value>(SourceText::new(name, scenario.text.to_string()))?;
+    let diagnostic = |w: ExerciseWarning| read.source_map.complain(&w.path, w.code, w.message, Some(w.help));
+    Ok(warnings.into_iter().map(diagnostic).collect())
 }
 
-fn to_json(found: &[Diagnostic]) -> String {
-    let complaint = |d: &Diagnostic| {
+fn to_json(found: &[Diagnostic], warnings: &[Diagnostic]) -> String {
+    let complaint = |(severity, d): (&'static str, &Diagnostic)| {
         let (line, column) = d.line_and_column().unzip();
         serde_json::to_value(ComplaintFile {
+            severity,
             file: &d.source.name,
             line,
             column,
@@ -72,6 +97,7 @@ fn to_json(found: &[Diagnostic]) -> String {
             help: d.help.as_deref(),
         })
     };
-    let all: Vec<_> = found.iter().filter_map(|d| complaint(d).ok()).collect();
+    let all = found.iter().map(|d| ("error", d)).chain(warnings.iter().map(|d| ("warning", d)));
+    let all: Vec<_> = all.filter_map(|d| complaint(d).ok()).collect();
     serde_json::to_string_pretty(&all).unwrap_or_default()
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use typodont_core::device::DeviceSpec;
 #[cfg(feature = "devices")]
 use typodont_devices::servo::SecondHandRole;
-use typodont_exercise::scenario::{ResolveMode, Scenario};
+use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
 use typodont_exercise::session::OperatorFile;
 use typodont_formats::Library;
 use typodont_lesson::{self as lesson, LessonError, SessionConfig, ToothScan};
@@ -148,8 +148,13 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let library = lesson::library_for(&arguments.scenario);
     let mut scenario = lesson::read_scenario(&arguments.scenario, ResolveMode::MakeWorkpiece)?;
     let mut digests = BTreeMap::new();
+    let seed = arguments.seed.unwrap_or_else(|| lesson::seed_from_time(jiff::Timestamp::now()));
     if let Some(scan) = read_tooth_scan(arguments)? {
         scan.replace_teeth(&mut scenario)?;
+        if let Ok(workpiece) = Workpiece::make(&scenario, seed) {
+            let warnings = lesson::caries_warnings(&scenario, &workpiece);
+            warnings.iter().for_each(|w| eprintln!("warning: {}: {}; {}", w.code, w.message, w.help));
+        }
         digests.insert("tooth".to_string(), scan.digest().to_string());
     }
     let driver = match is_scripted {
@@ -159,7 +164,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let run = RunRequest {
         scenario: Arc::new(scenario),
         driver,
-        seed: arguments.seed.unwrap_or_else(|| lesson::seed_from_time(jiff::Timestamp::now())),
+        seed,
         participant: &arguments.participant,
         out: &arguments.out,
         digests,

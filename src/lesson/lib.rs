@@ -32,6 +32,7 @@
 //! ```
 
 mod error;
+mod exercise_warnings;
 mod inputs;
 mod preparation;
 mod tooth_scan;
@@ -45,6 +46,7 @@ mod live_lesson;
 pub mod second_hand;
 
 pub use error::LessonError;
+pub use exercise_warnings::{ExerciseWarning, IDLE_POINTS_MAX, caries_warnings, exercise_warnings};
 pub use inputs::{is_valid_participant_code, library_for, read_scenario, scenario_files, seed_from_time};
 pub use preparation::{PreparedSession, RecordedSession, SessionConfig};
 pub use tooth_scan::ToothScan;

@@ -233,7 +233,9 @@ pub fn build(session: &SessionFile, lapses: &[ErrorEpisode], rules: &FeedbackRul
             feedback.findings.push(builder.finding(&fail.metric, &fail.title, fail.value, goal, None, true));
         }
     }
-    let mut items: Vec<_> = grade.items.iter().filter(|i| i.max_points - i.points >= LOST_POINTS_MIN).collect();
+    // Points lost because of another item are explained by that item.
+    let has_lost = |i: &&super::ItemResultFile| i.max_points - i.own_points() >= LOST_POINTS_MIN;
+    let mut items: Vec<_> = grade.items.iter().filter(has_lost).collect();
     items.sort_by(|a, b| (b.max_points - b.points).total_cmp(&(a.max_points - a.points)));
     for item in items {
         if explained_metrics.insert(&item.metric) {

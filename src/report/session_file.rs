@@ -172,6 +172,13 @@ pub struct ItemResultFile {
     pub max_points: f64,
     pub full_at: f64,
     pub zero_at: f64,
+    /// Measure of the item on which this item depends; left out for an item that counts by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts_with: Option<String>,
+    /// Share of its points that the other item earned, 0 to 1, by which the points of this item are multiplied; left
+    /// out for an item that counts by itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts_with_share: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -202,6 +209,14 @@ pub struct RatingFile {
     pub value: Option<f64>,
     /// As counted: mirrored for statements against the system.
     pub counted: Option<f64>,
+}
+
+impl ItemResultFile {
+    /// Points by the item's own measure, before they are multiplied by the share of the item on which it depends.
+    pub fn own_points(&self) -> f64 {
+        let share = self.value.map_or(0.0, |v| ((v - self.zero_at) / (self.full_at - self.zero_at)).clamp(0.0, 1.0));
+        if self.counts_with.is_some() { share * self.max_points } else { self.points }
+    }
 }
 
 impl SessionFile {
@@ -368,6 +383,8 @@ fn grade(grade: &Grade) -> GradeFile {
                 max_points: item.max_points,
                 full_at: item.full_at,
                 zero_at: item.zero_at,
+                counts_with: item.counts_with.as_ref().map(|c| c.metric.clone()),
+                counts_with_share: item.counts_with.as_ref().map(|c| round_to_nine_decimals(c.share)),
             })
             .collect(),
         hard_fail_checks: grade

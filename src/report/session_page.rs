@@ -104,6 +104,8 @@ struct ReportPlace {
 struct ReportItem {
     title: String,
     formula: Value,
+    /// Dependence on another item, in words; empty for an item that counts by itself.
+    counts_with: Value,
     value: Value,
     r#where: Value,
     spot: Option<ReportPlace>,
@@ -410,6 +412,7 @@ impl ReportLocalizer<'_> {
         ReportItem {
             title: item.title.clone(),
             formula: self.formula(&item.metric),
+            counts_with: self.html(&phrases::counts_with(item, self.session.grade.as_ref())),
             value: self.value(&item.metric, item.value),
             r#where: self.place(&item.metric),
             spot: self.evidence_place(&item.metric),

@@ -103,6 +103,8 @@ mod tests {
             max_points: 50.0,
             full_at: 1.0,
             zero_at: 0.0,
+            counts_with: None,
+            counts_with_share: None,
         };
         GradeFile {
             points: 60.0,

@@ -233,6 +233,10 @@ fn names_that_lead_nowhere() {
         json!("zone_removed_pct(target)"),
         &[("unknown-zone", "/rubric/items/0/metric")],
     );
+    let dependent = "/rubric/items/1/counts_with";
+    check("item that counts with no item", dependent, json!("dice"), &[("unknown-item", dependent)]);
+    check("item that counts with itself", dependent, json!("healthy_per_decay_pct"), &[("unknown-item", dependent)]);
+    check("item that counts with a dependent one", dependent, json!("force_max_n"), &[("chained-item", dependent)]);
     check("unknown questionnaire", "/questionnaire", json!("simulater"), &[("missing-file", "/questionnaire")]);
     check("questionnaire that climbs", "/questionnaire", json!("../secret"), &[("wrong-form", "/questionnaire")]);
     check(
@@ -288,7 +292,7 @@ fn parts_that_do_not_fit_together() {
     check(
         "the wrong end earns",
         "/rubric/items/0/full_at",
-        json!(50),
+        json!(40),
         &[("backward-rubric", "/rubric/items/0/full_at")],
     );
     check(

@@ -28,6 +28,7 @@ def main(arguments):
     [bundle] = map(pathlib.Path, arguments)
     session = json.loads((bundle / "session.json").read_text())
     differences = [*shares(bundle, session["metrics"]), *verdicts(bundle), *recording(bundle, session)]
+    differences += points(session)
     for difference in differences:
         print(difference)
     return 1 if differences else 0
@@ -77,6 +78,31 @@ def verdicts(bundle):
             yield f"performance.seg.nrrd: {name} holds matter that is still there"
         if name in {"left", "kept_sound", "kept"} and not numpy.all(after[seen == value] != 0):
             yield f"performance.seg.nrrd: {name} holds matter that is gone"
+
+
+def points(session):
+    """The points of each item, from its value, and their sum."""
+    grade = session["grade"]
+
+    def share(item):
+        if item["value"] is None:
+            return 0.0
+        full, zero = item["full_at"], item["zero_at"]
+        return min(max((item["value"] - zero) / (full - zero), 0.0), 1.0)
+
+    shares = {item["metric"]: share(item) for item in grade["items"] if "counts_with" not in item}
+    for item in grade["items"]:
+        factor = 1.0
+        if "counts_with" in item:
+            factor = shares[item["counts_with"]]
+            if abs(factor - item["counts_with_share"]) > 1e-6:
+                yield f"{item['title']}: counts with a share of {factor}, session.json says {item['counts_with_share']}"
+        derived = share(item) * factor * item["max_points"]
+        if abs(derived - item["points"]) > 1e-6:
+            yield f"{item['title']}: {derived} points, session.json says {item['points']}"
+    total = sum(item["points"] for item in grade["items"])
+    if abs(total - grade["points"]) > 1e-6:
+        yield f"the items sum to {total} points, session.json says {grade['points']}"
 
 
 def recording(bundle, session):

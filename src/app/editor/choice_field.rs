@@ -35,6 +35,7 @@ pub fn named_choices(form: &FormContext, pointer: &str) -> Option<Vec<NamedChoic
                 .collect(),
         ),
         "metric" => Some(metric_choices(form)),
+        "counts_with" => Some(other_item_choices(form, pointer)),
         "tooth_with" | "quadrant_of" => {
             Some(plain(editor.ids(&teeth.iter().map(|tooth| format!("{tooth}/decay")).collect::<Vec<_>>())))
         }
@@ -56,6 +57,25 @@ pub fn named_choices(form: &FormContext, pointer: &str) -> Option<Vec<NamedChoic
 
 fn is_entry_of(pointer: &str, list: &str) -> bool {
     pointer.rsplit_once('/').is_some_and(|(above, _)| last_segment(above) == list)
+}
+
+/// Metrics of the other items of the rubric, with the titles of these items.
+fn other_item_choices(form: &FormContext, pointer: &str) -> Vec<NamedChoice> {
+    let items = form.value("/rubric/items").and_then(Value::as_array);
+    let own = pointer.strip_prefix("/rubric/items/").and_then(|rest| rest.split('/').next()?.parse::<usize>().ok());
+    let others = items
+        .into_iter()
+        .flatten()
+        .enumerate()
+        .filter(|(index, item)| Some(*index) != own && item.get("counts_with").is_none_or(Value::is_null));
+    let text = |item: &Value, key: &str| item.get(key).and_then(Value::as_str).unwrap_or_default().to_string();
+    others
+        .map(|(_, item)| NamedChoice {
+            name: text(item, "metric"),
+            title: text(item, "title"),
+            description: String::new(),
+        })
+        .collect()
 }
 
 /// All metrics; those with an argument are listed for each zone of the exercise.

@@ -145,6 +145,7 @@ const LABELS: &[(&str, &str)] = &[
     ("points", "label.points"),
     ("full_at", "label.full_at"),
     ("zero_at", "label.zero_at"),
+    ("counts_with", "label.counts_with"),
     ("hard_fails", "label.hard_fails"),
     ("when", "label.when"),
     ("above", "label.above"),

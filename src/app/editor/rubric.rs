@@ -90,6 +90,7 @@ fn item_ui(ui: &mut egui::Ui, form: &mut FormContext, at: &str) {
         };
         ui.weak(form.words.get(key));
     }
+    field_ui(ui, form, &child(at, "counts_with"));
     for key in ["points", "full_at", "zero_at"] {
         diagnostics_ui(ui, form, &child(at, key));
     }

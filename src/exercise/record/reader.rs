@@ -117,6 +117,25 @@ impl Recording {
         found.assemble(name)
     }
 
+    /// Returns a recording of a session that has no file, still without ticks, inputs and commands. It has no digests:
+    /// it can be scored, but not verified.
+    pub fn unverified(head: RecordingHeadFile, scenario: Arc<Scenario>, workpiece: &Workpiece) -> Recording {
+        Recording {
+            head,
+            end: None,
+            scenario,
+            initial: workpiece.volume.clone(),
+            original: workpiece.original.clone(),
+            ticks: Vec::new(),
+            inputs: Vec::new(),
+            commands: Vec::new(),
+            events: Vec::new(),
+            digests: Vec::new(),
+            initial_digest: RunningDigest::new(),
+            end_bytes: Vec::new(),
+        }
+    }
+
     /// Returns the workpiece from which the session started.
     ///
     /// # Errors

@@ -463,9 +463,10 @@ pub enum ZoneRole {
     Target,
     /// Tissue that may be removed without penalty.
     Leeway,
-    /// Walls or floor that must remain intact.
+    /// Walls or floor that must remain intact. Decay within them does not count.
     Container,
-    /// Tissue that must never be removed.
+    /// Tissue that must never be removed. Decay within it does not count, unless the region names that decay as its
+    /// tissue.
     NeverRemove,
 }
 
@@ -881,6 +882,11 @@ pub struct RubricItemFile {
     pub full_at: f64,
     /// Value of the measure that earns no points.
     pub zero_at: f64,
+    /// The measure of another item of this rubric, such as "decay_cleared_pct". The points of this item are
+    /// multiplied by the share of its points that the other item earned, so that nobody is rewarded for what was
+    /// avoided by not doing the work. The other item must not depend on a third.
+    #[serde(default)]
+    pub counts_with: Option<String>,
 }
 
 /// A critical error, which fails an exercise regardless of the points.

@@ -433,7 +433,14 @@ pub const CHARTING: &[MetricInfo] = &[
 
 /// Measures with an argument in brackets.
 pub const WITH_ARGUMENT: &[MetricInfo] = &[
-    info("zone_removed_pct", "Zone removed", "%", Neither, "100·|R∩Z| / |Z|; no value if the zone is empty"),
+    info(
+        "zone_removed_pct",
+        "Zone removed",
+        "%",
+        Neither,
+        "100·|R∩Z| / |Z|; caries does not count in a zone that must be preserved or must not be touched; no value if \
+         the zone is empty",
+    ),
     info(
         "surface_within_tol",
         "Agreement of cavity and target surfaces",

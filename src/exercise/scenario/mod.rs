@@ -414,6 +414,8 @@ pub struct RubricItem {
     pub points: f64,
     pub full_at: f64,
     pub zero_at: f64,
+    /// Index of the item of the same rubric by whose earned share the points are multiplied.
+    pub counts_with: Option<usize>,
 }
 
 #[derive(Clone, Debug, PartialEq)]

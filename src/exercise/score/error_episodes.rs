@@ -30,7 +30,7 @@ const VOLUME_LEAST: f64 = 0.02;
 pub enum EpisodeKind {
     /// Sound tissue was removed beyond the leeway.
     Overcut,
-    /// Vulnerable tissue was removed or exposed, or tissue of a zone that must never be removed was removed.
+    /// Vulnerable tissue was removed or exposed, or sound tissue of a zone that must never be removed was removed.
     Vulnerable,
     /// Tissue to be removed was left.
     Left,

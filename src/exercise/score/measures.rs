@@ -94,7 +94,7 @@ pub fn all(
     let of_fillings = if restoration.is_some() { OF_FILLINGS } else { &[] };
     let charting = if chart.is_some() { CHARTING } else { &[] };
     let mut metrics: Vec<Metric> = PLAIN.iter().chain(of_fillings).chain(charting).map(Metric::plain).collect();
-    let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
+    let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)format!("zone_removed_pct({})", z.id)));
     let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
     metrics.extend(zones.chain([tolerance]).flatten());
     let asked = scenario.rubric.iter().flat_map(Rubric::metrics);
@@ -128,7 +128,7 @@ impl MeasureSource<'_> {
             ("surface_within_tol", Some(MetricArgument::ToleranceMm(tolerance))) => {
                 self.outline_share(*tolerance).into()
             }
-            ("zone_removed_pct", Some(MetricArgument::Zone(id))) => self.zone_removed_pct(id).into(),
+            ("zone_removed_pct", Some(MetricArgument::Zone(id))) => self.zone_removed_pct(id),
             _ => self
                 .of_stages(name)
                 .or_else(|| self.of_removed_volume(name))
@@ -189,9 +189,11 @@ impl MeasureSource<'_> {
             "overcut_depth_max_mm" => self.overcut(),
             "undercut_depth_max_mm" => self.undercut(),
             "pulp_exposed" => {
-                let voxel = self.comparison.exposed();
-                let evidence = voxel.map(|v| self.evidence_at(v));
-                ComputedValue { value: Some(if voxel.is_some() { 1.0 } else { 0.0 }), evidence }
+                let exposed = self.comparison.exposed().map(|voxel| (self.exposed_at(voxel), voxel));
+                // A voxel whose tick is unknown comes after all others.
+                let first = exposed.min_by_key(|&(at, voxel)| (at.is_none(), at, voxel));
+                let evidence = first.map(|(at, voxel)| Evidence { at, ..self.evidence_at(voxel) });
+                ComputedValue { value: Some(if first.is_some() { 1.0 } else { 0.0 }), evidence }
             }
             "remaining_dentine_thickness_min_mm" => {
                 self.deepest(self.comparison.nearest(|s| s.removed() && !s.vulnerable(), |s| s.vulnerable()), None)
@@ -229,9 +231,14 @@ impl MeasureSource<'_> {
         self.chart.and_then(|chart| charting::measure(name, chart)).into()
     }
 
-    fn zone_removed_pct(&self, id: &str) -> Option<f64> {
-        let zone = self.recording.scenario.zones.iter().position(|z| z.id == id)?;
-        self.comparison.zone_removed_pct(zone)
+    /// Computes a zone's removed share, with the voxel of the zone that was removed first as evidence.
+    fn zone_removed_pct(&self, id: &str) -> ComputedValue {
+        let Some(zone) = self.recording.scenario.zones.iter().position(|z| z.id == id) else {
+            return ComputedValue::default();
+        };
+        let first = self.comparison.removed_of_zone(zone).min_by_key(|&v| (self.process.removals.at(v), v));
+        let evidence = first.map(|v| self.evidence_at(v));
+        ComputedValue { value: self.comparison.zone_removed_pct(zone), evidence }
     }
 
     fn cutting_stage(&self) -> Option<&StageResult> {
@@ -299,6 +306,12 @@ impl MeasureSource<'_> {
             }
             None => otherwise.into(),
         }
+    }
+
+    /// Returns the tick at which a vulnerable voxel was removed, or exposed by the removal of its first neighbour.
+    fn exposed_at(&self, voxel: usize) -> Option<Tick> {
+        let around = self.comparison.grid.neighbours(voxel).chain([voxel]);
+        around.filter_map(|v| self.process.removals.at(v)).min()
     }
 
     fn evidence_at(&self, voxel: usize) -> Evidence {

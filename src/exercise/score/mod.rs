@@ -8,6 +8,7 @@ mod charting;
 mod cropped_grid;
 mod voxel_removals;
 mod grade;
+mod idle;
 mod error_episodes;
 mod measures;
 mod process;
@@ -19,18 +20,20 @@ mod zones;
 pub use charting::{ProbingReading, SiteResult};
 pub use cropped_grid::CroppedGrid;
 pub use error_episodes::{AnatomicalDirection, EpisodeKind, ErrorEpisode, error_episodes};
-pub use grade::{Grade, HardFailResult, ItemResult};
+pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
+pub use idle::idle_grade;
 pub use measures::{Evidence, Measure, Measures};
 pub use process::{Trace, TraceSample};
 pub use restoration::Restoration;
 pub use verdict::Verdict;
 pub use voxel_removals::{VoxelRemoval, VoxelRemovals};
+pub use zones::{DecayInZone, decay_in_zones, decay_on_vulnerable_mm3};
 
 use crate::record;
 use crate::record::{Recording, Replay, ReplayCheck};
 
 /// Version of the formulae. It changes whenever the score of an old recording would change.
-pub const SCORER_VERSION: u32 = 1;
+pub const SCORER_VERSION: u32 = 2;
 
 /// Complete result of scoring a recording.
 #[derive(Clone, Debug)]

@@ -1,8 +1,7 @@
 //! The comparison of the removed tissue with the tissue to be removed.
 
 use super::cropped_grid::CroppedGrid;
-use super::voxel_set::VoxelSet;
-use super::zones;
+use super::zones::ZoneVoxels;
 use crate::catalog::TissueRole;
 use crate::record::Replay;
 use crate::scenario::Scenario;
@@ -17,7 +16,7 @@ pub struct RemovalComparison {
     /// Flags of each voxel.
     pub flags: Vec<VoxelFlags>,
     /// The scenario's zones, in their order.
-    pub zones: Vec<VoxelSet>,
+    pub zones: Vec<ZoneVoxels>,
     pub counts: RemovalCounts,
 }
 
@@ -82,7 +81,7 @@ pub struct VoxelDistance {
 impl RemovalComparison {
     pub fn of(scenario: &Scenario, replay: &Replay) -> RemovalComparison {
         let initial = &replay.workpiece.volume;
-        let zones: Vec<VoxelSet> = scenario.zones.iter().map(|z| zones::mask(z, initial)).collect();
+        let zones: Vec<ZoneVoxels> = scenario.zones.iter().map(|z| ZoneVoxels::of(z, scenario, initial)).collect();
         let targets: Vec<usize> = (0..zones.len()).filter(|&z| scenario.zones[z].role == ZoneRole::Target).collect();
         let role: [Option<TissueRole>; 256] = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
         let mut counts = RemovalCounts::default();
@@ -93,7 +92,8 @@ impl RemovalComparison {
             }
             let role = role[usize::from(before.0)];
             let decay = role == Some(TissueRole::Decay);
-            let target = if targets.is_empty() { decay } else { targets.iter().any(|&z| zones[z].contains(index)) };
+            let target =
+                if targets.is_empty() { decay } else { targets.iter().any(|&z| zones[z].counted.contains(index)) };
             let set = VoxelFlags::default()
                 .with(VoxelFlags::REMOVED, after == Label::AIR)
                 .with(VoxelFlags::DECAY, decay)
@@ -166,9 +166,9 @@ impl RemovalComparison {
         Some(distances)
     }
 
-    /// Returns the first vulnerable voxel that [is exposed](RemovalComparison::is_exposed).
-    pub fn exposed(&self) -> Option<usize> {
-        self.indices(|s| s.vulnerable()).find(|&voxel| self.is_exposed(voxel))
+    /// Returns the vulnerable voxels that [are exposed](RemovalComparison::is_exposed).
+    pub fn exposed(&self) -> impl Iterator<Item = usize> + '_ {
+        self.indices(|s| s.vulnerable()).filter(|&voxel| self.is_exposed(voxel))
     }
 
     /// Returns true for a vulnerable voxel that was removed or is next to a removed one.
@@ -177,11 +177,20 @@ impl RemovalComparison {
             && (self.flags[voxel].removed() || self.grid.neighbours(voxel).any(|n| self.flags[n].removed()))
     }
 
-    /// Returns 100·|R∩Z| / |Z| for the zone Z with this index; `None` for an empty zone.
+    /// Returns 100·|R∩Z| / |Z| for the zone Z with this index. A zone that consists of decay alone has nothing to
+    /// protect: 0. `None` for an empty zone.
     pub fn zone_removed_pct(&self, zone: usize) -> Option<f64> {
-        let all = self.zones[zone].count();
-        let removed = self.zones[zone].iter().filter(|&v| self.flags[v].removed()).count();
-        (all > 0).then(|| 100.0 * removed as f64 / all as f64)
+        let ZoneVoxels { counted, decay } = &self.zones[zone];
+        let all = counted.count();
+        match all {
+            0 => (*decay > 0).then_some(0.0),
+            _ => Some(100.0 * self.removed_of_zone(zone).count() as f64 / all as f64),
+        }
+    }
+
+    /// Returns the removed voxels of the zone with this index.
+    pub fn removed_of_zone(&self, zone: usize) -> impl Iterator<Item = usize> + '_ {
+        self.zones[zone].counted.iter().filter(|&v| self.flags[v].removed())
     }
 }
 

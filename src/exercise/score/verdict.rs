@@ -24,8 +24,8 @@ pub enum Verdict {
     Overcut = 4,
     /// Decay or target, not removed.
     Left = 5,
-    /// Pulp or another vulnerable structure, removed or exposed; or removed tissue of a zone that must never be
-    /// removed.
+    /// Pulp or another vulnerable structure, removed or exposed; or removed tissue, other than decay, of a zone
+    /// that must never be removed.
     VulnerableTouched = 6,
     /// Any other tissue, preserved.
     Kept = 7,
@@ -138,12 +138,12 @@ pub fn of(
     let is_harmless = harmless(scenario, shape);
     let is_forbidden = |voxel: usize| {
         let mut zones = scenario.zones.iter().zip(&shape.zones);
-        zones.any(|(z, mask)| z.role == ZoneRole::NeverRemove && mask.contains(voxel))
+        zones.any(|(z, mask)| z.role == ZoneRole::NeverRemove && mask.counted.contains(voxel))
     };
     // Walls and floor that must remain intact have no leeway.
     let is_container = |voxel: usize| {
         let mut zones = scenario.zones.iter().zip(&shape.zones);
-        zones.any(|(z, mask)| z.role == ZoneRole::Container && mask.contains(voxel))
+        zones.any(|(z, mask)| z.role == ZoneRole::Container && mask.counted.contains(voxel))
     };
     let verdict = |voxel: usize| {
         if initial.tissue(voxel) == Label::AIR {
@@ -187,8 +187,11 @@ fn harmless<'a>(scenario: &'a Scenario, shape: &'a RemovalComparison) -> impl Fn
         (crop, distances)
     });
     move |voxel| {
-        let in_zone =
-            scenario.zones.iter().zip(&shape.zones).any(|(z, mask)| z.role == ZoneRole::Leeway && mask.contains(voxel));
+        let in_zone = scenario
+            .zones
+            .iter()
+            .zip(&shape.zones)
+            .any(|(z, mask)| z.role == ZoneRole::Leeway && mask.counted.contains(voxel));
         let is_near = near.as_ref().is_some_and(|(crop, distances)| {
             crop.index_of(voxel).is_some_and(|i| distances[i] <= scenario.measures.leeway)
         });

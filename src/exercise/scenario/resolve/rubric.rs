@@ -118,7 +118,8 @@ impl Resolver<'_> {
             let help = "change the points of the items so that their sum is 100";
             self.complain("/rubric/items", "wrong-sum", format!("the sum of the points is {sum}, not 100"), help);
         }
-        let mut items = Vec::new();
+        let mut items: Vec<RubricItem> = Vec::new();
+        let mut written_items = Vec::new();
         for (index, item) in written.items.iter().enumerate() {
             let path = format!("/rubric/items/{index}");
             if item.full_at == item.zero_at {
@@ -134,7 +135,17 @@ impl Resolver<'_> {
                 self.check_direction(&metric, item, &path);
                 self.check_needs(&metric, capabilities, &format!("{path}/metric"));
                 let &file::RubricItemFile { points, full_at, zero_at, .. } = item;
-                items.push(RubricItem { title: item.title.clone(), metric, points, full_at, zero_at });
+                let title = item.title.clone();
+                items.push(RubricItem { title, metric, points, full_at, zero_at, counts_with: None });
+                written_items.push((index, item));
+            }
+        }
+        // An item without a known measure was reported above; the others may depend on it.
+        let is_complete = items.len() == written.items.len();
+        for (own, (index, item)) in written_items.into_iter().enumerate().filter(|_| is_complete) {
+            if let Some(name) = &item.counts_with {
+                let path = format!("/rubric/items/{index}/counts_with");
+                items[own].counts_with = self.counts_with(name, own, &items, written, &path);
             }
         }
         let mut hard_fails = Vec::new();
@@ -150,6 +161,39 @@ impl Resolver<'_> {
             }
         }
         Rubric { pass_points: written.pass_points, items, hard_fails }
+    }
+
+    /// Returns the index of the item that uses the measure `name`, by whose share the points of the item `own` are
+    /// multiplied; `None` after a diagnostic.
+    fn counts_with(
+        &mut self,
+        name: &str,
+        own: usize,
+        items: &[RubricItem],
+        written: &file::RubricFile,
+        path: &str,
+    ) -> Option<usize> {
+        let names: Vec<String> = items.iter().map(|item| item.metric.name()).collect();
+        let found: Vec<usize> = (0..items.len()).filter(|&i| i != own && names[i] == name).collect();
+        let depends = |metric: &str| written.items.iter().any(|i| i.metric == metric && i.counts_with.is_some());
+        match found[..] {
+            [other] if !depends(name) => return Some(other),
+            [_] => {
+                let message = format!("the item of \"{name}\" depends on another item itself");
+                self.complain(path, "chained-item", message, "name an item without \"counts_with\"");
+            }
+            [] => {
+                let others = names.iter().enumerate().filter(|(i, _)| *i != own).map(|(_, n)| n.as_str());
+                let others: Vec<&str> = others.filter(|n| !depends(n)).collect();
+                let message = format!("no other item of this rubric uses the measure \"{name}\"");
+                self.complain(path, "unknown-item", message, did_you_mean(name, others));
+            }
+            _ => {
+                let message = format!("several items of this rubric use the measure \"{name}\"");
+                self.complain(path, "ambiguous-item", message, "name a measure that only one other item uses");
+            }
+        }
+        None
     }
 
     /// Reports a rubric item that rewards the worse end of a measure.

@@ -1,0 +1,68 @@
+//! What the shipped rubrics pay for, and what `typodont check` says of rubrics that are not fair.
+
+use crate::support::bundle;
+use crate::support::folder;
+
+use bundle::*;
+use folder::folder;
+use std::path::Path;
+use std::sync::Arc;
+use typodont_exercise::scenario::{ResolveMode, Workpiece};
+use typodont_exercise::score::idle_grade;
+use typodont_lesson::{IDLE_POINTS_MAX, exercise_warnings, read_scenario, scenario_files};
+
+/// The shipped exercises that are graded.
+fn graded_exercises() -> Vec<Arc<typodont_exercise::scenario::Scenario>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let files = scenario_files(&folder).unwrap();
+    let read = |file: &std::path::PathBuf| Arc::new(read_scenario(file, ResolveMode::ReadScans).unwrap());
+    files.iter().map(read).filter(|scenario| scenario.rubric.is_some()).collect()
+}
+
+#[test]
+fn idle_hands_earn_under_ten_points_in_every_shipped_exercise() {
+    // Aim: nobody is paid for what was avoided by not doing the work; exercise 5 once paid 60 points for it. Method:
+    // a hand that rests above the teeth and confirms each stage, scored like any other session.
+    let exercises = graded_exercises();
+    assert!(exercises.len() >= 12, "{}", exercises.len());
+    for scenario in exercises {
+        let workpiece = Workpiece::make(&scenario, 1).unwrap();
+        let grade = idle_grade(&scenario, &workpiece, 1).unwrap().unwrap();
+        println!("{}: {} points", scenario.id, grade.points);
+        assert!(grade.points < IDLE_POINTS_MAX && !grade.passed, "{}: {:#?}", scenario.id, grade.items);
+    }
+}
+
+#[test]
+fn check_warns_of_a_rubric_that_pays_for_doing_nothing() {
+    // Method: exercise 5 as it was, without the dependence of its items, in coarse voxels.
+    let shipped = format!("{}/scenarios/5-grinding.json", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(shipped).unwrap();
+    let unfair = text.replace(", \"counts_with\": \"decay_cleared_pct\"", "").replace("0.1 } }", "0.25 } }");
+    assert_ne!(unfair, text);
+    let file = folder("unfair").join("unfair.json");
+    std::fs::write(&file, unfair).unwrap();
+    let path = file.to_str().unwrap();
+    let output = typodont(&["check", path]);
+    assert!(output.status.success(), "a warning does not forbid the exercise");
+    assert!(told(&output).contains("1 files checked, no errors, 1 warning"), "{}", told(&output));
+    let warning = complained(&output);
+    assert!(warning.contains("warning: ") && warning.contains("idle-points: /rubric/items/1: "), "{warning}");
+    assert!(warning.contains("earns 60 of 100 points"), "{warning}");
+    let json: serde_json::Value = serde_json::from_str(&told(&typodont(&["check", path, "--format", "json"]))).unwrap();
+    assert_eq!((&json[0]["severity"], &json[0]["code"]), (&"warning".into(), &"idle-points".into()), "{json}");
+}
+
+#[test]
+fn check_says_when_caries_lies_within_a_protected_zone() {
+    // Method: exercise 5 with a lesion deep in the dentine.
+    let shipped = format!("{}/scenarios/5-grinding.json", env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(shipped).unwrap();
+    let deep = text.replace("\"depth_mm\": 0.4", "\"depth_mm\": 2.6").replace("0.1 } }", "0.2 } }");
+    let file = folder("deep").join("deep.json");
+    std::fs::write(&file, deep).unwrap();
+    let scenario = Arc::new(read_scenario(&file, ResolveMode::ReadScans).unwrap());
+    let warnings = exercise_warnings(&scenario).unwrap();
+    let zone = warnings.iter().find(|w| w.code == "caries-in-zone").expect("a warning");
+    assert!(zone.path == "/zones/1" && zone.message.contains("Dentine within 0.5 mm of the pulp"), "{zone:?}");
+}
