@@ -3,7 +3,9 @@
 use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use typodont_integrations::gradebook::{AttemptPolicy, GradebookOptions, Lms, StudentTable, gradebook};
+use typodont_integrations::gradebook::{
+    AttemptPolicy, CriticalErrorPolicy, GradebookOptions, Lms, StudentTable, gradebook,
+};
 use typodont_integrations::session_id;
 use typodont_report::cohort::Cohort;
 use typodont_review::{self as review, LogSnapshot};
@@ -21,6 +23,9 @@ pub struct Arguments {
     /// Session that counts when a participant has several of one exercise
     #[arg(long, value_name = "WHICH", default_value = "last")]
     take: AttemptPolicyName,
+    /// Points of a session with a critical error: unchanged, limited to one below the pass mark, or zero
+    #[arg(long, value_name = "RULE", default_value = "keep")]
+    critical: CriticalErrorPolicyName,
     /// Students' identities: a CSV file with the column participant and the columns by which the system identifies students
     #[arg(long, value_name = "FILE.csv")]
     students: Option<PathBuf>,
@@ -45,6 +50,13 @@ enum AttemptPolicyName {
     First,
 }
 
+#[derive(Clone, Copy, ValueEnum)]
+enum CriticalErrorPolicyName {
+    Keep,
+    Cap,
+    Zero,
+}
+
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let templates = load_templates()?;
     let translator = templates.languages().translator(&arguments.language).map_err(CliError::misuse)?;
@@ -67,9 +79,15 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         AttemptPolicyName::Best => AttemptPolicy::Best,
         AttemptPolicyName::First => AttemptPolicy::First,
     };
-    let made = gradebook(&cohort, &GradebookOptions { lms, policy, students: students.as_ref(), translator });
+    let critical = match arguments.critical {
+        CriticalErrorPolicyName::Keep => CriticalErrorPolicy::Keep,
+        CriticalErrorPolicyName::Cap => CriticalErrorPolicy::Cap,
+        CriticalErrorPolicyName::Zero => CriticalErrorPolicy::Zero,
+    };
+    let options = GradebookOptions { lms, policy, critical, students: students.as_ref(), translator };
+    let made = gradebook(&cohort, &options);
     for what in &made.warnings {
-        eprintln!("left out: {what}");
+        eprintln!("note: {what}");
     }
     if made.students == 0 {
         let what = "no-grades: no session with a participant code has a grade";

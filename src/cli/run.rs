@@ -60,6 +60,9 @@ pub struct Arguments {
     /// Voxel spacing of that volume, if its header does not state it
     #[arg(long, value_name = "MM", requires = "tooth", value_parser = spacing)]
     tooth_spacing_mm: Option<f32>,
+    /// FDI number of the tooth in that volume, such as 13; by default the number of the exercise's own tooth
+    #[arg(long, value_name = "NUMBER", requires = "tooth", value_parser = tooth_number)]
+    fdi: Option<u8>,
     /// Participant code of the trainee; never a name
     #[arg(long, value_name = "CODE", default_value = "", value_parser = participant)]
     participant: String,
@@ -78,6 +81,13 @@ pub fn spacing(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(mm) if (0.01..=2.0).contains(&mm) => Ok(mm),
         _ => Err("the voxel spacing must be between 0.01 and 2 mm".into()),
+    }
+}
+
+fn tooth_number(text: &str) -> Result<u8, String> {
+    match text.parse::<u8>() {
+        Ok(fdi) if (1..=4).contains(&(fdi / 10)) && (1..=8).contains(&(fdi % 10)) => Ok(fdi),
+        _ => Err("the FDI number must be one of 11–18, 21–28, 31–38 or 41–48".into()),
     }
 }
 
@@ -151,6 +161,12 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let seed = arguments.seed.unwrap_or_else(|| lesson::seed_from_time(jiff::Timestamp::now()));
     if let Some(scan) = read_tooth_scan(arguments)? {
         scan.replace_teeth(&mut scenario)?;
+        if arguments.fdi.is_none()
+            && let Some(tooth) = scenario.scene.teeth.first()
+        {
+            let number = tooth.fdi;
+            eprintln!("note: the volume counts as tooth {number}, the exercise's own; --fdi gives it another number");
+        }
         if let Ok(workpiece) = Workpiece::make(&scenario, seed) {
             let warnings = lesson::caries_warnings(&scenario, &workpiece);
             warnings.iter().for_each(|w| eprintln!("warning: {}: {}; {}", w.code, w.message, w.help));
@@ -224,7 +240,8 @@ fn second_hand_source(arguments: &Arguments) -> Option<(second_hand::SecondHandS
 
 /// Reads the scan that replaces the exercise's own tooth.
 fn read_tooth_scan(arguments: &Arguments) -> Result<Option<ToothScan>, LessonError> {
-    arguments.tooth.as_ref().map(|path| ToothScan::read(path, arguments.tooth_spacing_mm)).transpose()
+    let read = |path| ToothScan::read(path, arguments.tooth_spacing_mm, arguments.fdi);
+    arguments.tooth.as_deref().map(read).transpose()
 }
 
 /// Reads a scripted operator, by name or from a file.

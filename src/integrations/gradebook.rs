@@ -23,11 +23,52 @@ pub enum AttemptPolicy {
     First,
 }
 
+/// Rule for the points of a session with a critical error, which a gradebook cannot show as such.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CriticalErrorPolicy {
+    /// The points are written unchanged.
+    #[default]
+    Keep,
+    /// The points are limited to [`CAP_BELOW_PASS`] below the pass mark.
+    Cap,
+    /// 0 points are written.
+    Zero,
+}
+
+/// Number of points below the pass mark to which [`CriticalErrorPolicy::Cap`] limits a grade.
+pub const CAP_BELOW_PASS: f64 = 1.0;
+
+impl CriticalErrorPolicy {
+    /// Returns the points to be written for a grade. A grade that an examiner passed in spite of the error is kept.
+    pub fn points(self, grade: &GradeFile) -> f64 {
+        let applies = !grade.hard_fails.is_empty() && !grade.passed;
+        match self {
+            CriticalErrorPolicy::Cap if applies => grade.points.min((grade.pass_points - CAP_BELOW_PASS).max(0.0)),
+            CriticalErrorPolicy::Zero if applies => 0.0,
+            _ => grade.points,
+        }
+    }
+
+    /// Returns the warning about `count` grades with a critical error.
+    fn warning(self, count: usize) -> String {
+        let effect = match self {
+            CriticalErrorPolicy::Keep => {
+                "their points are exported unchanged, which a gradebook cannot tell from a pass (--critical zero or \
+                 cap changes them)"
+            }
+            CriticalErrorPolicy::Cap => "their points are limited to one below the pass mark",
+            CriticalErrorPolicy::Zero => "0 points are exported for them",
+        };
+        format!("{count} of these grades failed because of a critical error; {effect}")
+    }
+}
+
 /// Contents of a grade table.
 #[derive(Clone, Copy, Debug)]
 pub struct GradebookOptions<'a> {
     pub lms: Lms,
     pub policy: AttemptPolicy,
+    pub critical: CriticalErrorPolicy,
     /// Identities of the students; without them, participant codes are written to `ID number` (Moodle) or
     /// `SIS User ID` (Canvas).
     pub students: Option<&'a StudentTable>,
@@ -106,7 +147,7 @@ impl StudentTable {
 /// Builds the grade table of a cohort: one row per participant, one column per exercise (for Moodle also its
 /// feedback).
 pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
-    let GradebookOptions { lms, policy, students, translator } = *options;
+    let GradebookOptions { lms, policy, critical, students, translator } = *options;
     let graded: Vec<(&SessionFile, &GradeFile)> =
         cohort.sessions.iter().filter_map(|(_, s)| Some((s, s.grade.as_ref()?))).collect();
     let mut warnings = Vec::new();
@@ -183,20 +224,17 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
         for exercise in &exercises {
             let own = graded.iter().filter(|(s, _)| s.participant == person && s.scenario.id == exercise.scenario.id);
             let grade = select_grade(&own.copied().collect::<Vec<_>>(), policy);
-            critical_errors += usize::from(grade.is_some_and(|g| !g.hard_fails.is_empty()));
-            line.push(grade.map_or_else(String::new, |g| g.points.to_string()));
+            critical_errors += usize::from(grade.is_some_and(|g| !g.hard_fails.is_empty() && !g.passed));
+            line.push(grade.map_or_else(String::new, |g| critical.points(g).to_string()));
             if lms == Lms::Moodle {
-                line.push(grade.map_or_else(String::new, |g| feedback(g, translator)));
+                line.push(grade.map_or_else(String::new, |g| feedback(g, critical, translator)));
             }
         }
         table += &csv::format_row(&line);
         count += 1;
     }
     if critical_errors > 0 {
-        warnings.push(format!(
-            "{critical_errors} of these grades failed because of a critical error, whatever their points, which a \
-             gradebook cannot show"
-        ));
+        warnings.push(critical.warning(critical_errors));
     }
     Gradebook { csv: table, students: count, warnings }
 }
@@ -227,7 +265,7 @@ fn select_grade<'a>(sessions: &[(&'a SessionFile, &'a GradeFile)], policy: Attem
 }
 
 /// Summarises a grade as the feedback text of a gradebook.
-fn feedback(grade: &GradeFile, translator: Translator) -> String {
+fn feedback(grade: &GradeFile, critical: CriticalErrorPolicy, translator: Translator) -> String {
     let key = if grade.passed { "gradebook.passed" } else { "gradebook.not_passed" };
     let (points, most) = (round(grade.points), round(grade.max_points));
     let mut sentences =
@@ -237,6 +275,10 @@ fn feedback(grade: &GradeFile, translator: Translator) -> String {
     }
     if !grade.hard_fails.is_empty() {
         sentences.push(translator.text("gradebook.critical_errors", &[("titles", grade.hard_fails.join("; "))]));
+    }
+    let exported = critical.points(grade);
+    if exported != grade.points {
+        sentences.push(translator.text("gradebook.critical_points", &[("points", round(exported))]));
     }
     sentences.extend(grade.items.iter().map(|item| {
         let (points, most) = (round(item.points), round(item.max_points));
@@ -248,4 +290,31 @@ fn feedback(grade: &GradeFile, translator: Translator) -> String {
 /// Formats points, rounded to one decimal place.
 fn round(points: f64) -> String {
     ((points * 10.0).round() / 10.0).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_critical_error_changes_exported_points_only_if_asked() {
+        let failed = GradeFile {
+            points: 82.5,
+            max_points: 100.0,
+            pass_points: 70.0,
+            finished: true,
+            passed: false,
+            hard_fails: vec!["Pulp exposed".into()],
+            items: Vec::new(),
+            hard_fail_checks: Vec::new(),
+        };
+        let policies = [CriticalErrorPolicy::Keep, CriticalErrorPolicy::Cap, CriticalErrorPolicy::Zero];
+        assert_eq!(policies.map(|p| p.points(&failed)), [82.5, 69.0, 0.0]);
+        let low = GradeFile { points: 12.0, ..failed.clone() };
+        assert_eq!(policies.map(|p| p.points(&low)), [12.0, 12.0, 0.0]);
+        // An examiner may pass a session in spite of the error.
+        let excused = GradeFile { passed: true, ..failed };
+        assert_eq!(policies.map(|p| p.points(&excused)), [82.5; 3]);
+        assert!(CriticalErrorPolicy::Keep.warning(2).contains("unchanged"));
+    }
 }

@@ -15,19 +15,22 @@ pub struct ToothScan {
     image: nrrd::VoxelImage,
     /// Voxel spacing, mm, that replaces the one in the file's header.
     spacing: Option<f32>,
+    /// FDI number of the tooth; `None` for the number of the exercise's own tooth.
+    fdi: Option<u8>,
     digest: String,
 }
 
 impl ToothScan {
-    /// Reads a CT volume or a label map (NRRD). `spacing` (mm) replaces the one in the file's header.
+    /// Reads a CT volume or a label map (NRRD). `spacing` (mm) replaces the one in the file's header, and `fdi` the
+    /// number of the exercise's own tooth.
     ///
     /// # Errors
     ///
     /// When the file cannot be read or is not a volume.
-    pub fn read(path: &Path, spacing: Option<f32>) -> Result<ToothScan, LessonError> {
+    pub fn read(path: &Path, spacing: Option<f32>, fdi: Option<u8>) -> Result<ToothScan, LessonError> {
         let bytes = typodont_formats::read_file(path)?;
         let image = nrrd::read(path).map_err(|error| wrong_volume(path, error.to_string()))?;
-        Ok(ToothScan { path: path.to_path_buf(), image, spacing, digest: hex(&Sha256::digest(&bytes)) })
+        Ok(ToothScan { path: path.to_path_buf(), image, spacing, fdi, digest: hex(&Sha256::digest(&bytes)) })
     }
 
     /// SHA-256 of the file.
@@ -47,6 +50,9 @@ impl ToothScan {
         let volume = Arc::new(volume.map_err(|why| wrong_volume(&self.path, why))?);
         for tooth in &mut scenario.scene.teeth {
             tooth.source = ToothSource::Given(volume.clone());
+        }
+        if let Some(fdi) = self.fdi {
+            scenario.renumber_teeth(fdi).map_err(|why| wrong_volume(&self.path, why))?;
         }
         Ok(())
     }

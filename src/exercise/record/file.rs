@@ -41,6 +41,9 @@ pub struct RecordingHeadFile {
     /// carried out some ticks after it was issued.
     #[serde(default)]
     pub live: bool,
+    /// FDI number of the tooth that replaced the exercise's own; left out if the number is the exercise's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tooth_fdi: Option<u8>,
     pub device: DeviceSpecFile,
     /// SHA-256 of the files from which the session was made, by name.
     pub digests: BTreeMap<String, String>,
@@ -60,6 +63,7 @@ impl RecordingHeadFile {
             started: String::new(),
             operator: None,
             live: false,
+            tooth_fdi: scenario.substituted_fdi,
             device: DeviceSpecFile::from(device),
             digests: BTreeMap::new(),
         }

@@ -254,8 +254,11 @@ impl RecordingParts {
             library.insert(file, bytes);
         }
         let source = SourceText::new(format!("{name}: scenario.json"), text);
-        let scenario =
+        let mut scenario =
             scenario::resolve(source, &library, ResolveMode::FromRecording).map_err(RecordingError::Scenario)?;
+        if let Some(fdi) = head.tooth_fdi {
+            scenario.renumber_teeth(fdi).map_err(|what| damaged(&what))?;
+        }
         check_agreement(&head, &scenario, original.is_some()).map_err(damaged)?;
         Ok(Recording {
             head,

@@ -16,6 +16,7 @@ mod questionnaire;
 mod resolve;
 mod schema;
 mod tooth_bounds;
+mod tooth_words;
 mod workpiece;
 
 pub use cavity::{PreparedCavity, ProximalBox};
@@ -51,6 +52,9 @@ pub struct Scenario {
     /// be scored again. Scans are not among them; the volume made from a scan is part of the recording.
     pub files: BTreeMap<String, Arc<[u8]>>,
     pub scene: Scene,
+    /// FDI number of a tooth that replaced the exercise's own, if it has another number; see
+    /// [`Scenario::renumber_teeth`].
+    pub substituted_fdi: Option<u8>,
     pub tissues: TissueTable,
     pub carving: CarvingParameters,
     pub vibration: Vibration,
@@ -446,6 +450,29 @@ impl QuestionKind {
 }
 
 impl Scenario {
+    /// Gives the teeth of the exercise another FDI number, and changes the words for the tooth in its summary,
+    /// instructions, questions and zones accordingly. The title remains: it identifies the exercise.
+    ///
+    /// # Errors
+    /// Returns a message if there is no tooth with this number.
+    pub fn renumber_teeth(&mut self, fdi: u8) -> Result<(), String> {
+        let Some(former) = self.scene.teeth.first().map(|tooth| tooth.fdi) else { return Ok(()) };
+        let Some(words) = tooth_words::Replacement::of(former, fdi) else {
+            return Err(format!("there is no tooth {fdi}; the FDI number must be one of 11–18, 21–28, 31–38 or 41–48"));
+        };
+        self.scene.teeth.iter_mut().for_each(|tooth| tooth.fdi = fdi);
+        self.substituted_fdi = Some(fdi);
+        let stages = self.stages.iter_mut().flat_map(|stage| {
+            let questions = stage.ask.iter_mut().map(|question| &mut question.text);
+            [&mut stage.title, &mut stage.instruction].into_iter().chain(questions)
+        });
+        let zones = self.zones.iter_mut().map(|zone| &mut zone.title);
+        for text in stages.chain(zones).chain([&mut self.summary]) {
+            *text = words.apply(text);
+        }
+        Ok(())
+    }
+
     /// Returns the index of the last stage in which burs run.
     pub fn cutting_stage(&self) -> Option<usize> {
         self.stages.iter().rposition(|s| s.cutting)

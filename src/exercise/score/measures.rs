@@ -94,7 +94,7 @@ pub fn all(
     let of_fillings = if restoration.is_some() { OF_FILLINGS } else { &[] };
     let charting = if chart.is_some() { CHARTING } else { &[] };
     let mut metrics: Vec<Metric> = PLAIN.iter().chain(of_fillings).chain(charting).map(Metric::plain).collect();
-    let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)format!("zone_removed_pct({})", z.id)));
+    let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
     let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
     metrics.extend(zones.chain([tolerance]).flatten());
     let asked = scenario.rubric.iter().flat_map(Rubric::metrics);

@@ -157,6 +157,7 @@ impl Resolver<'_> {
             sha256: hex(&Sha256::digest(text.as_bytes())),
             files: std::mem::take(&mut self.files),
             scene: scene?,
+            substituted_fdi: None,
             tissues: self.tissues.clone(),
             carving,
             vibration: Vibration {

@@ -25,7 +25,8 @@ pub struct Excavation {
 struct DecayColumn {
     /// Height of the tooth's surface.
     top: f32,
-    /// Height of the decay's lower end.
+    /// Height of the decay's lower end: the lower face of its lowest voxel, not its centre, so that the path is the
+    /// same in coarse and in fine voxels.
     floor: f32,
 }
 
@@ -35,7 +36,10 @@ impl Excavation {
         let grid = volume.grid();
         let columns = columns(volume, is_decay);
         let flat = Grid { dims: [grid.dims[0], grid.dims[1], 1], ..*grid };
-        let inside = distance::to_set(&flat, |i| columns[i].is_none());
+        // The border lies between two columns, half a voxel before the centre of the first column without decay.
+        let half = 0.5 * grid.spacing.x.max(grid.spacing.y);
+        let inside: Vec<f32> =
+            distance::to_set(&flat, |i| columns[i].is_none()).into_iter().map(|d| (d - half).max(0.0)).collect();
         let widest = inside.iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, &b| a.max(b));
         // Decay narrower than the bur is cut along its centre line.
         let least = (self.radius - self.margin).min(0.8 * widest);
@@ -85,7 +89,7 @@ fn columns(volume: &Volume, is_decay: impl Fn(Vec3, Label) -> bool) -> Vec<Optio
         let column = index % flat;
         tops[column] = tops[column].max(place.z);
         if floors[column].is_infinite() && is_decay(place, label) {
-            floors[column] = place.z;
+            floors[column] = place.z - 0.5 * grid.spacing.z;
         }
     }
     let both = tops.into_iter().zip(floors);
