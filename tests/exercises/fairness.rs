@@ -38,7 +38,7 @@ fn check_warns_of_a_rubric_that_pays_for_doing_nothing() {
     // Method: exercise 5 as it was, without the dependence of its items, in coarse voxels.
     let shipped = format!("{}/scenarios/5-grinding.json", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(shipped).unwrap();
-    let unfair = text.replace(", \"counts_with\": \"decay_cleared_pct\"", "").replace("0.1 } }", "0.25 } }");
+    let unfair = text.replace(", \"counts_with\": \"accessible_decay_cleared_pct\"", "").replace("0.1 } }", "0.25 } }");
     assert_ne!(unfair, text);
     let file = folder("unfair").join("unfair.json");
     std::fs::write(&file, unfair).unwrap();
@@ -58,7 +58,7 @@ fn check_says_when_caries_lies_within_a_protected_zone() {
     // Method: exercise 5 with a lesion deep in the dentine.
     let shipped = format!("{}/scenarios/5-grinding.json", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(shipped).unwrap();
-    let deep = text.replace("\"depth_mm\": 0.4", "\"depth_mm\": 2.6").replace("0.1 } }", "0.2 } }");
+    let deep = text.replace("\"depth_mm\": 0.4", "\"depth_mm\": 4.0").replace("0.1 } }", "0.2 } }");
     let file = folder("deep").join("deep.json");
     std::fs::write(&file, deep).unwrap();
     let scenario = Arc::new(read_scenario(&file, ResolveMode::ReadScans).unwrap());

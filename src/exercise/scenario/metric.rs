@@ -42,8 +42,9 @@ pub enum MetricArgument {
 
 /// Measures that have no meaning without tissue to be removed: by their rules for empty sets, they would then report a
 /// good result.
-const OF_TARGET: [&str; 13] = [
+const OF_TARGET: [&str; 14] = [
     "decay_cleared_pct",
+    "accessible_decay_cleared_pct",
     "healthy_per_decay_pct",
     "efficiency_pct_s",
     "dice",
@@ -84,6 +85,7 @@ pub enum RequiredFeature {
 /// one each, unless they are in this table.
 const REQUIRED_FEATURES: &[(&str, &[RequiredFeature])] = &[
     ("decay_cleared_pct", &[RequiredFeature::Decay]),
+    ("accessible_decay_cleared_pct", &[RequiredFeature::Decay]),
     ("healthy_per_decay_pct", &[RequiredFeature::Decay]),
     ("efficiency_pct_s", &[RequiredFeature::Decay]),
     ("detect_tooth", &[RequiredFeature::ToothQuestion]),
@@ -128,6 +130,14 @@ const fn info(
 /// Measures without an argument, in the order of reports.
 pub const PLAIN: &[MetricInfo] = &[
     info("decay_cleared_pct", "Caries removed", "%", Higher, "100·|R∩D| / |D|; no value without caries"),
+    info(
+        "accessible_decay_cleared_pct",
+        "Accessible caries removed",
+        "%",
+        Higher,
+        "100·|R∩D′| / |D′|; D′ is the part of D that the smallest cutting instrument of the tray reaches, as a ball, \
+         without cutting other tissue: corners between coarse voxels do not count; no value without caries",
+    ),
     info(
         "healthy_per_decay_pct",
         "Sound tissue removed, relative to the caries",

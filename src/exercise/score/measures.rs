@@ -168,6 +168,12 @@ impl MeasureSource<'_> {
         let cleared_pct = || share(counts.removed_decay, counts.decay).map(|s| 100.0 * s);
         Some(match name {
             "decay_cleared_pct" => cleared_pct().into(),
+            "accessible_decay_cleared_pct" => {
+                let cutting = self.recording.scenario.instruments.iter().filter(|i| i.cuts);
+                let radii = cutting.map(|i| i.to_instrument().head_radius());
+                let smallest = radii.reduce(f32::min).unwrap_or(0.0);
+                self.comparison.accessible_cleared_pct(&self.replay.workpiece.volume, smallest).into()
+            }
             "healthy_per_decay_pct" => share(counts.removed_other, counts.decay).map(|s| 100.0 * s).into(),
             "efficiency_pct_s" => {
                 let drilling_ticks = self.process.drilling_ticks;

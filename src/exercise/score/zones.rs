@@ -142,14 +142,14 @@ mod tests {
         // Aim: a careful hand that removes all caries and no dentine harms no protected zone; one voxel of sound
         // dentine of the zone is harm. A lesion near the pulp once failed everybody. Method: a deep lesion, removed
         // entirely by assignment, without and with one sound voxel of the zone.
-        let (scenario, workpiece) = deep_lesion(2.6);
+        let (scenario, workpiece) = deep_lesion(4.0);
         let zone = scenario.zones.iter().position(|z| z.id == "over_pulp").unwrap();
         let initial = workpiece.volume.clone();
         let is_decay = |v: &usize| scenario.tissues.role(initial.tissue(*v)) == Some(TissueRole::Decay);
         let decay: Vec<usize> = (0..initial.grid().len()).filter(is_decay).collect();
         let whole_zone = super::mask(&scenario.zones[zone], &initial);
         let in_zone: Vec<usize> = decay.iter().copied().filter(|&v| whole_zone.contains(v)).collect();
-        assert!(in_zone.len() > 20, "the lesion reaches the zone: {}", in_zone.len());
+        assert!(in_zone.len() > 4, "the lesion reaches the zone: {}", in_zone.len());
         assert_eq!(super::decay_in_zones(&scenario, &workpiece)[0].zone, scenario.zones[zone].title);
 
         let careful = removed(&workpiece, decay.iter().copied());
