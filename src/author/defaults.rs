@@ -50,7 +50,10 @@ pub fn new_exercise(title: &str, stage: &str, instruction: &str, lines: [&str; 3
         "title": {spared}, "metric": "healthy_per_decay_pct", "points": 30, "full_at": 20, "zero_at": 100,
         "counts_with": "accessible_decay_cleared_pct"
       }},
-      {{ "title": {light}, "metric": "force_max_n", "points": 20, "full_at": 1.8, "zero_at": 3.3, "counts_with": "accessible_decay_cleared_pct" }}
+      {{
+        "title": {light}, "metric": "force_max_n", "points": 20, "full_at": 1.8, "zero_at": 3.3,
+        "counts_with": "accessible_decay_cleared_pct"
+      }}
     ],
     "hard_fails": [
       {{ "title": {fail}, "metric": "pulp_exposed", "when": {{ "above": 0 }} }}
