@@ -215,3 +215,55 @@ fn everyone_gets_through_the_introductions() {
         }
     }
 }
+
+#[test]
+#[ignore = "scripts/test --long"]
+fn points_of_all_operators_in_all_exercises() {
+    // Aim: the table of `docs/operators.md`. Method: every graded exercise, by idle hands and by each operator, with
+    // the seeds 1 to TYPODONT_SEEDS (1 if it is not set), at the voxel size TYPODONT_SPACING (the exercise's own).
+    // Timid and hasty hands never have more points than careful ones.
+    let seeds: u64 = std::env::var("TYPODONT_SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(1);
+    let spacing = std::env::var("TYPODONT_SPACING").ok();
+    let scenarios = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let out = folder("operators_table");
+    println!("| exercise | idle | timid | hasty | careful | expert |\n| --- | --- | --- | --- | --- | --- |");
+    let mut wrong = Vec::new();
+    for file in typodont_lesson::scenario_files(&scenarios).unwrap() {
+        let text = std::fs::read_to_string(&file).unwrap();
+        if !text.contains("\"rubric\"") {
+            continue;
+        }
+        let name = file.file_name().unwrap().to_str().unwrap();
+        let own = spacing
+            .as_ref()
+            .map_or(text.clone(), |mm| text.replace("\"spacing_mm\": 0.1", &format!("\"spacing_mm\": {mm}")));
+        let file = out.join(name);
+        std::fs::write(&file, own).unwrap();
+        let scenario = typodont_exercise::scenario::ResolveMode::ReadScans;
+        let scenario = std::sync::Arc::new(typodont_lesson::read_scenario(&file, scenario).unwrap());
+        let workpiece = typodont_exercise::scenario::Workpiece::make(&scenario, 1).unwrap();
+        let idle = typodont_exercise::score::idle_grade(&scenario, &workpiece, 1).unwrap().unwrap().points;
+        let mut row = format!("| {} | {idle:.1} |", name.trim_end_matches(".json"));
+        let mut means = Vec::new();
+        for operator in ["timid", "hasty", "careful", "expert"] {
+            let sessions: Vec<Value> = (1..=seeds)
+                .map(|seed| session(&run(file.to_str().unwrap(), operator, &out, &["--seed", &seed.to_string()])))
+                .collect();
+            let points: Vec<f64> = sessions.iter().map(|s| s["grade"]["points"].as_f64().unwrap()).collect();
+            let passed = sessions.iter().filter(|s| s["grade"]["passed"] == true).count();
+            let mean = points.iter().sum::<f64>() / points.len() as f64;
+            let [low, high] =
+                [points.iter().copied().fold(f64::INFINITY, f64::min), points.iter().copied().fold(0.0, f64::max)];
+            row += &match seeds {
+                1 => format!(" {mean:.1}{} |", if passed == 1 { "" } else { " F" }),
+                _ => format!(" {mean:.1} ({low:.1}–{high:.1}), {passed} of {seeds} pass |"),
+            };
+            means.push(mean);
+        }
+        println!("{row}");
+        if means[0] > means[2] || means[1] > means[2] {
+            wrong.push(name.to_string());
+        }
+    }
+    assert!(wrong.is_empty(), "careful hands have fewer points than timid or hasty ones: {wrong:?}");
+}
