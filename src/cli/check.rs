@@ -6,6 +6,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use typodont_exercise::scenario::ResolveMode;
+use typodont_exercise::scenario::file::ScenarioFile;
 use typodont_formats::diagnostic::{Diagnostic, SourceText};
 use typodont_formats::json;
 use typodont_lesson::{self as lesson, ExerciseWarning, scenario_files};
@@ -78,7 +79,7 @@ fn check(path: &Path) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
     let name = path.display().to_string();
     let about_file = |why: String| vec![Diagnostic::about_file(&name, "impossible-scene", why, None)];
     let warnings = lesson::exercise_warnings(&scenario).map_err(about_file)?;
-    let read = json::read::<serde_json::Value>(SourceText::new(name, scenario.text.to_string()))?;
+    let read = json::read::<ScenarioFile>(SourceText::new(name, scenario.text.to_string()))?;
     let diagnostic = |w: ExerciseWarning| read.source_map.complain(&w.path, w.code, w.message, Some(w.help));
     Ok(warnings.into_iter().map(diagnostic).collect())
 }

@@ -6,7 +6,7 @@
 use super::Grade;
 use crate::record::{Recording, RecordingEndFile, RecordingHeadFile, ReplayCheck, ServoStatsFile, TickRecord};
 use crate::scenario::{Scenario, Workpiece};
-use crate::session::{Effect, Input, Observer, Session, Trainee, run, setup};
+use crate::session::{self, Effect, Input, Observer, Session, Trainee};
 use std::convert::Infallible;
 use std::sync::Arc;
 use typodont_core::device::{Device, DeviceError, DeviceSpec, Reading, Wrench};
@@ -33,11 +33,11 @@ pub fn idle_grade(scenario: &Arc<Scenario>, workpiece: &Workpiece, seed: u64) ->
     }
     let spec = DeviceSpec::phantom_omni();
     let head = RecordingHeadFile::of(scenario, &spec, seed);
-    let mut simulation = Simulation::new(setup(scenario, workpiece, spec.clone()));
+    let mut simulation = Simulation::new(session::setup(scenario, workpiece, spec.clone()));
     let mut session = Session::new(scenario.clone(), workpiece);
     let mut trainee = IdleTrainee { spec, stage: None, ticks: 0 };
     let mut log = SessionLog::default();
-    let Ok(_) = run(&mut session, &mut simulation, &mut trainee, &mut log);
+    let Ok(_) = session::run(&mut session, &mut simulation, &mut trainee, &mut log);
     let end = RecordingEndFile { reason: "complete".into(), servo: ServoStatsFile::of(&simulation) };
     let mut recording = Recording::unverified(head, scenario.clone(), workpiece);
     recording.end = Some(end);
@@ -99,7 +99,7 @@ impl Observer for SessionLog {
     }
 
     fn command(&mut self, tick: Tick, command: &Command) -> Result<(), Infallible> {
-        self.commands.push((tick, command.clone()));
+        self.commands.push((tick, *command));
         Ok(())
     }
 
