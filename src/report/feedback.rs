@@ -1,18 +1,19 @@
 //! Feedback in sentences: the causes of lost points and advice for the next attempt.
 //!
-//! Takes a session's grade, its measures, its error episodes ("lapses") and rules that a school may edit. Gives for
-//! each rubric item that lost points the events with their place, time and force, the most costly item first. Every
-//! sentence refers to the measure that it explains.
+//! Takes the result of a session, as in `session.json`, and rules that a school may edit. Gives for each rubric item
+//! that lost points the events with their place, time and force, the most costly item first. Every sentence refers to
+//! the measure that it explains, and takes tissue, wall, place, depth, force and time from one error episode ("lapse")
+//! or from the evidence of that measure, never from two of them.
 
-use super::SessionFile;
 use super::display_format;
 use super::language::{Message, MessageArgs, Texts, placeholders};
+use super::{EpisodeFile, EvidenceFile, SessionFile};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use typodont_core::tick::Tick;
-use typodont_exercise::catalog::TissueTable;
-use typodont_exercise::score::{AnatomicalDirection, EpisodeKind, ErrorEpisode};
+use typodont_exercise::catalog::TissueRole;
+use typodont_exercise::scenario::Scenario;
+use typodont_exercise::score::EpisodeKind;
 use typodont_formats::diagnostic::{Diagnostic, SourceText, headlines};
 use typodont_formats::json;
 
@@ -49,11 +50,12 @@ struct FeedbackRule {
     /// Order of severity among the mistakes: by the volume of tissue concerned (the default) or by depth.
     #[serde(default)]
     worst_by: Option<Severity>,
-    /// Sentence for each of the worst such mistakes: {depth} {volume} {tissue} {where} {when} {force} {seconds} {value}
-    /// {goal}.
+    /// Sentence for each of the worst such mistakes: {depth} {volume} {tissue} {sound_tissue} {where} {when} {at}
+    /// {force} {force_at} {seconds} {zone} {value} {goal} {title}.
     #[serde(default)]
     say: Option<Texts>,
-    /// Sentence used instead if the measure itself has a time: {when} {value} {goal} {title}.
+    /// Sentence used instead if the measure has the evidence that the sentence states: {tissue} {sound_tissue} {where}
+    /// {depth} {volume} {when} {force} {value} {goal} {title}.
     #[serde(default)]
     seen: Option<Texts>,
     /// Sentence used if neither is known: {value} {goal} {title}.
@@ -68,6 +70,7 @@ struct FeedbackRule {
 enum MistakeName {
     Overcut,
     Vulnerable,
+    Zone,
     Left,
     Force,
     Neighbour,
@@ -86,6 +89,7 @@ impl From<MistakeName> for EpisodeKind {
         match name {
             MistakeName::Overcut => EpisodeKind::Overcut,
             MistakeName::Vulnerable => EpisodeKind::Vulnerable,
+            MistakeName::Zone => EpisodeKind::Zone,
             MistakeName::Left => EpisodeKind::Left,
             MistakeName::Force => EpisodeKind::Force,
             MistakeName::Neighbour => EpisodeKind::Neighbour,
@@ -94,8 +98,24 @@ impl From<MistakeName> for EpisodeKind {
     }
 }
 
-const SAY_PLACEHOLDERS: [&str; 9] = ["depth", "volume", "tissue", "where", "when", "force", "seconds", "value", "goal"];
-const SEEN_PLACEHOLDERS: [&str; 4] = ["when", "value", "goal", "title"];
+const SAY_PLACEHOLDERS: [&str; 14] = [
+    "depth",
+    "volume",
+    "tissue",
+    "sound_tissue",
+    "where",
+    "when",
+    "at",
+    "force",
+    "force_at",
+    "seconds",
+    "zone",
+    "value",
+    "goal",
+    "title",
+];
+const SEEN_PLACEHOLDERS: [&str; 10] =
+    ["tissue", "sound_tissue", "where", "depth", "volume", "when", "force", "value", "goal", "title"];
 const OTHERWISE_PLACEHOLDERS: [&str; 3] = ["value", "goal", "title"];
 
 /// Rules by which the sentences are made; always with a rule for measures that no other rule names.
@@ -126,12 +146,13 @@ impl FeedbackRules {
         if found.is_empty() { Ok(FeedbackRules(read.value.rules)) } else { Err(headlines(&found)) }
     }
 
-    /// Rule for a measure. A rule about touched vulnerable tissue is skipped where a higher value is better: such a
-    /// zone was to be removed.
+    /// Rule for a measure. A rule about protected tissue is skipped where a higher value is better: such a zone was to
+    /// be removed.
     fn rule_for(&self, metric: &str, is_lower_better: bool) -> Option<&FeedbackRule> {
         let name = metric.split('(').next().unwrap_or(metric);
-        let is_applicable =
-            |rule: &FeedbackRule| is_lower_better || rule.lapse.map(EpisodeKind::from) != Some(EpisodeKind::Vulnerable);
+        let is_applicable = |rule: &FeedbackRule| {
+            is_lower_better || !matches!(rule.lapse, Some(MistakeName::Vulnerable | MistakeName::Zone))
+        };
         self.0
             .iter()
             .find(|r| r.metric == name && is_applicable(r))
@@ -220,12 +241,11 @@ pub struct Feedback {
     pub full_marks: Vec<String>,
 }
 
-/// Feedback on a graded session; empty for a session without a grade.
-pub fn build(session: &SessionFile, lapses: &[ErrorEpisode], rules: &FeedbackRules, tissues: &TissueTable) -> Feedback {
+/// Feedback on a graded session; empty for a session without a grade. `scenario` gives the titles of tissues and zones.
+pub fn build(session: &SessionFile, scenario: &Scenario, rules: &FeedbackRules) -> Feedback {
     let mut feedback = Feedback::default();
     let Some(grade) = &session.grade else { return feedback };
-    let mut builder =
-        SentenceBuilder { session, lapses, rules, tissues, numbered_lapses: Vec::new(), moments: Vec::new() };
+    let mut builder = SentenceBuilder { session, scenario, rules, numbered_lapses: Vec::new(), moments: Vec::new() };
     let mut explained_metrics: BTreeSet<&str> = BTreeSet::new();
     for fail in grade.hard_fail_checks.iter().filter(|f| f.failed) {
         if explained_metrics.insert(&fail.metric) {
@@ -254,9 +274,8 @@ pub fn build(session: &SessionFile, lapses: &[ErrorEpisode], rules: &FeedbackRul
 /// Makes sentences and numbers the moments that they mention.
 struct SentenceBuilder<'a> {
     session: &'a SessionFile,
-    lapses: &'a [ErrorEpisode],
+    scenario: &'a Scenario,
     rules: &'a FeedbackRules,
-    tissues: &'a TissueTable,
     /// Lapses that have a moment, by index, with its number.
     numbered_lapses: Vec<(usize, usize)>,
     moments: Vec<FeedbackMoment>,
@@ -286,23 +305,31 @@ impl SentenceBuilder<'_> {
                 .map(|(name, said)| (name.to_string(), said))
                 .into();
         if let (Some(mistake), Some(texts)) = (rule.lapse.map(EpisodeKind::from), &rule.say) {
-            for index in self.worst_lapses(mistake, rule.worst_by) {
+            for index in self.worst_lapses(mistake, metric, goal, rule.worst_by) {
                 finding.sentences.extend(self.sentence(index, texts, &args));
             }
         }
         if finding.sentences.is_empty() {
-            finding.sentences.push(self.sentence_without_lapse(metric, rule, args));
+            finding.sentences.push(self.sentence_without_lapse(metric, value, rule, args));
         }
         finding.advice = rule.advice.clone().map(|texts| Message::PerLanguage { texts, args: Vec::new() });
         finding
     }
 
-    /// Indices of the lapses of a kind that are described: the worst first, at most [`LAPSES_PER_ITEM_MAX`].
-    fn worst_lapses(&self, mistake: EpisodeKind, by: Option<Severity>) -> Vec<usize> {
-        let meant = self.lapses.iter().enumerate().filter(|(_, l)| l.kind == mistake);
+    /// Indices of the lapses of a kind that are described: the worst first, at most [`LAPSES_PER_ITEM_MAX`]. Of zones,
+    /// only those in the measure's zone; of forces, only those above `goal`.
+    fn worst_lapses(&self, mistake: EpisodeKind, metric: &str, goal: Option<f64>, by: Option<Severity>) -> Vec<usize> {
+        let zone = metric.split_once('(').map(|(_, zone)| zone.trim_end_matches(')'));
+        let is_meant = |lapse: &EpisodeFile| match mistake {
+            EpisodeKind::Zone => lapse.zone.as_deref() == zone,
+            EpisodeKind::Force => goal.is_none_or(|goal| lapse.force_n.is_some_and(|force| force > goal)),
+            _ => true,
+        };
+        let lapses = &self.session.episodes;
+        let meant = lapses.iter().enumerate().filter(|(_, l)| l.kind == mistake.id() && is_meant(l));
         let mut meant: Vec<usize> = meant.map(|(index, _)| index).collect();
         if by == Some(Severity::Depth) {
-            let depth = |index: &usize| self.lapses[*index].depth.unwrap_or(0.0);
+            let depth = |index: &usize| lapses[*index].depth_mm.unwrap_or(0.0);
             meant.sort_by(|a, b| depth(b).total_cmp(&depth(a)));
         }
         meant.truncate(LAPSES_PER_ITEM_MAX);
@@ -311,11 +338,9 @@ impl SentenceBuilder<'_> {
 
     /// A sentence about a lapse; `None` if the text has a placeholder for which this lapse has no value.
     fn sentence(&mut self, index: usize, texts: &Texts, args: &MessageArgs) -> Option<FeedbackSentence> {
-        let lapse = &self.lapses[index];
         let mut all_args = args.clone();
-        all_args.extend(lapse_args(lapse, self.tissues));
-        let names: BTreeSet<&str> = texts.values().flat_map(|t| placeholders(t)).collect();
-        if names.iter().any(|name| !all_args.iter().any(|(n, _)| n == name)) {
+        all_args.extend(lapse_args(&self.session.episodes[index], self.scenario));
+        if !is_complete(texts, &all_args) {
             return None;
         }
         let moment = self.moment_of_lapse(index);
@@ -329,9 +354,8 @@ impl SentenceBuilder<'_> {
         if let Some((_, number)) = self.numbered_lapses.iter().find(|(i, _)| *i == index) {
             return *number;
         }
-        let lapse = &self.lapses[index];
-        let span = lapse.span.map(|span| span.map(Tick::seconds));
-        let number = self.add_moment(lapse.worst.map(Tick::seconds), span, lapse.place.to_array().map(f64::from));
+        let EpisodeFile { at_s, from_s, to_s, place_mm, .. } = self.session.episodes[index];
+        let number = self.add_moment(at_s, from_s.zip(to_s).map(|(from, to)| [from, to]), place_mm);
         self.numbered_lapses.push((index, number));
         number
     }
@@ -342,20 +366,34 @@ impl SentenceBuilder<'_> {
         number
     }
 
-    fn sentence_without_lapse(&mut self, metric: &str, rule: &FeedbackRule, args: MessageArgs) -> FeedbackSentence {
-        let evidence = self.session.evidence.get(metric);
-        if let (Some(texts), Some(evidence)) = (&rule.seen, evidence)
-            && let Some(at) = evidence.at_s
-        {
-            let number = self.add_moment(Some(at), None, evidence.place_mm);
-            let args_with_time = [args, vec![("when".to_string(), at_time(at))]].concat();
-            return FeedbackSentence {
-                message: Message::PerLanguage { texts: texts.clone(), args: args_with_time },
-                moment: Some(number),
-            };
+    fn sentence_without_lapse(
+        &mut self,
+        metric: &str,
+        value: Option<f64>,
+        rule: &FeedbackRule,
+        args: MessageArgs,
+    ) -> FeedbackSentence {
+        if let (Some(texts), Some(evidence)) = (&rule.seen, self.session.evidence.get(metric)) {
+            let all_args = [args.clone(), evidence_args(evidence, self.scenario)].concat();
+            if is_complete(texts, &all_args) {
+                let number = self.add_moment(evidence.at_s, None, evidence.place_mm);
+                let message = Message::PerLanguage { texts: texts.clone(), args: all_args };
+                return FeedbackSentence { message, moment: Some(number) };
+            }
         }
-        FeedbackSentence { message: Message::PerLanguage { texts: rule.otherwise.clone(), args }, moment: None }
+        let states_value = rule.otherwise.values().any(|text| placeholders(text).any(|name| name == "value"));
+        let message = if value.is_none() && states_value {
+            Message::Keyed { key: "feedback.no_value".into(), fallback: String::new(), args }
+        } else {
+            Message::PerLanguage { texts: rule.otherwise.clone(), args }
+        };
+        FeedbackSentence { message, moment: None }
     }
+}
+
+/// Returns true if every placeholder of a text has a value.
+fn is_complete(texts: &Texts, args: &MessageArgs) -> bool {
+    texts.values().flat_map(|text| placeholders(text)).all(|name| args.iter().any(|(known, _)| known == name))
 }
 
 /// A number and its unit with non-breaking spaces, so that they stay on one line.
@@ -368,42 +406,85 @@ fn at_time(seconds: f64) -> Message {
 }
 
 /// Values of the placeholders for a lapse; a name without a value is left out.
-fn lapse_args(lapse: &ErrorEpisode, tissues: &TissueTable) -> MessageArgs {
-    let mut known = vec![
-        ("volume", Message::plain(non_breaking(format!("{} mm³", display_format::number(lapse.volume))))),
-        ("force", Message::plain(non_breaking(format!("{:.1} N", lapse.force)))),
-        ("seconds", Message::plain(non_breaking(display_format::duration(lapse.seconds)))),
+fn lapse_args(lapse: &EpisodeFile, scenario: &Scenario) -> MessageArgs {
+    let zone = lapse.zone.as_ref().and_then(|id| scenario.zones.iter().find(|zone| zone.id == *id));
+    let when = lapse.from_s.zip(lapse.to_s).zip(lapse.at_s).map(|((from, to), at)| {
+        if to - from < SINGLE_MOMENT_S {
+            return at_time(at);
+        }
+        let [from, to] = [from, to].map(|s| Message::plain(non_breaking(display_format::duration(s))));
+        Message::text("when.between", &[("from", from), ("to", to)])
+    });
+    let known = [
+        ("depth", lapse.depth_mm.map(length)),
+        ("volume", lapse.volume_mm3.map(volume)),
+        ("tissue", tissue(lapse.tissue.as_deref(), scenario)),
+        ("sound_tissue", sound_tissue(lapse.tissue.as_deref(), scenario)),
+        ("where", lapse.wall.as_deref().map(wall)),
+        ("when", when),
+        ("at", lapse.at_s.map(at_time)),
+        ("force", lapse.force_n.map(force)),
+        ("force_at", lapse.force_at_n.map(force)),
+        ("seconds", lapse.contact_s.map(|s| Message::plain(non_breaking(display_format::duration(s))))),
+        ("zone", zone.map(|zone| Message::plain(zone.title.as_str()))),
     ];
-    known.extend(lapse.depth.map(|mm| ("depth", Message::plain(non_breaking(format!("{mm:.1} mm"))))));
-    known.extend(lapse.direction.map(|way| ("where", Message::text(format!("where.{}", direction_key(way)), &[]))));
-    known.extend(
-        tissues
-            .by_label(lapse.tissue)
-            .map(|t| ("tissue", Message::text_or(format!("tissue.{}", t.name), t.title.to_lowercase()))),
-    );
-    known.extend(lapse.span.map(|[from, to]| {
-        let [from, to] = [from, to].map(Tick::seconds);
-        let when = match lapse.worst {
-            Some(worst) if to - from < SINGLE_MOMENT_S => at_time(worst.seconds()),
-            _ => {
-                let [from, to] = [from, to].map(|s| Message::plain(non_breaking(display_format::duration(s))));
-                Message::text("when.between", &[("from", from), ("to", to)])
-            }
-        };
-        ("when", when)
-    }));
-    known.into_iter().map(|(name, said)| (name.to_string(), said)).collect()
+    with_values(known)
 }
 
-/// Last part of the language key of a direction (`where.…`).
-fn direction_key(direction: AnatomicalDirection) -> &'static str {
-    match direction {
-        AnatomicalDirection::Buccal => "buccal",
-        AnatomicalDirection::Lingual => "lingual",
-        AnatomicalDirection::Mesial => "mesial",
-        AnatomicalDirection::Distal => "distal",
-        AnatomicalDirection::Occlusal => "occlusal",
-        AnatomicalDirection::Apical => "apical",
+/// Values of the placeholders for the evidence of a measure; a name without a value is left out.
+fn evidence_args(evidence: &EvidenceFile, scenario: &Scenario) -> MessageArgs {
+    let known = [
+        ("depth", evidence.depth_mm.map(length)),
+        ("volume", evidence.volume_mm3.map(volume)),
+        ("tissue", tissue(evidence.tissue.as_deref(), scenario)),
+        ("sound_tissue", sound_tissue(evidence.tissue.as_deref(), scenario)),
+        ("where", evidence.wall.as_deref().map(wall)),
+        ("when", evidence.at_s.map(at_time)),
+        ("force", evidence.force_n.map(force)),
+    ];
+    with_values(known)
+}
+
+fn with_values<const N: usize>(known: [(&str, Option<Message>); N]) -> MessageArgs {
+    known.into_iter().filter_map(|(name, said)| Some((name.to_string(), said?))).collect()
+}
+
+fn length(mm: f64) -> Message {
+    Message::plain(non_breaking(format!("{mm:.1} mm")))
+}
+
+fn force(newtons: f64) -> Message {
+    Message::plain(non_breaking(format!("{newtons:.1} N")))
+}
+
+/// A volume in mm³ with two decimals; a smaller one than a tenth with three.
+fn volume(mm3: f64) -> Message {
+    let decimals = if mm3 == 0.0 {
+        0
+    } else if mm3 < 0.1 {
+        3
+    } else {
+        2
+    };
+    Message::plain(non_breaking(format!("{mm3:.decimals$} mm³")))
+}
+
+fn wall(id: &str) -> Message {
+    Message::text(format!("where.{id}"), &[])
+}
+
+/// Title of a tissue, in lower case within a sentence.
+fn tissue(name: Option<&str>, scenario: &Scenario) -> Option<Message> {
+    let entry = scenario.tissues.by_name(name?)?;
+    Some(Message::text_or(format!("tissue.{}", entry.name), entry.title.to_lowercase()))
+}
+
+/// Title of a tissue, called sound where it is sound tooth tissue; calculus or an old filling never is.
+fn sound_tissue(name: Option<&str>, scenario: &Scenario) -> Option<Message> {
+    let title = tissue(name, scenario)?;
+    match scenario.tissues.by_name(name?)?.role {
+        TissueRole::Sound => Some(Message::text("tissue_is.sound", &[("tissue", title)])),
+        _ => Some(title),
     }
 }
 
@@ -412,14 +493,14 @@ mod tests {
     use super::super::templates::Templates;
     use super::*;
     use typodont_exercise::score;
+    use typodont_exercise::score::ErrorEpisode;
 
     #[test]
     fn the_most_costly_line_is_told_first_and_every_sentence_has_its_measure() {
         let (recording, scored) = crate::example();
         let session = SessionFile::of(&recording, &scored);
-        let lapses = score::error_episodes(&recording, &scored);
         let templates = Templates::shipped();
-        let feedback = build(&session, &lapses, templates.rules(), &recording.scenario.tissues);
+        let feedback = build(&session, &recording.scenario, templates.rules());
         let lost: Vec<f64> = feedback.findings.iter().filter_map(|f| f.lost).collect();
         assert!(lost.len() >= 3 && lost.is_sorted_by(|a, b| a >= b), "{lost:?}");
         for finding in &feedback.findings {
@@ -436,9 +517,17 @@ mod tests {
         let deepest = feedback.findings.iter().find(|f| f.metric == "overcut_depth_max_mm").unwrap();
         let english =
             templates.languages().in_each_language(&deepest.sentences[0].message)["en"].replace('\u{a0}', " ");
-        let depth =
-            lapses.iter().filter(|l| l.kind == EpisodeKind::Overcut).filter_map(|l| l.depth).fold(0.0, f32::max);
-        assert!(english.contains(&format!(", {depth:.1} mm deep (")) && english.ends_with(" N)."), "{english}");
+        let evidence = &session.evidence["overcut_depth_max_mm"];
+        let told = [
+            display_format::measure("overcut_depth_max_mm", session.metric("overcut_depth_max_mm")),
+            format!("sound {}", evidence.tissue.as_ref().unwrap()),
+            format!("at the {} wall", evidence.wall.as_ref().unwrap()),
+            format!("at {}", display_format::duration(evidence.at_s.unwrap())),
+            format!("{:.1} N", evidence.force_n.unwrap()),
+        ];
+        assert!(told.iter().all(|part| english.contains(part)), "{english}: {told:?}");
+        let moment = feedback.moments[deepest.sentences[0].moment.unwrap() - 1].clone();
+        assert_eq!((moment.at, moment.place), (evidence.at_s, evidence.place_mm), "one and the same evidence");
     }
 
     #[test]
@@ -446,7 +535,7 @@ mod tests {
         // Aim: no sentence sends a trainee to the wrong place. Method: the verdict at each lapse's place, and its time.
         let (recording, scored) = crate::example();
         let grid = scored.replay.workpiece.volume.grid();
-        let lapses = score::error_episodes(&recording, &scored);
+        let lapses = score::error_episodes(&recording.scenario, &scored);
         let of = |mistake: EpisodeKind| lapses.iter().filter(move |l| l.kind == mistake);
         assert!(
             of(EpisodeKind::Overcut).count() > 0

@@ -38,8 +38,8 @@ pub use labelmap::tissues as tissue_map;
 pub use language::{Languages, Message, Translator};
 pub use pictures::{PREVIEW_SIZE, preview_png, sections_png};
 pub use session_file::{
-    AnswerResultFile, CriticalErrorFile, DeviceFile, EvidenceFile, GradeFile, ItemResultFile, QuestionnaireFile,
-    RatingFile, ScenarioRef, SessionFile, SiteReadingFile, StageResultFile,
+    AnswerResultFile, CriticalErrorFile, DeviceFile, EpisodeFile, EvidenceFile, GradeFile, ItemResultFile,
+    QuestionnaireFile, RatingFile, ScenarioRef, SessionFile, SiteReadingFile, StageResultFile,
 };
 pub use templates::Templates;
 

@@ -5,14 +5,20 @@ use serde_json::Value as Json;
 use std::collections::BTreeMap;
 use typodont_core::device::DeviceSpec;
 use typodont_core::tick::Tick;
+use typodont_core::volume::Label;
 use typodont_exercise::catalog::CoefficientName;
 use typodont_exercise::record::{DeviceSpecFile, Recording, ServoStatsFile, ended_by_name};
-use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire};
-use typodont_exercise::score::{Grade, SCORER_VERSION, Scored, SiteResult};
+use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire, Scenario};
+use typodont_exercise::score;
+use typodont_exercise::score::{EpisodeKind, ErrorEpisode, Evidence, Grade, SCORER_VERSION, Scored, SiteResult};
 use typodont_exercise::session::{AnswerRecord, AnswerValue};
 
 /// Version of this file's format.
 pub const VERSION: u32 = 1;
+
+/// Maximum number of episodes of each kind in the file, the greatest first. More than twenty presses or cuts of one
+/// kind are a habit, which the measures show.
+const EPISODES_MAX: usize = 20;
 
 pub type DeviceFile = DeviceSpecFile;
 
@@ -53,6 +59,9 @@ pub struct SessionFile {
     /// Place and time at which some of the metrics arose.
     #[serde(default)]
     pub evidence: BTreeMap<String, EvidenceFile>,
+    /// Error episodes, which the sentences of the feedback describe; left out if there are none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub episodes: Vec<EpisodeFile>,
     /// Absent without a rubric.
     #[serde(default)]
     pub grade: Option<GradeFile>,
@@ -143,6 +152,62 @@ pub struct EvidenceFile {
     /// Position in tooth space, mm from the centre of the crown at the neck: buccal, distal (mesial for 21–28 and
     /// 41–48), occlusal.
     pub place_mm: [f64; 3],
+    /// Name of the tissue that was removed, left, exposed or touched there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tissue: Option<String>,
+    /// Direction from the nearest caries; for remaining caries, from the cavity: buccal, lingual, mesial, distal,
+    /// occlusal or apical.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<String>,
+    /// Distance that the metric states, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_mm: Option<f64>,
+    /// Volume of the vulnerable tissue that was removed, mm³.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume_mm3: Option<f64>,
+    /// Force at that time, N.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
+}
+
+/// An error of one kind, on one tissue, at one wall, in one period of time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeFile {
+    /// overcut, vulnerable, zone, left, force, neighbour or soft.
+    pub kind: String,
+    /// Identifier of the protected zone of which tissue was removed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zone: Option<String>,
+    /// Name of the tissue.
+    pub tissue: Option<String>,
+    /// Direction from the nearest tissue to be removed; for remaining tissue, from the cavity.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wall: Option<String>,
+    /// Position of the greatest depth or force, tooth space, mm; of vulnerable tissue and zones, the first position.
+    pub place_mm: [f64; 3],
+    /// Depth at that position, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_mm: Option<f64>,
+    /// Volume of the removed, exposed or remaining tissue, mm³; left out for contact and force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub volume_mm3: Option<f64>,
+    /// Maximum force in this period, N; left out for remaining tissue.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_n: Option<f64>,
+    /// When the position was reached, s; left out for remaining tissue.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub at_s: Option<f64>,
+    /// Force at that time, N.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_at_n: Option<f64>,
+    /// Begin and end of the period, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from_s: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to_s: Option<f64>,
+    /// Total time in contact within the period, s; for contact and force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact_s: Option<f64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -225,11 +290,8 @@ impl SessionFile {
         let head = &recording.head;
         let scenario = &recording.scenario;
         let metrics = scored.measures.all.iter().map(|m| (m.metric.name(), m.value.map(round_to_nine_decimals)));
-        let evidence = scored.measures.all.iter().filter_map(|m| {
-            let evidence = m.evidence?;
-            let place_mm = evidence.place.to_array().map(|v| round_to_nine_decimals(f64::from(v)));
-            Some((m.metric.name(), EvidenceFile { at_s: evidence.at.map(|t| t.seconds()), place_mm }))
-        });
+        let evidence =
+            scored.measures.all.iter().filter_map(|m| Some((m.metric.name(), evidence_file(scenario, &m.evidence?))));
         let ended = match &recording.end {
             Some(end) => end.reason.clone(),
             None => "the recording breaks off".to_string(),
@@ -255,6 +317,7 @@ impl SessionFile {
             chart: scored.chart.iter().flatten().map(site).collect(),
             metrics: metrics.collect(),
             evidence: evidence.collect(),
+            episodes: episodes(scenario, scored),
             grade: scored.grade.as_ref().map(grade),
             questionnaire: scenario.questionnaire.as_ref().map(|q| questionnaire(q, &scored.replay.outcome.ratings)),
             servo: recording.end.as_ref().map_or(ticks, |end| end.servo.clone()),
@@ -273,6 +336,51 @@ impl SessionFile {
     pub fn metric(&self, name: &str) -> Option<f64> {
         self.metrics.get(name).copied().flatten()
     }
+}
+
+fn evidence_file(scenario: &Scenario, evidence: &Evidence) -> EvidenceFile {
+    let rounded = |value: f32| round_to_nine_decimals(f64::from(value));
+    EvidenceFile {
+        at_s: evidence.at.map(Tick::seconds),
+        place_mm: evidence.place.to_array().map(rounded),
+        tissue: evidence.tissue.and_then(|tissue| tissue_name(scenario, tissue)),
+        wall: evidence.direction.map(|direction| direction.id().to_string()),
+        depth_mm: evidence.depth.map(rounded),
+        volume_mm3: evidence.volume.map(round_to_nine_decimals),
+        force_n: evidence.force.map(rounded),
+    }
+}
+
+/// The greatest episodes of each kind.
+fn episodes(scenario: &Scenario, scored: &Scored) -> Vec<EpisodeFile> {
+    let all = score::error_episodes(scenario, scored);
+    let of_kinds = all.chunk_by(|a, b| a.kind == b.kind);
+    of_kinds.flat_map(|of_kind| of_kind.iter().take(EPISODES_MAX)).map(|e| episode_file(scenario, e)).collect()
+}
+
+fn episode_file(scenario: &Scenario, episode: &ErrorEpisode) -> EpisodeFile {
+    let rounded = |value: f32| round_to_nine_decimals(f64::from(value));
+    let is_contact = matches!(episode.kind, EpisodeKind::Force | EpisodeKind::Neighbour | EpisodeKind::Soft);
+    let is_timed = episode.worst.is_some();
+    EpisodeFile {
+        kind: episode.kind.id().to_string(),
+        zone: episode.zone.map(|zone| scenario.zones[zone].id.clone()),
+        tissue: tissue_name(scenario, episode.tissue),
+        wall: episode.direction.map(|direction| direction.id().to_string()),
+        place_mm: episode.place.to_array().map(rounded),
+        depth_mm: episode.depth.map(rounded),
+        volume_mm3: (!is_contact).then(|| round_to_nine_decimals(episode.volume)),
+        force_n: is_timed.then(|| rounded(episode.force)),
+        at_s: episode.worst.map(Tick::seconds),
+        force_at_n: is_timed.then(|| rounded(episode.worst_force)),
+        from_s: episode.span.map(|[from, _]| from.seconds()),
+        to_s: episode.span.map(|[_, to]| to.seconds()),
+        contact_s: is_contact.then(|| round_to_nine_decimals(episode.seconds)),
+    }
+}
+
+fn tissue_name(scenario: &Scenario, tissue: Label) -> Option<String> {
+    scenario.tissues.by_label(tissue).map(|entry| entry.name.clone())
 }
 
 fn site(result: &SiteResult) -> SiteReadingFile {

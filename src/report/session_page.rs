@@ -210,8 +210,7 @@ pub fn render(
     let figures_of = |shows: fn(&ViewKind) -> bool| {
         pictures.iter().filter(|p| shows(&p.kind)).map(|p| localizer.figure(p)).collect()
     };
-    let lapses = score::error_episodes(recording, scored);
-    let feedback = feedback::build(session, &lapses, templates.rules(), &recording.scenario.tissues);
+    let feedback = feedback::build(session, &recording.scenario, templates.rules());
     let script = templates.script();
     let packed_voxels = voxels::pack(scored);
     let data = script_data(templates, recording, scored, session, &feedback, packed_voxels.as_ref().map(|v| &v.header));

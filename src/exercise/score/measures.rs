@@ -1,15 +1,18 @@
 //! Every measure of a session, with its evidence.
 
 use super::charting::{self, SiteResult};
+use super::nearest_offset::{AnatomicalDirection, NearestOffsets};
 use super::process::{PeakValue, ProcessStats};
-use super::removal_comparison::{RemovalComparison, VoxelDistance};
+use super::removal_comparison::{RemovalComparison, VoxelDistance, VoxelFlags};
 use super::restoration::Restoration;
 use crate::record::{Recording, Replay};
+use crate::scenario::file::ZoneRole;
 use crate::scenario::metric::{CHARTING, MetricArgument, OF_FILLINGS, PLAIN};
 use crate::scenario::{Metric, QuestionKind, Rubric};
 use crate::session::{AnswerRecord, StageResult};
 use typodont_core::frame::Vec3;
 use typodont_core::tick::{TICK_S, Tick};
+use typodont_core::volume::Label;
 
 /// The measures of a session, in the order of the table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,12 +29,28 @@ pub struct Measure {
     pub evidence: Option<Evidence>,
 }
 
-/// Place and time at which a value arose.
+/// Place and time at which a value arose, and the tissue, depth and force there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence {
     pub at: Option<Tick>,
     /// Position, tooth space, mm.
     pub place: Vec3,
+    /// Tissue that was removed, left, exposed or touched there.
+    pub tissue: Option<Label>,
+    /// Direction from the nearest tissue to be removed; for remaining decay, from the cavity.
+    pub direction: Option<AnatomicalDirection>,
+    /// Distance that the value states, mm.
+    pub depth: Option<f32>,
+    /// Volume of the vulnerable tissue that was removed, mm³.
+    pub volume: Option<f64>,
+    /// Force at that tick, N.
+    pub force: Option<f32>,
+}
+
+impl Evidence {
+    fn at_place(place: Vec3) -> Evidence {
+        Evidence { at: None, place, tissue: None, direction: None, depth: None, volume: None, force: None }
+    }
 }
 
 impl Measures {
@@ -66,7 +85,12 @@ impl From<f64> for ComputedValue {
 
 impl From<Option<PeakValue>> for ComputedValue {
     fn from(moment: Option<PeakValue>) -> ComputedValue {
-        let evidence = moment.map(|m| Evidence { at: Some(m.at), place: m.place });
+        let evidence = moment.map(|m| Evidence {
+            at: Some(m.at),
+            tissue: Some(m.tissue).filter(|tissue| *tissue != Label::AIR),
+            force: Some(m.force),
+            ..Evidence::at_place(m.place)
+        });
         ComputedValue { value: moment.map(|m| m.value), evidence }
     }
 }
@@ -195,14 +219,20 @@ impl MeasureSource<'_> {
             "overcut_depth_max_mm" => self.overcut(),
             "undercut_depth_max_mm" => self.undercut(),
             "pulp_exposed" => {
-                let exposed = self.comparison.exposed().map(|voxel| (self.exposed_at(voxel), voxel));
-                // A voxel whose tick is unknown comes after all others.
-                let first = exposed.min_by_key(|&(at, voxel)| (at.is_none(), at, voxel));
-                let evidence = first.map(|(at, voxel)| Evidence { at, ..self.evidence_at(voxel) });
+                let first = self.comparison.first_exposed(&self.process.removals);
+                let removed_mm3 = self.comparison.removed_vulnerable() as f64 * self.comparison.grid.voxel_mm3();
+                let evidence = first.map(|(voxel, removal)| Evidence {
+                    at: removal.map(|r| r.at),
+                    force: removal.map(|r| r.force),
+                    volume: Some(removed_mm3),
+                    ..self.evidence_at(voxel)
+                });
                 ComputedValue { value: Some(if first.is_some() { 1.0 } else { 0.0 }), evidence }
             }
             "remaining_dentine_thickness_min_mm" => {
-                self.deepest(self.comparison.nearest(|s| s.removed() && !s.vulnerable(), |s| s.vulnerable()), None)
+                let is_floor = |s: VoxelFlags| s.removed() && !s.vulnerable();
+                let nearest = self.comparison.nearest(is_floor, |s| s.vulnerable(), &self.process.removals);
+                self.deepest(nearest, None)
             }
             _ => return None,
         })
@@ -242,8 +272,11 @@ impl MeasureSource<'_> {
         let Some(zone) = self.recording.scenario.zones.iter().position(|z| z.id == id) else {
             return ComputedValue::default();
         };
+        // Of a target, the first removed voxel says nothing about the share that was removed.
+        let role = self.recording.scenario.zones[zone].role;
+        let is_protected = matches!(role, ZoneRole::NeverRemove | ZoneRole::Container);
         let first = self.comparison.removed_of_zone(zone).min_by_key(|&v| (self.process.removals.at(v), v));
-        let evidence = first.map(|v| self.evidence_at(v));
+        let evidence = first.filter(|_| is_protected).map(|v| self.evidence_at(v));
         ComputedValue { value: self.comparison.zone_removed_pct(zone), evidence }
     }
 
@@ -295,42 +328,59 @@ impl MeasureSource<'_> {
 
     fn overcut(&self) -> ComputedValue {
         let any = self.comparison.flags.iter().any(|s| s.removed() && s.sound());
-        let farthest = self.comparison.farthest(|s| s.removed() && s.sound(), |s| s.decay());
-        self.deepest(farthest, if any { None } else { Some(0.0) })
+        let (is_cut, is_decay) = (|s: VoxelFlags| s.removed() && s.sound(), |s: VoxelFlags| s.decay());
+        let farthest = self.comparison.farthest(is_cut, is_decay, &self.process.removals);
+        self.with_direction(self.deepest(farthest, if any { None } else { Some(0.0) }), farthest, is_decay)
     }
 
     fn undercut(&self) -> ComputedValue {
         let any = self.comparison.flags.iter().any(|s| s.decay() && !s.removed());
-        let farthest = self.comparison.farthest(|s| s.decay() && !s.removed(), |s| s.removed());
-        self.deepest(farthest, if any { None } else { Some(0.0) })
+        let (is_left, is_removed) = (|s: VoxelFlags| s.decay() && !s.removed(), |s: VoxelFlags| s.removed());
+        let farthest = self.comparison.farthest(is_left, is_removed, &self.process.removals);
+        self.with_direction(self.deepest(farthest, if any { None } else { Some(0.0) }), farthest, is_removed)
     }
 
     fn deepest(&self, found: Option<VoxelDistance>, otherwise: Option<f64>) -> ComputedValue {
         match found {
             Some(VoxelDistance { mm, voxel }) => {
-                ComputedValue { value: Some(f64::from(mm)), evidence: Some(self.evidence_at(voxel)) }
+                let evidence = Evidence { depth: Some(mm), ..self.evidence_at(voxel) };
+                ComputedValue { value: Some(f64::from(mm)), evidence: Some(evidence) }
             }
             None => otherwise.into(),
         }
     }
 
-    /// Returns the tick at which a vulnerable voxel was removed, or exposed by the removal of its first neighbour.
-    fn exposed_at(&self, voxel: usize) -> Option<Tick> {
-        let around = self.comparison.grid.neighbours(voxel).chain([voxel]);
-        around.filter_map(|v| self.process.removals.at(v)).min()
+    /// Adds the direction of the farthest voxel from the set from which its distance was measured.
+    fn with_direction(
+        &self,
+        computed: ComputedValue,
+        farthest: Option<VoxelDistance>,
+        is_in: impl Fn(VoxelFlags) -> bool,
+    ) -> ComputedValue {
+        let Some((evidence, VoxelDistance { voxel, .. })) = computed.evidence.zip(farthest) else { return computed };
+        let flags = &self.comparison.flags;
+        let distal = self.replay.workpiece.distal();
+        let offsets = NearestOffsets::new(&self.comparison.grid, distal, |v| is_in(flags[v]), |v| v == voxel);
+        let direction = offsets.of(voxel).map(|(_, direction)| direction);
+        ComputedValue { evidence: Some(Evidence { direction, ..evidence }), ..computed }
     }
 
     fn evidence_at(&self, voxel: usize) -> Evidence {
         let grid = &self.comparison.grid;
-        Evidence { at: self.process.removals.at(voxel), place: grid.centre(grid.cell(voxel)) }
+        let removal = self.process.removals.get(voxel).filter(|_| self.comparison.flags[voxel].removed());
+        Evidence {
+            at: removal.map(|r| r.at),
+            tissue: Some(self.replay.workpiece.volume.tissue(voxel)),
+            force: removal.map(|r| r.force),
+            ..Evidence::at_place(grid.centre(grid.cell(voxel)))
+        }
     }
 }
 
 /// Computes a measure of a filling. The evidence of a distance is its position, without a time, since a surface results
 /// from many strokes.
 fn of_filling(restoration: &Restoration, name: &str) -> ComputedValue {
-    let at =
-        |value: f64, place: Vec3| ComputedValue { value: Some(value), evidence: Some(Evidence { at: None, place }) };
+    let at = |value: f64, place: Vec3| ComputedValue { value: Some(value), evidence: Some(Evidence::at_place(place)) };
     match name {
         "filled_pct" if restoration.cavity > 0 => {
             (100.0 * restoration.filled as f64 / restoration.cavity as f64).into()

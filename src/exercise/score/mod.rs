@@ -5,12 +5,14 @@
 
 mod voxel_set;
 mod charting;
+mod contact_spell;
 mod cropped_grid;
 mod voxel_removals;
 mod grade;
 mod idle;
 mod error_episodes;
 mod measures;
+mod nearest_offset;
 mod process;
 mod restoration;
 mod removal_comparison;
@@ -18,16 +20,19 @@ mod verdict;
 mod zones;
 
 pub use charting::{ProbingReading, SiteResult};
+pub use contact_spell::ContactSpell;
 pub use cropped_grid::CroppedGrid;
-pub use error_episodes::{AnatomicalDirection, EpisodeKind, ErrorEpisode, error_episodes};
+pub use error_episodes::{EpisodeKind, ErrorEpisode, error_episodes};
 pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
 pub use idle::idle_grade;
 pub use measures::{Evidence, Measure, Measures};
+pub use nearest_offset::AnatomicalDirection;
 pub use process::{Trace, TraceSample};
 pub use restoration::Restoration;
 pub use verdict::Verdict;
 pub use voxel_removals::{VoxelRemoval, VoxelRemovals};
-pub use zones::{DecayInZone, decay_in_zones, decay_on_vulnerable_mm3};
+pub use voxel_set::VoxelSet;
+pub use zones::{DecayInZone, ZoneVoxels, decay_in_zones, decay_on_vulnerable_mm3};
 
 use crate::record;
 use crate::record::{Recording, Replay, ReplayCheck};
@@ -44,6 +49,12 @@ pub struct Scored {
     /// Verdicts, one per voxel of the workpiece.
     pub verdicts: Vec<Verdict>,
     pub removals: VoxelRemovals,
+    /// Voxels of each zone of the scenario.
+    pub zones: Vec<ZoneVoxels>,
+    /// Spells in which the force on a tissue exceeded the value that still earns all points.
+    pub hard_presses: Vec<ContactSpell>,
+    /// Spells in which a running bur touched soft tissue or an adjacent tooth.
+    pub forbidden_contacts: Vec<ContactSpell>,
     /// Force, speed and progress over time, sampled for charts.
     pub trace: Trace,
     pub grade: Option<Grade>,
@@ -95,6 +106,19 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
     let measures = measures::all(recording, &replay, &seen, &comparison, restoration.as_ref(), chart.as_deref());
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
-    let process::ProcessStats { removals: falls, trace, led_ticks, .. } = seen;
-    Scored { replay, measures, verdicts, removals: falls, trace, grade, restoration, chart, led_ticks }
+    let process::ProcessStats { removals, trace, led_ticks, hard_presses, forbidden_contacts, .. } = seen;
+    Scored {
+        replay,
+        measures,
+        verdicts,
+        removals,
+        zones: comparison.zones,
+        hard_presses,
+        forbidden_contacts,
+        trace,
+        grade,
+        restoration,
+        chart,
+        led_ticks,
+    }
 }

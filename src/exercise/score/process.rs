@@ -1,10 +1,11 @@
 //! The process of the work: force, speed and path, tick by tick.
 
+use super::contact_spell::{ContactSpell, ContactSpells};
 use super::removal_comparison::ProximityField;
 use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
 use crate::catalog::TissueRole;
 use crate::record::{Recording, TickRecord};
-use crate::scenario::Workpiece;
+use crate::scenario::{Limit, Scenario, Workpiece};
 use crate::session::Session;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Step;
@@ -25,6 +26,10 @@ pub struct PeakValue {
     pub at: Tick,
     /// Position, tooth space, mm.
     pub place: Vec3,
+    /// Tissue that was touched at that tick.
+    pub tissue: Label,
+    /// Force at that tick, N.
+    pub force: f32,
 }
 
 /// Maximum and mean of a quantity over ticks.
@@ -36,11 +41,11 @@ pub struct RunningStats {
 }
 
 impl RunningStats {
-    fn add(&mut self, value: f64, at: Tick, place: Vec3) {
-        if self.highest.is_none_or(|h| value > h.value) {
-            self.highest = Some(PeakValue { value, at, place });
+    fn add(&mut self, reached: PeakValue) {
+        if self.highest.is_none_or(|h| reached.value > h.value) {
+            self.highest = Some(reached);
         }
-        self.sum += value;
+        self.sum += reached.value;
         self.count += 1;
     }
 
@@ -68,6 +73,10 @@ pub struct ProcessStats {
     pub smoothness: Option<f64>,
     pub removals: VoxelRemovals,
     pub trace: Trace,
+    /// Spells in which the force on a tissue exceeded the value that still earns all points for `force_max_n`.
+    pub hard_presses: Vec<ContactSpell>,
+    /// Spells in which a running bur touched soft tissue or an adjacent tooth in a cutting stage.
+    pub forbidden_contacts: Vec<ContactSpell>,
 }
 
 /// One sample of the curves in a report.
@@ -103,8 +112,13 @@ pub struct ProcessObserver {
     is_rotary: Vec<bool>,
     proximity: ProximityField,
     stats: ProcessStats,
+    /// Force above which a press is recorded, N; `None` if the rubric does not limit the force.
+    force_limit: Option<f64>,
+    hard_presses: ContactSpells,
+    forbidden_contacts: ContactSpells,
     last_place: Option<Vec3>,
-    was_touched: bool,
+    /// The last contact since the speed was last measured: the touched tissue and the force, N.
+    last_touch: Option<(Label, f32)>,
     now: TraceSample,
     /// Positions of the tip in contact, every [`SPAN`] ticks, by uninterrupted period of contact.
     contact_runs: Vec<Vec<Vec3>>,
@@ -137,9 +151,14 @@ impl ProcessObserver {
                 smoothness: None,
                 removals: VoxelRemovals::default(),
                 trace: Trace::default(),
+                hard_presses: Vec::new(),
+                forbidden_contacts: Vec::new(),
             },
+            force_limit: force_limit(scenario),
+            hard_presses: ContactSpells::default(),
+            forbidden_contacts: ContactSpells::default(),
             last_place: None,
-            was_touched: false,
+            last_touch: None,
             now,
             contact_runs: Vec::new(),
             removal_log: Vec::new(),
@@ -157,26 +176,32 @@ impl ProcessObserver {
         self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
         self.stats.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
-        self.was_touched |= step.touch.is_some();
         if step.coupling_force != Vec3::ZERO
             && let Some((stage, _)) = session.stage()
         {
             self.stats.led_ticks[stage] += 1;
         }
         if let Some(touch) = &step.touch {
-            let force = f64::from(pressed.length());
+            let (tissue, force) = (touch.label, pressed.length());
+            self.last_touch = Some((tissue, force));
             self.stats.contact_ticks += 1;
-            self.stats.force.add(force, tick, place);
+            let reached = PeakValue { value: f64::from(force), at: tick, place, tissue, force };
+            self.stats.force.add(reached);
             if self.proximity.is_near(place) {
-                self.stats.force_near.add(force, tick, place);
+                self.stats.force_near.add(reached);
             }
-            self.now.force = self.now.force.max(pressed.length());
+            self.now.force = self.now.force.max(force);
             self.now.touched = true;
+            // Matter too thin to have a tissue is not named.
+            if tissue != Label::AIR && self.force_limit.is_some_and(|limit| f64::from(force) > limit) {
+                self.hard_presses.add(tissue, tick, force, place);
+            }
             let is_running = self.is_rotary[step.instrument] && session.stage().is_some_and(|(_, s)| s.cutting);
-            match self.roles[usize::from(touch.label.0)] {
-                Some(TissueRole::Soft) if is_running => self.stats.soft_ticks += 1,
-                Some(TissueRole::Neighbour) if is_running => self.stats.neighbour_ticks += 1,
-                _ => {}
+            let role = self.roles[usize::from(tissue.0)].filter(|_| is_running);
+            self.stats.soft_ticks += u64::from(role == Some(TissueRole::Soft));
+            self.stats.neighbour_ticks += u64::from(role == Some(TissueRole::Neighbour));
+            if matches!(role, Some(TissueRole::Soft | TissueRole::Neighbour)) {
+                self.forbidden_contacts.add(tissue, tick, force, place);
             }
         }
         if tick.0.is_multiple_of(SPAN) {
@@ -195,10 +220,11 @@ impl ProcessObserver {
         let speed = step_length / (SPAN as f64 * TICK_S);
         self.stats.path_mm += step_length;
         self.now.speed = speed as f32;
-        if self.was_touched && self.last_place.is_some() {
-            self.stats.speed.add(speed, tick, place);
+        if let Some((tissue, force)) = self.last_touch.filter(|_| self.last_place.is_some()) {
+            let reached = PeakValue { value: speed, at: tick, place, tissue, force };
+            self.stats.speed.add(reached);
             if self.proximity.is_near(place) {
-                self.stats.speed_near.add(speed, tick, place);
+                self.stats.speed_near.add(reached);
             }
             match self.contact_runs.last_mut() {
                 Some(spell) if !spell.is_empty() => spell.push(place),
@@ -207,15 +233,30 @@ impl ProcessObserver {
         } else if self.contact_runs.last().is_some_and(|s| !s.is_empty()) {
             self.contact_runs.push(Vec::new());
         }
-        self.was_touched = false;
+        self.last_touch = None;
         self.last_place = Some(place);
     }
 
     pub fn finish(mut self) -> ProcessStats {
         self.stats.removals = VoxelRemovals::sorted(self.removal_log);
         self.stats.smoothness = log_dimensionless_jerk(&self.contact_runs);
+        self.stats.hard_presses = self.hard_presses.finish();
+        self.stats.forbidden_contacts = self.forbidden_contacts.finish();
         self.stats
     }
+}
+
+/// Returns the greatest force that costs no points, N: the least of the rubric's values for `force_max_n`; `None` if
+/// the rubric does not limit this measure.
+fn force_limit(scenario: &Scenario) -> Option<f64> {
+    let rubric = scenario.rubric.as_ref()?;
+    let items = rubric.items.iter().map(|i| (&i.metric, i.full_at));
+    let fails = rubric.hard_fails.iter().filter_map(|fail| match fail.when {
+        Limit::Above(limit) => Some((&fail.metric, limit)),
+        Limit::Below(_) => None,
+    });
+    let limits = items.chain(fails).filter(|(metric, _)| metric.info.name == "force_max_n");
+    limits.map(|(_, limit)| limit).reduce(f64::min)
 }
 
 /// Returns −ln(T⁵/L² · ∫|jerk|² dt) over all periods of contact (Hogan & Sternad 2009); a value nearer to zero is

@@ -1,12 +1,16 @@
 //! The comparison of the removed tissue with the tissue to be removed.
 
 use super::cropped_grid::CroppedGrid;
+use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
 use super::zones::ZoneVoxels;
 use crate::catalog::TissueRole;
 use crate::record::Replay;
 use crate::scenario::Scenario;
 use crate::scenario::file::ZoneRole;
 use typodont_core::volume::{Grid, Label, Volume, distance};
+
+/// Distances that differ by less are equal, mm: the same distance along other axes differs by rounding errors.
+const EQUAL_DISTANCES_MM: f32 = 1e-4;
 
 /// Sets of voxels of the workpiece, and the measures that follow from them. R is the removed tissue, D the decay at the
 /// start, T the tissue to be removed: the target zones, or D if there are none.
@@ -111,36 +115,43 @@ impl RemovalComparison {
         self.flags.iter().enumerate().filter(move |(_, s)| holds(**s)).map(|(i, _)| i)
     }
 
-    /// Returns the voxel of one set that is farthest from another set; `None` if either is empty.
+    /// Returns the voxel of one set that is farthest from another set; `None` if either is empty. Of voxels at the same
+    /// distance, the one that was removed first is returned.
     pub fn farthest(
         &self,
         of: impl Fn(VoxelFlags) -> bool,
         from: impl Fn(VoxelFlags) -> bool,
+        removals: &VoxelRemovals,
     ) -> Option<VoxelDistance> {
-        self.extreme(of, from, |a, b| a > b)
+        self.extreme(of, from, f32::max, removals)
     }
 
-    /// Returns the voxel of one set that is nearest to another set; `None` if either is empty.
-    pub fn nearest(&self, of: impl Fn(VoxelFlags) -> bool, to: impl Fn(VoxelFlags) -> bool) -> Option<VoxelDistance> {
-        self.extreme(of, to, |a, b| a < b)
+    /// Returns the voxel of one set that is nearest to another set; `None` if either is empty. Of voxels at the same
+    /// distance, the one that was removed first is returned.
+    pub fn nearest(
+        &self,
+        of: impl Fn(VoxelFlags) -> bool,
+        to: impl Fn(VoxelFlags) -> bool,
+        removals: &VoxelRemovals,
+    ) -> Option<VoxelDistance> {
+        self.extreme(of, to, f32::min, removals)
     }
 
     fn extreme(
         &self,
         of: impl Fn(VoxelFlags) -> bool,
         from: impl Fn(VoxelFlags) -> bool,
-        beats: impl Fn(f32, f32) -> bool,
+        choose: fn(f32, f32) -> f32,
+        removals: &VoxelRemovals,
     ) -> Option<VoxelDistance> {
         let crop = CroppedGrid::around(&self.grid, 0, self.indices(|s| of(s) || from(s)))?;
         let distances = distance::to_set(&crop.grid, |i| from(self.flags[crop.whole_index(i)]));
-        let mut best: Option<VoxelDistance> = None;
-        for (index, &mm) in distances.iter().enumerate().filter(|(_, d)| d.is_finite()) {
-            let voxel = crop.whole_index(index);
-            if of(self.flags[voxel]) && best.is_none_or(|b| beats(mm, b.mm)) {
-                best = Some(VoxelDistance { mm, voxel });
-            }
-        }
-        best
+        let all = distances.iter().enumerate().filter(|(_, d)| d.is_finite());
+        let all = all.map(|(index, &mm)| (mm, crop.whole_index(index))).filter(|&(_, voxel)| of(self.flags[voxel]));
+        let mm = all.clone().map(|(mm, _)| mm).reduce(choose)?;
+        let equals = all.filter(|(other, _)| (other - mm).abs() <= EQUAL_DISTANCES_MM);
+        let (_, voxel) = equals.min_by_key(|&(_, voxel)| (removals.at(voxel), voxel))?;
+        Some(VoxelDistance { mm, voxel })
     }
 
     /// Returns the distances between the borders of R and T in both directions, mm, in ascending order; `None` if
@@ -166,9 +177,17 @@ impl RemovalComparison {
         Some(distances)
     }
 
-    /// Returns the vulnerable voxels that [are exposed](RemovalComparison::is_exposed).
-    pub fn exposed(&self) -> impl Iterator<Item = usize> + '_ {
-        self.indices(|s| s.vulnerable()).filter(move |&voxel| self.is_exposed(voxel))
+    /// Returns the vulnerable voxel that [was exposed](RemovalComparison::is_exposed) first, with the removal that
+    /// exposed it.
+    pub fn first_exposed(&self, removals: &VoxelRemovals) -> Option<(usize, Option<VoxelRemoval>)> {
+        let exposed = self.indices(|s| s.vulnerable()).filter(|&voxel| self.is_exposed(voxel));
+        let exposed = exposed.map(|voxel| (voxel, removals.exposing(&self.grid, voxel)));
+        exposed.min_by_key(|(voxel, removal)| (removal.map(|r| r.at), *voxel))
+    }
+
+    /// Number of voxels of vulnerable tissue that were removed.
+    pub fn removed_vulnerable(&self) -> usize {
+        self.indices(|s| s.vulnerable() && s.removed()).count()
     }
 
     /// Returns true for a vulnerable voxel that was removed or is next to a removed one.

@@ -1,6 +1,7 @@
 //! The times at which voxels were removed.
 
 use typodont_core::tick::Tick;
+use typodont_core::volume::Grid;
 
 /// Removal of a voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +37,12 @@ impl VoxelRemovals {
     pub fn get(&self, voxel: usize) -> Option<VoxelRemoval> {
         let place = self.all.binary_search_by_key(&voxel, |&(v, _)| v as usize).ok()?;
         Some(self.all[place].1)
+    }
+
+    /// Returns the removal by which a voxel was exposed: the earliest of its own and those of its neighbours; `None` if
+    /// it was not exposed.
+    pub fn exposing(&self, grid: &Grid, voxel: usize) -> Option<VoxelRemoval> {
+        std::iter::once(voxel).chain(grid.neighbours(voxel)).filter_map(|v| self.get(v)).min_by_key(|r| r.at)
     }
 
     /// Returns all removals in ascending order of voxels.
