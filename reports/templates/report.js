@@ -38,6 +38,8 @@ class Page {
     this.palette = new Palette(session.tissues, session.verdicts);
     this.moment = session.seconds;
     this.asked = null;
+    /** The place that is marked by a ring, mm of tooth space. */
+    this.ring = null;
     this.mark = null;
     this.cuts = [0, 1, 2].map(number => new Cut(byId(`cut-${number}`), number, voxels, this.palette));
     byId('explore').hidden = false;
@@ -114,28 +116,35 @@ class Page {
 
   // Places.
 
-  /** Says of a voxel what it was and what became of it. */
-  ask(cell) {
+  /** Says of a voxel what it was and what became of it; the ring is drawn around it, or around a place beside it. */
+  ask(cell, ring = this.voxels.pointOf(cell)) {
     this.asked = cell;
+    this.ring = ring;
     for (const cut of this.cuts) cut.show(cell);
     this.showCuts();
     this.tell();
     this.drawSoon();
   }
 
+  /** The directions and distances of a place from the middle of the tooth, in words. */
+  wayTo(place) {
+    const way = (axis, high, low) => this.say(`script.${place[axis] >= 0 ? high : low}`, { mm: Math.abs(place[axis]).toFixed(1) });
+    const y = this.voxels.mirrored ? way(1, 'mesial', 'distal') : way(1, 'distal', 'mesial');
+    return { x: way(0, 'buccal', 'lingual'), y, z: way(2, 'up', 'down') };
+  }
+
   tell() {
     const told = byId('told');
-    if (!this.asked) return;
+    if (!this.asked) {
+      // A place beside the tooth: on an adjacent tooth, or on the gingiva.
+      if (this.mark !== null && this.ring) told.textContent = `${this.say('script.mark', { number: this.mark })} ${Object.values(this.wayTo(this.ring)).join(', ')}.`;
+      return;
+    }
     const cell = this.asked, { voxels, palette } = this;
     const tissue = voxels.tissue(cell), verdict = voxels.verdict[voxels.index(cell)], fall = voxels.fallOf(cell);
-    const way = (axis, high, low) => {
-      const mm = voxels.pointOf(cell)[axis];
-      return this.say(`script.${mm >= 0 ? high : low}`, { mm: Math.abs(mm).toFixed(1) });
-    };
     const values = {
       tissue: this.named(palette.tissues.get(tissue)), verdict: this.named(palette.verdicts.get(verdict)),
-      voxel: voxels.inBundle(cell).join(', '),
-      x: way(0, 'buccal', 'lingual'), y: voxels.mirrored ? way(1, 'mesial', 'distal') : way(1, 'distal', 'mesial'), z: way(2, 'up', 'down'),
+      voxel: voxels.inBundle(cell).join(', '), ...this.wayTo(voxels.pointOf(cell)),
     };
     if (fall) Object.assign(values, { time: duration(fall.tick / 1000), seconds: (fall.tick / 1000).toFixed(3), force: fall.force.toFixed(2), tool: this.session.tools[fall.tool] || '–' });
     const parts = [tissue === 0 ? this.say('script.air') : this.say(fall ? 'script.fell' : 'script.kept', values)];
@@ -150,21 +159,40 @@ class Page {
   visit(place, seconds, mark) {
     this.mark = mark;
     this.setMoment(seconds ?? this.session.seconds);
+    if (this.solid) this.turnTo(place);
     const cell = this.matterNear(this.voxels.cellOf(place));
-    if (this.solid) {
-      const { eye } = this.solid, box = this.voxels;
-      const middle = box.pointOf(box.low.map((v, axis) => v + 0.5 * box.size[axis]));
-      const outward = place.map((v, axis) => v - middle[axis]);
-      // From above, and leaning toward the wall across the cavity, so that the place is seen.
-      eye.lookFrom(unit([-0.45 * Math.sign(outward[0]) * Math.min(Math.abs(outward[0]), 1), -0.45 * Math.sign(outward[1]) * Math.min(Math.abs(outward[1]), 1), 1]));
-      eye.middle = place.slice();
-      eye.half = 3.5;
-      this.solid.clips.fill(null);
-      for (const box of document.querySelectorAll('.clip')) box.checked = false;
+    if (cell) this.ask(cell, place);
+    else {
+      this.asked = null;
+      this.ring = place;
+      this.tell();
+      this.drawSoon();
     }
-    if (cell) this.ask(cell);
     const view = byId('explore'), { top, bottom } = byId('solid').getBoundingClientRect();
     if (top < 0 || bottom > window.innerHeight) view.scrollIntoView({ block: 'start' });
+  }
+
+  /**
+   * Turns the tooth so that a place is seen as it is now: along the middle of the directions in which nothing covers it and
+   * the ring around it. Where there are none, the tooth is cut open at the place, from the side on which least lies before it.
+   */
+  turnTo(place) {
+    const { solid, voxels } = this, { eye, clips } = solid;
+    eye.middle = place.slice();
+    eye.half = 3.5;
+    clips.fill(null);
+    const isOpen = (point, way) => voxels.coverOf(point, way) === 0;
+    const open = VIEWS.filter(way => isOpen(place, way) && ringAround(place, way).filter(point => isOpen(point, way)).length >= 7);
+    if (open.length) {
+      const middle = open.reduce(added);
+      eye.lookFrom(open.reduce((best, way) => (dot(way, middle) > dot(best, middle) ? way : best)));
+    } else {
+      const cover = SECTION_VIEWS.map(way => voxels.coverOf(place, way));
+      const way = SECTION_VIEWS[cover.indexOf(Math.min(...cover))], axis = way.findIndex(Boolean);
+      eye.lookFrom(way);
+      clips[axis] = Math.round(voxels.cellOf(place)[axis]);
+    }
+    for (const box of document.querySelectorAll('.clip')) box.checked = clips[this.cuts[box.dataset.clip].axis] !== null;
   }
 
   /** The nearest voxel of the tooth around a place. */
@@ -230,7 +258,7 @@ class Page {
   drawSolid(share) {
     if (!this.solid) return;
     const began = performance.now();
-    this.solid.asked = this.asked;
+    this.solid.ring = this.ring;
     this.solid.draw(share);
     if (share > this.share) return;
     // A slow adapter gets fewer pixels while things move: the next frame comes when this one is done.

@@ -19,12 +19,15 @@ uniform vec3 up;
 uniform vec3 away;           // from the eye: one mm, voxels
 uniform bool byVerdict;
 uniform bool patterns;
-uniform vec3 asked;          // a place that was asked about, voxels; negative for none
+uniform bool hasRing;
+uniform vec3 ring;           // a place that is marked by a ring, voxels
 in vec2 place;               // -1 to 1
 out vec4 colour;
 
 const float BRICK = 8.0;
 const float STEP = 0.7;
+const float RING = 0.35;        // radius of the ring, mm
+const float RING_DEPTH = 0.4;   // how far before the place something may lie and not hide it, mm
 const uint OUTSIDE = 0u, RIGHTLY = 2u, LEEWAY = 3u, OVERCUT = 4u, LEFT = 5u, VULNERABLE = 6u, KEPT = 7u;
 
 float at(vec3 p) { return texture(density, (p + 0.5) / dims).r; }
@@ -85,13 +88,23 @@ vec3 shown(vec3 p, vec3 n) {
   return found;
 }
 
+// The ring around a place, as it is seen from the eye; hidden where something lies before the place. `t` is the distance of
+// what the ray meets, mm. Black within white: seen on every ground.
+vec4 marked(vec4 seen, vec3 origin, float t) {
+  vec3 to = (ring - origin) * spacing, forward = away * spacing;
+  float along = dot(to, forward), off = abs(length(to - along * forward) - RING);
+  if (!hasRing || t < along - RING_DEPTH || off > 0.1) return seen;
+  return off < 0.06 ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(1.0);
+}
+
 void main() {
   vec3 origin = middle + place.x * right + place.y * up;
   vec3 inverse = 1.0 / (away + vec3(equal(away, vec3(0.0))) * 1e-9);
   vec3 a = (low - origin) * inverse, b = (high - origin) * inverse;
   vec3 nearer = min(a, b), farther = max(a, b);
   float t = max(nearer.x, max(nearer.y, nearer.z)), end = min(farther.x, min(farther.y, farther.z));
-  colour = vec4(0.0);
+  const float FAR = 1e6;
+  colour = marked(vec4(0.0), origin, FAR);
   if (t >= end) return;
   float pace = STEP / length(away);
   vec3 p = origin + (t + 1e-4) * away;
@@ -99,8 +112,7 @@ void main() {
     // A section: cut open by the clip planes, lit from nowhere.
     uvec2 here = meant(ivec3(round(p)));
     vec3 c = byVerdict ? standing(here.r, here.g) : tissue(here.r);
-    colour = vec4(c * 0.94, 1.0);
-    if (asked.x >= 0.0 && abs(distance(p * spacing, asked * spacing) - 0.35) < 0.06) colour = vec4(0.0, 0.0, 0.0, 1.0);
+    colour = marked(vec4(c * 0.94, 1.0), origin, t);
     return;
   }
   vec3 bricks = ceil(dims / BRICK);
@@ -127,8 +139,7 @@ void main() {
       vec3 out1 = n / spacing * 0.35, out2 = n / spacing * 0.9;
       light *= 1.0 - 0.22 * at(p + out1) - 0.22 * at(p + out2);
       vec3 c = shown(p, n) * light + 0.08 * pow(max(dot(n, normalize(lamp + back)), 0.0), 40.0);
-      if (asked.x >= 0.0 && abs(distance(p * spacing, asked * spacing) - 0.35) < 0.06) c = vec3(0.0);
-      colour = vec4(c, 1.0);
+      colour = marked(vec4(c, 1.0), origin, t);
       return;
     }
     before = here;

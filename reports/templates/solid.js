@@ -1,6 +1,8 @@
 // The tooth in 3D: rays through the density, drawn with WebGL 2.
 
 const BRICK = 8;
+/** Radius of the ring around a place, mm; as in the shader. */
+const RING = 0.35;
 
 const VERTEX = `#version 300 es
 out vec2 place;
@@ -20,11 +22,29 @@ const SIDES = {
   apical: [[0, 1, 0], [1, 0, 0]],
 };
 
+/** Directions that are tried to look at a place, evenly spread (Fibonacci's spiral). */
+const VIEWS = Array.from({ length: 400 }, (_, number) => {
+  const z = 1 - (2 * number + 1) / 400, angle = number * Math.PI * (3 - Math.sqrt(5)), level = Math.sqrt(1 - z * z);
+  return [level * Math.cos(angle), level * Math.sin(angle), z];
+});
+
+/** Directions from which a section is looked at: from each side but from the root. */
+const SECTION_VIEWS = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]];
+
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const scaled = (a, s) => a.map(v => v * s);
 const added = (a, b) => a.map((v, i) => v + b[i]);
 const unit = a => scaled(a, 1 / Math.hypot(...a));
+
+/** Eight points of the ring around a place as it is seen from a direction. */
+function ringAround(place, way) {
+  const right = unit(cross(Math.abs(way[2]) > 0.9 ? [1, 0, 0] : [0, 0, 1], way)), up = cross(way, right);
+  return Array.from({ length: 8 }, (_, number) => {
+    const angle = number * Math.PI / 4;
+    return added(place, added(scaled(right, RING * Math.cos(angle)), scaled(up, RING * Math.sin(angle))));
+  });
+}
 
 /** An orthographic camera: a millimetre has the same length everywhere in the picture. */
 class Eye {
@@ -90,7 +110,8 @@ class Solid {
     const size = voxels.dims.map((n, axis) => n * voxels.spacing[axis]);
     this.eye = new Eye(voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1))), 0.55 * Math.max(...size));
     this.clips = [null, null, null];
-    this.asked = null;
+    /** The place that is marked by a ring, mm of tooth space. */
+    this.ring = null;
     this.byVerdict = true;
     this.patterns = true;
     const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS);
@@ -99,8 +120,8 @@ class Solid {
   }
 
   /** Shows what another one showed: after an adapter was lost and a new one begins with nothing in it. */
-  resume({ eye, clips, asked, byVerdict, patterns }) {
-    return Object.assign(this, { eye, clips, asked, byVerdict, patterns });
+  resume({ eye, clips, ring, byVerdict, patterns }) {
+    return Object.assign(this, { eye, clips, ring, byVerdict, patterns });
   }
 
   textures(palette) {
@@ -201,7 +222,12 @@ class Solid {
     set('right', inVoxels(scaled(eye.right, eye.half * width / height)));
     set('up', inVoxels(scaled(eye.up, eye.half)));
     set('away', inVoxels(scaled(eye.back, -1)));
-    set('asked', this.asked || [-1, -1, -1]);
+    gl.uniform1i(this.uniforms.hasRing, this.ring !== null);
+    set('ring', this.ring ? voxels.cellOf(this.ring) : [0, 0, 0]);
+    // The same for whoever reads the page by program.
+    const { middle, right, up, half } = eye;
+    const clips = this.clips.map((at, axis) => (at === null ? null : voxels.pointOf([at, at, at])[axis]));
+    canvas.dataset.view = JSON.stringify({ middle, right, up, half, clips, ring: this.ring, ratio: width / height });
     gl.uniform1i(this.uniforms.byVerdict, this.byVerdict);
     gl.uniform1i(this.uniforms.patterns, this.patterns);
     gl.clearColor(0, 0, 0, 0);

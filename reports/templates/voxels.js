@@ -217,6 +217,21 @@ class Voxels {
     return cell.map((v, axis) => this.about.first[axis] + v * this.about.stride);
   }
 
+  /**
+   * How much lies between a place (mm of tooth space) and an eye in a direction, in steps of half a voxel; what lies within a
+   * third of a millimetre of the place belongs to it.
+   */
+  coverOf(place, way) {
+    const step = 0.5 * Math.min(...this.spacing), from = this.cellOf(place);
+    const reach = Math.hypot(...this.dims.map((n, axis) => n * this.spacing[axis]));
+    let count = 0;
+    for (let mm = 0.33; mm < reach; mm += step) {
+      const [x, y, z] = from.map((v, axis) => v + mm * way[axis] / this.spacing[axis]);
+      if (this.sample(x, y, z) > 0.5) count++;
+    }
+    return count;
+  }
+
   /** Density between voxels, 0 to 1; outside there is none. */
   sample(x, y, z) {
     const [nx, ny, nz] = this.dims;
