@@ -521,7 +521,7 @@ mod tests {
         let told = [
             display_format::measure("overcut_depth_max_mm", session.metric("overcut_depth_max_mm")),
             format!("sound {}", evidence.tissue.as_ref().unwrap()),
-            format!("at the {} wall", evidence.wall.as_ref().unwrap()),
+            templates.languages().text_in("en", &wall(evidence.wall.as_ref().unwrap())),
             format!("at {}", display_format::duration(evidence.at_s.unwrap())),
             format!("{:.1} N", evidence.force_n.unwrap()),
         ];
