@@ -3,6 +3,9 @@
 
 mod architecture;
 mod circles;
+mod dependencies;
 mod names;
 mod parts;
 mod sources;
+#[path = "../support/tools.rs"]
+mod tools;
