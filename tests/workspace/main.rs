@@ -7,5 +7,7 @@ mod dependencies;
 mod names;
 mod parts;
 mod sources;
+// Without the rest of the tests' support, which the workspace's rules do not need.
+#[allow(dead_code)]
 #[path = "../support/tools.rs"]
 mod tools;
