@@ -6,6 +6,8 @@
 mod anatomy;
 #[cfg(feature = "devices")]
 mod assist;
+#[cfg(feature = "devices")]
+mod link_key;
 mod bench;
 mod check;
 mod cohort;
@@ -35,6 +37,8 @@ mod preview;
 #[cfg(feature = "review")]
 mod review;
 mod run;
+#[cfg(any(feature = "devices", feature = "school"))]
+mod secret_file;
 #[cfg(feature = "school")]
 mod school;
 mod score;

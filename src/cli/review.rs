@@ -1,5 +1,6 @@
 //! `typodont review`: serves the examiners' review pages to a browser.
 
+mod connections;
 mod server;
 
 #[cfg(not(feature = "school"))]
@@ -43,6 +44,10 @@ pub struct Arguments {
     /// Host name of this computer or of its HTTPS proxy, in addition to its address; may be given several times
     #[arg(long, value_name = "NAME")]
     name: Vec<String>,
+    /// Address of the HTTPS proxy in front of this page: its X-Forwarded-For header then tells who is asking, so that wrong
+    /// passwords are counted for each client and not for the proxy; the header is ignored from any other address
+    #[arg(long, value_name = "ADDRESS")]
+    behind_proxy: Option<IpAddr>,
     /// File with the examiners' password; by default the password is taken from TYPODONT_REVIEW_PASSWORD, if that is set
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
@@ -103,7 +108,8 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     } else {
         print_line(login_url(at, &token))?;
     }
-    server::serve(listener, Arc::new(app)).map_err(|e| CliError::wrong(format!("{at}: the server stopped: {e}")))
+    server::serve(listener, Arc::new(app), arguments.behind_proxy)
+        .map_err(|e| CliError::wrong(format!("{at}: the server stopped: {e}")))
 }
 
 /// Downloads bundles and overrides, and then exchanges overrides periodically.

@@ -1,6 +1,8 @@
 //! `typodont run`: runs one exercise and writes its bundle.
 
 #[cfg(feature = "devices")]
+use super::link_key::{self, TypedKey};
+#[cfg(feature = "devices")]
 use super::live;
 #[cfg(not(all(feature = "desktop", feature = "devices")))]
 use super::missing_part;
@@ -43,10 +45,14 @@ pub struct Arguments {
     #[arg(long, value_name = "NAME[:WHICH]", conflicts_with = "second_at")]
     second: Option<String>,
     /// Address on this computer at which a second device may join from another computer
-    #[arg(long, value_name = "ADDRESS:PORT", requires = "second_key")]
+    #[arg(long, value_name = "ADDRESS:PORT")]
     second_at: Option<String>,
-    /// Key that the other computer must give: at least 8 characters
-    #[arg(long, value_name = "KEY", requires = "second_at", value_parser = key)]
+    /// File with the key that the other computer must have, as written by `typodont assist --new-key`; by default the key is
+    /// taken from TYPODONT_LINK_KEY
+    #[arg(long, value_name = "FILE", requires = "second_at")]
+    second_key_file: Option<PathBuf>,
+    /// The key itself, at least 8 characters; other users of this computer can read it there, so prefer --second-key-file
+    #[arg(long, value_name = "KEY", requires = "second_at", conflicts_with = "second_key_file")]
     second_key: Option<String>,
     /// Purpose of the second device
     #[arg(long, value_enum, default_value_t)]
@@ -112,15 +118,6 @@ impl From<SecondHandRoleName> for SecondHandRole {
 }
 
 /// Parses a key; it must be long enough to resist a thousand guesses per second.
-fn key(text: &str) -> Result<String, String> {
-    match text.len() >= 8 {
-        true => Ok(text.to_string()),
-        false => Err("the key must have at least 8 characters, because it lets another computer exert force on a \
-        person's hand"
-            .into()),
-    }
-}
-
 fn participant(text: &str) -> Result<String, String> {
     match lesson::is_valid_participant_code(text) {
         true => Ok(text.to_string()),
@@ -194,7 +191,7 @@ fn open_devices(arguments: &Arguments) -> Result<SessionDriver, CliError> {
     let first = lesson::open_device(&arguments.device)?;
     let held = (first.name.as_str(), first.device.spec());
     let second =
-        second_hand_source(arguments).map(|(from, role)| PendingSecondHand::join(&from, role, held)).transpose()?;
+        second_hand_source(arguments)?.map(|(from, role)| PendingSecondHand::join(&from, role, held)).transpose()?;
     Ok(SessionDriver::Person(Box::new(live::Hands { first, second })))
 }
 
@@ -215,7 +212,7 @@ fn open_in_window(arguments: &Arguments) -> Result<(), CliError> {
     super::open_window(typodont_app::AppOptions {
         exercise: Some(arguments.scenario.clone()),
         tooth: read_tooth_scan(arguments)?,
-        second: second_hand_source(arguments),
+        second: second_hand_source(arguments)?,
         begins_at_once: arguments.begin,
         editor_mode: None,
         device: (arguments.device == MOUSE).then(|| MOUSE.into()),
@@ -229,13 +226,19 @@ fn open_in_window(arguments: &Arguments) -> Result<(), CliError> {
 
 /// Source and role of the second hand; `None` if none joins.
 #[cfg(feature = "devices")]
-fn second_hand_source(arguments: &Arguments) -> Option<(second_hand::SecondHandSource, SecondHandRole)> {
-    let from = match (&arguments.second, arguments.second_at.clone().zip(arguments.second_key.clone())) {
+fn second_hand_source(
+    arguments: &Arguments,
+) -> Result<Option<(second_hand::SecondHandSource, SecondHandRole)>, CliError> {
+    let from = match (&arguments.second, arguments.second_at.clone()) {
         (Some(name), _) => second_hand::SecondHandSource::Device(name.clone()),
-        (None, Some((at, key))) => second_hand::SecondHandSource::Network { at, key },
-        (None, None) => return None,
+        (None, Some(at)) => {
+            let typed = arguments.second_key.as_ref().map(|key| TypedKey { option: "--second-key", key });
+            let key = link_key::read(arguments.second_key_file.as_deref(), typed, "--second-key-file")?;
+            second_hand::SecondHandSource::Network { at, key }
+        }
+        (None, None) => return Ok(None),
     };
-    Some((from, arguments.second_role.into()))
+    Ok(Some((from, arguments.second_role.into())))
 }
 
 /// Reads the scan that replaces the exercise's own tooth.

@@ -4,15 +4,17 @@
 //! accesses two slots in which the newest value wins; over the network a thread exchanges them as UDP datagrams, a
 //! thousand per second.
 //!
-//! Over the network, incoming data moves a hand. Both ends therefore share a key, and every datagram carries a
-//! message authentication code (HMAC-SHA-256): datagrams from elsewhere, altered, late or out of order are dropped
-//! and counted.
+//! Over the network, incoming data moves a hand. Both ends therefore share a key ([`crate::link_key`]), and every
+//! datagram carries a message authentication code (HMAC-SHA-256) under a key of its direction: a datagram that is sent
+//! back to its sender proves nothing. A hand moves only by datagrams that name the receiver's random number of this
+//! connection and are newer than the newest: those recorded earlier, altered, late or out of order are dropped and
+//! counted. An end draws a new number whenever the other one falls silent, so that no recording is ever valid again.
 
 use crate::coupling::DelayedPosition;
+use crate::link_key::DirectionKeys;
 use crate::realtime;
 use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
-use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::Arc;
@@ -72,7 +74,7 @@ impl HandLink {
     pub fn listen(at: impl ToSocketAddrs, key: &str) -> io::Result<(HandLink, SocketAddr)> {
         let socket = UdpSocket::bind(at)?;
         let address = socket.local_addr()?;
-        Ok((HandLink::over_udp(socket, None, key)?, address))
+        Ok((HandLink::over_udp(socket, None, key, LinkEnd::Listening)?, address))
     }
 
     /// Creates the instructor's end over the network: sends to the trainee's address.
@@ -84,24 +86,24 @@ impl HandLink {
         let none = || io::Error::new(io::ErrorKind::NotFound, "no address");
         let to = to.to_socket_addrs()?.next().ok_or_else(none)?;
         let from: SocketAddr = if to.is_ipv4() { ([0, 0, 0, 0], 0).into() } else { ([0u16; 8], 0).into() };
-        HandLink::over_udp(UdpSocket::bind(from)?, Some(to), key)
+        HandLink::over_udp(UdpSocket::bind(from)?, Some(to), key, LinkEnd::Connecting)
     }
 
-    fn over_udp(socket: UdpSocket, peer: Option<SocketAddr>, key: &str) -> io::Result<HandLink> {
+    fn over_udp(socket: UdpSocket, peer: Option<SocketAddr>, key: &str, end: LinkEnd) -> io::Result<HandLink> {
         socket.set_read_timeout(Some(SEND_INTERVAL))?;
         let (ours, theirs, epoch) = (Arc::new(SeqLock::new()), Arc::new(SeqLock::new()), Instant::now());
         let (stop, rejected) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
         let mut worker = UdpWorker {
             socket,
             peer,
-            key: key.as_bytes().to_vec(),
+            end,
+            keys: DirectionKeys::derive(key),
             ours: ours.clone(),
             theirs: theirs.clone(),
             epoch,
             rejected: rejected.clone(),
-            // Random for every session, seeded by the system.
-            session_nonce: RandomState::new().build_hasher().finish() as u32 | 1,
-            peer_nonce: 0,
+            own_nonce: random_nonce()?,
+            peer_nonce: NO_NONCE,
             sequence: 0,
             last_datagram: None,
             one_way_delay: FIRST_DELAY,
@@ -149,28 +151,60 @@ const SEND_INTERVAL: Duration = Duration::from_millis(1);
 /// Delay assumed before the first round trip has been measured, s: that of a bad network.
 const FIRST_DELAY: f32 = 0.05;
 
-/// Silence after which a peer may be replaced by another one that has the key.
+/// Silence after which the connection is over: the next one has new random numbers, and may be with another peer that
+/// has the key.
 const PEER_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Length of a datagram; for the layout see `content/devices/link.md`.
-const DATAGRAM_LENGTH: usize = 80;
+const DATAGRAM_LENGTH: usize = 116;
 const MAGIC: [u8; 4] = *b"TYPH";
-const PROTOCOL: u8 = 1;
-/// Bytes of the authentication code at the end: 64 bits cannot be guessed at a thousand attempts per second.
-const MAC_LENGTH: usize = 8;
+const PROTOCOL: u8 = 2;
+/// Offset of the authentication code, which covers everything before it.
+const MAC_AT: usize = 100;
+
+/// Random number of an end for one connection.
+type Nonce = [u8; 16];
+
+/// Stands for the number of an end from which nothing was received yet.
+const NO_NONCE: Nonce = [0; 16];
+
+fn random_nonce() -> io::Result<Nonce> {
+    let mut nonce = NO_NONCE;
+    getrandom::fill(&mut nonce)
+        .map_err(|e| io::Error::other(format!("the system's random number generator failed: {e}")))?;
+    Ok(nonce)
+}
+
+/// Role of an end in a connection over the network. Its number is part of every datagram it sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LinkEnd {
+    Connecting = 0,
+    Listening = 1,
+}
+
+impl LinkEnd {
+    fn other(self) -> LinkEnd {
+        match self {
+            LinkEnd::Connecting => LinkEnd::Listening,
+            LinkEnd::Listening => LinkEnd::Connecting,
+        }
+    }
+}
 
 struct UdpWorker {
     socket: UdpSocket,
+    end: LinkEnd,
+    /// For the connecting end always the address that it was given.
     peer: Option<SocketAddr>,
-    key: Vec<u8>,
+    keys: DirectionKeys,
     ours: Arc<SeqLock<SLOT_WORDS>>,
     theirs: Arc<SeqLock<SLOT_WORDS>>,
     epoch: Instant,
     rejected: Arc<AtomicU64>,
-    /// Random number that names this session: a peer that sends it back is answering us, and answering now.
-    session_nonce: u32,
-    peer_nonce: u32,
-    sequence: u32,
+    /// Names this connection: a peer that sends it back is answering this end, and answering now.
+    own_nonce: Nonce,
+    peer_nonce: Nonce,
+    sequence: u64,
     last_datagram: Option<ReceivedDatagram>,
     /// Time in transit of a datagram, s: half of a round trip; grows at once and shrinks slowly.
     one_way_delay: f32,
@@ -179,7 +213,7 @@ struct UdpWorker {
 /// The newest datagram of the other end.
 #[derive(Clone, Copy)]
 struct ReceivedDatagram {
-    sequence: u32,
+    sequence: u64,
     /// Clock of the sender, µs.
     sent_us: u64,
     at: Instant,
@@ -192,6 +226,7 @@ impl UdpWorker {
         let mut send_at = Instant::now();
         let mut bytes = [0; DATAGRAM_LENGTH + 1];
         while !should_stop.load(Ordering::Acquire) {
+            self.end_silent_connection();
             if Instant::now() >= send_at {
                 send_at = (send_at + SEND_INTERVAL).max(Instant::now());
                 self.send();
@@ -216,30 +251,45 @@ impl UdpWorker {
         }
     }
 
-    fn send_to(&mut self, peer: SocketAddr, peer_nonce: u32) {
+    /// Forgets a peer that has been silent for too long. Its datagrams, and recordings of them, name a number that is
+    /// no longer valid.
+    fn end_silent_connection(&mut self) {
+        if self.last_datagram.is_none_or(|last| last.at.elapsed() < PEER_TIMEOUT) {
+            return;
+        }
+        // If the generator fails, the next iteration tries again; until then the old connection stays closed to all.
+        let Ok(nonce) = random_nonce() else { return };
+        (self.own_nonce, self.peer_nonce, self.last_datagram) = (nonce, NO_NONCE, None);
+        if self.end == LinkEnd::Listening {
+            self.peer = None;
+        }
+    }
+
+    fn send_to(&mut self, peer: SocketAddr, peer_nonce: Nonce) {
         let Some((_, words)) = self.ours.read() else { return };
         let (hand, _) = decode_words(words);
-        self.sequence = self.sequence.wrapping_add(1);
+        // At a thousand per second it does not overflow.
+        self.sequence += 1;
         let (echo_us, echo_age_us) = match self.last_datagram {
             Some(last) => (last.sent_us, last.at.elapsed().as_micros() as u32),
             None => (0, 0),
         };
         let mut bytes = [0; DATAGRAM_LENGTH];
         bytes[..4].copy_from_slice(&MAGIC);
-        bytes[4..8].copy_from_slice(&[PROTOCOL, u8::from(hand.is_leading), 0, 0]);
-        bytes[8..12].copy_from_slice(&self.sequence.to_le_bytes());
-        bytes[12..20].copy_from_slice(&(self.epoch.elapsed().as_micros() as u64).to_le_bytes());
-        bytes[20..28].copy_from_slice(&echo_us.to_le_bytes());
-        bytes[28..32].copy_from_slice(&echo_age_us.to_le_bytes());
-        bytes[64..68].copy_from_slice(&self.session_nonce.to_le_bytes());
-        bytes[68..72].copy_from_slice(&peer_nonce.to_le_bytes());
-        bytes[32..36].copy_from_slice(&hand.buttons.to_le_bytes());
+        bytes[4..8].copy_from_slice(&[PROTOCOL, u8::from(hand.is_leading), self.end as u8, 0]);
+        bytes[8..16].copy_from_slice(&self.sequence.to_le_bytes());
+        bytes[16..24].copy_from_slice(&(self.epoch.elapsed().as_micros() as u64).to_le_bytes());
+        bytes[24..32].copy_from_slice(&echo_us.to_le_bytes());
+        bytes[32..36].copy_from_slice(&echo_age_us.to_le_bytes());
+        bytes[36..40].copy_from_slice(&hand.buttons.to_le_bytes());
         let numbers = hand.position.to_array().into_iter().chain(hand.orientation.to_array());
-        for (to, number) in bytes[36..64].chunks_exact_mut(4).zip(numbers) {
+        for (to, number) in bytes[40..68].chunks_exact_mut(4).zip(numbers) {
             to.copy_from_slice(&number.to_le_bytes());
         }
-        let mac = self.mac(&bytes[..DATAGRAM_LENGTH - MAC_LENGTH]);
-        bytes[DATAGRAM_LENGTH - MAC_LENGTH..].copy_from_slice(&mac);
+        bytes[68..84].copy_from_slice(&self.own_nonce);
+        bytes[84..100].copy_from_slice(&peer_nonce);
+        let mac = self.mac(self.end, &bytes[..MAC_AT]).finalize().into_bytes();
+        bytes[MAC_AT..].copy_from_slice(&mac[..DATAGRAM_LENGTH - MAC_AT]);
         // A datagram that cannot be sent is treated as lost.
         let _ = self.socket.send_to(&bytes, peer);
     }
@@ -247,36 +297,39 @@ impl UdpWorker {
     /// Processes a datagram; `None` if it is rejected.
     fn receive(&mut self, bytes: &[u8], from: SocketAddr) -> Option<()> {
         let bytes: &[u8; DATAGRAM_LENGTH] = bytes.try_into().ok()?;
-        if bytes[..4] != MAGIC || bytes[4] != PROTOCOL {
+        let sender = self.end.other();
+        if bytes[..4] != MAGIC || bytes[4] != PROTOCOL || bytes[6] != sender as u8 {
             return None;
         }
-        self.hmac(&bytes[..DATAGRAM_LENGTH - MAC_LENGTH])
-            .verify_truncated_left(&bytes[DATAGRAM_LENGTH - MAC_LENGTH..])
-            .ok()?;
+        self.mac(sender, &bytes[..MAC_AT]).verify_truncated_left(&bytes[MAC_AT..]).ok()?;
+        let nonce = |at: usize| -> Nonce { std::array::from_fn(|i| bytes[at + i]) };
         let word = |at: usize| u32::from_le_bytes(std::array::from_fn(|i| bytes[at + i]));
         let long = |at: usize| u64::from(word(at)) | u64::from(word(at + 4)) << 32;
-        let number = |i: usize| f32::from_bits(word(36 + 4 * i));
-        let (sequence, now) = (word(8), Instant::now());
-        if word(68) != self.session_nonce {
-            // The nonce is not that of this session: the peer does not know it yet, or the datagram is a replay of an
-            // old session. Either way the answer contains the nonce, and no hand moves.
-            self.send_to(from, word(64));
-            return Some(());
-        }
-        if let Some(last) = self.last_datagram.filter(|last| last.at.elapsed() < PEER_TIMEOUT) {
+        let number = |i: usize| f32::from_bits(word(40 + 4 * i));
+        let (sequence, peer_nonce, now) = (long(8), nonce(68), Instant::now());
+        match self.last_datagram {
             // Only one peer at a time, and only datagrams newer than the newest.
-            let is_newer = sequence.wrapping_sub(last.sequence).cast_signed() > 0;
-            if self.peer != Some(from) || !is_newer {
-                return None;
+            Some(last) => {
+                let is_peer = self.peer == Some(from) && self.peer_nonce == peer_nonce;
+                if !is_peer || nonce(84) != self.own_nonce || sequence <= last.sequence {
+                    return None;
+                }
             }
+            // The peer does not know this end's number yet, or the datagram is a recording of an earlier connection.
+            // Either way the answer contains the number, and no hand moves.
+            None if nonce(84) != self.own_nonce => {
+                self.send_to(from, peer_nonce);
+                return Some(());
+            }
+            None => {}
         }
-        (self.peer, self.peer_nonce) = (Some(from), word(64));
-        self.last_datagram = Some(ReceivedDatagram { sequence, sent_us: long(12), at: now });
-        self.measure_round_trip(long(20), word(28));
+        (self.peer, self.peer_nonce) = (Some(from), peer_nonce);
+        self.last_datagram = Some(ReceivedDatagram { sequence, sent_us: long(16), at: now });
+        self.measure_round_trip(long(24), word(32));
         let hand = LinkedHand {
             position: Vec3::new(number(0), number(1), number(2)),
             orientation: Quat::from_xyzw(number(3), number(4), number(5), number(6)),
-            buttons: word(32),
+            buttons: word(36),
             is_leading: bytes[5] & 1 == 1,
         };
         if !hand.position.is_finite() || !hand.orientation.is_finite() {
@@ -299,15 +352,15 @@ impl UdpWorker {
         self.one_way_delay = one_way.max(self.one_way_delay + (one_way - self.one_way_delay) * 0.01).clamp(0.0, 1.0);
     }
 
-    fn hmac(&self, bytes: &[u8]) -> Hmac<Sha256> {
-        let mut hmac = Hmac::<Sha256>::new_from_slice(&self.key).expect("HMAC takes keys of any length");
+    /// Returns the authentication code of what `sender` sends.
+    fn mac(&self, sender: LinkEnd, bytes: &[u8]) -> Hmac<Sha256> {
+        let key = match sender {
+            LinkEnd::Connecting => &self.keys.of_connecting_end,
+            LinkEnd::Listening => &self.keys.of_listening_end,
+        };
+        let mut hmac = Hmac::<Sha256>::new_from_slice(key).expect("HMAC takes keys of any length");
         hmac.update(bytes);
         hmac
-    }
-
-    fn mac(&self, bytes: &[u8]) -> [u8; MAC_LENGTH] {
-        let whole = self.hmac(bytes).finalize().into_bytes();
-        std::array::from_fn(|i| whole[i])
     }
 }
 
@@ -380,5 +433,151 @@ mod tests {
         UdpSocket::bind("127.0.0.1:0").unwrap().send_to(b"nonsense", address).unwrap();
         assert!(eventually(|| here.rejected_count() > 20));
         assert_eq!(here.latest(), None);
+    }
+    /// Socket of an attacker, who has no key, or of a wire tapper.
+    fn socket() -> UdpSocket {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+        socket
+    }
+
+    fn receive(socket: &UdpSocket) -> Option<(Vec<u8>, SocketAddr)> {
+        let mut bytes = [0; 2048];
+        socket.recv_from(&mut bytes).ok().map(|(length, from)| (bytes[..length].to_vec(), from))
+    }
+
+    #[test]
+    fn a_datagram_sent_back_makes_nobody_the_peer() {
+        // Aim: an attacker with one old datagram and no key does not become the peer. Method: an instructor's datagram
+        // of yesterday, sent to a trainee; every answer is sent back as it is, and with its two numbers exchanged.
+        // Regression: the code once had no direction, and the second reflection was accepted.
+        let attacker = socket();
+        let yesterday = {
+            let instructor = HandLink::connect(attacker.local_addr().unwrap(), "secret").unwrap();
+            instructor.publish(&hand(9.0, true));
+            let mut recorded = None;
+            assert!(eventually(|| {
+                recorded = receive(&attacker);
+                recorded.is_some()
+            }));
+            recorded.unwrap().0
+        };
+        let (trainee, address) = HandLink::listen("127.0.0.1:0", "secret").unwrap();
+        trainee.publish(&hand(1.0, false));
+        attacker.send_to(&yesterday, address).unwrap();
+        let mut answers = 0;
+        for _ in 0..200 {
+            let Some((answer, _)) = receive(&attacker) else {
+                attacker.send_to(&yesterday, address).unwrap();
+                continue;
+            };
+            answers += 1;
+            attacker.send_to(&answer, address).unwrap();
+            let mut exchanged = answer.clone();
+            exchanged[68..84].copy_from_slice(&answer[84..100]);
+            exchanged[84..100].copy_from_slice(&answer[68..84]);
+            exchanged[6] ^= 1;
+            attacker.send_to(&exchanged, address).unwrap();
+        }
+        assert!(answers > 0, "the attack found nobody");
+        assert_eq!(trainee.latest(), None);
+        // The instructor of today joins all the same.
+        let instructor = HandLink::connect(address, "secret").unwrap();
+        instructor.publish(&hand(3.0, false));
+        assert!(eventually(|| trainee.latest().is_some_and(|(hand, _)| hand.position.x == 3.0)));
+    }
+
+    #[test]
+    fn a_hundred_thousand_recorded_datagrams_move_no_hand() {
+        // Aim: recordings are worth nothing, even on the wire itself. Method: a tapper between the ends passes their
+        // datagrams on and records them; then it sends recorded ones, reflected ones and altered ones in between, from
+        // the peer's own address. The instructor's positions only grow: a smaller one would be a recorded one. Another
+        // stranger sends recordings from an address of their own.
+        const TRIES: u64 = 100_000;
+        let (tap, side) = (socket(), socket());
+        tap.set_read_timeout(Some(Duration::from_micros(200))).unwrap();
+        let (trainee, trainee_address) = HandLink::listen("127.0.0.1:0", "secret").unwrap();
+        let instructor = HandLink::connect(tap.local_addr().unwrap(), "secret").unwrap();
+        let (mut recorded, mut instructor_address) = (Vec::new(), None);
+        let (mut x, mut seen, mut tries, mut after) = (0.0_f32, 0.0_f32, 0_u64, 0);
+        let start = Instant::now();
+        while trainee.rejected_count() < TRIES || after < 100 {
+            assert!(start.elapsed() < Duration::from_secs(120), "{} of {tries} were refused", trainee.rejected_count());
+            x += 0.01;
+            instructor.publish(&hand(x, true));
+            trainee.publish(&hand(-x, false));
+            while let Some((datagram, from)) = receive(&tap) {
+                let is_of_trainee = from == trainee_address;
+                if !is_of_trainee {
+                    instructor_address = Some(from);
+                }
+                let to = if is_of_trainee { instructor_address } else { Some(trainee_address) };
+                to.map(|to| tap.send_to(&datagram, to));
+                recorded.push(datagram);
+            }
+            if let Some((hand, _)) = trainee.latest() {
+                assert!(
+                    hand.position.x >= seen,
+                    "a recorded position moved the hand: {} after {seen}",
+                    hand.position.x
+                );
+                after += usize::from(trainee.rejected_count() >= TRIES && hand.position.x > seen);
+                seen = hand.position.x;
+            }
+            // Few at a time, so that the system drops none, and the tap passes the pair's own on in between.
+            let first = recorded.len().saturating_sub(500);
+            for datagram in recorded[..first].iter().step_by(1 + first / 60).take(60) {
+                let mut altered = datagram.clone();
+                altered[40 + (tries % 76) as usize] ^= 1;
+                tap.send_to(datagram, trainee_address).unwrap();
+                tap.send_to(&altered, trainee_address).unwrap();
+                side.send_to(datagram, trainee_address).unwrap();
+                tries += 3;
+            }
+        }
+        assert!(seen > 1.0, "the pair stayed connected: {seen}");
+        assert!(receive(&side).is_none(), "nobody else is answered while the pair is connected");
+        // The trainee is followed as well.
+        assert!(instructor.latest().is_some_and(|(hand, age)| hand.position.x < -1.0 && age < 2.0));
+    }
+
+    #[test]
+    fn a_recording_is_worth_nothing_after_the_peer_has_gone() {
+        // Aim: a recording of this very evening does not move the hand either. Method: the instructor leads and leaves;
+        // after the silence, every datagram is sent again, first from another address.
+        let tap = socket();
+        let (trainee, trainee_address) = HandLink::listen("127.0.0.1:0", "secret").unwrap();
+        trainee.publish(&hand(-1.0, false));
+        let mut recorded = Vec::new();
+        {
+            let instructor = HandLink::connect(tap.local_addr().unwrap(), "secret").unwrap();
+            instructor.publish(&hand(7.0, true));
+            let mut instructor_address = None;
+            assert!(eventually(|| {
+                if let Some((datagram, from)) = receive(&tap) {
+                    if from != trainee_address {
+                        instructor_address = Some(from);
+                        recorded.push(datagram.clone());
+                    }
+                    let to = if from == trainee_address { instructor_address } else { Some(trainee_address) };
+                    to.map(|to| tap.send_to(&datagram, to));
+                }
+                recorded.len() > 200
+            }));
+        }
+        assert!(trainee.latest().is_some());
+        assert!(eventually(|| trainee.latest().is_some_and(|(_, age)| age > PEER_TIMEOUT.as_secs_f32() + 0.2)));
+        for attacker in [socket(), tap] {
+            for datagram in &recorded {
+                attacker.send_to(datagram, trainee_address).unwrap();
+                thread::sleep(Duration::from_micros(200));
+            }
+        }
+        let (_, age) = trainee.latest().unwrap();
+        assert!(age > PEER_TIMEOUT.as_secs_f32(), "a recorded datagram was accepted {age} s ago");
+        // Whoever has the key is the next peer.
+        let instructor = HandLink::connect(trainee_address, "secret").unwrap();
+        instructor.publish(&hand(8.0, false));
+        assert!(eventually(|| trainee.latest().is_some_and(|(hand, _)| hand.position.x == 8.0)));
     }
 }

@@ -9,6 +9,7 @@ use jsonc_parser::ast::{ObjectPropName, Value};
 use jsonc_parser::common::{Range as AstRange, Ranged};
 use jsonc_parser::{CollectOptions, ParseOptions, parse_to_ast};
 use regex_lite::Regex;
+use schemars::transform::RecursiveTransform;
 use schemars::{JsonSchema, Schema, SchemaGenerator, generate::SchemaSettings};
 use serde::de::DeserializeOwned;
 use serde_json::Value as Json;
@@ -60,9 +61,33 @@ impl SourceMap {
     }
 }
 
+/// Form of every text for which its type gives no other: no control character except tab and line break, and no
+/// character that reverses the direction of what follows it, so that a title reads in every place as its author sees
+/// it, and a database can store it.
+const TEXT_PATTERN: &str = r"^[^\u0000-\u0008\u000B\u000C\u000E-\u001F\u007F-\u009F\u202A-\u202E\u2066-\u2069]*$";
+
+/// Returns true for a character that [`TEXT_PATTERN`] excludes.
+fn is_forbidden(letter: char) -> bool {
+    let is_control = letter.is_control() && !matches!(letter, '\t' | '\n' | '\r');
+    is_control || matches!(letter, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 /// Returns the schema of a type, as printed for editors and as used by [`read`].
 pub fn schema_of<T: JsonSchema>() -> Schema {
-    SchemaGenerator::new(SchemaSettings::draft2020_12()).into_root_schema_for::<T>()
+    let settings = SchemaSettings::draft2020_12().with_transform(RecursiveTransform(require_plain_text));
+    SchemaGenerator::new(settings).into_root_schema_for::<T>()
+}
+
+/// Adds [`TEXT_PATTERN`] to the schema of a text that has no form of its own.
+fn require_plain_text(schema: &mut Schema) {
+    let accepts_text = match schema.get("type") {
+        Some(Json::String(name)) => name == "string",
+        Some(Json::Array(names)) => names.iter().any(|name| name == "string"),
+        _ => false,
+    };
+    if accepts_text && ["enum", "const", "pattern"].into_iter().all(|key| schema.get(key).is_none()) {
+        schema.insert("pattern".into(), TEXT_PATTERN.into());
+    }
 }
 
 /// Reads a text as a value of type `T`.
@@ -70,6 +95,24 @@ pub fn schema_of<T: JsonSchema>() -> Schema {
 /// # Errors
 /// Returns every complaint about syntax or structure, in order of position.
 pub fn read<T: DeserializeOwned + JsonSchema>(source: Arc<SourceText>) -> Result<ParsedJson<T>, Vec<Diagnostic>> {
+    read_with(source, false)
+}
+
+/// Reads a text from a recording as [`read`] does, but accepts every character in its texts: an earlier version may
+/// have recorded it, and its replay must not change.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_recorded<T: DeserializeOwned + JsonSchema>(
+    source: Arc<SourceText>,
+) -> Result<ParsedJson<T>, Vec<Diagnostic>> {
+    read_with(source, true)
+}
+
+fn read_with<T: DeserializeOwned + JsonSchema>(
+    source: Arc<SourceText>,
+    accepts_all_characters: bool,
+) -> Result<ParsedJson<T>, Vec<Diagnostic>> {
     let whole = |code, message: String, help: &str| {
         let help = (!help.is_empty()).then(|| help.to_string());
         Diagnostic { code, source: source.clone(), span: None, path: String::new(), message, help }
@@ -88,7 +131,13 @@ pub fn read<T: DeserializeOwned + JsonSchema>(source: Arc<SourceText>) -> Result
         return Err(vec![whole("syntax", "the file is empty".into(), "")]);
     };
     let root = schema_of::<T>();
-    let mut check = Check { source: source.clone(), root: root.as_value(), found: Vec::new(), spans: BTreeMap::new() };
+    let mut check = Check {
+        source: source.clone(),
+        root: root.as_value(),
+        accepts_all_characters,
+        found: Vec::new(),
+        spans: BTreeMap::new(),
+    };
     check.value(&value, root.as_value(), &mut String::new());
     let Check { mut found, spans, .. } = check;
     if !found.is_empty() {
@@ -156,6 +205,7 @@ fn clip(range: AstRange, length: usize) -> Range<usize> {
 struct Check<'s> {
     source: Arc<SourceText>,
     root: &'s Json,
+    accepts_all_characters: bool,
     found: Vec<Diagnostic>,
     spans: BTreeMap<String, Range<usize>>,
 }
@@ -249,6 +299,7 @@ impl<'s> Check<'s> {
             path.push_str(&pointer::escape(&name));
             match (known.and_then(|k| k.get(&name)), others) {
                 (Some(inner), _) => self.value(&property.value, inner, path),
+                (None, Some(Json::Object(_))) if self.has_forbidden(&property.name, &name, path) => {}
                 (None, Some(Json::Object(_))) => self.value(&property.value, others.unwrap_or(&Json::Null), path),
                 (None, Some(Json::Bool(false))) => {
                     let names = known.into_iter().flat_map(|k| k.keys().map(String::as_str)).collect::<Vec<_>>();
@@ -315,7 +366,28 @@ impl<'s> Check<'s> {
         }
     }
 
+    /// Complains of the first character of a text that people cannot see or that changes how others are read, and
+    /// returns true if there is one.
+    fn has_forbidden(&mut self, at: &impl Ranged, text: &str, path: &str) -> bool {
+        let Some(letter) = text.chars().find(|c| is_forbidden(*c)).filter(|_| !self.accepts_all_characters) else {
+            return false;
+        };
+        let (what, help) = match letter.is_control() {
+            true => ("a control character", "delete the character, or type the text again"),
+            false => (
+                "a character that changes the direction of the text",
+                "delete the character; where the order of a mixed text is wrong, use the marks U+200E and U+200F",
+            ),
+        };
+        let message = format!("the text contains U+{:04X}, {what}", u32::from(letter));
+        self.complain(at, path, "forbidden-character", message, Some(help.into()));
+        true
+    }
+
     fn text(&mut self, text: &jsonc_parser::ast::StringLit, schema: &Json, path: &str) {
+        if self.has_forbidden(text, &text.value, path) {
+            return;
+        }
         if let Some(words) = schema.get("enum").and_then(Json::as_array) {
             let words: Vec<&str> = words.iter().filter_map(Json::as_str).collect();
             if !words.contains(&text.value.as_ref()) {
@@ -329,7 +401,8 @@ impl<'s> Check<'s> {
             self.complain(text, path, "too-short", "the text is empty".into(), description(schema));
             return;
         }
-        let pattern = schema.get("pattern").and_then(Json::as_str).and_then(|p| Regex::new(p).ok());
+        let pattern = schema.get("pattern").and_then(Json::as_str).filter(|p| *p != TEXT_PATTERN);
+        let pattern = pattern.and_then(|p| Regex::new(p).ok());
         if pattern.is_some_and(|p| !p.is_match(&text.value)) {
             let message = format!("\"{}\" does not have the required form", abridged(&text.value));
             self.complain(text, path, "wrong-form", message, description(schema));
@@ -495,5 +568,46 @@ mod tests {
         assert_eq!(found[COMPLAINTS_MAX].code, "too-many");
         let found = read::<TwoNumbers>(SourceText::new("a.json", r#"{"first":1,"first":2}"#)).expect_err("a key twice");
         assert_eq!(found.iter().map(|d| d.code).collect::<Vec<_>>(), ["duplicate-key"]);
+    }
+
+    #[derive(Debug, serde::Deserialize, JsonSchema)]
+    #[allow(dead_code)]
+    struct Titled {
+        title: String,
+        words: BTreeMap<String, String>,
+    }
+
+    #[test]
+    fn the_form_of_a_text_excludes_the_forbidden_characters() {
+        // Aim: editors that know only the schema accept what the program reads. Method: every character of the planes
+        // in use as a title, against the pattern and by reading it, as itself and, where JSON demands it, escaped.
+        let pattern = Regex::new(TEXT_PATTERN).unwrap();
+        for letter in (0..0x2_0000).filter_map(char::from_u32) {
+            assert_eq!(pattern.is_match(&letter.to_string()), !is_forbidden(letter), "U+{:04X}", u32::from(letter));
+        }
+        for (letter, line_column) in [('\0', (1, 10)), ('\u{1b}', (1, 10)), ('\u{9b}', (1, 10)), ('\u{202e}', (1, 10))]
+        {
+            let text = serde_json::json!({ "title": format!("Cavity{letter}two"), "words": {} }).to_string();
+            let found = read::<Titled>(SourceText::new("a.json", text.as_str())).expect_err("a forbidden character");
+            let [only] = &found[..] else { panic!("{found:?}") };
+            assert_eq!(
+                (only.code, only.path.as_str(), only.line_and_column()),
+                ("forbidden-character", "/title", Some(line_column))
+            );
+            assert!(only.message.contains(&format!("U+{:04X}", u32::from(letter))), "{}", only.message);
+            assert!(
+                read_recorded::<Titled>(SourceText::new("a.json", text)).is_ok(),
+                "what was recorded stays readable"
+            );
+        }
+        let key = serde_json::json!({ "title": "a", "words": { "a\u{2066}b": "c" } }).to_string();
+        assert_eq!(
+            read::<Titled>(SourceText::new("a.json", key)).expect_err("in a key")[0].code,
+            "forbidden-character"
+        );
+        for fine in ["two\nlines\tand more", "مرحبا \u{200f}(2)\u{200e}", "Kavite açma 🦷", ""] {
+            let text = serde_json::json!({ "title": fine, "words": { fine: fine } }).to_string();
+            assert!(read::<Titled>(SourceText::new("a.json", text)).is_ok(), "{fine}");
+        }
     }
 }

@@ -75,6 +75,7 @@ impl Library {
         for folder in &self.folders {
             let path = folder.join(name);
             if path.is_file() {
+                require_inside(&path, folder, name)?;
                 return read_file(&path).map(Arc::from);
             }
         }
@@ -90,6 +91,24 @@ impl Library {
     pub fn text(&self, name: &str) -> Result<Arc<SourceText>, Diagnostic> {
         decode_text(name, self.bytes(name)?.to_vec())
     }
+}
+
+/// Fails when a symbolic link leads a file out of its folder: an exercise from somebody else could otherwise name any
+/// file of the computer, and a complaint would quote it.
+fn require_inside(path: &Path, folder: &Path, name: &str) -> Result<(), Diagnostic> {
+    let resolved = |path: &Path| {
+        fs::canonicalize(path).map_err(|error| {
+            Diagnostic::about_file(name, "unreadable-file", format!("the file cannot be read: {error}"), None)
+        })
+    };
+    // The folder itself may be a link.
+    let folder = resolved(if folder.as_os_str().is_empty() { Path::new(".") } else { folder })?;
+    if resolved(path)?.starts_with(folder) {
+        return Ok(());
+    }
+    let help = "copy the file itself into the folder".to_string();
+    let message = "the file is a symbolic link that leads out of the folder";
+    Err(Diagnostic::about_file(name, "outside-folder", message, Some(help)))
 }
 
 /// Reads a file that the user named; the path is relative to the current folder and may lead anywhere on disk.
@@ -126,12 +145,78 @@ pub fn read_text(path: &Path) -> Result<Arc<SourceText>, Diagnostic> {
 /// # Errors
 /// Fails when the bytes are not UTF-8.
 pub fn decode_text(name: &str, bytes: Vec<u8>) -> Result<Arc<SourceText>, Diagnostic> {
-    match String::from_utf8(bytes) {
-        Ok(text) => Ok(SourceText::new(name, text.strip_prefix('\u{feff}').unwrap_or(&text))),
-        Err(error) => {
-            let at = error.utf8_error().valid_up_to();
-            let help = Some("save the file as UTF-8".to_string());
-            Err(Diagnostic::about_file(name, "not-text", format!("byte {at} is not UTF-8 text"), help))
+    const MARK: char = '\u{feff}';
+    let error = match String::from_utf8(bytes) {
+        Ok(text) => return Ok(SourceText::new(name, text.strip_prefix(MARK).unwrap_or(&text))),
+        Err(error) => error,
+    };
+    let (at, bytes) = (error.utf8_error().valid_up_to(), error.as_bytes());
+    let wrong = bytes[at];
+    // The text up to the end of the line shows the place; the rest may be hundreds of megabytes of something else.
+    let end = bytes[at..].iter().take(LINE_REST_MAX).position(|b| *b == b'\n');
+    let until = end.map_or(bytes.len().min(at + LINE_REST_MAX), |line_end| at + line_end);
+    let shown = String::from_utf8_lossy(&bytes[..until]);
+    let text = shown.strip_prefix(MARK).unwrap_or(&shown);
+    let start = at - (shown.len() - text.len());
+    Err(Diagnostic {
+        code: "not-text",
+        source: SourceText::new(name, text),
+        span: Some(start..start + char::REPLACEMENT_CHARACTER.len_utf8()),
+        path: String::new(),
+        message: format!("the byte 0x{wrong:02X} is not UTF-8 text"),
+        help: Some("save the file as UTF-8".to_string()),
+    })
+}
+
+/// Maximum length of the shown rest of a line that is not UTF-8, bytes.
+const LINE_REST_MAX: usize = 80;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_that_is_not_text_is_named_by_line_and_column() {
+        // Aim: an author finds the letter that an old editor saved as Latin-1. Method: the wrong byte in the second
+        // line, after letters of two bytes, with and without a byte order mark; and as the last byte of the file.
+        for mark in ["", "\u{feff}"] {
+            let bytes = [mark.as_bytes(), "{\n  \"öü".as_bytes(), b"\xe9\"\n}"].concat();
+            let found = decode_text("a.json", bytes).unwrap_err();
+            assert_eq!(found.headline(), "a.json:2:6: not-text: the byte 0xE9 is not UTF-8 text");
+            assert!(found.to_string().contains("2 |   \"öü"), "{found}");
         }
+        let found = decode_text("a.json", b"\xff".to_vec()).unwrap_err();
+        assert_eq!(found.line_and_column(), Some((1, 1)));
+        let found = decode_text("a.json", vec![0xff; 10_000_000]).unwrap_err();
+        assert!(found.source.text.len() < 1000, "{}", found.source.text.len());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_out_of_the_folder_is_refused() {
+        // Aim: an exercise from somebody else reads no file of the computer. Method: links to a file outside and to a
+        // folder outside; a link within the folder, and the same folder through a link, are read.
+        use std::os::unix::fs::symlink;
+        let folder = std::env::temp_dir().join(format!("typodont-links-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        let own = folder.join("own");
+        fs::create_dir_all(&own).unwrap();
+        fs::create_dir_all(folder.join("other")).unwrap();
+        fs::write(folder.join("other/secret.csv"), "root:x:0:0\n").unwrap();
+        fs::write(own.join("path.csv"), "x\n").unwrap();
+        symlink(folder.join("other/secret.csv"), own.join("link.csv")).unwrap();
+        symlink(folder.join("other"), own.join("linked")).unwrap();
+        symlink("path.csv", own.join("inside.csv")).unwrap();
+        symlink(&own, folder.join("same")).unwrap();
+        for root in [&own, &folder.join("same")] {
+            let library = Library::empty().with_folder(root);
+            for name in ["link.csv", "linked/secret.csv"] {
+                let found = library.text(name).unwrap_err();
+                assert_eq!(found.code, "outside-folder");
+                assert!(!found.to_string().contains("root:x"), "{found}");
+            }
+            assert_eq!(library.text("inside.csv").unwrap().text, "x\n");
+        }
+        fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -86,6 +86,10 @@ pub(super) fn triangles_of_gltf(
 ) -> Result<Mesh, String> {
     let (text, blob) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
     let root = json::Root::from_slice(text).map_err(|e| format!("this is not a glTF 2.0 file: {e}"))?;
+    if let Some(unknown) = root.extensions_required.iter().find(|name| !is_ignorable(name)) {
+        let shown: String = unknown.chars().filter(|c| !c.is_control()).take(60).collect();
+        return Err(format!("the glTF file requires the extension \"{shown}\", which is not supported"));
+    }
     let buffers = root.buffers.iter().map(|buffer| match (&buffer.uri, blob) {
         (None, Some(blob)) => Ok(blob.to_vec()),
         (None, None) => Err("a buffer of the glTF file has no data".to_string()),
@@ -108,6 +112,12 @@ pub(super) fn triangles_of_gltf(
         None => (0..root.meshes.len()).try_for_each(|number| file.add(number, &NodeTransform::IDENTITY, &mut walk))?,
     }
     Ok(walk.mesh)
+}
+
+/// Returns true for a required extension that changes only materials, textures or lights, which are never read.
+/// Without any other, such as one for compression, the shape would be missing or wrong.
+fn is_ignorable(extension: &str) -> bool {
+    ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"].iter().any(|kind| extension.starts_with(kind))
 }
 
 /// Returns the two parts of a binary glTF file: its JSON text, and its binary data if there are any.
@@ -378,6 +388,12 @@ mod tests {
         broken("data:application/octet-stream;base64,", "away.bin?", "away.bin");
         broken("\"bufferView\":1,", "", "compressed");
         broken("5123", "5126", "cut off");
+        let requires =
+            |name: &str| gltf().replace("\"scene\":0", &format!("\"extensionsRequired\":[\"{name}\"],\"scene\":0"));
+        for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization", "ACME_odd"] {
+            check("a.gltf", requires(name).as_bytes(), Err(&format!("requires the extension \"{name}\"")));
+        }
+        check("a.gltf", requires("KHR_materials_unlit").as_bytes(), Ok(320.0));
     }
 
     #[test]

@@ -28,6 +28,9 @@ const FAILURES_PER_MINUTE_MAX: u32 = 60;
 /// Number of addresses whose failed attempts are tracked.
 const TRACKED_ADDRESSES_MAX: usize = 1000;
 
+/// Wrong passwords in a row from a browser that has logged in before, after which it counts as any other.
+const DEVICE_FAILURES_MAX: u32 = 10;
+
 /// Method of logging in.
 #[derive(Clone)]
 pub enum AuthMode {
@@ -46,7 +49,7 @@ pub struct Auth {
     active_token_tag: [u8; 32],
     spent_token_tags: Vec<[u8; 32]>,
     logins: BTreeMap<[u8; 32], Login>,
-    failed_attempts: BTreeMap<IpAddr, FailedAttempts>,
+    failed_attempts: BTreeMap<AttemptSource, FailedAttempts>,
     failures_this_minute: (i64, u32),
 }
 
@@ -58,6 +61,15 @@ pub struct Login {
     /// Examiner's name as last entered, offered as the default in forms.
     pub display_name: String,
     last_seen: i64,
+}
+
+/// Source whose wrong passwords are counted together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum AttemptSource {
+    Address(IpAddr),
+    /// Browser that has logged in before, by the tag of its device cookie. Examiners who share an address, behind a
+    /// proxy, then do not share each other's mistakes.
+    Device([u8; 32]),
 }
 
 #[derive(Clone, Copy, Default)]
@@ -80,8 +92,13 @@ pub enum TokenLogin {
 /// Result of a login with a password.
 #[derive(Debug, PartialEq, Eq)]
 pub enum PasswordLogin {
-    /// The password was right; contains the session cookie.
-    LoggedIn(String),
+    /// The password was right.
+    LoggedIn {
+        /// Session cookie.
+        cookie: String,
+        /// Cookie that marks this browser as one that knew the password.
+        device_cookie: String,
+    },
     WrongPassword,
     /// Too many wrong passwords; contains the seconds until the next attempt is accepted.
     RateLimited(i64),
@@ -144,35 +161,76 @@ impl Auth {
         }
     }
 
-    /// Logs in with the password, unless attempts from `peer`, or from everywhere, are rate-limited.
+    /// Logs in with the password, unless attempts from `peer`, or from everywhere, are rate-limited. A browser with a
+    /// valid device cookie is limited by its own attempts only.
     ///
     /// # Errors
     ///
     /// Returns a message when the system's random number generator fails.
-    pub fn log_in_with_password(&mut self, given: &str, peer: IpAddr, now: i64) -> Result<PasswordLogin, String> {
+    pub fn log_in_with_password(
+        &mut self,
+        given: &str,
+        peer: IpAddr,
+        device_cookie: Option<&str>,
+        now: i64,
+    ) -> Result<PasswordLogin, String> {
         let Some(password) = self.password_tag else { return Ok(PasswordLogin::WrongPassword) };
         let minute = now.div_euclid(60);
         if self.failures_this_minute.0 != minute {
             self.failures_this_minute = (minute, 0);
         }
-        let until = self.failed_attempts.get(&peer).map_or(0, |t| t.locked_until);
-        let until =
-            if self.failures_this_minute.1 >= FAILURES_PER_MINUTE_MAX { until.max(60 * (minute + 1)) } else { until };
+        let source = self.attempt_source(peer, device_cookie);
+        let is_device = matches!(source, AttemptSource::Device(_));
+        let until = self.failed_attempts.get(&source).map_or(0, |t| t.locked_until);
+        let until = match !is_device && self.failures_this_minute.1 >= FAILURES_PER_MINUTE_MAX {
+            true => until.max(60 * (minute + 1)),
+            false => until,
+        };
         if now < until {
             return Ok(PasswordLogin::RateLimited(until - now));
         }
         if crypto::verify_tag(&self.key, given.as_bytes(), &password) {
-            self.failed_attempts.remove(&peer);
-            return Ok(PasswordLogin::LoggedIn(self.create_session(now)?));
+            self.failed_attempts.remove(&source);
+            let device_cookie = self.issue_device_cookie()?;
+            return Ok(PasswordLogin::LoggedIn { cookie: self.create_session(now)?, device_cookie });
         }
-        self.failures_this_minute.1 += 1;
+        if !is_device {
+            self.failures_this_minute.1 += 1;
+        }
         if self.failed_attempts.len() >= TRACKED_ADDRESSES_MAX {
             self.failed_attempts.retain(|_, attempts| now < attempts.locked_until);
         }
-        let attempts = self.failed_attempts.entry(peer).or_default();
+        let attempts = self.failed_attempts.entry(source).or_default();
         let pause = (BACKOFF << attempts.count.min(10)).min(BACKOFF_MAX);
         *attempts = FailedAttempts { count: attempts.count + 1, locked_until: now + pause };
         Ok(PasswordLogin::WrongPassword)
+    }
+
+    /// Returns the source of an attempt: the browser if it has logged in before and has not guessed since, otherwise its
+    /// address.
+    fn attempt_source(&self, peer: IpAddr, device_cookie: Option<&str>) -> AttemptSource {
+        let is_own = |cookie: &&str| {
+            let (word, tag) = cookie.split_at_checked(64).unwrap_or_default();
+            crypto::verify_tag(&self.key, tag.as_bytes(), &self.device_tag(word))
+        };
+        let Some(cookie) = device_cookie.filter(is_own) else { return AttemptSource::Address(peer) };
+        let source = AttemptSource::Device(crypto::hmac_tag(&self.key, cookie.as_bytes()));
+        match self.failed_attempts.get(&source).is_some_and(|attempts| attempts.count >= DEVICE_FAILURES_MAX) {
+            true => AttemptSource::Address(peer),
+            false => source,
+        }
+    }
+
+    fn issue_device_cookie(&self) -> Result<String, String> {
+        let word = hex(&crypto::random_bytes()?);
+        let tag = hex(&crypto::hmac_tag(&self.key, format!("device {word}").as_bytes()));
+        Ok(word + &tag)
+    }
+
+    /// Returns the tag of the tag that a device cookie with this word must have, for a comparison in constant time.
+    fn device_tag(&self, word: &str) -> [u8; 32] {
+        let tag = hex(&crypto::hmac_tag(&self.key, format!("device {word}").as_bytes()));
+        crypto::hmac_tag(&self.key, tag.as_bytes())
     }
 
     fn create_session(&mut self, now: i64) -> Result<String, String> {
@@ -246,16 +304,47 @@ mod tests {
     fn wrong_passwords_are_rate_limited() {
         let (mut auth, token) = Auth::new(&AuthMode::Password("correct horse battery".into())).unwrap();
         assert_eq!(auth.log_in_with_token(&token, 0), Ok(TokenLogin::Rejected), "a password disables login links");
-        assert_eq!(auth.log_in_with_password("wrong", HERE, 100), Ok(PasswordLogin::WrongPassword));
-        assert_eq!(auth.log_in_with_password("correct horse battery", HERE, 100), Ok(PasswordLogin::RateLimited(2)));
-        assert_eq!(auth.log_in_with_password("wrong", HERE, 102), Ok(PasswordLogin::WrongPassword));
-        assert_eq!(auth.log_in_with_password("wrong", HERE, 103), Ok(PasswordLogin::RateLimited(3)));
+        assert_eq!(auth.log_in_with_password("wrong", HERE, None, 100), Ok(PasswordLogin::WrongPassword));
+        assert_eq!(
+            auth.log_in_with_password("correct horse battery", HERE, None, 100),
+            Ok(PasswordLogin::RateLimited(2))
+        );
+        assert_eq!(auth.log_in_with_password("wrong", HERE, None, 102), Ok(PasswordLogin::WrongPassword));
+        assert_eq!(auth.log_in_with_password("wrong", HERE, None, 103), Ok(PasswordLogin::RateLimited(3)));
         assert!(matches!(
-            auth.log_in_with_password("correct horse battery", HERE, 106),
-            Ok(PasswordLogin::LoggedIn(_))
+            auth.log_in_with_password("correct horse battery", HERE, None, 106),
+            Ok(PasswordLogin::LoggedIn { .. })
         ));
         // The number of attempts per minute is also limited for all addresses together.
-        let attempts = (0..200u8).map(|n| auth.log_in_with_password("wrong", [10, 0, 0, n].into(), 240).unwrap());
+        let attempts = (0..200u8).map(|n| auth.log_in_with_password("wrong", [10, 0, 0, n].into(), None, 240).unwrap());
         assert_eq!(attempts.filter(|t| *t == PasswordLogin::WrongPassword).count(), FAILURES_PER_MINUTE_MAX as usize);
+    }
+    #[test]
+    fn a_browser_that_logged_in_before_is_not_locked_out_by_others() {
+        // Aim: behind a proxy, where all share an address, nobody locks out the examiners. Method: others use up every
+        // attempt of the address and of the minute; then a browser with its device cookie, with a forged one, and with
+        // its own after too many guesses.
+        let (mut auth, _) = Auth::new(&AuthMode::Password("correct horse battery".into())).unwrap();
+        let right = "correct horse battery";
+        let Ok(PasswordLogin::LoggedIn { device_cookie, .. }) = auth.log_in_with_password(right, HERE, None, 0) else {
+            panic!("the password does not log in")
+        };
+        for n in 0..200u8 {
+            auth.log_in_with_password("wrong", [10, 0, 0, n].into(), None, 60).unwrap();
+            auth.log_in_with_password("wrong", HERE, None, 60).unwrap();
+        }
+        let forged =
+            ["", "ö", &device_cookie[1..], &device_cookie.replace(&device_cookie[70..71], "x"), &"0".repeat(128)];
+        for cookie in forged.into_iter().map(Some).chain([None]) {
+            let outcome = auth.log_in_with_password(right, HERE, cookie, 60).unwrap();
+            assert!(matches!(outcome, PasswordLogin::RateLimited(_)), "{cookie:?}: {outcome:?}");
+        }
+        let own = Some(device_cookie.as_str());
+        assert!(matches!(auth.log_in_with_password(right, HERE, own, 60), Ok(PasswordLogin::LoggedIn { .. })));
+        // A stolen cookie gives few guesses: its own are slowed down, and then it counts for nothing.
+        let guesses = (0..10_000).filter(|second| {
+            auth.log_in_with_password("wrong", HERE, own, 120 + second / 100) == Ok(PasswordLogin::WrongPassword)
+        });
+        assert!(guesses.count() < 30);
     }
 }

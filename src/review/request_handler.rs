@@ -49,6 +49,11 @@ impl ReviewApp {
             return Response::plain_error(405, "wrong-method: this address does not accept the request's method")
                 .with_header("allow", allowed);
         }
+        // A preview of a link asks by HEAD, and must not use up a login link.
+        if route == Route::LoginLink && request.method != "GET" {
+            return Response::plain_error(405, "wrong-method: this address does not accept the request's method")
+                .with_header("allow", "GET");
+        }
         if request.body.len() > BODY_MAX {
             return Response::plain_error(413, "long-form: the form is too long");
         }
@@ -142,12 +147,13 @@ impl ReviewApp {
         let outcome = self.state().auth.log_in_with_password(
             first_value(&form, "password"),
             request.peer,
+            request.cookie(&device_cookie_name(request)),
             request.now.as_second(),
         );
         match outcome {
-            Ok(PasswordLogin::LoggedIn(cookie)) => {
-                Response::redirect("/").with_header("set-cookie", session_cookie(request, &cookie))
-            }
+            Ok(PasswordLogin::LoggedIn { cookie, device_cookie }) => Response::redirect("/")
+                .with_header("set-cookie", session_cookie(request, &cookie))
+                .with_header("set-cookie", device_cookie_header(request, &device_cookie)),
             Ok(PasswordLogin::WrongPassword) => {
                 self.login_page(language, request, 403, "wrong", 0).with_log("wrong-password: a login was refused")
             }
@@ -219,9 +225,24 @@ fn cookie_name(request: &Request) -> String {
     format!("typodont_review_{}", request.local_addr.port())
 }
 
+/// Name of the cookie of a browser that has logged in before.
+fn device_cookie_name(request: &Request) -> String {
+    format!("typodont_device_{}", request.local_addr.port())
+}
+
 fn session_cookie(request: &Request, cookie: &str) -> String {
+    secured(request, cookie_name(request), cookie)
+}
+
+fn device_cookie_header(request: &Request, cookie: &str) -> String {
+    const MONTH_S: u32 = 30 * 24 * 3600;
+    format!("{}; Max-Age={MONTH_S}", secured(request, device_cookie_name(request), cookie))
+}
+
+/// A cookie that scripts cannot read and other sites cannot make a browser send.
+fn secured(request: &Request, name: String, value: &str) -> String {
     // A browser that uses HTTPS, through a proxy, must never send the cookie over plain HTTP.
     let secure = request.header("origin").is_some_and(|origin| origin.starts_with("https://"));
     let more = if secure { "; Secure" } else { "" };
-    format!("{}={cookie}; Path=/; HttpOnly; SameSite=Strict{more}", cookie_name(request))
+    format!("{name}={value}; Path=/; HttpOnly; SameSite=Strict{more}")
 }

@@ -89,6 +89,12 @@ pub fn is_transient(error: &Error) -> bool {
     }
 }
 
+/// Returns true if the database refuses this session's own content, so that another session may still be stored: text
+/// that it cannot store (class 22), a rule of a table (23), or a text that exceeds a limit (54).
+pub fn is_data_error(error: &Error) -> bool {
+    error.code().is_some_and(|code| ["22", "23", "54"].contains(&&code.code()[..2]))
+}
+
 fn has_transient_io_cause(error: &Error) -> bool {
     let mut cause = error.source();
     while let Some(error) = cause {

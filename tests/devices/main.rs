@@ -6,6 +6,7 @@ mod counting;
 mod devices;
 mod drivers;
 mod haply;
+mod link_key;
 mod live;
 mod mouse;
 mod native;

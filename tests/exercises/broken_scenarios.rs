@@ -92,6 +92,17 @@ fn texts_that_are_not_json() {
 }
 
 #[test]
+fn characters_that_nobody_sees() {
+    // Regression: a title with a zero byte passed, and its sessions could never enter a school's records.
+    for (name, letter) in [("zero", '\0'), ("escape", '\u{1b}'), ("override", '\u{202e}'), ("isolate", '\u{2066}')] {
+        let text = json!(format!("Grinding{letter}two"));
+        check(name, "/title", text.clone(), &[("forbidden-character", "/title")]);
+        check(name, "/stages/0/instruction", text, &[("forbidden-character", "/stages/0/instruction")]);
+    }
+    check("a mark", "/title", json!("تحضير\u{200f} (36)"), &[]);
+}
+
+#[test]
 fn keys_that_are_missing_unknown_or_double() {
     check("unknown key", "/titel", json!("x"), &[("unknown-key", "/titel")]);
     check("unknown key deep down", "/stages/0/cuting", json!(true), &[("unknown-key", "/stages/0/cuting")]);

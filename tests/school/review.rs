@@ -277,6 +277,9 @@ fn strangers_are_refused() {
     )
     .unwrap();
     let desk = Desk::open(&folder, &[]);
+    // A preview of the link asks by HEAD, and leaves it usable.
+    let preview = ask(desk.at, "HEAD", &desk.way_in(), &[("host", desk.at.to_string().as_str())], "");
+    assert_eq!((preview.status, preview.header("allow"), preview.header("set-cookie")), (405, "GET", ""));
     let browser = desk.browser();
     let id = browser.ids("/").remove(0);
     let (at, host, own) = (desk.at, desk.at.to_string(), format!("http://{}", desk.at));
@@ -397,6 +400,81 @@ fn whoever_is_slow_keeps_nobody_waiting() {
     let long = format!("GET / HTTP/1.1\r\nhost: {}\r\nx: {}\r\n\r\n", desk.at, "x".repeat(60_000));
     let status = sent(desk.at, long.as_bytes()).status;
     assert!([0, 431].contains(&status), "{status}");
+}
+
+#[test]
+fn idle_connections_close_the_desk_for_nobody() {
+    // Aim: whoever opens connections and sends nothing, or half a head, gains nothing. Method: 200 of them, then an honest request.
+    // It is answered while connections of the last ones are still open, and so before any of them reached its time limit.
+    // Regression: the 97th connection once waited until an earlier one was given up after ten seconds.
+    let folder = folder("review_idle");
+    enter(&folder, &graded("anna", [25.0, 38.5]));
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    let mut idle: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(desk.at).unwrap()).collect();
+    idle.iter_mut().skip(100).for_each(|stream| drop(stream.write_all(b"GET / HTTP/1.1\r\nhost: ")));
+    let begun = Instant::now();
+    assert_eq!(browser.get("/").status, 200);
+    let took = begun.elapsed();
+    let is_open = |stream: &mut TcpStream| {
+        stream.set_nonblocking(true).unwrap();
+        stream.read(&mut [0; 64]).is_err_and(|e| e.kind() == std::io::ErrorKind::WouldBlock)
+    };
+    let open = idle.iter_mut().filter_map(|stream| is_open(stream).then_some(())).count();
+    println!("answered after {:.2} s beside {open} open connections", took.as_secs_f64());
+    assert!((20..64).contains(&open), "{open} of 200 are open after {took:?}");
+}
+
+#[test]
+fn behind_a_proxy_everybody_has_attempts_of_their_own() {
+    // Aim: a guesser locks out nobody else. Method: the desk is told of a proxy, and the header names two people; a desk that was
+    // not told believes no header; an examiner who was in before is not locked out even there.
+    let folder = folder("review_proxied");
+    enter(&folder, &graded("anna", [25.0, 38.5]));
+    let right = encoded(&[("password", "correct horse battery")]);
+    let wrong = encoded(&[("password", "correct horse bottery")]);
+    let open = |more: &[&str]| {
+        let mut proxied = command(&folder, &[&["--name", "marks.school.example"], more].concat());
+        proxied.env("TYPODONT_REVIEW_PASSWORD", "correct horse battery");
+        Desk::start(proxied)
+    };
+    let post = |desk: &Desk, person: &str, cookie: &str, body: &str| {
+        let headers = [
+            ("host", "marks.school.example"),
+            ("origin", "https://marks.school.example"),
+            ("content-type", "application/x-www-form-urlencoded"),
+            ("x-forwarded-for", person),
+            ("cookie", cookie),
+        ];
+        ask(desk.at, "POST", "/door", &headers, body)
+    };
+    let desk = open(&["--behind-proxy", "127.0.0.1"]);
+    assert_eq!(post(&desk, "198.51.100.7", "", &wrong).status, 403);
+    assert_eq!(post(&desk, "198.51.100.7", "", &right).status, 429);
+    assert_eq!(
+        post(&desk, "203.0.113.1, 198.51.100.7", "", &right).status,
+        429,
+        "earlier entries are the client's own"
+    );
+    let entered = post(&desk, "198.51.100.8", "", &right);
+    assert_eq!(entered.status, 303);
+    desk.told("198.51.100.8 POST door 303");
+    drop(desk);
+
+    let desk = open(&[]);
+    let entered = post(&desk, "198.51.100.8", "", &right);
+    let cookies: Vec<&str> =
+        entered.headers.iter().filter(|(n, _)| n == "set-cookie").map(|(_, v)| v.as_str()).collect();
+    let device = cookies.iter().find(|cookie| cookie.starts_with("typodont_device_")).unwrap();
+    for part in ["HttpOnly", "SameSite=Strict", "Secure"] {
+        assert!(device.contains(part), "{device}");
+    }
+    for n in 0..3 {
+        let status = post(&desk, &format!("198.51.100.{n}"), "", &wrong).status;
+        assert_eq!(status, if n == 0 { 403 } else { 429 }, "a header that nobody asked for gives no further attempt");
+    }
+    assert_eq!(post(&desk, "198.51.100.9", "", &right).status, 429);
+    assert_eq!(post(&desk, "198.51.100.8", device.split(';').next().unwrap(), &right).status, 303);
 }
 
 #[test]

@@ -517,6 +517,148 @@ fn a_disk_that_is_not_mounted_is_no_empty_store() {
     assert_eq!(cluster.count("SELECT count(*) FROM typodont.job WHERE state = 'done'"), 2);
 }
 
+/// Text of this many letters that does not compress, as an index of the database would like.
+fn scattered(letters: usize) -> String {
+    let mut dice = Dice(7);
+    (0..letters).map(|_| char::from(b'!' + dice.below(90) as u8)).filter(|c| !"\"\\".contains(*c)).collect()
+}
+
+#[test]
+fn a_text_that_is_too_long_for_the_records_holds_up_no_other_session() {
+    // Aim: one odd bundle costs one bundle. Method: texts of 12 000 letters where the records have an index, each in a bundle
+    // between good ones. Regression: SQLSTATE 54000 once ended the station's sync, each time anew.
+    let Some(cluster) = school_of(&["station-1"]) else { return };
+    let folder = folder("too_long");
+    let (own, long) = (folder.join("own"), scattered(12_000));
+    let mut poisoned = Vec::new();
+    for (n, pointer) in ["/participant", "/scenario/id", "/scenario/sha256"].iter().enumerate() {
+        let mut one = school::session("5-grinding", "berk", 50.0);
+        *one.pointer_mut(pointer).unwrap() = json!(long);
+        poisoned.push(enter(&own, &format!("b{n}-poison"), one, 500));
+    }
+    let mut one = school::session("5-grinding", "berk", 50.0);
+    one["metrics"][long.as_str()] = json!(1.5);
+    poisoned.push(enter(&own, "b3-poison", one, 500));
+    for n in 0..5 {
+        enter(&own, &format!("b{n}-sound"), school::session("5-grinding", &format!("student-{n}"), 50.0), 500);
+    }
+    let address = format!("file://{}", folder.join("store").display());
+    let output = cluster.typodont("station-1", &["sync", &text(&own), "--class", "A", "--store", &address]);
+    let told = complained(&output);
+    assert!(String::from_utf8_lossy(&output.stdout).starts_with("5 sessions sent"), "{output:?}");
+    for bundle in &poisoned {
+        assert!(told.contains(&text(bundle)), "{told}");
+    }
+    assert_eq!(cluster.count("SELECT count(*) FROM typodont.session"), 5);
+    assert_eq!(files_below(&folder.join("store")).len(), 5, "nothing of the refused ones is left");
+    // The records themselves refuse it, whatever a station lets through: about this session, and not for good.
+    let mut client = cluster.client("station-1");
+    let error = client.query_one("SELECT typodont.exercise_of($1, 'id', 'title')", &[&long]).unwrap_err();
+    assert!(typodont_school::records::is_data_error(&error) && !typodont_school::records::is_transient(&error));
+}
+
+#[test]
+fn admitting_a_login_takes_nobodys_password() {
+    // Aim: a slip of the pen costs nobody the database. Method: the owner, a superuser, logins beyond the rules about rows, and a
+    // registrar under a station's name; then the same with the word that is asked for.
+    let Some(cluster) = school_of(&["station-1"]) else { return };
+    let folder = folder("admitted");
+    let secret = folder.join("secret");
+    fs::write(&secret, "hunter2 and more\n").unwrap();
+    cluster
+        .client("owner")
+        .batch_execute(
+            "ALTER ROLE owner PASSWORD 'own'; CREATE ROLE dba LOGIN SUPERUSER; CREATE ROLE reader LOGIN BYPASSRLS;
+             CREATE ROLE staff; CREATE ROLE heir LOGIN IN ROLE owner; CREATE ROLE maker LOGIN CREATEROLE;
+             CREATE ROLE copier LOGIN REPLICATION; ALTER ROLE registrar PASSWORD 'reg'",
+        )
+        .unwrap();
+    let passwords = || -> Vec<(String, Option<String>)> {
+        let sql = "SELECT rolname::text, rolpassword FROM pg_authid WHERE rolname NOT LIKE 'pg\\_%' ORDER BY 1";
+        cluster.client("owner").query(sql, &[]).unwrap().iter().map(|row| (row.get(0), row.get(1))).collect()
+    };
+    let members = "SELECT count(*) FROM pg_auth_members";
+    let (before, members_before) = (passwords(), cluster.count(members));
+    let admit = |login: &str, more: &[&str]| {
+        let fixed = ["school", "admit", login, "--as", "station"];
+        cluster.typodont("owner", &[&fixed, more].concat())
+    };
+    let with_password = ["--password-file", &text(&secret)];
+    let replacing = ["--password-file", &text(&secret), "--replace"];
+    for login in ["owner", "dba", "reader", "heir", "maker", "copier", "staff"] {
+        for more in [&[][..], &with_password, &replacing] {
+            let output = admit(login, more);
+            assert_eq!(output.status.code(), Some(1), "{login}: {}", complained(&output));
+            assert!(complained(&output).contains("wrong-login"), "{login}: {}", complained(&output));
+        }
+    }
+    let output = admit("registrar", &with_password);
+    assert!(output.status.code() == Some(1) && complained(&output).contains("--replace"), "{}", complained(&output));
+    assert_eq!(admit("pg_read_all_data", &[]).status.code(), Some(2));
+    assert_eq!((passwords(), cluster.count(members)), (before.clone(), members_before), "nothing was changed");
+    assert_eq!(cluster.count("SELECT count(*) FROM typodont.audit WHERE detail LIKE 'owner as%'"), 0);
+    // Asked for, it is done; and what a login may do is printed.
+    assert_eq!(String::from_utf8_lossy(&admit("registrar", &replacing).stdout), "registrar: registrar, station\n");
+    assert_ne!(passwords(), before);
+    assert_eq!(String::from_utf8_lossy(&admit("station-2", &with_password).stdout), "station-2: station\n");
+}
+
+#[test]
+fn a_worker_changes_measures_only_with_a_score_of_its_own() {
+    // Aim: a worker's login is no way to lose or forge measures unseen. Method: what a curious worker would try, before and after
+    // it has entered a score; what it may do is in the audit log.
+    let Some(cluster) = school_of(&["station-1"]) else { return };
+    let folder = folder("measures");
+    let own = folder.join("own");
+    for n in 0..3 {
+        enter(&own, &format!("b{n}"), school::session("5-grinding", &format!("student-{n}"), 50.0), 500);
+    }
+    sync(&cluster, "station-1", &own, &format!("file://{}", folder.join("store").display()), "A");
+    let measures = "SELECT count(*) FROM typodont.metric_value";
+    let lines = "SELECT count(*) FROM typodont.audit WHERE action = 'measures removed' AND session_id IS NOT NULL";
+    let before = cluster.count(measures);
+    let (id, version): (String, i64) = {
+        let row =
+            cluster.client("owner").query_one("SELECT min(id::text), min(scorer_version) FROM typodont.session", &[]);
+        row.map(|row| (row.get(0), row.get(1))).unwrap()
+    };
+    let mut worker = cluster.client("worker");
+    let removed = |worker: &mut postgres::Client| worker.execute("DELETE FROM typodont.metric_value", &[]).unwrap();
+    assert_eq!(removed(&mut worker), 0);
+    let insert = format!("INSERT INTO typodont.metric_value VALUES ('{id}', {version}, 'made_up', 1)");
+    assert!(worker.batch_execute(&insert).is_err());
+    // Neither in somebody else's name nor at another time.
+    for (column, value) in [("scored_by", "'station-1'"), ("scored_at", "now() + interval '1 day'")] {
+        let score = format!(
+            "INSERT INTO typodont.score (session_id, scorer_version, result, typodont_version, {column})
+             VALUES ('{id}', {version}, '{{}}', 'x', {value})"
+        );
+        assert!(worker.batch_execute(&score).is_err(), "{column}");
+    }
+    assert_eq!((cluster.count(measures), cluster.count(lines)), (before, 0));
+    // With its score it replaces the measures of that session and version; afterwards they stand.
+    let mut transaction = worker.transaction().unwrap();
+    let score = format!(
+        "INSERT INTO typodont.score (session_id, scorer_version, result, typodont_version) VALUES ('{id}', {version}, '{{}}', 'x')"
+    );
+    transaction.batch_execute(&score).unwrap();
+    assert_eq!(transaction.execute("DELETE FROM typodont.metric_value", &[]).unwrap(), 3);
+    transaction.batch_execute(&insert).unwrap();
+    transaction.commit().unwrap();
+    assert_eq!(removed(&mut worker), 0);
+    assert!(worker.batch_execute(&insert.replace("made_up", "more")).is_err());
+    assert_eq!((cluster.count(measures), cluster.count(lines)), (before - 2, 1));
+    let audit = cluster.ask("registrar", &["school", "audit"]);
+    let line = audit.lines().find(|line| line.contains("measures removed")).unwrap();
+    assert!(line.contains("\"worker\"") && line.contains(&id) && line.contains("3 of scorer version"), "{line}");
+    // An erasure is one line of its own, and takes the measures with it.
+    cluster.ask(
+        "registrar",
+        &["school", "erase", "student-1", "--store", &format!("file://{}", folder.join("store").display())],
+    );
+    assert_eq!(cluster.count(&format!("{measures} WHERE session_id NOT IN (SELECT id FROM typodont.session)")), 0);
+}
+
 #[test]
 fn nobody_is_erased_or_noted_by_a_slip() {
     let Some(cluster) = school_of(&["station-1"]) else { return };

@@ -3,6 +3,11 @@
 
 mod architecture;
 mod circles;
+mod dependencies;
 mod names;
 mod parts;
 mod sources;
+// Without the rest of the tests' support, which the workspace's rules do not need.
+#[allow(dead_code)]
+#[path = "../support/tools.rs"]
+mod tools;

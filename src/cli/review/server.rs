@@ -1,5 +1,6 @@
 //! HTTP/1.1 server of the review pages, with limits on connections and times.
 
+use super::connections::{Admission, ConnectionTable};
 use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::server::conn::http1;
@@ -7,19 +8,16 @@ use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use std::convert::Infallible;
 use std::io;
-use std::net::SocketAddr;
-use std::sync::Arc;
+use std::net::{IpAddr, SocketAddr};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::net::TcpStream;
-use tokio::sync::Semaphore;
+use tokio::task::AbortHandle;
 use typodont_report::sanitize_display;
 use typodont_review::{BODY_MAX, Request, Response, ReviewApp, route_name};
 
-/// Maximum number of simultaneous connections; a browser opens six.
-const CONNECTIONS_MAX: usize = 96;
-
 /// Time limits for the head of a request and for its body; a browser needs milliseconds.
-const HEAD_WAIT: Duration = Duration::from_secs(10);
+const HEAD_WAIT: Duration = Duration::from_secs(5);
 const BODY_WAIT: Duration = Duration::from_secs(10);
 
 /// Time limit of a connection: a report of 6 MB over a slow line takes a minute.
@@ -35,27 +33,41 @@ const HEAD_MAX: usize = 32 << 10;
 /// Maximum length of a logged line, characters.
 const LOG_LINE_MAX: usize = 300;
 
-/// Serves requests until the program is stopped.
+/// Open connections, shared with the tasks that serve them.
+type Connections = Arc<Mutex<ConnectionTable<AbortHandle>>>;
+
+/// Locks the table. Its values are complete after every statement, so a poisoned mutex is used nevertheless.
+fn locked(connections: &Connections) -> MutexGuard<'_, ConnectionTable<AbortHandle>> {
+    connections.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Serves requests until the program is stopped. `proxy` is the address whose X-Forwarded-For header is believed.
 ///
 /// # Errors
 /// The system's error if the server cannot be started on this listener.
-pub fn serve(listener: std::net::TcpListener, app: Arc<ReviewApp>) -> io::Result<()> {
+pub fn serve(listener: std::net::TcpListener, app: Arc<ReviewApp>, proxy: Option<IpAddr>) -> io::Result<()> {
     let at = listener.local_addr()?;
     listener.set_nonblocking(true)?;
     let runtime =
         tokio::runtime::Builder::new_current_thread().enable_io().enable_time().max_blocking_threads(8).build()?;
     runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener)?;
-        let room = Arc::new(Semaphore::new(CONNECTIONS_MAX));
+        let connections = Arc::new(Mutex::new(ConnectionTable::new(proxy)));
+        // Connections are accepted at any time: one that waits to be accepted could not be told from an idle one.
         loop {
-            let Ok(place) = Arc::clone(&room).acquire_owned().await else { return Ok(()) };
             match listener.accept().await {
                 Ok((stream, peer)) => {
-                    let desk = Arc::clone(&app);
-                    tokio::spawn(async move {
-                        serve_connection(stream, peer, at, desk).await;
-                        drop(place);
-                    });
+                    let Admission::Admitted(number, evicted) = locked(&connections).admit(peer.ip().to_canonical())
+                    else {
+                        continue;
+                    };
+                    if let Some(evicted) = evicted {
+                        evicted.abort();
+                    }
+                    let (desk, open) = (Arc::clone(&app), Arc::clone(&connections));
+                    let connection = ConnectionContext { number, peer, at, proxy, app: desk, connections: open };
+                    let task = tokio::spawn(serve_connection(stream, connection));
+                    locked(&connections).set_handle(number, task.abort_handle());
                 }
                 Err(error) => {
                     log(&format!("a connection could not be accepted: {error}"));
@@ -66,12 +78,28 @@ pub fn serve(listener: std::net::TcpListener, app: Arc<ReviewApp>) -> io::Result
     })
 }
 
-async fn serve_connection(stream: TcpStream, peer: SocketAddr, at: SocketAddr, app: Arc<ReviewApp>) {
+/// A connection, and what its requests need.
+#[derive(Clone)]
+struct ConnectionContext {
+    number: u64,
+    peer: SocketAddr,
+    at: SocketAddr,
+    proxy: Option<IpAddr>,
+    app: Arc<ReviewApp>,
+    connections: Connections,
+}
+
+async fn serve_connection(stream: TcpStream, mut context: ConnectionContext) {
     // For a listener on an address such as 0.0.0.0: the local address at which this request arrived.
-    let at = stream.local_addr().unwrap_or(at);
+    context.at = stream.local_addr().unwrap_or(context.at);
+    let _guard = ConnectionGuard { connections: Arc::clone(&context.connections), number: context.number };
     let service = service_fn(move |asked: hyper::Request<Incoming>| {
-        let desk = Arc::clone(&app);
-        async move { Ok::<_, Infallible>(to_hyper(handle(asked, peer, at, desk).await)) }
+        let context = context.clone();
+        async move {
+            let response = handle(asked, &context).await;
+            locked(&context.connections).end_request(context.number, Instant::now());
+            Ok::<_, Infallible>(to_hyper(response))
+        }
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -83,13 +111,35 @@ async fn serve_connection(stream: TcpStream, peer: SocketAddr, at: SocketAddr, a
     let _ = tokio::time::timeout(CONNECTION_LIFE, connection).await;
 }
 
+/// Entry of a connection in the table, removed when the connection ends in whichever way.
+struct ConnectionGuard {
+    connections: Connections,
+    number: u64,
+}
+
+impl Drop for ConnectionGuard {
+    fn drop(&mut self) {
+        locked(&self.connections).remove(self.number);
+    }
+}
+
+/// Returns the address of the client: that of the connection, or, if this is the proxy's, the last one that the proxy
+/// has entered. Earlier entries are the client's own and may be invented.
+fn client_address(peer: IpAddr, proxy: Option<IpAddr>, headers: &hyper::HeaderMap) -> IpAddr {
+    let peer = peer.to_canonical();
+    if proxy.map(|proxy| proxy.to_canonical()) != Some(peer) {
+        return peer;
+    }
+    let last = headers.get_all("x-forwarded-for").iter().next_back().and_then(|value| value.to_str().ok());
+    let last = last.and_then(|list| list.rsplit(',').next()).unwrap_or_default().trim();
+    let address = last.parse::<IpAddr>().or_else(|_| last.parse::<SocketAddr>().map(|with_port| with_port.ip()));
+    address.map_or(peer, |address| address.to_canonical())
+}
+
 /// Handles one request; the log line about it contains none of the request's content.
-async fn handle(
-    hyper_request: hyper::Request<Incoming>,
-    peer: SocketAddr,
-    at: SocketAddr,
-    app: Arc<ReviewApp>,
-) -> Response {
+async fn handle(hyper_request: hyper::Request<Incoming>, context: &ConnectionContext) -> Response {
+    let (at, app) = (context.at, Arc::clone(&context.app));
+    let peer = client_address(context.peer.ip(), context.proxy, hyper_request.headers());
     let begun = Instant::now();
     let method = match hyper_request.method().as_str() {
         known @ ("GET" | "HEAD" | "POST") => known.to_string(),
@@ -98,9 +148,13 @@ async fn handle(
     let page = route_name(hyper_request.uri().path());
     let response = match read_request(hyper_request, peer, at).await {
         // Handling a request reads from disk; it runs on a blocking thread, so that other requests do not wait.
-        Ok(request) => tokio::task::spawn_blocking(move || app.handle(&request))
-            .await
-            .unwrap_or_else(|_| Response::plain_error(500, "failed: the request failed; see the program's log")),
+        Ok(request) => {
+            // Only now: a slow form is as idle as no request.
+            locked(&context.connections).begin_request(context.number);
+            tokio::task::spawn_blocking(move || app.handle(&request))
+                .await
+                .unwrap_or_else(|_| Response::plain_error(500, "failed: the request failed; see the program's log"))
+        }
         Err(refused) => *refused,
     };
     for line in &response.log_lines {
@@ -111,13 +165,13 @@ async fn handle(
         let _ = super::print_line(super::login_url(at, token));
     }
     let took = begun.elapsed().as_secs_f64() * 1e3;
-    log(&format!("{} {method} {page} {} {took:.1} ms", peer.ip(), response.status));
+    log(&format!("{peer} {method} {page} {} {took:.1} ms", response.status));
     response
 }
 
 async fn read_request(
     hyper_request: hyper::Request<Incoming>,
-    peer: SocketAddr,
+    peer: IpAddr,
     at: SocketAddr,
 ) -> Result<Request, Box<Response>> {
     let (head, body) = hyper_request.into_parts();
@@ -140,7 +194,7 @@ async fn read_request(
         query: head.uri.query().unwrap_or_default().to_string(),
         headers: head.headers.iter().map(header).collect(),
         body,
-        peer: peer.ip().to_canonical(),
+        peer,
         local_addr: at,
         now: jiff::Timestamp::now(),
     })
@@ -161,4 +215,35 @@ fn to_hyper(response: Response) -> hyper::Response<Full<Bytes>> {
 /// Prints a log line with the time.
 fn log(line: &str) {
     eprintln!("{} {}", jiff::Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ"), sanitize_display(line, LOG_LINE_MAX));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_forwarded_address_counts_only_from_the_proxy() {
+        let proxy: IpAddr = [192, 0, 2, 1].into();
+        let check = |peer: [u8; 4], lines: &[&str], expected: &str| {
+            let mut headers = hyper::HeaderMap::new();
+            for line in lines {
+                headers.append("x-forwarded-for", line.parse().unwrap());
+            }
+            let found = client_address(peer.into(), Some(proxy), &headers);
+            assert_eq!(found.to_string(), expected, "{peer:?} {lines:?}");
+        };
+        check([192, 0, 2, 1], &["198.51.100.7"], "198.51.100.7");
+        check([192, 0, 2, 1], &["10.0.0.1, 198.51.100.7"], "198.51.100.7");
+        check([192, 0, 2, 1], &["10.0.0.1", "198.51.100.7"], "198.51.100.7");
+        check([192, 0, 2, 1], &["198.51.100.7:4711"], "198.51.100.7");
+        check([192, 0, 2, 1], &["2001:db8::1"], "2001:db8::1");
+        check([192, 0, 2, 1], &[], "192.0.2.1");
+        check([192, 0, 2, 1], &["unknown"], "192.0.2.1");
+        check([203, 0, 113, 9], &["198.51.100.7"], "203.0.113.9");
+        let headers = hyper::HeaderMap::from_iter([(
+            hyper::header::HeaderName::from_static("x-forwarded-for"),
+            "1.2.3.4".parse().unwrap(),
+        )]);
+        assert_eq!(client_address(proxy, None, &headers), proxy, "without --behind-proxy the header means nothing");
+    }
 }

@@ -21,6 +21,9 @@ pub struct Arguments {
     /// File with the login's password, if the server requires one
     #[arg(long, value_name = "FILE")]
     password_file: Option<PathBuf>,
+    /// With --password-file: replace the password of a login that already exists
+    #[arg(long, requires = "password_file")]
+    replace: bool,
     #[command(flatten)]
     at: DatabaseArguments,
 }
@@ -63,6 +66,11 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
             "\"{login}\": wrong-login: names that begin with typodont_ are reserved for roles; choose another name"
         )));
     }
+    if login.starts_with("pg_") {
+        return Err(CliError::misuse(format!(
+            "\"{login}\": wrong-login: names that begin with pg_ are reserved by PostgreSQL; choose another name"
+        )));
+    }
     if class.is_empty() == (*role == LoginRole::Examiner) {
         return Err(CliError::misuse("--class: an examiner needs at least one class, and no other role takes a class"));
     }
@@ -75,18 +83,63 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         }
     };
     let mut client = arguments.at.connect()?;
-    let missing = grant_role(&mut client, arguments, password.as_deref());
-    match missing.map_err(|e| CliError::wrong(format!("--database: refused: {}", describe_db_error(&e))))? {
-        None => print_line(format!("{login}: {}", role.name())),
-        Some(class) => Err(CliError::wrong(format!("--class: unknown-class: there is no class \"{class}\""))),
+    let outcome = grant_role(&mut client, arguments, password.as_deref());
+    match outcome.map_err(|e| CliError::wrong(format!("--database: refused: {}", describe_db_error(&e))))? {
+        AdmitOutcome::Admitted(roles) => print_line(format!("{login}: {}", roles.join(", "))),
+        AdmitOutcome::UnknownClass(class) => {
+            Err(CliError::wrong(format!("--class: unknown-class: there is no class \"{class}\"")))
+        }
+        AdmitOutcome::TooPowerful(why) => Err(CliError::wrong(format!(
+            "\"{login}\": wrong-login: this login {why}, and would read every record; choose a login of its own for \
+            the {}",
+            role.name()
+        ))),
+        AdmitOutcome::Exists => Err(CliError::wrong(format!(
+            "\"{login}\": known-login: the login already exists; give --replace to change its password, or leave \
+            --password-file out to grant only the role"
+        ))),
     }
 }
 
-/// Grants the role; returns the name of a class that does not exist, if there is one.
-fn grant_role(client: &mut Client, arguments: &Arguments, password: Option<&str>) -> Result<Option<String>, Error> {
-    let Arguments { login, role, class, .. } = arguments;
+/// Result of a request to admit a login. Nothing is changed unless it was admitted.
+enum AdmitOutcome {
+    /// Contains the names of all roles that the login now has.
+    Admitted(Vec<String>),
+    UnknownClass(String),
+    /// The rules about rows do not apply to the login; contains the reason.
+    TooPowerful(String),
+    /// The login exists, and its password was to be set without --replace.
+    Exists,
+}
+
+/// Reason for which no rule about rows would hold for an existing login, empty if there is none; no row for a new login.
+const PRIVILEGES_SQL: &str = "SELECT CASE
+    WHEN r.rolsuper THEN 'is a superuser'
+    WHEN pg_has_role(r.oid, d.datdba, 'MEMBER') THEN 'owns the database'
+    WHEN pg_has_role(r.oid, n.nspowner, 'MEMBER') THEN 'owns the tables'
+    WHEN r.rolbypassrls THEN 'has the attribute BYPASSRLS'
+    WHEN r.rolcreaterole THEN 'has the attribute CREATEROLE'
+    WHEN r.rolreplication THEN 'has the attribute REPLICATION'
+    WHEN NOT r.rolcanlogin THEN 'is a group of logins'
+    ELSE '' END
+  FROM pg_roles r, pg_database d, pg_namespace n
+  WHERE r.rolname = $1 AND d.datname = current_database() AND n.nspname = 'typodont'";
+
+/// Creates the login if necessary, and grants the role.
+fn grant_role(client: &mut Client, arguments: &Arguments, password: Option<&str>) -> Result<AdmitOutcome, Error> {
+    let Arguments { login, role, class, replace, .. } = arguments;
     let mut transaction = client.transaction()?;
-    let is_there = transaction.query_opt("SELECT FROM pg_roles WHERE rolname = $1", &[login])?.is_some();
+    let found = transaction.query_opt(PRIVILEGES_SQL, &[login])?;
+    let is_there = found.is_some();
+    if let Some(row) = found {
+        let privilege: String = row.get(0);
+        if !privilege.is_empty() {
+            return Ok(AdmitOutcome::TooPowerful(privilege));
+        }
+        if password.is_some() && !replace {
+            return Ok(AdmitOutcome::Exists);
+        }
+    }
     // The server quotes the names and values of these statements itself (`format`).
     let mut execute_formatted = |sql: &str, words: [&str; 2]| -> Result<(), Error> {
         let [first, second] = words;
@@ -105,11 +158,15 @@ fn grant_role(client: &mut Client, arguments: &Arguments, password: Option<&str>
         let sql = "INSERT INTO typodont.examines (login, class_id) SELECT $1, id FROM typodont.class WHERE name = $2
           ON CONFLICT (login, class_id) DO UPDATE SET login = excluded.login";
         if transaction.execute(sql, &[login, class])? == 0 {
-            return Ok(Some(sanitize_display(class, 80)));
+            return Ok(AdmitOutcome::UnknownClass(sanitize_display(class, 80)));
         }
     }
     let detail = format!("{login} as {}", role.name());
     transaction.query("SELECT typodont.note('admitted', $1)", &[&detail])?;
+    let sql = "SELECT substr(g.rolname, 10) FROM pg_roles g JOIN pg_auth_members m ON m.roleid = g.oid
+      JOIN pg_roles l ON l.oid = m.member
+      WHERE l.rolname = $1 AND g.rolname LIKE 'typodont\\_%' ORDER BY 1";
+    let roles = transaction.query(sql, &[login])?.iter().map(|row| row.get(0)).collect();
     transaction.commit()?;
-    Ok(None)
+    Ok(AdmitOutcome::Admitted(roles))
 }

@@ -3,6 +3,7 @@
 use super::connection::DbConnection;
 use super::retry::RetryPolicy;
 use crate::cli::CliError;
+use crate::cli::secret_file::require_private;
 use clap::Args;
 use postgres::Config;
 use postgres::config::{Host, SslMode};
@@ -123,27 +124,9 @@ fn password(config: &Config) -> Result<Option<String>, CliError> {
     let Some(path) = std::env::var_os("PGPASSFILE").map(PathBuf::from).or(own).filter(|path| path.is_file()) else {
         return Ok(None);
     };
-    is_private(&path)?;
+    require_private(&path)?;
     let text = typodont_formats::read_text(&path)?.text.clone();
     Ok(text.lines().find_map(|line| match_pgpass_line(line, config)))
-}
-
-#[cfg(unix)]
-fn is_private(path: &Path) -> Result<(), CliError> {
-    use std::os::unix::fs::PermissionsExt;
-    let mode = std::fs::metadata(path).map_or(0, |meta| meta.permissions().mode());
-    match mode & 0o077 {
-        0 => Ok(()),
-        _ => Err(CliError::wrong(format!(
-            "{}: open-secret: other users can read the file; run chmod 600",
-            path.display()
-        ))),
-    }
-}
-
-#[cfg(not(unix))]
-fn is_private(_: &Path) -> Result<(), CliError> {
-    Ok(())
 }
 
 /// The password of a line `host:port:database:user:password`, if it matches this connection; `*` matches anything, and

@@ -8,7 +8,6 @@ use super::store_marker;
 use crate::cli::{CliError, print_line};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use postgres::error::SqlState;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -294,8 +293,8 @@ fn upload_session(
         manifest: &archive.manifest,
     };
     let entered = match connection.query_with_retry(|client| records::insert_session(client, &finished)) {
-        // Text that a database cannot store, such as a character with the value zero.
-        Err(DbError::Rejected(error)) if is_data_error(&error) => {
+        // Text that a database cannot store, such as a character with the value zero, or one that is too long.
+        Err(DbError::Rejected(error)) if records::is_data_error(&error) => {
             store.remove_folder(&folder)?;
             return Ok(Err(format!("unkept-session: {}", records::describe_db_error(&error))));
         }
@@ -312,11 +311,6 @@ fn upload_session(
 fn session_file_digest(bundle: &Path) -> String {
     let text = typodont_formats::read_text(&bundle.join(typodont_report::bundle::SESSION_FILE));
     text.map_or(String::new(), |source| typodont_exercise::scenario::hex(&Sha256::digest(source.text.as_bytes())))
-}
-
-fn is_data_error(error: &postgres::Error) -> bool {
-    let class = error.code().map(SqlState::code).unwrap_or_default();
-    class.starts_with("22") || class.starts_with("23")
 }
 
 /// Uploads the missing parts. Parts of an earlier attempt are read back and compared.

@@ -42,7 +42,10 @@ pub enum ResolveMode {
 /// # Errors
 /// Returns all diagnostics if the scenario or one of its files is missing or invalid.
 pub fn resolve(source: Arc<SourceText>, library: &Library, mode: ResolveMode) -> Result<Scenario, Vec<Diagnostic>> {
-    let read = json::read::<ScenarioFile>(source.clone())?;
+    let read = match mode {
+        ResolveMode::FromRecording => json::read_recorded::<ScenarioFile>(source.clone())?,
+        ResolveMode::MakeWorkpiece | ResolveMode::ReadScans => json::read::<ScenarioFile>(source.clone())?,
+    };
     let mut found = Vec::new();
     let tissues = TissueTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
     let instruments = InstrumentTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
