@@ -35,6 +35,7 @@ const EXERCISES: [(&str, &str); 5] = [
 const SEED: u64 = 1;
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    super::check_output_folder(&arguments.out)?;
     let library = Library::shipped();
     let operator = operator(&arguments.operator, &library)?;
     for (name, text) in EXERCISES {

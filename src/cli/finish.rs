@@ -14,5 +14,9 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let templates = super::load_templates()?;
     let unfinished = PartialBundle::resume(&arguments.partial).map_err(CliError::wrong)?;
-    print_line(unfinished.complete(&templates).map_err(CliError::wrong)?.display())
+    let completed = unfinished.complete_interrupted(&templates).map_err(CliError::wrong)?;
+    for remark in completed.remarks {
+        eprintln!("{}: {remark}", completed.path.display());
+    }
+    print_line(completed.path.display())
 }

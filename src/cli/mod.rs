@@ -1,7 +1,7 @@
 //! The command line.
 //!
 //! Takes arguments. Gives files, lines and an exit status: 0 success, 1 the input is wrong or a check fails, 2 wrong
-//! usage. Contains no logic that is not available as a library call.
+//! usage, 3 a bundle holds but could not be judged completely. Contains no logic that is not available as a library call.
 
 mod anatomy;
 #[cfg(feature = "devices")]
@@ -179,6 +179,8 @@ pub(crate) enum CliError {
     Misuse(String),
     /// The error was already printed; only the exit status remains.
     AlreadyReported,
+    /// A bundle holds, but not everything could be judged; this was already printed.
+    PartlyVerified,
 }
 
 impl From<Vec<Diagnostic>> for CliError {
@@ -217,7 +219,15 @@ impl CliError {
         match self {
             CliError::Complaints(found) => headlines(found),
             CliError::Wrong(what) | CliError::Misuse(what) => what.clone(),
-            CliError::AlreadyReported => String::new(),
+            CliError::AlreadyReported | CliError::PartlyVerified => String::new(),
+        }
+    }
+
+    fn exit_status(&self) -> u8 {
+        match self {
+            CliError::Complaints(_) | CliError::Wrong(_) | CliError::AlreadyReported => 1,
+            CliError::Misuse(_) => 2,
+            CliError::PartlyVerified => 3,
         }
     }
 
@@ -232,19 +242,30 @@ impl CliError {
                 }
             }
             CliError::Wrong(what) | CliError::Misuse(what) => eprintln!("{what}"),
-            CliError::AlreadyReported => {}
+            CliError::AlreadyReported | CliError::PartlyVerified => {}
         }
     }
 }
 
 /// Parses the arguments, carries out the command, and prints its error.
 pub fn main() -> ExitCode {
+    survive_file_size_limit();
     match execute(Arguments::parse().command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.report();
-            ExitCode::from(if matches!(failure, CliError::Misuse(_)) { 2 } else { 1 })
+            ExitCode::from(failure.exit_status())
         }
+    }
+}
+
+/// Has a write beyond the size limit for files (`ulimit -f`) fail with an error; by default the system ends the program
+/// without a word.
+fn survive_file_size_limit() {
+    #[cfg(unix)]
+    {
+        // The flag is never read: what matters is that the signal is caught. If it cannot be, nothing is lost but words.
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, std::sync::Arc::default());
     }
 }
 
@@ -343,6 +364,17 @@ const DEFAULT_LANGUAGE: &str = "en";
 /// Templates of the folder `reports/templates` in the working folder, if it exists; otherwise the built-in ones.
 fn load_templates() -> Result<typodont_report::Templates, CliError> {
     typodont_report::Templates::in_folder(Path::new("reports/templates")).map_err(CliError::Wrong)
+}
+
+/// Checks that a folder for output is not a file.
+///
+/// # Errors
+/// A message that names the option if the path, or a folder on the way to it, is a file.
+fn check_output_folder(out: &Path) -> Result<(), CliError> {
+    match out.ancestors().find(|folder| folder.is_file()) {
+        Some(file) => Err(CliError::misuse(format!("--out: {} is a file, not a folder", file.display()))),
+        None => Ok(()),
+    }
 }
 
 /// Prints a line. A closed pipe, as of `head` after its last line, is not an error.

@@ -148,6 +148,7 @@ pub enum SessionDriver {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    super::check_output_folder(&arguments.out)?;
     let is_scripted = arguments.device == SCRIPTED;
     if !arguments.headless && (is_scripted || arguments.device == MOUSE) {
         return open_in_window(arguments);

@@ -19,12 +19,9 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let scored = score::score(&recording, ReplayCheck::Skip)
         .map_err(|e| CliError::wrong(format!("{}: damaged-recording: {e}", path.display())))?;
     print_line(SessionFile::of(&recording, &scored).to_json().trim_end())?;
-    if recording.end.is_none() {
-        let seconds = recording.len() as f64 * typodont_core::tick::TICK_S;
-        eprintln!(
-            "{}: the recording is incomplete: it ends after {seconds:.3} s, and the score covers this part only",
-            path.display()
-        );
+    if let Some(loss) = recording.describe_loss() {
+        let extent = if recording.is_cut_off() { "; the score covers this part only" } else { "" };
+        eprintln!("{}: {loss}{extent}", path.display());
     }
     Ok(())
 }

@@ -3,28 +3,52 @@
 use super::{CliError, print_line};
 use clap::Args;
 use std::path::PathBuf;
-use typodont_report::bundle;
-use typodont_report::bundle::Verification;
+use typodont_report::Templates;
+use typodont_report::bundle::{self, VerificationStatus};
 
 #[derive(Args)]
+#[command(after_help = "\
+Exit status: 0 everything was judged and follows from the recording; 1 something differs, or cannot be read; 3 what was \
+judged follows, but not everything could be judged, such as a page made from templates that are not available here.")]
 pub struct Arguments {
     /// Folder of the bundle, or a recording alone
     bundle: PathBuf,
+    /// Folder with the templates from which the bundle's page was made, besides reports/templates and the shipped ones
+    #[arg(long, value_name = "DIR")]
+    templates: Option<PathBuf>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let path = &arguments.bundle;
     let verification = match path.is_file() {
         true => bundle::verify_recording(path),
-        false => bundle::verify(path, &super::load_templates()?),
+        false => bundle::verify(path, &known_templates(arguments)?),
     };
-    let Verification { complaints, unverified: unjudged } = verification.map_err(CliError::wrong)?;
-    for complaint in &complaints {
-        eprintln!("{}: {complaint}", path.display());
+    let verification = verification.map_err(CliError::wrong)?;
+    let shown = path.display();
+    for line in verification.complaints.iter().chain(&verification.remarks) {
+        eprintln!("{shown}: {line}");
     }
-    match (complaints.is_empty(), unjudged.is_empty()) {
-        (false, _) => Err(CliError::AlreadyReported),
-        (true, true) => print_line(format!("{}: verified", path.display())),
-        (true, false) => print_line(format!("{}: verified, except: {}", path.display(), unjudged.join("; "))),
+    match verification.status() {
+        VerificationStatus::Verified => print_line(format!("{shown}: verified")),
+        VerificationStatus::Differs => Err(CliError::AlreadyReported),
+        VerificationStatus::PartlyVerified => {
+            let unjudged = verification.unverified.join("; ");
+            print_line(format!("{shown}: holds, but this was not judged: {unjudged}"))?;
+            Err(CliError::PartlyVerified)
+        }
     }
+}
+
+/// Templates from which the page may have been made: those asked for, those of this place, and the shipped ones.
+fn known_templates(arguments: &Arguments) -> Result<Vec<Templates>, CliError> {
+    let mut known = Vec::new();
+    if let Some(folder) = &arguments.templates {
+        if !folder.is_dir() {
+            return Err(CliError::misuse(format!("--templates: {} is not a folder", folder.display())));
+        }
+        known.push(Templates::in_folder(folder).map_err(CliError::Wrong)?);
+    }
+    known.extend([super::load_templates()?, Templates::shipped()]);
+    Ok(known)
 }

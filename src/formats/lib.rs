@@ -31,4 +31,4 @@ pub mod visual_mesh;
 pub mod csv_tables;
 pub mod import;
 
-pub use library::{Library, decode_text, read_file, read_text};
+pub use library::{Library, decode_text, read_file, read_text, write_failure};

@@ -3,6 +3,8 @@
 use crate::diagnostic::{Diagnostic, SourceText};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io;
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -132,6 +134,18 @@ pub fn read_file(path: &Path) -> Result<Vec<u8>, Diagnostic> {
     fs::read(path).map_err(|error| refused(format!("the file cannot be read: {error}")))
 }
 
+/// Returns the reason for which a file could not be written, in words that name what to do about it.
+pub fn write_failure(error: &io::Error) -> String {
+    let cause = match error.kind() {
+        ErrorKind::StorageFull => "the disk is full",
+        ErrorKind::QuotaExceeded => "the disk quota of this account is used up",
+        ErrorKind::FileTooLarge => "the file has reached the size limit for files (see `ulimit -f`)",
+        ErrorKind::ReadOnlyFilesystem => "the disk is read-only",
+        _ => return error.to_string(),
+    };
+    format!("{cause} ({error})")
+}
+
 /// Reads a text file that the user named.
 ///
 /// # Errors
@@ -218,5 +232,25 @@ mod tests {
             assert_eq!(library.text("inside.csv").unwrap().text, "x\n");
         }
         fs::remove_dir_all(&folder).unwrap();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_failed_write_says_what_to_make_room_for() {
+        // Aim: the system's own words are not enough. Method: the error numbers of Linux.
+        let check = |number: i32, words: &str| {
+            let why = write_failure(&io::Error::from_raw_os_error(number));
+            assert!(why.starts_with(words), "{why}");
+        };
+        check(28, "the disk is full (");
+        check(122, "the disk quota of this account is used up (");
+        check(27, "the file has reached the size limit for files (see `ulimit -f`) (");
+        check(30, "the disk is read-only (");
+        check(5, "Input/output error");
     }
 }

@@ -1,6 +1,7 @@
 //! Errors of a lesson.
 
 use std::fmt;
+use std::io;
 use std::path::PathBuf;
 use typodont_exercise::record::RecorderError;
 use typodont_exercise::scenario::WorkpieceError;
@@ -14,6 +15,8 @@ pub enum LessonError {
     ImpossibleScene { scenario: String, why: WorkpieceError },
     /// The recording could not be created; no session began.
     RecordingNotStarted(RecorderError),
+    /// The recording cannot be synced to the disk; no session began.
+    NoDiskSync { path: PathBuf, why: io::Error },
     /// The bundle's folder cannot be made or filled.
     Bundle(BundleError),
     /// The session stopped; `folder` holds its recording up to then.
@@ -47,11 +50,15 @@ impl fmt::Display for LessonError {
         match self {
             LessonError::ImpossibleScene { scenario, why } => write!(f, "{scenario}: impossible-scene: {why}"),
             LessonError::RecordingNotStarted(error) => error.fmt(f),
+            LessonError::NoDiskSync { path, why } => {
+                write!(f, "{}: unwritable-file: the recording cannot be synced to the disk: {why}", path.display())
+            }
             LessonError::Bundle(unmade) => unmade.fmt(f),
             LessonError::Stopped { why, folder } => {
                 write!(
                     f,
-                    "{why}\nthe recording up to this point is in {}; `typodont finish` makes a bundle from it",
+                    "{why}\nthe recording up to this point is in {0}; once the cause is removed, \
+                     `typodont finish {0}` makes the bundle",
                     folder.display()
                 )
             }

@@ -31,6 +31,7 @@
 //! # Ok::<(), typodont_lesson::LessonError>(())
 //! ```
 
+mod disk_sync;
 mod error;
 mod exercise_warnings;
 mod inputs;

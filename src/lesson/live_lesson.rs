@@ -1,5 +1,6 @@
 //! A session with a person at a device, recorded while it runs.
 
+use super::disk_sync::DiskSync;
 use super::live::{LiveError, LiveEvent, LiveSession};
 use super::preparation::{PreparedSession, RecordedSession};
 use super::{LessonError, PendingSecondHand};
@@ -21,6 +22,7 @@ pub struct Lesson {
     /// Servo of the second device, if it is connected to this machine.
     assist: Option<SecondHandServo>,
     observer: RecordingObserver,
+    disk_sync: DiskSync,
     partial_bundle: PartialBundle,
     templates: Templates,
 }
@@ -33,22 +35,25 @@ impl Lesson {
         device: Box<dyn Device + Send>,
         second: Option<PendingSecondHand>,
     ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
-        let PreparedSession { scenario, workpiece, recorder, partial_bundle, templates, .. } = prepared;
+        let PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, .. } = prepared;
         let mut session = Session::new(scenario, &workpiece);
         let mut observer = RecordingObserver { recorder, edits: Vec::new(), handle_orientation: UPRIGHT };
         let (second, assist) = second.map_or((None, None), |hand| (Some(hand.servo_hand), hand.assist));
         let started = LiveSession::begin(&mut session, simulation, device, second, &mut observer);
         let (live, events) = started.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
-        Ok((Lesson { session, live, assist, observer, partial_bundle, templates }, events))
+        Ok((Lesson { session, live, assist, observer, disk_sync, partial_bundle, templates }, events))
     }
 
     /// Returns the events since the last call, in order; [`Lesson::edits`] then holds the edits of that time.
     ///
     /// # Errors
     ///
-    /// [`LessonError::Stopped`] if the recording cannot be written or the servo failed.
+    /// [`LessonError::Stopped`] if the recording cannot be written or synced to the disk, or the servo failed.
     pub fn poll(&mut self) -> Result<Vec<LiveEvent>, LessonError> {
         self.observer.edits.clear();
+        if let Some(why) = self.disk_sync.error() {
+            return Err(LessonError::stopped(&self.partial_bundle, &why));
+        }
         let events = self.live.poll(&mut self.session, &mut self.observer);
         events.map_err(|broken| stopped_error(&self.partial_bundle, &broken))
     }
@@ -109,11 +114,11 @@ impl Lesson {
     ///
     /// [`LessonError::Stopped`] if the servo failed or the recording cannot be completed.
     pub fn end(self) -> Result<RecordedSession, LessonError> {
-        let Lesson { session, live, observer, partial_bundle, templates, .. } = self;
+        let Lesson { session, live, observer, disk_sync, partial_bundle, templates, .. } = self;
         let reason = if session.outcome().aborted { "aborted" } else { "complete" };
         let summary = live.end::<RecordingObserver>().map_err(|broken| stopped_error(&partial_bundle, &broken))?;
         let end = RecordingEndFile { reason: reason.into(), servo: summary.servo_file() };
-        RecordedSession::close(observer.recorder, &end, partial_bundle, templates)
+        RecordedSession::close(observer.recorder, disk_sync, &end, partial_bundle, templates)
     }
 }
 

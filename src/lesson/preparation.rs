@@ -1,6 +1,7 @@
 //! Preparation of a session from an exercise, and the completion of its recording to a bundle.
 
 use super::LessonError;
+use super::disk_sync::DiskSync;
 #[cfg(feature = "devices")]
 use super::{Lesson, PendingSecondHand, live::LiveEvent};
 use jiff::Timestamp;
@@ -41,6 +42,7 @@ pub struct PreparedSession {
     pub(super) scenario: Arc<Scenario>,
     pub(super) workpiece: Arc<Workpiece>,
     pub(super) recorder: Recorder,
+    pub(super) disk_sync: DiskSync,
     pub(super) partial_bundle: PartialBundle,
     pub(super) templates: Templates,
     spec: DeviceSpec,
@@ -80,13 +82,19 @@ impl SessionConfig<'_> {
             ..RecordingHeadFile::of(&scenario, &spec, seed)
         };
         let partial_bundle = PartialBundle::create(out, &bundle_name(&head, started))?;
-        match Recorder::create(&partial_bundle.recording_path(), &head, &scenario, &workpiece) {
-            Ok(recorder) => {
-                Ok(PreparedSession { scenario, workpiece, recorder, partial_bundle, templates, spec, seed })
+        let path = partial_bundle.recording_path();
+        let recorder = Recorder::create(&path, &head, &scenario, &workpiece).map_err(LessonError::RecordingNotStarted);
+        let opened = recorder.and_then(|recorder| {
+            let disk_sync = DiskSync::start(&path).map_err(|why| LessonError::NoDiskSync { path, why })?;
+            Ok((recorder, disk_sync))
+        });
+        match opened {
+            Ok((recorder, disk_sync)) => {
+                Ok(PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, spec, seed })
             }
             Err(error) => {
                 partial_bundle.abandon();
-                Err(LessonError::RecordingNotStarted(error))
+                Err(error)
             }
         }
     }
@@ -122,7 +130,8 @@ impl PreparedSession {
     /// When the recording cannot be written.
     pub fn run_script(self, operator: OperatorFile) -> Result<RecordedSession, LessonError> {
         let mut simulation = self.simulation();
-        let PreparedSession { scenario, workpiece, mut recorder, partial_bundle, templates, spec, seed } = self;
+        let PreparedSession { scenario, workpiece, mut recorder, disk_sync, partial_bundle, templates, spec, seed } =
+            self;
         let mut session = Session::new(scenario.clone(), &workpiece);
         let mut trainee = Operator::new(operator, scenario, workpiece, spec, seed);
         let progress = typodont_exercise::session::run(&mut session, &mut simulation, &mut trainee, &mut recorder);
@@ -132,7 +141,7 @@ impl PreparedSession {
             RunEnd::DeviceGone(gone) => gone.to_string(),
         };
         let end = RecordingEndFile { reason, servo: ServoStatsFile::of(&simulation) };
-        RecordedSession::close(recorder, &end, partial_bundle, templates)
+        RecordedSession::close(recorder, disk_sync, &end, partial_bundle, templates)
     }
 
     fn simulation(&self) -> Simulation {
@@ -149,11 +158,13 @@ pub struct RecordedSession {
 impl RecordedSession {
     pub(super) fn close(
         recorder: Recorder,
+        disk_sync: DiskSync,
         end: &RecordingEndFile,
         partial_bundle: PartialBundle,
         templates: Templates,
     ) -> Result<RecordedSession, LessonError> {
         recorder.finish(end).map_err(|e| LessonError::stopped(&partial_bundle, &e))?;
+        disk_sync.finish().map_err(|e| LessonError::stopped(&partial_bundle, &e))?;
         Ok(RecordedSession { partial_bundle, templates })
     }
 

@@ -1,7 +1,8 @@
 //! Bundles: a session's folder, written completely or not at all, and verified byte by byte.
 //!
 //! While a session runs, its recording grows in a folder named `….partial`; when all files are written, the folder is
-//! renamed. All other files follow from the recording: [`verify`] derives them again and compares.
+//! renamed. All other files follow from the recording: [`verify`] derives them again and compares. Every file is synced
+//! to the disk before the folder is renamed, so that a bundle is whole even after a power cut.
 
 use super::session_file::SessionFile;
 use super::templates::Templates;
@@ -10,10 +11,13 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
+use std::fs::File;
 use std::io;
+use std::io::Write;
 use std::path::{Component, Path, PathBuf};
+use typodont_core::tick::Tick;
 use typodont_exercise::record;
-use typodont_exercise::record::{Recording, ReplayCheck};
+use typodont_exercise::record::{Recording, RecordingError, ReplayCheck};
 use typodont_exercise::scenario::hex;
 use typodont_exercise::score;
 use typodont_exercise::score::Scored;
@@ -29,11 +33,31 @@ pub const REPORT_FILE: &str = "report.html";
 pub struct BundleError {
     path: PathBuf,
     why: String,
+    remedy: Remedy,
+}
+
+/// Advice to the person who meets a [`BundleError`].
+#[derive(Debug)]
+enum Remedy {
+    None,
+    /// The recording is on the disk; the bundle can be made later.
+    Finish,
+    /// The folder holds nothing of a session.
+    Delete,
 }
 
 impl fmt::Display for BundleError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "{}: unmade-bundle: {}", self.path.display(), self.why)
+        let path = self.path.display();
+        write!(f, "{path}: unmade-bundle: {}", self.why)?;
+        match self.remedy {
+            Remedy::None => Ok(()),
+            Remedy::Finish => write!(
+                f,
+                "\nthe recording is safe in {path}; once the cause is removed, `typodont finish {path}` makes the bundle"
+            ),
+            Remedy::Delete => f.write_str("; the folder may be deleted"),
+        }
     }
 }
 
@@ -54,10 +78,13 @@ impl PartialBundle {
     /// When the folder cannot be created, or a bundle of that name exists.
     pub fn create(out: &Path, name: &str) -> Result<PartialBundle, BundleError> {
         let (path, partial) = (out.join(name), out.join(format!("{name}.partial")));
-        let unmade = |e: io::Error| BundleError { path: partial.clone(), why: e.to_string() };
+        let unmade = |e: io::Error| BundleError::new(&partial, typodont_formats::write_failure(&e));
+        if let Some(file) = out.ancestors().find(|folder| folder.is_file()) {
+            return Err(BundleError::new(file, "this is a file, not a folder"));
+        }
         fs::create_dir_all(out).map_err(unmade)?;
         if path.exists() {
-            return Err(BundleError { path, why: "a bundle with this name exists already".into() });
+            return Err(BundleError::new(&path, "a bundle with this name exists already"));
         }
         fs::create_dir(&partial).map_err(unmade)?;
         Ok(PartialBundle { partial, path })
@@ -72,12 +99,15 @@ impl PartialBundle {
         let path = match partial.extension().is_some_and(|e| e == "partial") {
             true => partial.with_extension(""),
             false => {
-                let why = "the name of an unfinished session's folder must end in .partial".to_string();
-                return Err(BundleError { path: partial.to_path_buf(), why });
+                return Err(BundleError::new(
+                    partial,
+                    "the name of an unfinished session's folder must end in .partial",
+                ));
             }
         };
         match path.exists() {
-            true => Err(BundleError { path, why: "a bundle with this name exists already".into() }),
+            true => Err(BundleError::new(&path, "a bundle with this name exists already")),
+            false if !partial.is_dir() => Err(BundleError::new(partial, "there is no folder of this name")),
             false => Ok(PartialBundle { partial: partial.to_path_buf(), path }),
         }
     }
@@ -99,19 +129,82 @@ impl PartialBundle {
     ///
     /// When the recording cannot be scored or a file cannot be written; the folder then stays `….partial`.
     pub fn complete(self, templates: &Templates) -> Result<PathBuf, BundleError> {
-        let PartialBundle { partial, path } = self;
-        let unmade = |why: String| BundleError { path: partial.clone(), why };
-        let bytes = fs::read(partial.join(record::FILE_NAME)).map_err(|e| unmade(e.to_string()))?;
-        let recording = Recording::parse(record::FILE_NAME, &bytes).map_err(|e| unmade(e.to_string()))?;
-        let scored = score::score(&recording, ReplayCheck::Skip).map_err(unmade)?;
-        let files = derive_files(&recording, &bytes, &scored, templates).map_err(unmade)?;
-        fs::create_dir_all(partial.join("views")).map_err(|e| unmade(e.to_string()))?;
-        for (name, bytes) in files {
-            fs::write(partial.join(&name), bytes).map_err(|e| unmade(format!("{name}: {e}")))?;
-        }
-        fs::rename(&partial, &path).map_err(|e| unmade(e.to_string()))?;
-        Ok(path)
+        self.complete_checked(templates, ReplayCheck::Skip).map(|completed| completed.path)
     }
+
+    /// [`PartialBundle::complete`] for a session that was interrupted: reads its recording as far as it is intact.
+    ///
+    /// # Errors
+    ///
+    /// As [`PartialBundle::complete`]; when nothing was recorded, the error says so.
+    pub fn complete_interrupted(self, templates: &Templates) -> Result<CompletedBundle, BundleError> {
+        self.complete_checked(templates, ReplayCheck::Full)
+    }
+
+    fn complete_checked(self, templates: &Templates, check: ReplayCheck) -> Result<CompletedBundle, BundleError> {
+        let PartialBundle { partial, path } = self;
+        let unmade = |why: String| BundleError::new(&partial, why);
+        let unwritten = |name: &str, e: &io::Error| {
+            let why = format!("{name}: {}", typodont_formats::write_failure(e));
+            BundleError { remedy: Remedy::Finish, ..unmade(why) }
+        };
+        let bytes = match fs::read(partial.join(record::FILE_NAME)) {
+            // The session was killed before it had created its recording.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+            read => read.map_err(|e| unmade(e.to_string()))?,
+        };
+        let recording = match Recording::parse(record::FILE_NAME, &bytes) {
+            Err(error @ RecordingError::NothingRecorded { .. }) => {
+                return Err(BundleError { remedy: Remedy::Delete, ..unmade(error.to_string()) });
+            }
+            parsed => parsed.map_err(|e| unmade(e.to_string()))?,
+        };
+        let scored = score::score(&recording, check).map_err(unmade)?;
+        let files = derive_files(&recording, &bytes, &scored, templates).map_err(unmade)?;
+        fs::create_dir_all(partial.join("views")).map_err(|e| unwritten("views", &e))?;
+        for (name, bytes) in files {
+            write_synced(&partial.join(&name), &bytes).map_err(|e| unwritten(&name, &e))?;
+        }
+        for folder in [&partial.join("views"), &partial] {
+            sync_folder(folder);
+        }
+        fs::rename(&partial, &path).map_err(|e| unwritten("the folder cannot be renamed", &e))?;
+        sync_folder(path.parent().unwrap_or(Path::new(".")));
+        let difference = scored
+            .replay
+            .difference
+            .map(|d| format!("{}: {d}; `typodont verify` will not confirm this bundle", record::FILE_NAME));
+        let loss = recording.describe_loss().map(|loss| format!("{}: {loss}", record::FILE_NAME));
+        Ok(CompletedBundle { path, remarks: loss.into_iter().chain(difference).collect() })
+    }
+}
+
+impl BundleError {
+    fn new(path: &Path, why: impl Into<String>) -> BundleError {
+        BundleError { path: path.to_path_buf(), why: why.into(), remedy: Remedy::None }
+    }
+}
+
+/// The bundle of an interrupted session.
+#[derive(Clone, Debug)]
+pub struct CompletedBundle {
+    pub path: PathBuf,
+    /// Parts of the session that were lost, and differences of its replay.
+    pub remarks: Vec<String>,
+}
+
+/// Writes a file and syncs it to the disk.
+fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_data()
+}
+
+/// Syncs the names in a folder to the disk, where the system can. A file system that cannot is not an error: the files
+/// are written in any case.
+pub fn sync_folder(folder: &Path) {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
 
 /// Everything in a bundle that follows from its recording, by name.
@@ -152,54 +245,89 @@ fn sha256(bytes: &[u8]) -> String {
 pub struct Verification {
     /// Differences between the bundle and its recording.
     pub complaints: Vec<String>,
-    /// Parts that could not be verified.
+    /// Parts that could not be judged.
     pub unverified: Vec<String>,
+    /// Facts that are no differences, such as a session that was cut off.
+    pub remarks: Vec<String>,
 }
 
-/// Replays a bundle's recording, derives all other files again, and compares. Of a bundle from another version of the
-/// program, the recording, the results and the digests are verified, but not its pages and pictures.
+/// Answer of a [`Verification`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VerificationStatus {
+    /// Everything was judged and follows from the recording.
+    Verified,
+    /// Everything that could be judged follows from the recording.
+    PartlyVerified,
+    /// Something differs from the recording.
+    Differs,
+}
+
+impl Verification {
+    pub fn status(&self) -> VerificationStatus {
+        match (self.complaints.is_empty(), self.unverified.is_empty()) {
+            (false, _) => VerificationStatus::Differs,
+            (true, false) => VerificationStatus::PartlyVerified,
+            (true, true) => VerificationStatus::Verified,
+        }
+    }
+}
+
+/// Replays a bundle's recording, derives all other files again, and compares. The page is made again from the templates
+/// among `known` that the bundle names. Of a bundle from another version of the program, the recording, the results and
+/// the digests are verified, but not its pages and pictures.
+///
+/// A session that was cut off verifies as what it is: its result must say so, and follow from the part that can be read.
 ///
 /// # Errors
 ///
-/// When nothing can be verified: the recording is missing or cannot be read.
-pub fn verify(bundle: &Path, templates: &Templates) -> Result<Verification, String> {
+/// When nothing can be verified: the recording is missing or cannot be read, or `known` is empty.
+pub fn verify(bundle: &Path, known: &[Templates]) -> Result<Verification, String> {
     let path = bundle.join(record::FILE_NAME);
     let bytes = typodont_formats::read_file(&path).map_err(|d| d.headline())?;
     let recording = Recording::parse(&path.display().to_string(), &bytes).map_err(|e| e.to_string())?;
     let (made_by, this) = (&recording.head.typodont_version, env!("CARGO_PKG_VERSION"));
     let scored = score::score(&recording, ReplayCheck::Full).map_err(|e| format!("{}: {e}", path.display()))?;
-    let mut complaints: Vec<String> =
-        scored.replay.difference.iter().map(|d| format!("{}: {d}", record::FILE_NAME)).collect();
-    let written = match read_plain_file(bundle, SESSION_FILE) {
-        Ok(written) => written,
+    let loss = recording.describe_loss().map(|loss| format!("{}: {loss}", record::FILE_NAME));
+    let mut verification = Verification { remarks: loss.into_iter().collect(), ..Verification::default() };
+    let complaints = &mut verification.complaints;
+    complaints.extend(scored.replay.difference.iter().map(|d| format!("{}: {d}", record::FILE_NAME)));
+    let (written, session) = match read_session_file(bundle) {
+        Ok(read) => read,
         Err(error) => {
-            complaints.push(format!("{SESSION_FILE}: {error}"));
-            return Ok(Verification { complaints, ..Verification::default() });
-        }
-    };
-    let session: SessionFile = match serde_json::from_slice(&written) {
-        Ok(session) => session,
-        Err(error) => {
-            complaints.push(format!("{SESSION_FILE}: {error}"));
-            return Ok(Verification { complaints, ..Verification::default() });
+            complaints.push(error);
+            return Ok(verification);
         }
     };
     complaints.extend(compare_files(bundle, &bytes, &session));
     complaints.extend(compare_results(&recording, &scored, &session));
-    let mut unjudged = Vec::new();
     complaints.extend(unlisted_files(bundle, &session));
     if made_by != this {
         // The results are compared in any case; the drawings and texts of another version cannot be.
-        unjudged.push(format!("its pages and images, which were made by typodont {made_by} (this is version {this})"));
+        let part = format!("its pages and images, which were made by typodont {made_by} (this is version {this})");
+        verification.unverified.push(part);
     } else if complaints.is_empty() {
+        let own = known.iter().find(|t| session.template_sha256 == sha256(t.session_source_text().as_bytes()));
+        let templates = own.or(known.first()).ok_or("no templates are known")?;
         let derived = derive_files(&recording, &bytes, &scored, templates)?;
-        let is_our_page = session.template_sha256 == sha256(templates.session_source_text().as_bytes());
-        complaints.extend(compare_derived(bundle, &session, &derived, &written, is_our_page));
-        if !is_our_page {
-            unjudged.push(format!("{REPORT_FILE}, which was made from a different template"));
+        complaints.extend(compare_derived(bundle, &session, &derived, &written, own.is_some()));
+        if own.is_none() {
+            let part = format!("{REPORT_FILE}, which was made from templates that are not available here");
+            verification.unverified.push(part);
         }
     }
-    Ok(Verification { complaints, unverified: unjudged })
+    Ok(verification)
+}
+
+/// Reads `session.json`: its bytes and its content. The error is a complaint.
+fn read_session_file(bundle: &Path) -> Result<(Vec<u8>, SessionFile), String> {
+    let is_unfinished = bundle.extension().is_some_and(|e| e == "partial") && !bundle.join(SESSION_FILE).exists();
+    if is_unfinished {
+        let bundle = bundle.display();
+        return Err(format!("this session was not finished; `typodont finish {bundle}` makes its bundle"));
+    }
+    let written = read_plain_file(bundle, SESSION_FILE).map_err(|e| format!("{SESSION_FILE}: {e}"))?;
+    let session = serde_json::from_slice(&written).map_err(|e| format!("{SESSION_FILE}: {e}"))?;
+    Ok((written, session))
 }
 
 /// Complaints about files that `session.json` does not name.
@@ -215,7 +343,8 @@ fn unlisted_files(bundle: &Path, session: &SessionFile) -> Vec<String> {
     found.iter().map(|name| format!("{name}: this file is not part of a bundle")).collect()
 }
 
-/// [`verify`] for a recording without a bundle: compares its replay with the states that it contains.
+/// [`verify`] for a recording without a bundle: compares its replay with the states that it contains. Whatever followed
+/// the end of a cut-off recording is not judged.
 ///
 /// # Errors
 ///
@@ -225,7 +354,17 @@ pub fn verify_recording(path: &Path) -> Result<Verification, String> {
     let workpiece = recording.workpiece().map_err(|e| format!("{}: {e}", path.display()))?;
     let replay = record::replay(&recording, workpiece, ReplayCheck::Full, |_, _, _, _| ());
     let complaints = replay.difference.iter().map(ToString::to_string).collect();
-    Ok(Verification { complaints, ..Verification::default() })
+    let (unverified, remarks) = match recording.describe_loss() {
+        Some(_) if recording.is_cut_off() => {
+            let kept = Tick(recording.len() as u64).seconds();
+            (
+                vec![format!("the end of the session, after {kept:.3} s")],
+                recording.describe_loss().into_iter().collect(),
+            )
+        }
+        loss => (Vec::new(), loss.into_iter().collect()),
+    };
+    Ok(Verification { complaints, unverified, remarks })
 }
 
 /// Reads a file of a bundle. Only a regular file is read, never a link, a pipe or a device, which might be endless.

@@ -6,4 +6,8 @@ mod damaged_recordings;
 mod example;
 mod golden;
 mod killed;
+#[cfg(target_os = "linux")]
+mod power_cut;
 mod proof;
+#[cfg(target_os = "linux")]
+mod volatile_disk;

@@ -46,7 +46,10 @@ fn files(bundle: &Path) -> Vec<PathBuf> {
 fn verify(bundle: &Path) -> Result<(), String> {
     let output = typodont(&["verify", bundle.to_str().unwrap()]);
     match output.status.code() {
-        Some(0) => Ok(()),
+        Some(0) => {
+            assert!(told(&output).contains(": verified"), "{}", told(&output));
+            Ok(())
+        }
         Some(1) => Err(complained(&output)),
         other => panic!("exit status {other:?}: {}", complained(&output)),
     }
@@ -226,44 +229,178 @@ fn a_forged_version_does_not_avoid_the_check() {
         let complaint = verify(&forged).expect_err(name);
         assert!(complaint.contains("metrics.healthy_per_decay_pct"), "{name}: {complaint}");
     }
-    // A different page alone is accepted, since a school may have changed its template, but it is reported as
-    // unverified.
+    // A page made from templates that are not here cannot be judged: it neither passes nor fails.
     let forged = copy(&whole, "accused_page");
-    let page = "<h1>Passed</h1>";
-    fs::write(forged.join("report.html"), page).unwrap();
-    let mut other = session(&whole);
-    other["template_sha256"] = "00".into();
-    let digest: String = Sha256::digest(page).iter().map(|b| format!("{b:02x}")).collect();
-    other["digests"]["report.html"] = digest.into();
-    let text = fs::read_to_string(whole.join("session.json")).unwrap();
-    let text = text.replace(session(&whole)["template_sha256"].as_str().unwrap(), "00");
-    let text = text.replace(
-        session(&whole)["digests"]["report.html"].as_str().unwrap(),
-        other["digests"]["report.html"].as_str().unwrap(),
-    );
-    fs::write(forged.join("session.json"), text).unwrap();
-    let output = typodont(&["verify", forged.to_str().unwrap()]);
-    assert!(output.status.success(), "{}", complained(&output));
-    assert!(told(&output).contains("except: report.html"), "{}", told(&output));
+    change_page(&forged, "<h1>Passed</h1>", "00");
+    assert_eq!(exit_status(&forged, &[]), (Some(3), true));
     // A file that does not belong to a bundle.
     let forged = copy(&whole, "accused_unlisted");
     fs::write(forged.join("views/zz.png"), "x").unwrap();
     assert!(verify(&forged).expect_err("unlisted file").contains("views/zz.png: this file is not part of a bundle"));
 }
 
+/// Exit status of `verify` with further arguments, and whether it says that the page was not judged.
+fn exit_status(bundle: &Path, more: &[&str]) -> (Option<i32>, bool) {
+    let output = typodont(&[&["verify", bundle.to_str().unwrap()], more].concat());
+    (output.status.code(), told(&output).contains("holds, but this was not judged: report.html"))
+}
+
+/// Replaces the page of a bundle, and adapts its digest and the digest of its templates, as text.
+fn change_page(bundle: &Path, page: &str, template_sha256: &str) {
+    fs::write(bundle.join("report.html"), page).unwrap();
+    let file = bundle.join("session.json");
+    let text = fs::read_to_string(&file).unwrap();
+    let before = session(bundle);
+    let digest: String = Sha256::digest(page).iter().map(|b| format!("{b:02x}")).collect();
+    let text = text.replace(before["template_sha256"].as_str().unwrap(), template_sha256);
+    let text = text.replace(before["digests"]["report.html"].as_str().unwrap(), &digest);
+    fs::write(file, text).unwrap();
+}
+
+#[test]
+fn a_school_s_own_page_is_judged_where_its_templates_are() {
+    // Aim: 0 only when everything was judged, 3 where the templates are missing, 1 for a forged page. Method: a bundle made
+    // in a folder with a template of its own.
+    let school = folder("own_templates");
+    let templates = school.join("reports/templates");
+    fs::create_dir_all(&templates).unwrap();
+    let style = fs::read_to_string("reports/templates/report.css").unwrap();
+    fs::write(templates.join("report.css"), style + "\nbody { letter-spacing: 0.01em }\n").unwrap();
+    let program = |arguments: &[&str]| {
+        std::process::Command::new(program()).args(arguments).current_dir(&school).output().unwrap()
+    };
+    let scenario = std::path::absolute("scenarios/4-diagnosis.json").unwrap();
+    let output = program(&["run", scenario.to_str().unwrap(), "--headless", "--seed", "1", "--out", "sessions"]);
+    assert!(output.status.success(), "{}", complained(&output));
+    let bundle = school.join(told(&output).trim());
+    let of_school = ["--templates", templates.to_str().unwrap()];
+    assert_eq!(exit_status(&bundle, &[]), (Some(3), true));
+    assert_eq!(exit_status(&bundle, &of_school), (Some(0), false));
+    let here = program(&["verify", bundle.to_str().unwrap()]);
+    assert_eq!(here.status.code(), Some(0), "{}", complained(&here));
+    // The same templates named for another page.
+    let forged = copy(&bundle, "own_templates_forged");
+    let digest = session(&bundle)["template_sha256"].as_str().unwrap().to_string();
+    change_page(&forged, "<h1>Passed</h1>", &digest);
+    assert_eq!(exit_status(&forged, &of_school), (Some(1), false));
+    assert_eq!(exit_status(&forged, &["--templates", "no-such-folder"]), (Some(2), false));
+}
+
+/// Finishes a recording as an interrupted session. Returns the bundle and what was said about the loss.
+fn finish(name: &str, recording: &[u8]) -> (PathBuf, String) {
+    let partial = folder(name).join("session.partial");
+    fs::create_dir_all(&partial).unwrap();
+    fs::write(partial.join("recording.mcap"), recording).unwrap();
+    let output = typodont(&["finish", partial.to_str().unwrap()]);
+    assert!(output.status.success(), "{name}: {}", complained(&output));
+    let finished = PathBuf::from(told(&output).trim());
+    assert!(!partial.exists() && finished.ends_with("session"), "{name}");
+    (finished, complained(&output))
+}
+
 #[test]
 fn an_interrupted_session_can_be_finished_but_not_passed() {
+    // Aim: whatever a power cut leaves, the session before it is kept, its loss is told, and the bundle verifies as what
+    // it is.
     let whole = run(GRINDING, "careful", &folder("cut_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
-    let partial = folder("cut_off").join("session.partial");
+    let size = bytes.len();
+    let mut flipped = bytes.clone();
+    flipped[size * 9 / 10] ^= 1;
+    let with_zeros = [&bytes[..size * 95 / 100], &[0; 4096]].concat();
+    for (name, recording, words) in [
+        ("cut_off", &bytes[..size * 97 / 100], "cut off before its end: what followed"),
+        ("cut_zeros", &with_zeros, "s were lost"),
+        ("cut_flipped", &flipped, "s were lost"),
+    ] {
+        let (finished, complaint) = finish(name, recording);
+        assert!(complaint.contains(words), "{name}: {complaint}");
+        let grade = &session(&finished)["grade"];
+        assert_eq!((&grade["finished"], &grade["passed"]), (&false.into(), &false.into()), "{name}: {grade}");
+        verify(&finished).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let output = typodont(&["score", finished.to_str().unwrap()]);
+        assert!(output.status.success() && complained(&output).contains(words), "{name}: {}", complained(&output));
+        // A recording alone does not say that it was meant to end there.
+        let output = typodont(&["verify", finished.join("recording.mcap").to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(3), "{name}: {}", complained(&output));
+        // It is no way to hide the end of a complete session.
+        let forged = forge(&whole, &format!("{name}_forged"), recording);
+        let complaint = verify(&forged).expect_err(name);
+        assert!(complaint.contains("session.json: grade") && complaint.contains(words), "{name}: {complaint}");
+    }
+    // A torn end takes nothing from the session.
+    let (finished, complaint) = finish("cut_torn", &bytes[..size - 3]);
+    assert!(complaint.contains("nothing of it was lost"), "{complaint}");
+    assert_eq!(session(&finished)["grade"], session(&whole)["grade"]);
+    verify(&finished).unwrap();
+}
+
+#[test]
+fn an_unfinished_session_names_what_to_do() {
+    let partial = folder("unfinished").join("session.partial");
     fs::create_dir_all(&partial).unwrap();
-    fs::write(partial.join("recording.mcap"), &bytes[..bytes.len() * 97 / 100]).unwrap();
-    let output = typodont(&["finish", partial.to_str().unwrap()]);
-    assert!(output.status.success(), "{}", complained(&output));
-    let finished = PathBuf::from(told(&output).trim());
-    assert!(!partial.exists() && finished.ends_with("session"));
-    let grade = &session(&finished)["grade"];
-    assert_eq!((&grade["finished"], &grade["passed"]), (&false.into(), &false.into()), "{grade}");
+    let path = partial.to_str().unwrap();
+    // Killed in its first milliseconds: no recording, an empty one, or one without a tick.
+    let whole = run(GRINDING, "careful", &folder("unfinished_whole"), &[]);
+    let bytes = fs::read(whole.join("recording.mcap")).unwrap();
+    for content in [None, Some(&bytes[..0]), Some(&bytes[..60])] {
+        if let Some(content) = content {
+            fs::write(partial.join("recording.mcap"), content).unwrap();
+        }
+        let output = typodont(&["finish", path]);
+        assert_eq!(output.status.code(), Some(1));
+        let complaint = complained(&output);
+        assert!(complaint.contains("nothing was recorded") && complaint.contains("may be deleted"), "{complaint}");
+        assert_eq!(complaint.lines().count(), 1, "{complaint}");
+    }
+    fs::write(partial.join("recording.mcap"), &bytes).unwrap();
+    let complaint = verify(&partial).expect_err("unfinished");
+    assert!(complaint.contains(&format!("`typodont finish {path}` makes its bundle")), "{complaint}");
+    let output = typodont(&["finish", partial.with_file_name("other.partial").to_str().unwrap()]);
+    assert!(complained(&output).contains("there is no folder of this name"), "{}", complained(&output));
+}
+
+#[test]
+fn a_file_in_the_place_of_the_output_folder_is_named() {
+    let file = folder("file_as_folder").join("file");
+    fs::write(&file, "x").unwrap();
+    for out in [file.clone(), file.join("below")] {
+        let output = typodont(&["run", GRINDING, "--headless", "--out", out.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(2));
+        let expected = format!("--out: {} is a file, not a folder", file.display());
+        assert_eq!(complained(&output).trim(), expected);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_size_limit_ends_a_session_with_a_sentence_and_without_a_loss() {
+    // Aim: the limit for files, like a full disk, is met while the session is recorded and while its report is made. Method:
+    // `ulimit -f` in units of 512 bytes; first below the size of the recording, then between that and the report's.
+    let whole = run(GRINDING, "careful", &folder("limit_whole"), &[]);
+    let size = |name: &str| fs::metadata(whole.join(name)).unwrap().len();
+    let (recording, page) = (size("recording.mcap"), size("report.html"));
+    assert!(page > recording + 20_000, "the page has {page} bytes, the recording {recording}");
+    for (name, limit, words) in [
+        ("limit_recording", recording * 9 / 10, "the recording cannot be written: the file has reached the size limit"),
+        ("limit_report", recording + 10_000, "the file has reached the size limit"),
+    ] {
+        let out = folder(name);
+        let command = format!("ulimit -f {}; exec \"$0\" \"$@\"", limit / 512);
+        let arguments = [program(), "run", GRINDING, "--headless", "--seed", "1", "--out", out.to_str().unwrap()];
+        let output = std::process::Command::new("sh").arg("-c").arg(command).args(arguments).output().unwrap();
+        let complaint = complained(&output);
+        assert_eq!(output.status.code(), Some(1), "{name}: {complaint}");
+        assert!(complaint.contains(words), "{name}: {complaint}");
+        let partial = fs::read_dir(&out).unwrap().next().unwrap().unwrap().path();
+        assert!(
+            complaint.contains(&format!("`typodont finish {}` makes the bundle", partial.display())),
+            "{complaint}"
+        );
+        let output = typodont(&["finish", partial.to_str().unwrap()]);
+        assert!(output.status.success(), "{name}: {}", complained(&output));
+        verify(Path::new(told(&output).trim())).unwrap_or_else(|e| panic!("{name}: {e}"));
+    }
 }
 
 #[test]

@@ -3,12 +3,14 @@
 use super::sync::progress_bar;
 use crate::cli::{CliError, cohort, print_line};
 use clap::Args;
+use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
+use typodont_exercise::scenario::hex;
 use typodont_exercise::score::SCORER_VERSION;
 use typodont_formats::read_file;
 use typodont_integrations::session_id;
-use typodont_report::sanitize_display;
+use typodont_report::{SessionFile, sanitize_display};
 use typodont_school::{RECORDING, Shard, rescore};
 
 #[derive(Args)]
@@ -29,17 +31,18 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let unwritable = |e: std::io::Error| CliError::wrong(format!("{}: unwritable-folder: {e}", out.display()));
     fs::create_dir_all(out).map_err(unwritable)?;
     let with_recording = |path: &Path| path.join(RECORDING).is_file();
-    let sessions = cohort.sessions.iter().map(|(path, session)| (session_id(session), path));
-    let own: Vec<(String, &PathBuf)> =
-        sessions.filter(|(id, path)| shard.contains(id) && with_recording(path)).collect();
+    let sessions = cohort.sessions.iter().map(|(path, session)| (session_id(session), path, session));
+    let own: Vec<(String, &PathBuf, &SessionFile)> =
+        sessions.filter(|(id, path, _)| shard.contains(id) && with_recording(path)).collect();
     let bar = progress_bar(own.len() as u64, "scored");
     let (mut done, mut before, mut failed) = (0, 0, 0);
-    for (id, path) in own {
+    for (id, path, session) in own {
         let file = out.join(format!("{id}.v{SCORER_VERSION}.json"));
         if file.is_file() {
             before += 1;
         } else {
             let read = read_file(&path.join(RECORDING)).map_err(|d| d.headline());
+            let read = read.and_then(|bytes| check_digest(session, &bytes).map(|()| bytes));
             match read.and_then(|bytes| rescore(&id, &bytes).map_err(|unscored| unscored.0)) {
                 Ok(result) => {
                     // The file is complete or absent: a killed program leaves nothing that looks finished.
@@ -60,4 +63,15 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     bar.finish_and_clear();
     print_line(format!("{}: {done} scored, {before} already scored, {failed} failed", out.display()))?;
     if failed > 0 { Err(CliError::AlreadyReported) } else { Ok(()) }
+}
+
+/// Checks that a recording is the one that was scored. A damaged one would be read up to the damage, and give the result
+/// of a session that was cut off.
+fn check_digest(session: &SessionFile, bytes: &[u8]) -> Result<(), String> {
+    match session.digests.get(RECORDING) {
+        Some(digest) if *digest != hex(&Sha256::digest(bytes)) => {
+            Err(format!("{RECORDING}: damaged-recording: the file differs from the recording that was scored"))
+        }
+        _ => Ok(()),
+    }
 }

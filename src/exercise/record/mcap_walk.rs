@@ -1,7 +1,7 @@
 //! A reader of the records of an MCAP file that checks every length and checksum before use.
 //!
-//! Takes bytes. Gives records in order, chunks unpacked; for a truncated file, the records before the cut. Never
-//! accepts a complete but inconsistent record: that is damage, reported with its byte offset.
+//! Takes bytes. Gives records in order, chunks unpacked, up to the end of the file or the first damage, and says where
+//! and why it stopped. Never gives a record that is incomplete or whose checksum is wrong.
 
 use mcap::records::{ChunkHeader, Record, op};
 use mcap::{MAGIC, parse_record};
@@ -12,49 +12,91 @@ const CHUNK_MAX: u64 = 64 << 20;
 /// Size of a record's prefix (kind and length), bytes.
 const PREFIX: usize = 9;
 
-/// Passes every record to `visit`.
+/// First kind of record that other programs may define; unknown kinds below it are damage.
+const FIRST_PRIVATE_KIND: u8 = 0x80;
+
+/// Offset of the name of the compression in a chunk record: after the prefix, two times, a size and a checksum.
+const CHUNK_COMPRESSION: usize = PREFIX + 28;
+
+/// Name of the compression of this program's chunks, as it stands in a chunk record.
+const ZSTD: &[u8] = b"\x04\0\0\0zstd";
+
+/// Reason for which reading stopped before the regular end of a file.
+#[derive(Debug)]
+pub(super) struct Stop {
+    /// Byte at which the first record begins that was not read.
+    pub at: usize,
+    pub what: String,
+}
+
+/// Passes every record to `visit`, up to the regular end of the file.
 ///
 /// # Errors
-/// Returns a description of the first damaged record, or the first error of `visit`.
-pub(super) fn walk(bytes: &[u8], mut visit: impl FnMut(Record) -> Result<(), String>) -> Result<(), String> {
+/// Returns where and why reading stopped: the file ends early, a record is damaged, or `visit` refused it.
+pub(super) fn walk(bytes: &[u8], mut visit: impl FnMut(Record) -> Result<(), String>) -> Result<(), Stop> {
     if !bytes.starts_with(MAGIC) {
-        return Err("not an MCAP file".to_string());
+        return Err(Stop { at: 0, what: "not an MCAP file".to_string() });
     }
     let mut at = MAGIC.len();
-    // A complete file ends with the magic bytes it starts with; the file of a killed session just stops.
-    let is_whole = bytes.len() >= 2 * MAGIC.len() && bytes.ends_with(MAGIC);
     while let Some((kind, body)) = next(bytes, at) {
-        let damaged = |what: String| format!("the record at byte {at}: {what}");
-        if kind == op::ATTACHMENT && !is_attachment(body) {
-            return Err(damaged("the lengths of an attachment are inconsistent".to_string()));
-        }
-        let record = parse_record(kind, body).map_err(|e| damaged(e.to_string()))?;
-        let is_last = matches!(record, Record::Footer(_));
-        match record {
-            Record::Chunk { header, data } => {
-                let unpacked = unpack(&header, &data).map_err(damaged)?;
-                let mut inside = 0;
-                while inside < unpacked.len() {
-                    let (kind, body) =
-                        next(&unpacked, inside).ok_or_else(|| damaged("a record of the chunk is truncated".into()))?;
-                    visit(parse_record(kind, body).map_err(|e| damaged(e.to_string()))?)?;
-                    inside += PREFIX + body.len();
-                }
-            }
-            other => visit(other)?,
-        }
+        let is_last = visit_record(kind, body, &mut visit)
+            .map_err(|what| Stop { at, what: format!("the record at byte {at}: {what}") })?;
         at += PREFIX + body.len();
         if is_last {
-            return match bytes[at..] == *MAGIC {
-                true => Ok(()),
-                false => Err(format!("{} bytes follow the footer", bytes.len() - at)),
+            let rest = &bytes[at..];
+            return match () {
+                () if rest == MAGIC => Ok(()),
+                () if MAGIC.starts_with(rest) => Err(Stop {
+                    at,
+                    what: format!("the last {} bytes of the file are missing", MAGIC.len() - rest.len()),
+                }),
+                () => Err(Stop { at, what: format!("{} bytes follow the footer", rest.len()) }),
             };
         }
     }
-    match is_whole {
-        true => Err(format!("the record at byte {at}: its length {} is wrong", length(bytes, at).unwrap_or_default())),
-        false => Ok(()),
+    let what = match (bytes.len() - at, length(bytes, at)) {
+        (0, _) => format!("the file ends at byte {at}, before the footer"),
+        (_, Some(length)) => format!("the record at byte {at}: its length {length} exceeds the file"),
+        (rest, None) => format!("the record at byte {at} is cut off after {rest} bytes"),
+    };
+    Err(Stop { at, what })
+}
+
+/// Passes a record, or the records of a chunk, to `visit`. Returns true for the last record of a file.
+fn visit_record(kind: u8, body: &[u8], visit: &mut impl FnMut(Record) -> Result<(), String>) -> Result<bool, String> {
+    if kind == op::ATTACHMENT && !is_attachment(body) {
+        return Err("the lengths of an attachment are inconsistent".to_string());
     }
+    match parse_record(kind, body).map_err(|e| e.to_string())? {
+        Record::Chunk { header, data } => {
+            let unpacked = unpack(&header, &data)?;
+            let mut inside = 0;
+            while inside < unpacked.len() {
+                let (kind, body) = next(&unpacked, inside).ok_or("a record of the chunk is truncated")?;
+                visit(parse_record(kind, body).map_err(|e| e.to_string())?)?;
+                inside += PREFIX + body.len();
+            }
+        }
+        // Zeros, which a file system leaves after a power cut, would otherwise be empty records.
+        Record::Unknown { opcode, .. } if opcode < FIRST_PRIVATE_KIND => {
+            return Err(format!("there is no kind of record {opcode}"));
+        }
+        Record::Footer(_) => return Ok(true),
+        other => visit(other)?,
+    }
+    Ok(false)
+}
+
+/// Time of the last message in a chunk at or after byte `from`, ns, by the chunk's own header; `None` without a chunk.
+pub(super) fn last_time_after(bytes: &[u8], from: usize) -> Option<u64> {
+    (from..bytes.len()).rev().find_map(|at| {
+        let is_chunk = bytes[at] == op::CHUNK && bytes[at..].get(CHUNK_COMPRESSION..)?.starts_with(ZSTD);
+        let (kind, body) = if is_chunk { next(bytes, at)? } else { return None };
+        match parse_record(kind, body) {
+            Ok(Record::Chunk { header, .. }) => Some(header.message_end_time),
+            _ => None,
+        }
+    })
 }
 
 /// Returns the length of a record's body as its prefix states it.

@@ -6,7 +6,8 @@
 //! A recording is an MCAP file (<https://mcap.dev>): the scenario's text, the tables it used and the initial volume
 //! as attachments; one `/haptic` message per tick; inputs, commands and stages as JSON on `/event`; once a second, on
 //! `/digest`, a digest of everything so far. The file is appended to while the session runs, so that a killed session
-//! loses only its last moments.
+//! loses only its last moments. Whoever creates a [`Recorder`] also has the file synced to the disk (`lesson`), which
+//! limits the loss of a power cut.
 
 mod tick_record;
 mod file;
@@ -17,7 +18,7 @@ mod volume;
 mod writer;
 
 pub use file::{DeviceSpecFile, RecordingEndFile, RecordingHeadFile, ServoStatsFile, VERSION, ended_by_name};
-pub use reader::{Recording, RecordingError};
+pub use reader::{Recording, RecordingError, RecordingLoss};
 pub use replay::{Difference, Replay, ReplayCheck, replay};
 pub use tick_record::TickRecord;
 pub use writer::{Recorder, RecorderError};

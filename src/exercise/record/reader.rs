@@ -1,9 +1,13 @@
-//! The reader of recordings, complete or truncated.
+//! The reader of recordings, complete, cut off or damaged.
+//!
+//! A recording is read up to the first damage: chunks are checked by their checksums, so that everything before it is as
+//! it was written. The reader never continues beyond damage, because a replay needs every tick from the first on.
 
 use super::file::{
     DigestFile, END, EventFile, EventKindFile, HEAD, InputFile, RecordingEndFile, RecordingHeadFile, VERSION,
 };
 use super::mcap_walk;
+use super::mcap_walk::Stop;
 use super::replay::RunningDigest;
 use super::tick_record::{TickLayout, TickRecord};
 use super::volume;
@@ -25,8 +29,10 @@ use typodont_formats::diagnostic::{Diagnostic, SourceText, headlines};
 #[derive(Clone, Debug)]
 pub struct Recording {
     pub head: RecordingHeadFile,
-    /// End metadata; `None` for an interrupted session.
+    /// End metadata; `None` for a session that was cut off: interrupted, or damaged before its end.
     pub end: Option<RecordingEndFile>,
+    /// Part of the file that could not be read; `None` for a whole file.
+    pub loss: Option<RecordingLoss>,
     pub scenario: Arc<Scenario>,
     /// The volume at the start of the session.
     pub initial: Arc<Volume>,
@@ -47,11 +53,26 @@ pub struct Recording {
     pub(super) end_bytes: Vec<u8>,
 }
 
+/// Part of a recording's file that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordingLoss {
+    /// Byte from which on the file cannot be read.
+    pub at_byte: usize,
+    /// Number of bytes from there to the end of the file.
+    pub bytes: usize,
+    /// Description of the damage.
+    pub what: String,
+    /// Latest tick that is named at or beyond the damage; `None` if nothing there can be recognised.
+    pub seen_until: Option<Tick>,
+}
+
 /// Reason for which a recording cannot be read.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RecordingError {
     /// The file cannot be read.
     File(Diagnostic),
+    /// The session ended before its first ticks reached the file.
+    NothingRecorded { name: String },
     /// The recording was made by a newer program.
     Newer { name: String, version: u32 },
     /// A part is missing or damaged.
@@ -64,6 +85,9 @@ impl fmt::Display for RecordingError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             RecordingError::File(diagnostic) => f.write_str(&diagnostic.headline()),
+            RecordingError::NothingRecorded { name } => {
+                write!(f, "{name}: empty-recording: nothing was recorded, because the session ended as it began")
+            }
             RecordingError::Newer { name, version } => {
                 write!(
                     f,
@@ -95,11 +119,11 @@ struct RecordingParts {
 }
 
 impl Recording {
-    /// Reads a recording. The recording of a killed session is read up to its last complete chunk.
+    /// Reads a recording up to its end or to the first damage; [`Recording::loss`] tells of the rest.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, is damaged or was made by a newer program, or if this program no
-    /// longer accepts its scenario.
+    /// Returns an error if the file cannot be read, has no intact tick or was made by a newer program, or if this
+    /// program no longer accepts its scenario.
     pub fn read(path: &Path) -> Result<Recording, RecordingError> {
         let bytes = typodont_formats::read_file(path).map_err(RecordingError::File)?;
         Recording::parse(&path.display().to_string(), &bytes)
@@ -108,13 +132,35 @@ impl Recording {
     /// Reads a recording from bytes; `name` is used in error messages.
     ///
     /// # Errors
-    /// Returns an error if the bytes are damaged or were written by a newer program, or if this program no longer
+    /// Returns an error if no tick is intact or the bytes were written by a newer program, or if this program no longer
     /// accepts the scenario.
     pub fn parse(name: &str, bytes: &[u8]) -> Result<Recording, RecordingError> {
-        let damaged = |what: String| RecordingError::Damaged { name: name.to_string(), what };
+        let nothing_recorded = || RecordingError::NothingRecorded { name: name.to_string() };
+        // After a power cut a file may have its size, but only zeros for content.
+        if bytes.iter().all(|byte| *byte == 0) {
+            return Err(nothing_recorded());
+        }
         let mut found = RecordingParts::default();
-        mcap_walk::walk(bytes, |record| found.add(record)).map_err(damaged)?;
-        found.assemble(name)
+        let stop = mcap_walk::walk(bytes, |record| found.add(record)).err();
+        let incomplete = found.discard_inconsistent_end(bytes.len());
+        let loss = stop.or(incomplete).map(|Stop { at, what }| {
+            let seen_until = mcap_walk::last_time_after(bytes, at).map(tick_at);
+            RecordingLoss { at_byte: at, bytes: bytes.len() - at, what, seen_until }
+        });
+        let has_ticks = !found.ticks.is_empty();
+        found.assemble(name, loss.clone()).map_err(|error| match (error, loss) {
+            // The file ends before the first tick. Where ticks can be seen beyond the damage, something was recorded.
+            (RecordingError::Damaged { .. }, Some(loss))
+                if !has_ticks && loss.seen_until.is_none() && loss.at_byte > 0 =>
+            {
+                nothing_recorded()
+            }
+            // What is missing was not read because of the damage: the damage is the reason.
+            (RecordingError::Damaged { name, what }, Some(loss)) => {
+                RecordingError::Damaged { name, what: format!("{what}: {}", loss.what) }
+            }
+            (error, _) => error,
+        })
     }
 
     /// Returns a recording of a session that has no file, still without ticks, inputs and commands. It has no digests:
@@ -153,9 +199,53 @@ impl Recording {
     pub fn is_empty(&self) -> bool {
         self.ticks.is_empty()
     }
+
+    /// Returns true if the recording ends before the session did.
+    pub fn is_cut_off(&self) -> bool {
+        self.end.is_none()
+    }
+
+    /// Returns a sentence for the person who reads a cut-off or damaged recording: what was read and what was lost;
+    /// `None` for a whole one.
+    pub fn describe_loss(&self) -> Option<String> {
+        let kept = Tick(self.ticks.len() as u64).seconds();
+        let what = self.loss.as_ref().map_or("", |loss| loss.what.as_str());
+        let seen_until = self.loss.as_ref().and_then(|loss| loss.seen_until).map(Tick::seconds);
+        match (self.is_cut_off(), seen_until) {
+            (false, _) if self.loss.is_none() => None,
+            (false, _) => Some(format!("the session is complete, and nothing of it was lost ({what})")),
+            (true, Some(until)) if until > kept => Some(format!(
+                "the recording is damaged after {kept:.3} s: from there to {until:.3} s at least, {:.3} s were lost ({what})",
+                until - kept
+            )),
+            (true, _) if what.is_empty() => {
+                Some(format!("the recording is cut off before its end: it ends after {kept:.3} s"))
+            }
+            (true, _) => {
+                Some(format!("the recording is cut off before its end: what followed {kept:.3} s was lost ({what})"))
+            }
+        }
+    }
+}
+
+/// Returns the tick of a message by its time, ns.
+fn tick_at(time: u64) -> Tick {
+    Tick((time as f64 / 1e9 / TICK_S).round() as u64)
 }
 
 impl RecordingParts {
+    /// Discards the end metadata if the records before it are not all there, and returns the reason.
+    fn discard_inconsistent_end(&mut self, size: usize) -> Option<Stop> {
+        let ticks = self.ticks.len() as u64;
+        let last_digest = self.digests.last().map(|digest| digest.tick);
+        let is_consistent = |end: &RecordingEndFile| end.servo.ticks == ticks && last_digest == Some(ticks);
+        if self.end.as_ref().is_none_or(is_consistent) {
+            return None;
+        }
+        self.end = None;
+        Some(Stop { at: size, what: "the last records before the end are missing".to_string() })
+    }
+
     fn add(&mut self, record: Record) -> Result<(), String> {
         match record {
             Record::Metadata(metadata) => {
@@ -227,7 +317,7 @@ impl RecordingParts {
         Ok(())
     }
 
-    fn assemble(self, name: &str) -> Result<Recording, RecordingError> {
+    fn assemble(self, name: &str, loss: Option<RecordingLoss>) -> Result<Recording, RecordingError> {
         let damaged = |what: &str| RecordingError::Damaged { name: name.to_string(), what: what.to_string() };
         let RecordingParts {
             head,
@@ -260,9 +350,13 @@ impl RecordingParts {
             scenario.renumber_teeth(fdi).map_err(|what| damaged(&what))?;
         }
         check_agreement(&head, &scenario, original.is_some()).map_err(damaged)?;
+        if end.is_none() && ticks.is_empty() {
+            return Err(damaged("no tick is intact"));
+        }
         Ok(Recording {
             head,
             end,
+            loss,
             scenario: Arc::new(scenario),
             initial: Arc::new(initial),
             original: original.map(Arc::new),

@@ -36,7 +36,7 @@ pub struct RecorderError {
 
 impl fmt::Display for RecorderError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "cannot write the recording — {} — {}", self.why, self.path.display())
+        write!(f, "{}: unwritable-file: the recording cannot be written: {}", self.path.display(), self.why)
     }
 }
 
@@ -68,7 +68,7 @@ impl Recorder {
         let (density, label) = volume::bytes(&workpiece.volume).map_err(|e| failed(e.to_string()))?;
         let original = workpiece.original.as_ref().map(|o| volume::bytes(o)).transpose();
         let original = original.map_err(|e| failed(e.to_string()))?;
-        let file = File::create(path).map_err(|e| failed(e.to_string()))?;
+        let file = File::create(path).map_err(|e| failed(typodont_formats::write_failure(&e)))?;
         // One thread and chunks buffered in memory: equal sessions give equal bytes, and a killed one complete
         // chunks.
         let options = WriteOptions::new()
@@ -114,18 +114,18 @@ impl Recorder {
                 running_digest: running,
             })
         };
-        attempt().map_err(|e| failed(e.to_string()))
+        attempt().map_err(|e| failed(reason(&e)))
     }
 
     fn write(&mut self, channel_id: u16, tick: Tick, data: &[u8]) -> Result<(), RecorderError> {
         let time = (tick.0 as f64 * TICK_S * 1e9).round() as u64;
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
         self.sequence = self.sequence.wrapping_add(1);
-        self.writer.write_to_known_channel(&header, data).map_err(|e| self.failed(e))
+        self.writer.write_to_known_channel(&header, data).map_err(|e| self.failed(&e))
     }
 
-    fn failed(&self, error: McapError) -> RecorderError {
-        RecorderError { path: self.path.clone(), why: error.to_string() }
+    fn failed(&self, error: &McapError) -> RecorderError {
+        RecorderError { path: self.path.clone(), why: reason(error) }
     }
 
     fn write_event(&mut self, tick: Tick, what: EventKindFile) -> Result<(), RecorderError> {
@@ -144,7 +144,15 @@ impl Recorder {
         let digest = DigestFile { tick: tick.0, sha256: self.running_digest.sha256() };
         self.write(self.digest_channel, tick, &json(&digest))?;
         let done = self.writer.write_metadata(&metadata(END, end)).and_then(|()| self.writer.finish().map(drop));
-        done.map_err(|e| self.failed(e))
+        done.map_err(|e| self.failed(&e))
+    }
+}
+
+/// Returns the reason of a failed write; of an error of the system, not of the compression that met it.
+fn reason(error: &McapError) -> String {
+    match error {
+        McapError::Io(error) => typodont_formats::write_failure(error),
+        other => other.to_string(),
     }
 }
 
@@ -196,7 +204,7 @@ impl Observer for Recorder {
             self.write(self.digest_channel, step.tick, &json(&digest))?;
         }
         if ticks_done.is_multiple_of(FLUSH_TICKS) {
-            self.writer.flush().map_err(|e| self.failed(e))?;
+            self.writer.flush().map_err(|e| self.failed(&e))?;
         }
         Ok(())
     }
