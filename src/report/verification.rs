@@ -313,9 +313,13 @@ fn sum_differences(grade: &GradeFile) -> Vec<String> {
         }
     };
     let off = |a: f64, b: f64| (a - b).abs() > POINTS_TOLERANCE;
-    complain(off(points, grade.points), format!("the items add up to {points:.3} points, not {:.3}", grade.points));
-    complain(off(most, grade.max_points), format!("the items allow {most:.3} points, not {:.3}", grade.max_points));
-    complain(failed != grade.hard_fails, "the critical errors are not those that were checked".to_string());
+    // Files of the first versions name neither items nor the critical errors that were checked.
+    if !grade.items.is_empty() {
+        complain(off(points, grade.points), format!("the items add up to {points:.3} points, not {:.3}", grade.points));
+        complain(off(most, grade.max_points), format!("the items allow {most:.3} points, not {:.3}", grade.max_points));
+    }
+    let lists_all = grade.hard_fail_checks.is_empty() || failed == grade.hard_fails;
+    complain(!lists_all, "the critical errors are not those that were checked".to_string());
     complain(passes != grade.passed, "passed or not passed does not follow from the points".to_string());
     found
 }
@@ -348,4 +352,80 @@ fn named_template(page: &[u8]) -> Option<&[u8]> {
     let at = start.windows(begin.len()).position(|window| window == begin)? + begin.len();
     let length = start[at..].windows(end.len()).position(|window| window == end)?;
     Some(&start[at..at + length])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The committed example and what verifies it, whatever the templates are now.
+    fn example() -> (PathBuf, SessionFile, Verifier) {
+        let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/example");
+        let session = crate::cohort::read_session(&bundle.join(SESSION_FILE)).unwrap();
+        let verifier = Verifier { template_sha256: session.template_sha256.clone(), cache: None };
+        (bundle, session, verifier)
+    }
+
+    #[test]
+    fn the_name_of_a_template_is_found_in_its_page() {
+        let page = with_template_name("<html>\n<head>\n<title>a</title>", "ab12");
+        assert_eq!(named_template(page.as_bytes()), Some(&b"ab12"[..]));
+        assert_eq!(named_template(b"<html><head>"), None);
+    }
+
+    #[test]
+    fn a_result_is_compared_with_its_recording() {
+        // Aim: every claim of a session.json is judged. Method: one claim of the example is changed at a time.
+        let (bundle, session, _) = example();
+        let recording = fs::read(bundle.join(record::FILE_NAME)).unwrap();
+        let replayed = replay(&recording).unwrap();
+        let judged = |session: &SessionFile| judge(&replayed, session, session.to_json().as_bytes());
+        if session.scorer_version == SCORER_VERSION {
+            assert_eq!(judged(&session), VerificationStatus::Verified);
+        }
+        let current = SessionFile { scorer_version: SCORER_VERSION, ..replayed.session.clone() };
+        let (digests, template_sha256) = (session.digests.clone(), session.template_sha256.clone());
+        let current = SessionFile { digests, template_sha256, ..current };
+        let changes: [(&str, fn(&mut SessionFile)); 10] = [
+            ("participant", |s| s.participant = "other".into()),
+            ("seed", |s| s.seed += 1),
+            ("started", |s| s.started = "2020-01-01T00:00:00Z".into()),
+            ("operator", |s| s.operator = None),
+            ("scenario", |s| s.scenario.title = "other".into()),
+            ("typodont_version", |s| s.typodont_version = "9.9.9".into()),
+            ("grade", |s| s.grade.as_mut().unwrap().points = 100.0),
+            ("metrics.dice", |s| drop(s.metrics.insert("dice".into(), Some(1.0)))),
+            ("metrics", |s| drop(s.metrics.insert("invented".into(), Some(1.0)))),
+            ("stages", |s| s.stages[0].ended_s += 1.0),
+        ];
+        for (part, change) in changes {
+            let mut changed = current.clone();
+            change(&mut changed);
+            let status = judged(&changed);
+            assert!(
+                status.differs() && status.note().contains(&format!("session.json: {part}: ")),
+                "{part}: {status:?}"
+            );
+        }
+        let older = SessionFile { scorer_version: SCORER_VERSION + 1, ..current };
+        assert_eq!(judged(&older).name(), "not verified");
+    }
+
+    #[test]
+    fn a_grade_that_contradicts_itself_is_named() {
+        let (_, session, _) = example();
+        let grade = session.grade.unwrap();
+        assert_eq!(sum_differences(&grade), Vec::<String>::new());
+        let changes: [(&str, fn(&mut GradeFile)); 4] = [
+            ("the items add up to", |g| g.points += 1.0),
+            ("the items allow", |g| g.max_points += 1.0),
+            ("critical errors", |g| g.hard_fails.push("invented".into())),
+            ("passed or not passed", |g| g.passed = !g.passed),
+        ];
+        for (what, change) in changes {
+            let mut changed = grade.clone();
+            change(&mut changed);
+            assert!(sum_differences(&changed).iter().any(|d| d.contains(what)), "{what}");
+        }
+    }
 }

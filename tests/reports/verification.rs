@@ -174,6 +174,15 @@ fn a_replay_is_done_once_per_recording() {
     assert_eq!(other.check(&bundle, &read), VerificationStatus::Pending, "another build replays again");
 }
 
+/// This many measures.
+fn many(count: usize) -> Value {
+    Value::Object((0..count).map(|n| (format!("m{n}"), json!(1.0))).collect())
+}
+
+fn stage(id: &str) -> Value {
+    json!({ "id": id, "started_s": 0.0, "ended_s": 1.0, "ended_by": "answer", "answers": [] })
+}
+
 #[test]
 fn a_session_with_too_much_in_it_is_refused_at_once() {
     // Aim: finding 8: a million measures made a page of 74 MB. Method: each bound is passed by one; the sentence names
@@ -189,26 +198,22 @@ fn a_session_with_too_much_in_it_is_refused_at_once() {
         fs::write(&file, one.to_string()).unwrap();
         typodont_report::cohort::read_session(&file).map(|_| ())
     };
-    let many = |count: usize| -> Value {
-        (0..count).map(|n| (format!("m{n}"), json!(1.0))).collect::<serde_json::Map<_, _>>().into()
-    };
     assert_eq!(plain(&|_| ()), Ok(()));
     assert_eq!(plain(&|one| one["metrics"] = many(2000)), Ok(()));
     assert_eq!(plain(&|one| one["participant"] = json!("x".repeat(64))), Ok(()));
-    let stage = |id: &str| json!({ "id": id, "started_s": 0.0, "ended_s": 1.0, "ended_by": "answer", "answers": [] });
-    let cases: Vec<(&dyn Fn(&mut Value), &str)> = vec![
-        (&|one| one["metrics"] = many(2001), "it has 2001 measures, and the maximum is 2000"),
-        (&|one| one["metrics"] = many(1_000_000), "MiB, and the maximum is 4 MiB"),
-        (&|one| one["participant"] = json!("x".repeat(65)), "participant's code has more than 64 characters"),
-        (&|one| one["scenario"]["id"] = json!("x".repeat(300)), "has more than 256 characters"),
-        (&|one| one["metrics"]["y".repeat(300)] = json!(1.0), "has more than 256 characters"),
-        (&|one| one["stages"] = (0..1001).map(|n| stage(&n.to_string())).collect(), "it has 1001 stages"),
-        (&|one| one["grade"]["points"] = json!(1e308), "points of its grade are invalid"),
-        (&|one| one["grade"]["points"] = json!(-1), "points of its grade are invalid"),
-        (&|one| one["started"] = json!("9999-99-99"), "it began in the year 9999"),
+    let cases: [(fn(&mut Value), &str); 9] = [
+        (|one| one["metrics"] = many(2001), "it has 2001 measures, and the maximum is 2000"),
+        (|one| one["metrics"] = many(1_000_000), "MiB, and the maximum is 4 MiB"),
+        (|one| one["participant"] = json!("x".repeat(65)), "participant's code has more than 64 characters"),
+        (|one| one["scenario"]["id"] = json!("x".repeat(300)), "has more than 256 characters"),
+        (|one| one["metrics"]["y".repeat(300)] = json!(1.0), "has more than 256 characters"),
+        (|one| one["stages"] = (0..1001).map(|n| stage(&n.to_string())).collect(), "it has 1001 stages"),
+        (|one| one["grade"]["points"] = json!(1e308), "points of its grade are invalid"),
+        (|one| one["grade"]["points"] = json!(-1), "points of its grade are invalid"),
+        (|one| one["started"] = json!("9999-99-99"), "it began in the year 9999"),
     ];
     for (change, expected) in cases {
-        let why = plain(change).unwrap_err();
+        let why = plain(&change).unwrap_err();
         assert!(why.contains(expected) && why.len() < 200, "{expected}: {why}");
     }
     let begun = std::time::Instant::now();
