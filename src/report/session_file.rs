@@ -352,7 +352,7 @@ fn check_points(grade: &GradeFile) -> Result<(), String> {
     let pairs = grade.items.iter().map(|item| (item.points, item.max_points));
     for (points, most) in pairs.chain([(grade.points, grade.max_points)]) {
         if !(most.is_finite() && most >= 0.0 && points >= 0.0 && points <= most + POINTS_TOLERANCE) {
-            return Err(format!("the points of its grade are invalid: {points} of {most}"));
+            return Err(format!("the points of its grade are invalid: {points:e} of {most:e}"));
         }
     }
     match grade.pass_points.is_finite() {

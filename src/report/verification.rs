@@ -1,4 +1,4 @@
-//! Whether a bundle's result follows from its recording.
+//! Verification of results: does what a bundle says follow from its recording?
 //!
 //! Takes a bundle and the `session.json` that was read from it. Gives a [`VerificationStatus`]: at once from the
 //! digests of all files, the sums of points and the head of the recording; completely by a replay, which is done once
@@ -69,10 +69,11 @@ impl VerificationStatus {
     }
 }
 
-/// What a recording gives, as kept in the cache.
+/// Result of a replay, as kept in the cache.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct ReplayedFile {
-    /// The result without digests and template.
+    /// The result without digests and template, and without the participant: whoever is erased elsewhere is not left
+    /// here. The participant is compared with the head of the recording each time.
     session: SessionFile,
     /// SHA-256 of the label maps, by file name.
     maps: BTreeMap<String, String>,
@@ -245,7 +246,7 @@ fn replay(bytes: &[u8]) -> Result<ReplayedFile, String> {
         // A session that was cut off and finished later is what its recording gives, and its result says so.
         let difference = scored.replay.difference.as_ref().filter(|d| !matches!(d, Difference::Unsealed));
         Ok(ReplayedFile {
-            session: SessionFile::of(&recording, &scored),
+            session: SessionFile { participant: String::new(), ..SessionFile::of(&recording, &scored) },
             maps: maps.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect(),
             difference: difference.map(|d| format!("{}: {d}", record::FILE_NAME)),
         })
@@ -257,6 +258,7 @@ fn replay(bytes: &[u8]) -> Result<ReplayedFile, String> {
 /// Compares a result with what its recording gives.
 fn judge(replayed: &ReplayedFile, session: &SessionFile, written: &[u8]) -> VerificationStatus {
     let ReplayedFile { session: expected, maps, difference } = replayed;
+    let expected = &SessionFile { participant: session.participant.clone(), ..expected.clone() };
     let mut differences: Vec<String> = difference.iter().cloned().collect();
     differences.extend(compare_facts(expected, session));
     let has_our_formulae = session.scorer_version == SCORER_VERSION;
@@ -385,9 +387,12 @@ mod tests {
         }
         let current = SessionFile { scorer_version: SCORER_VERSION, ..replayed.session.clone() };
         let (digests, template_sha256) = (session.digests.clone(), session.template_sha256.clone());
-        let current = SessionFile { digests, template_sha256, ..current };
-        let changes: [(&str, fn(&mut SessionFile)); 10] = [
-            ("participant", |s| s.participant = "other".into()),
+        let current = SessionFile { digests, template_sha256, participant: session.participant.clone(), ..current };
+        let head = Recording::parse_head(record::FILE_NAME, &recording).unwrap();
+        assert_eq!(head_differences(&head, &current), Vec::<String>::new());
+        let other = SessionFile { participant: "other".into(), ..current.clone() };
+        assert_eq!(head_differences(&head, &other), ["session.json: participant: differs from the recording"]);
+        let changes: [(&str, fn(&mut SessionFile)); 9] = [
             ("seed", |s| s.seed += 1),
             ("started", |s| s.started = "2020-01-01T00:00:00Z".into()),
             ("operator", |s| s.operator = None),

@@ -1,4 +1,4 @@
-//! Verification of the listed bundles in the background: what is known of each, and which is next.
+//! Verification of the listed bundles in the background.
 
 use super::app::ReviewApp;
 use super::bundle;
@@ -14,7 +14,7 @@ use typodont_report::{VerificationStatus, Verifier, sanitize_display};
 /// Maximum displayed length of the differences of a bundle, characters.
 const NOTE_MAX: usize = 600;
 
-/// What is known of the bundles, and the work that is left.
+/// Judgements of the bundles, and the work that is left.
 #[derive(Default)]
 pub(super) struct VerificationQueue {
     /// By path of the bundle: its files as they were judged, and the judgement.

@@ -174,6 +174,9 @@ fn a_replay_is_done_once_per_recording() {
     assert_eq!(other.check(&bundle, &read), VerificationStatus::Pending, "another build replays again");
 }
 
+/// A change of a session.
+type Change = fn(&mut Value);
+
 /// This many measures.
 fn many(count: usize) -> Value {
     Value::Object((0..count).map(|n| (format!("m{n}"), json!(1.0))).collect())
@@ -201,7 +204,7 @@ fn a_session_with_too_much_in_it_is_refused_at_once() {
     assert_eq!(plain(&|_| ()), Ok(()));
     assert_eq!(plain(&|one| one["metrics"] = many(2000)), Ok(()));
     assert_eq!(plain(&|one| one["participant"] = json!("x".repeat(64))), Ok(()));
-    let cases: [(fn(&mut Value), &str); 9] = [
+    let cases: [(Change, &str); 9] = [
         (|one| one["metrics"] = many(2001), "it has 2001 measures, and the maximum is 2000"),
         (|one| one["metrics"] = many(1_000_000), "MiB, and the maximum is 4 MiB"),
         (|one| one["participant"] = json!("x".repeat(65)), "participant's code has more than 64 characters"),

@@ -1,4 +1,4 @@
-//! What the results of a cohort rest on: their recordings, replayed.
+//! Verification of a cohort: each result against its recording, each recording once.
 
 use super::Cohort;
 use crate::display_format::sanitize_display;
