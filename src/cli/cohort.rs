@@ -1,5 +1,6 @@
 //! `typodont cohort`: compares many bundles.
 
+use super::verification::{self, VerificationArguments};
 use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,8 @@ pub struct Arguments {
     /// Folder for NRRD maps of the proportion of participants who removed each voxel
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
+    #[command(flatten)]
+    verification: VerificationArguments,
 }
 
 /// Maximum length of a printed path or reason, characters.
@@ -63,6 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let compares = csv.is_some() && !arguments.expert.is_empty();
     let mut sourced = arguments.source.read(html.is_some() || json.is_some() || maps.is_some() || compares)?;
     let mut cohort = std::mem::take(&mut sourced.cohort);
+    verification::settle(&mut cohort, &arguments.verification)?;
     cohort.experts = known_experts(&cohort, &arguments.expert)?;
     cohort.ratings =
         arguments.ratings.as_deref().map(|path| load_ratings(&cohort, path)).transpose()?.unwrap_or_default();
@@ -94,7 +98,8 @@ pub fn read_folder(folder: &Path) -> Result<Cohort, CliError> {
     Ok(cohort)
 }
 
-fn report_skipped(cohort: &Cohort, reported_count: usize) {
+/// Prints path and reason of every file that was skipped after the first `reported_count`.
+pub fn report_skipped(cohort: &Cohort, reported_count: usize) {
     for (path, reason) in &cohort.skipped[reported_count..] {
         eprintln!(
             "{}: skipped: {}",

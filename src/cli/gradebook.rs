@@ -1,5 +1,6 @@
 //! `typodont gradebook`: writes grades as a table that a school's system imports.
 
+use super::verification::{self, VerificationArguments};
 use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -35,6 +36,8 @@ pub struct Arguments {
     /// Use the examiner's grade where a grade was overridden (see `typodont review`)
     #[arg(long)]
     overrides: bool,
+    #[command(flatten)]
+    verification: VerificationArguments,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -62,6 +65,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let translator = templates.languages().translator(&arguments.language).map_err(CliError::misuse)?;
     let mut sourced = arguments.source.read(false)?;
     let mut cohort = std::mem::take(&mut sourced.cohort);
+    verification::settle(&mut cohort, &arguments.verification)?;
     if arguments.overrides {
         apply_overrides(&mut cohort, &sourced.overrides()?);
     }

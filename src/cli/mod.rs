@@ -44,6 +44,7 @@ mod school;
 mod score;
 #[cfg(feature = "integrations")]
 mod tls_roots;
+mod verification;
 mod verify;
 #[cfg(feature = "integrations")]
 mod xapi;

@@ -1,5 +1,6 @@
 //! `typodont parquet`: exports sessions, metrics and events for analysis.
 
+use super::verification::{self, VerificationArguments};
 use super::{CliError, SessionSource, cohort, print_line, write_file};
 use clap::Args;
 use std::path::PathBuf;
@@ -13,17 +14,20 @@ pub struct Arguments {
     /// month, and it may also be the URL of an object store
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    verification: VerificationArguments,
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let Arguments { source, output } = arguments;
+    let Arguments { source, output, verification } = arguments;
     let Some(folder) = source.bundle_folder()? else {
         #[cfg(feature = "school")]
-        return super::school::write_partitions(source, output);
+        return super::school::write_partitions(source, output, verification);
         #[cfg(not(feature = "school"))]
         return Err(super::missing_part::error("--database", "school"));
     };
-    let cohort = cohort::read_folder(folder)?;
+    let mut cohort = cohort::read_folder(folder)?;
+    verification::settle(&mut cohort, verification)?;
     let unwritable = |e: std::io::Error| CliError::wrong(format!("{}: unwritable-folder: {e}", output.display()));
     std::fs::create_dir_all(output).map_err(unwritable)?;
     for (name, bytes) in parquet_tables::all_tables(&cohort).map_err(CliError::wrong)? {

@@ -7,12 +7,12 @@ mod server;
 use super::folder_source::SchoolArguments;
 #[cfg(feature = "school")]
 use super::school::{self, DatabaseArguments, StoreArguments};
-use super::{CliError, load_templates, print_line};
+use super::{CliError, load_templates, print_line, verification};
 use clap::Args;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-#[cfg(feature = "school")]
 use std::time::Duration;
 use typodont_report::sanitize_display;
 use typodont_review::{AuthMode, PASSWORD_MIN, PageRenderer, ReviewApp, ReviewOptions};
@@ -59,6 +59,9 @@ pub struct Arguments {
 /// Interval between two exchanges of overrides with a database.
 #[cfg(feature = "school")]
 const EXCHANGE_EVERY: Duration = Duration::from_secs(5);
+
+/// Interval at which the folder is searched for bundles that are new or changed.
+const VERIFY_EVERY: Duration = Duration::from_secs(2);
 
 const PASSWORD: &str = "TYPODONT_REVIEW_PASSWORD";
 
@@ -108,7 +111,9 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     } else {
         print_line(login_url(at, &token))?;
     }
-    server::serve(listener, Arc::new(app), arguments.behind_proxy)
+    let app = Arc::new(app);
+    start_verification(&app)?;
+    server::serve(listener, app, arguments.behind_proxy)
         .map_err(|e| CliError::wrong(format!("{at}: the server stopped: {e}")))
 }
 
@@ -135,6 +140,25 @@ fn start_override_exchange(arguments: &Arguments) -> Result<(), CliError> {
             before = now;
         }
     });
+    Ok(())
+}
+
+/// Replays the recordings of the listed sessions in the background, on all processors.
+fn start_verification(app: &Arc<ReviewApp>) -> Result<(), CliError> {
+    let verifier = Arc::new(verification::verifier()?);
+    for number in 0..std::thread::available_parallelism().map_or(1, NonZero::get) {
+        let (app, verifier) = (Arc::clone(app), Arc::clone(&verifier));
+        std::thread::spawn(move || {
+            loop {
+                if !app.verify_next(&verifier) {
+                    if number == 0 {
+                        app.queue_changed_bundles();
+                    }
+                    std::thread::sleep(VERIFY_EVERY);
+                }
+            }
+        });
+    }
     Ok(())
 }
 

@@ -3,6 +3,7 @@
 mod lrs;
 mod sending;
 
+use super::verification::{self, VerificationArguments};
 use super::{CliError, cohort, print_line};
 use clap::{Args, Subcommand};
 use std::collections::BTreeMap;
@@ -43,6 +44,8 @@ struct MakeArguments {
     /// Name of this station
     #[arg(long, value_name = "NAME")]
     platform: Option<String>,
+    #[command(flatten)]
+    verification: VerificationArguments,
 }
 
 #[derive(Args)]
@@ -63,7 +66,8 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 }
 
 fn make_statements(arguments: &MakeArguments) -> Result<(), CliError> {
-    let cohort = cohort::read_folder(&arguments.folder)?;
+    let mut cohort = cohort::read_folder(&arguments.folder)?;
+    verification::settle(&mut cohort, &arguments.verification)?;
     let mut naming =
         XapiNaming::with_home_page(&arguments.home_page).map_err(|e| CliError::misuse(format!("--home-page: {e}")))?;
     naming.platform.clone_from(&arguments.platform);
@@ -76,13 +80,13 @@ fn make_statements(arguments: &MakeArguments) -> Result<(), CliError> {
     let spool = open_spool(&arguments.spool)?;
     let mut words = BTreeMap::new();
     let (mut sessions, mut statement_count) = (0, 0);
-    for (_, session) in &cohort.sessions {
+    for (path, session) in &cohort.sessions {
         let questionnaire = session.questionnaire.as_ref().map(|q| q.id.as_str());
         if let Some(id) = questionnaire {
             words.entry(id).or_insert_with(|| wording(&cohort, id));
         }
         let wording = questionnaire.and_then(|id| words[id].as_ref());
-        let statements = statements(session, &naming, wording);
+        let statements = statements(session, cohort.status(path), &naming, wording);
         if spool.put(&session_id(session), &statements).map_err(|e| spool_error(&arguments.spool, e))? {
             sessions += 1;
             statement_count += statements.len();

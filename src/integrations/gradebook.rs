@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use typodont_report::cohort::Cohort;
-use typodont_report::{GradeFile, SessionFile, Translator, csv, sanitize_display};
+use typodont_report::{GradeFile, SessionFile, Translator, VerificationStatus, csv, sanitize_display};
 
 /// Learning management system that imports the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,16 +144,33 @@ impl StudentTable {
     }
 }
 
+/// Graded session of a cohort.
+#[derive(Clone, Copy)]
+struct GradedSession<'a> {
+    session: &'a SessionFile,
+    grade: &'a GradeFile,
+    status: &'a VerificationStatus,
+}
+
+fn is_of(graded: &GradedSession, participant: &str, exercise: &SessionFile) -> bool {
+    graded.session.participant == participant && graded.session.scenario.id == exercise.scenario.id
+}
+
 /// Builds the grade table of a cohort: one row per participant, one column per exercise (for Moodle also its
 /// feedback).
 pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
     let GradebookOptions { lms, policy, critical, students, translator } = *options;
-    let graded: Vec<(&SessionFile, &GradeFile)> =
-        cohort.sessions.iter().filter_map(|(_, s)| Some((s, s.grade.as_ref()?))).collect();
+    let graded: Vec<GradedSession> = cohort
+        .sessions
+        .iter()
+        .filter_map(|(path, session)| {
+            Some(GradedSession { session, grade: session.grade.as_ref()?, status: cohort.status(path) })
+        })
+        .collect();
     let mut warnings = Vec::new();
     let mut exercises: Vec<&SessionFile> = Vec::new();
     let mut people: Vec<&str> = Vec::new();
-    for (session, _) in &graded {
+    for GradedSession { session, .. } in &graded {
         if !exercises.iter().any(|e| e.scenario.id == session.scenario.id) {
             exercises.push(session);
         }
@@ -162,7 +179,7 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
         }
     }
     people.sort_unstable();
-    let nameless = graded.iter().filter(|(s, _)| s.participant.is_empty()).count();
+    let nameless = graded.iter().filter(|g| g.session.participant.is_empty()).count();
     if nameless > 0 {
         warnings.push(format!("{nameless} graded sessions have no participant code and were left out"));
     }
@@ -185,8 +202,11 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
         if lms == Lms::Moodle {
             head.push(format!("{title} (feedback)"));
         }
-        let max_points: Vec<f64> =
-            graded.iter().filter(|(s, _)| s.scenario.id == exercise.scenario.id).map(|(_, g)| g.max_points).collect();
+        let max_points: Vec<f64> = graded
+            .iter()
+            .filter(|g| g.session.scenario.id == exercise.scenario.id)
+            .map(|g| g.grade.max_points)
+            .collect();
         if max_points.iter().any(|m| *m != max_points[0]) {
             warnings.push(format!("the sessions of \"{title}\" have different maximum points: export them separately"));
         }
@@ -198,7 +218,7 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
         table += &csv::format_row(&possible);
     }
     let mut count = 0;
-    let mut critical_errors = 0;
+    let (mut critical_errors, mut not_verified) = (0, 0);
     for person in people {
         let identity =
             match students {
@@ -222,16 +242,34 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
             continue;
         };
         for exercise in &exercises {
-            let own = graded.iter().filter(|(s, _)| s.participant == person && s.scenario.id == exercise.scenario.id);
-            let grade = select_grade(&own.copied().collect::<Vec<_>>(), policy);
-            critical_errors += usize::from(grade.is_some_and(|g| !g.hard_fails.is_empty() && !g.passed));
-            line.push(grade.map_or_else(String::new, |g| critical.points(g).to_string()));
+            let own = graded.iter().copied().filter(|g| is_of(g, person, exercise));
+            // A result that its recording does not give is nobody's grade; an earlier or later attempt may be.
+            let (differing, own): (Vec<GradedSession>, Vec<GradedSession>) = own.partition(|g| g.status.differs());
+            let selected = select_grade(&own, policy);
+            critical_errors += usize::from(selected.is_some_and(|g| !g.grade.hard_fails.is_empty() && !g.grade.passed));
+            not_verified += usize::from(selected.is_some_and(|g| !g.status.is_verified()));
+            line.push(selected.map_or_else(String::new, |g| critical.points(g.grade).to_string()));
+            if !differing.is_empty() {
+                let (person, count) = (sanitize_display(person, 40), differing.len());
+                let title = title(exercise, lms);
+                warnings.push(format!(
+                    "\"{person}\", \"{title}\": {count} sessions differ from their recordings, and their points are not \
+                     exported; typodont verify lists the differences"
+                ));
+            }
             if lms == Lms::Moodle {
-                line.push(grade.map_or_else(String::new, |g| feedback(g, critical, translator)));
+                let without =
+                    if differing.is_empty() { String::new() } else { translator.text("gradebook.differs", &[]) };
+                line.push(selected.map_or(without, |g| feedback(g, critical, translator)));
             }
         }
         table += &csv::format_row(&line);
         count += 1;
+    }
+    if not_verified > 0 {
+        warnings.push(format!(
+            "{not_verified} of these grades are not verified: no replay of the recording has confirmed them"
+        ));
     }
     if critical_errors > 0 {
         warnings.push(critical.warning(critical_errors));
@@ -253,23 +291,27 @@ fn title(session: &SessionFile, lms: Lms) -> String {
 
 /// Selects a grade from one participant's `sessions`, which are in chronological order; among equally good ones the
 /// last counts.
-fn select_grade<'a>(sessions: &[(&'a SessionFile, &'a GradeFile)], policy: AttemptPolicy) -> Option<&'a GradeFile> {
-    let of = |session: &(&'a SessionFile, &'a GradeFile)| session.1;
+fn select_grade<'a>(sessions: &[GradedSession<'a>], policy: AttemptPolicy) -> Option<GradedSession<'a>> {
     match policy {
-        AttemptPolicy::First => sessions.first().map(of),
-        AttemptPolicy::Last => sessions.last().map(of),
-        AttemptPolicy::Best => {
-            sessions.iter().map(of).max_by(|a, b| a.passed.cmp(&b.passed).then(a.points.total_cmp(&b.points)))
-        }
+        AttemptPolicy::First => sessions.first().copied(),
+        AttemptPolicy::Last => sessions.last().copied(),
+        AttemptPolicy::Best => sessions
+            .iter()
+            .copied()
+            .max_by(|a, b| a.grade.passed.cmp(&b.grade.passed).then(a.grade.points.total_cmp(&b.grade.points))),
     }
 }
 
 /// Summarises a grade as the feedback text of a gradebook.
-fn feedback(grade: &GradeFile, critical: CriticalErrorPolicy, translator: Translator) -> String {
+fn feedback(session: GradedSession, critical: CriticalErrorPolicy, translator: Translator) -> String {
+    let grade = session.grade;
     let key = if grade.passed { "gradebook.passed" } else { "gradebook.not_passed" };
     let (points, most) = (round(grade.points), round(grade.max_points));
     let mut sentences =
         vec![translator.text(key, &[("points", points), ("most", most), ("needed", round(grade.pass_points))])];
+    if !session.status.is_verified() {
+        sentences.push(translator.text("gradebook.not_verified", &[]));
+    }
     if !grade.finished {
         sentences.push(translator.text("gradebook.unfinished", &[]));
     }

@@ -49,6 +49,7 @@ fn sessions(cohort: &Cohort) -> Result<Vec<u8>, ParquetError> {
         .iter()
         .map(|(path, s)| (path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()), s))
         .collect();
+    let statuses = cohort.sessions.iter().map(|(path, _)| cohort.status(path));
     let text = |of: &dyn Fn(&SessionFile) -> Option<String>| {
         ParquetColumn::Text(all.iter().map(|(_, s)| of(s).filter(|t| !t.is_empty())).collect())
     };
@@ -78,6 +79,11 @@ fn sessions(cohort: &Cohort) -> Result<Vec<u8>, ParquetError> {
         ("pass_points", grade(&|g| g.pass_points)),
         ("passed", ParquetColumn::Boolean(all.iter().map(|(_, s)| s.grade.as_ref().map(|g| g.passed)).collect())),
         ("hard_fails", text(&|s| s.grade.as_ref().map(|g| g.hard_fails.join("; ")))),
+        ("verification", ParquetColumn::Text(statuses.clone().map(|s| Some(s.name().to_string())).collect())),
+        (
+            "verification_note",
+            ParquetColumn::Text(statuses.map(|s| Some(s.note()).filter(|note| !note.is_empty())).collect()),
+        ),
     ])
 }
 

@@ -10,7 +10,9 @@ use jiff::{SignedDuration, Timestamp};
 use serde_json::{Map, Value as Json, json};
 use typodont_core::tick::TICK_S;
 use typodont_exercise::scenario::Questionnaire;
-use typodont_report::{AnswerResultFile, QuestionnaireFile, RatingFile, SessionFile, StageResultFile};
+use typodont_report::{
+    AnswerResultFile, QuestionnaireFile, RatingFile, SessionFile, StageResultFile, VerificationStatus,
+};
 
 /// Language tag of titles: "undetermined", because no file states the language in which an exercise was written.
 const LANGUAGE: &str = "und";
@@ -52,9 +54,14 @@ impl XapiNaming {
 }
 
 /// Returns all statements of a session in chronological order. `wording` is the questionnaire's text, where it is
-/// available.
-pub fn statements(session: &SessionFile, naming: &XapiNaming, wording: Option<&Questionnaire>) -> Vec<Json> {
-    let builder = StatementBuilder { session, naming, id: session_id(session) };
+/// available; `status` is written into the last statement.
+pub fn statements(
+    session: &SessionFile,
+    status: &VerificationStatus,
+    naming: &XapiNaming,
+    wording: Option<&Questionnaire>,
+) -> Vec<Json> {
+    let builder = StatementBuilder { session, status, naming, id: session_id(session) };
     let mut statements = vec![builder.initialized()];
     for stage in &session.stages {
         statements.extend(stage.answers.iter().map(|answer| builder.answered(stage, answer)));
@@ -70,6 +77,7 @@ pub fn statements(session: &SessionFile, naming: &XapiNaming, wording: Option<&Q
 
 struct StatementBuilder<'a> {
     session: &'a SessionFile,
+    status: &'a VerificationStatus,
     naming: &'a XapiNaming,
     id: String,
 }
@@ -183,6 +191,10 @@ impl StatementBuilder<'_> {
             .filter_map(|(name, value)| Some((iri::metric(name), json!((*value)?))))
             .collect();
         extensions.insert(iri::extension("scorer-version"), json!(self.session.scorer_version));
+        extensions.insert(iri::extension("verification"), json!(self.status.name()));
+        if !self.status.is_verified() {
+            extensions.insert(iri::extension("verification-note"), json!(self.status.note()));
+        }
         let mut result = Map::new();
         result.insert("completion".into(), json!(whole));
         result.insert("duration".into(), json!(duration(self.length())));

@@ -6,6 +6,7 @@
 
 use super::session_file::SessionFile;
 use super::templates::Templates;
+use super::verification::with_template_name;
 use super::{glb, labelmap, pictures, session_page};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -214,14 +215,7 @@ fn derive_files(
     scored: &Scored,
     templates: &Templates,
 ) -> Result<BTreeMap<String, Vec<u8>>, String> {
-    let workpiece = &scored.replay.workpiece;
-    let tissues = &recording.scenario.tissues;
-    let grid = workpiece.volume.grid();
-    let mut files = BTreeMap::new();
-    files.insert("initial.seg.nrrd".to_string(), labelmap::tissues(&workpiece.volume, tissues)?);
-    files.insert("final.seg.nrrd".to_string(), labelmap::tissues(&scored.replay.volume, tissues)?);
-    files.insert("performance.seg.nrrd".to_string(), labelmap::performance(grid, &scored.verdicts)?);
-    files.insert("removal_time.nrrd".to_string(), labelmap::removal_times(grid, &scored.removals)?);
+    let mut files = derive_maps(recording, scored)?;
     files.insert("performance.glb".to_string(), glb::encode(&pictures::surface_parts(scored))?);
     let views = pictures::all_pictures(recording, scored);
     files.extend(views.iter().map(|view| (format!("views/{}.png", view.name), view.png.clone())));
@@ -230,13 +224,27 @@ fn derive_files(
     session.digests.insert(record::FILE_NAME.to_string(), sha256(bytes));
     session.template_sha256 = sha256(templates.session_source_text().as_bytes());
     let page = session_page::render(templates, recording, scored, &session, &views)?;
+    let page = with_template_name(&page, &session.template_sha256);
     session.digests.insert(REPORT_FILE.to_string(), sha256(page.as_bytes()));
     files.insert(REPORT_FILE.to_string(), page.into_bytes());
     files.insert(SESSION_FILE.to_string(), session.to_json().into_bytes());
     Ok(files)
 }
 
-fn sha256(bytes: &[u8]) -> String {
+/// Label maps and removal times, by file name.
+pub(super) fn derive_maps(recording: &Recording, scored: &Scored) -> Result<BTreeMap<String, Vec<u8>>, String> {
+    let workpiece = &scored.replay.workpiece;
+    let tissues = &recording.scenario.tissues;
+    let grid = workpiece.volume.grid();
+    Ok(BTreeMap::from([
+        ("initial.seg.nrrd".to_string(), labelmap::tissues(&workpiece.volume, tissues)?),
+        ("final.seg.nrrd".to_string(), labelmap::tissues(&scored.replay.volume, tissues)?),
+        ("performance.seg.nrrd".to_string(), labelmap::performance(grid, &scored.verdicts)?),
+        ("removal_time.nrrd".to_string(), labelmap::removal_times(grid, &scored.removals)?),
+    ]))
+}
+
+pub(super) fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
@@ -331,7 +339,7 @@ fn read_session_file(bundle: &Path) -> Result<(Vec<u8>, SessionFile), String> {
 }
 
 /// Complaints about files that `session.json` does not name.
-fn unlisted_files(bundle: &Path, session: &SessionFile) -> Vec<String> {
+pub(super) fn unlisted_files(bundle: &Path, session: &SessionFile) -> Vec<String> {
     let in_folder = |folder: &str| -> Vec<String> {
         let entries = fs::read_dir(bundle.join(folder)).into_iter().flatten().flatten();
         entries.map(|e| format!("{folder}{}", e.file_name().to_string_lossy())).collect()
@@ -368,7 +376,7 @@ pub fn verify_recording(path: &Path) -> Result<Verification, String> {
 }
 
 /// Reads a file of a bundle. Only a regular file is read, never a link, a pipe or a device, which might be endless.
-fn read_plain_file(bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
+pub(super) fn read_plain_file(bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
     let path = bundle.join(name);
     match fs::symlink_metadata(&path) {
         Err(error) => Err(error.to_string()),
@@ -378,7 +386,7 @@ fn read_plain_file(bundle: &Path, name: &str) -> Result<Vec<u8>, String> {
 }
 
 /// Complaints about files whose SHA-256 differs from that in `session.json`.
-fn compare_files(bundle: &Path, recording: &[u8], session: &SessionFile) -> Vec<String> {
+pub(super) fn compare_files(bundle: &Path, recording: &[u8], session: &SessionFile) -> Vec<String> {
     let mut complaints = Vec::new();
     if session.digests.get(record::FILE_NAME) != Some(&sha256(recording)) {
         complaints.push(format!("{}: the file differs from the recording that was scored", record::FILE_NAME));
@@ -436,6 +444,30 @@ fn with_digests_of_page(derived: &[u8], session: &SessionFile) -> Option<String>
 /// Complaints about results in `session.json` that differ from the recording's.
 fn compare_results(recording: &Recording, scored: &Scored, session: &SessionFile) -> Vec<String> {
     let expected = SessionFile::of(recording, scored);
+    let mut complaints = compare_facts(&expected, session);
+    complaints.extend(compare_scores(&expected, session));
+    complaints
+}
+
+/// Complaints about facts in `session.json` that differ from the recording's. No formula has a part in them.
+pub(super) fn compare_facts(expected: &SessionFile, session: &SessionFile) -> Vec<String> {
+    let differing = [
+        ("scenario", expected.scenario != session.scenario),
+        ("participant", expected.participant != session.participant),
+        ("seed", expected.seed != session.seed),
+        ("started", expected.started != session.started),
+        ("ended_because", expected.ended_because != session.ended_because),
+        ("operator", expected.operator != session.operator),
+        ("typodont_version", expected.typodont_version != session.typodont_version),
+        ("device", expected.device != session.device),
+        ("tooth_fdi", expected.tooth_fdi != session.tooth_fdi),
+        ("servo", expected.servo != session.servo),
+    ];
+    differing.into_iter().filter(|(_, differs)| *differs).map(|(name, _)| differing_part(name)).collect()
+}
+
+/// Complaints about measures, grade and answers in `session.json` that differ from the recording's.
+pub(super) fn compare_scores(expected: &SessionFile, session: &SessionFile) -> Vec<String> {
     let mut complaints = Vec::new();
     let tell = |value: Option<f64>| value.map_or("none".to_string(), |v| v.to_string());
     for (name, &value) in &expected.metrics {
@@ -447,17 +479,19 @@ fn compare_results(recording: &Recording, scored: &Scored, session: &SessionFile
             ));
         }
     }
-    let mut part = |name: &str, differs: bool| {
-        if differs {
-            complaints.push(format!("{SESSION_FILE}: {name}: differs from the value that the recording gives"));
-        }
-    };
-    part("grade", expected.grade != session.grade);
-    part("stages", expected.stages != session.stages);
-    part("questionnaire", expected.questionnaire != session.questionnaire);
-    part("scenario", expected.scenario != session.scenario);
-    part("participant", expected.participant != session.participant);
-    part("device", expected.device != session.device);
-    part("servo", expected.servo != session.servo);
+    let is_more = session.metrics.keys().any(|name| !expected.metrics.contains_key(name));
+    let differing = [
+        ("metrics", is_more),
+        ("evidence", expected.evidence != session.evidence),
+        ("grade", expected.grade != session.grade),
+        ("stages", expected.stages != session.stages),
+        ("chart", expected.chart != session.chart),
+        ("questionnaire", expected.questionnaire != session.questionnaire),
+    ];
+    complaints.extend(differing.into_iter().filter(|(_, differs)| *differs).map(|(name, _)| differing_part(name)));
     complaints
+}
+
+fn differing_part(name: &str) -> String {
+    format!("{SESSION_FILE}: {name}: differs from the value that the recording gives")
 }

@@ -29,6 +29,7 @@ pub mod raycast;
 pub mod phrases;
 mod session_file;
 mod session_page;
+pub mod verification;
 mod voxels;
 pub mod display_format;
 
@@ -42,6 +43,7 @@ pub use session_file::{
     QuestionnaireFile, RatingFile, ScenarioRef, SessionFile, SiteReadingFile, StageResultFile,
 };
 pub use templates::Templates;
+pub use verification::{VerificationStatus, Verifier};
 
 /// The recording of the committed example with its score, for tests that need a whole session.
 #[cfg(test)]

@@ -20,6 +20,27 @@ pub const VERSION: u32 = 1;
 /// kind are a habit, which the measures show.
 const EPISODES_MAX: usize = 20;
 
+/// Maximum size of a `session.json`, bytes. The largest that this program writes has some 100 kB.
+pub const FILE_BYTES_MAX: usize = 4 << 20;
+
+/// Maximum length of a participant's code, characters; `typodont run` accepts no longer one.
+const PARTICIPANT_MAX: usize = 64;
+
+/// Maximum length of an id, of a measure's name and of a moment, characters. A school's records index ids and names.
+const ID_MAX: usize = 256;
+
+/// Maximum number of measures, and of places and times of measures.
+const METRICS_MAX: usize = 2000;
+
+/// Maximum number of rubric items, critical errors, stages, answers, statements, sites and digests, each.
+const ENTRIES_MAX: usize = 1000;
+
+/// Years in which a session can have begun.
+const YEARS: std::ops::RangeInclusive<u32> = 1970..=2199;
+
+/// Tolerance of sums of points, which are rounded to nine decimals each.
+pub const POINTS_TOLERANCE: f64 = 1e-6;
+
 pub type DeviceFile = DeviceSpecFile;
 
 /// A session's result. Sessions entered by hand may leave out all but the scenario and the metrics.
@@ -326,6 +347,73 @@ impl SessionFile {
         }
     }
 
+    /// Reads the text of a `session.json`, and checks that its lengths, counts and points are within their bounds.
+    ///
+    /// # Errors
+    ///
+    /// A sentence when the text is no session, or a value is outside its bounds.
+    pub fn from_json(text: &str) -> Result<SessionFile, String> {
+        if text.len() > FILE_BYTES_MAX {
+            let (size, most) = (text.len() >> 20, FILE_BYTES_MAX >> 20);
+            return Err(format!("not a session: the file has {size} MiB, and the maximum is {most} MiB"));
+        }
+        let session: SessionFile = serde_json::from_str(text).map_err(|e| format!("not a session: {e}"))?;
+        match session.version {
+            VERSION => {}
+            version if version > VERSION => return Err(format!("made by a newer program (version {version})")),
+            version => return Err(format!("not a session: version {version}")),
+        }
+        session.check_bounds().map_err(|what| format!("not a session: {what}"))?;
+        Ok(session)
+    }
+
+    /// Checks lengths, counts, points and the year.
+    fn check_bounds(&self) -> Result<(), String> {
+        let questions = self.stages.iter().flat_map(|stage| &stage.answers);
+        let statements = self.questionnaire.iter().flat_map(|q| &q.items);
+        let items = self.grade.iter().flat_map(|grade| &grade.items);
+        let checks = self.grade.iter().flat_map(|grade| &grade.hard_fail_checks);
+        for (what, count, most) in [
+            ("measures", self.metrics.len(), METRICS_MAX),
+            ("places of measures", self.evidence.len(), METRICS_MAX),
+            ("rubric items", items.clone().count(), ENTRIES_MAX),
+            ("critical errors", checks.clone().count(), ENTRIES_MAX),
+            ("critical errors", self.grade.as_ref().map_or(0, |g| g.hard_fails.len()), ENTRIES_MAX),
+            ("stages", self.stages.len(), ENTRIES_MAX),
+            ("answers", questions.clone().count(), ENTRIES_MAX),
+            ("statements", statements.clone().count(), ENTRIES_MAX),
+            ("categories", self.questionnaire.as_ref().map_or(0, |q| q.categories.len()), ENTRIES_MAX),
+            ("sites of a chart", self.chart.len(), ENTRIES_MAX),
+            ("error episodes", self.episodes.len(), ENTRIES_MAX),
+            ("digests", self.digests.len(), ENTRIES_MAX),
+        ] {
+            if count > most {
+                return Err(format!("it has {count} {what}, and the maximum is {most}"));
+            }
+        }
+        let longer = |text: &str, most: usize| text.chars().nth(most).is_some();
+        if longer(&self.participant, PARTICIPANT_MAX) {
+            return Err(format!("the participant's code has more than {PARTICIPANT_MAX} characters"));
+        }
+        let ids = [&self.scenario.id, &self.scenario.sha256, &self.started, &self.typodont_version].into_iter();
+        let ids = ids.chain(self.metrics.keys()).chain(self.evidence.keys()).chain(self.digests.keys());
+        let ids = ids.chain(self.stages.iter().map(|stage| &stage.id)).chain(questions.map(|answer| &answer.question));
+        let ids = ids.chain(items.map(|item| &item.metric)).chain(checks.map(|check| &check.metric));
+        let ids = ids.chain(self.questionnaire.iter().map(|q| &q.id));
+        let mut ids = ids.chain(statements.flat_map(|statement| [&statement.id, &statement.category]));
+        if let Some(id) = ids.find(|id| longer(id, ID_MAX)) {
+            let beginning: String = id.chars().take(20).collect();
+            return Err(format!("the name \"{beginning}…\" has more than {ID_MAX} characters"));
+        }
+        self.grade.as_ref().map_or(Ok(()), check_points)?;
+        let year: String = self.started.chars().take_while(char::is_ascii_digit).collect();
+        let is_date = year.len() >= 4 && self.started.as_bytes().get(year.len()) == Some(&b'-');
+        if is_date && !year.parse().is_ok_and(|year| YEARS.contains(&year)) {
+            return Err(format!("it began in the year {year}; possible are {} to {}", YEARS.start(), YEARS.end()));
+        }
+        Ok(())
+    }
+
     /// The file's text.
     pub fn to_json(&self) -> String {
         // Numbers are finite and keys are texts: writing cannot fail.
@@ -381,6 +469,20 @@ fn episode_file(scenario: &Scenario, episode: &ErrorEpisode) -> EpisodeFile {
 
 fn tissue_name(scenario: &Scenario, tissue: Label) -> Option<String> {
     scenario.tissues.by_label(tissue).map(|entry| entry.name.clone())
+}
+
+/// Checks that points are numbers between zero and their maximum, each by itself; their sum is not checked here.
+fn check_points(grade: &GradeFile) -> Result<(), String> {
+    let pairs = grade.items.iter().map(|item| (item.points, item.max_points));
+    for (points, most) in pairs.chain([(grade.points, grade.max_points)]) {
+        if !(most.is_finite() && most >= 0.0 && points >= 0.0 && points <= most + POINTS_TOLERANCE) {
+            return Err(format!("the points of its grade are invalid: {points:e} of {most:e}"));
+        }
+    }
+    match grade.pass_points.is_finite() {
+        true => Ok(()),
+        false => Err("the points of its grade are invalid".into()),
+    }
 }
 
 fn site(result: &SiteResult) -> SiteReadingFile {

@@ -9,6 +9,7 @@ use super::overrides::{IntegrityIssue, LogSnapshot, OverrideLog};
 use super::page_renderer::PageRenderer;
 use super::pseudonyms::Pseudonymizer;
 use super::router::Route;
+use super::verification::{self, VerificationQueue};
 use jiff::Timestamp;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -35,6 +36,7 @@ pub struct ReviewApp {
     pub(super) anonymous: bool,
     pub(super) allowed_hosts: AllowedHosts,
     state: Mutex<ReviewState>,
+    pub(super) verification: Mutex<VerificationQueue>,
 }
 
 /// Mutable state, behind a mutex.
@@ -126,6 +128,7 @@ impl ReviewApp {
             anonymous,
             allowed_hosts: AllowedHosts(host_names),
             state: Mutex::new(state),
+            verification: verification::new_queue(),
         };
         Ok((app, first_token))
     }

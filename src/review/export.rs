@@ -35,6 +35,8 @@ pub fn csv(app: &ReviewApp, context: &RequestContext) -> Response {
         "examiner_result",
         "overrides",
         "reasons",
+        "verification",
+        "verification_note",
     ]);
     let mut table = csv::format_row(&head.map(|c| c.to_string()).collect::<Vec<_>>());
     for listed in &rows {
@@ -64,6 +66,8 @@ fn line(app: &ReviewApp, indexed: &IndexedSession, log: &LogSnapshot) -> Vec<Str
             cells.push(shown(&effective_overrides(indexed, log).map(reason).collect::<Vec<_>>().join("; ")));
         }
     }
+    let status = app.verification(indexed);
+    cells.extend([status.name().to_string(), shown(&status.note())]);
     cells
 }
 
@@ -120,6 +124,11 @@ struct ExportedSession<'a> {
     machine: Option<ExportedGrade>,
     /// `None` without overrides.
     examiner: Option<ExportedGrade>,
+    /// `verified`, `not verified` or `differs`.
+    verification: &'static str,
+    /// Differences from the recording, or the reason for which the result is not verified.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    verification_note: String,
     /// All overrides of the session ever made, including withdrawn ones, in order.
     history: Vec<&'a OverrideEntry>,
 }
@@ -163,6 +172,7 @@ fn session<'a>(app: &ReviewApp, indexed: &'a IndexedSession, log: &'a LogSnapsho
         passed,
     };
     let grade = indexed.grade.as_ref();
+    let status = app.verification(indexed);
     ExportedSession {
         id: &indexed.id,
         exercise: &indexed.exercise,
@@ -172,6 +182,8 @@ fn session<'a>(app: &ReviewApp, indexed: &'a IndexedSession, log: &'a LogSnapsho
         began: app.display_start(indexed),
         machine: grade.map(|g| of(g.machine.points, g.machine.passed, &g.machine)),
         examiner: grade.filter(|g| g.overrides > 0).map(|g| of(g.points, g.passed, &g.machine)),
+        verification: status.name(),
+        verification_note: status.note(),
         history: log.valid_entries().filter(|entry| entry.draft.session == indexed.id).collect(),
     }
 }

@@ -308,6 +308,37 @@ impl SessionIndex {
         })
     }
 
+    /// Returns the paths of the listed bundles, relative to the folder.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
+    pub fn paths(&self) -> rusqlite::Result<Vec<PathBuf>> {
+        let mut select = self.connection.prepare(&format!("SELECT session.path {LISTED_SESSIONS}"))?;
+        let rows = select.query_map([], |row| Ok(PathBuf::from(row.get::<_, String>(0)?)))?;
+        rows.collect()
+    }
+
+    /// Returns the other listed sessions with the same recording.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
+    pub fn same_recording(&self, indexed: &IndexedSession) -> rusqlite::Result<Vec<IndexedSession>> {
+        /// More are not named.
+        const NAMED_MAX: i64 = 20;
+        if indexed.recording.is_empty() {
+            return Ok(Vec::new());
+        }
+        let sql = format!(
+            "SELECT {COLUMNS} {LISTED_SESSIONS} AND session.recording = ?1 AND session.id <> ?2
+             ORDER BY session.id LIMIT {NAMED_MAX}"
+        );
+        let mut select = self.connection.prepare(&sql)?;
+        let rows = select.query_map([&indexed.recording, &indexed.id], indexed_session)?;
+        rows.collect()
+    }
+
     /// Returns path and reason for every file that is not listed: it is not a session, or a copy of one.
     ///
     /// # Errors

@@ -32,6 +32,7 @@ mod list;
 mod session_page;
 mod compare;
 mod export;
+mod verification;
 mod override_form;
 mod history;
 

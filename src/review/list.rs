@@ -4,6 +4,7 @@ use super::app::{RequestContext, ReviewApp, SHOWN_MAX};
 use super::http::Response;
 use super::index::IndexedSession;
 use super::query::{PAGE_LENGTHS, Query, ResultFilter, SortColumn};
+use super::verification::{ShownVerification, VerificationProgress};
 use serde::Serialize;
 use typodont_report::display_format;
 use typodont_report::sanitize_display;
@@ -28,6 +29,7 @@ struct ListPage {
     csv: String,
     json: String,
     left_out: usize,
+    verification: VerificationProgress,
 }
 
 #[derive(Serialize)]
@@ -44,6 +46,7 @@ struct SessionListRow {
     examiner: Option<String>,
     stands_passed: bool,
     overrides: usize,
+    verification: ShownVerification,
 }
 
 #[derive(Serialize)]
@@ -80,6 +83,7 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
     let found = state.index.query_sessions(&query, app.anonymous);
     let choices = state.index.filter_options();
     let left_out = state.index.left_out();
+    let listed_count = state.index.paths().map_or(0, |paths| paths.len());
     drop(state);
     let (Ok((rows, count)), Ok(choices), Ok(left_out)) = (found, choices, left_out) else {
         return app.index_failure(context);
@@ -107,6 +111,7 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
         csv: href("/sessions.csv", &everything),
         json: href("/sessions.json", &everything),
         left_out: left_out.len(),
+        verification: app.verification_progress(listed_count),
         asked: filter_form(&query),
     };
     app.page(context, &log, "list.html", body)
@@ -170,6 +175,7 @@ fn session_row(app: &ReviewApp, indexed: &IndexedSession) -> SessionListRow {
         examiner: judged.map(|g| display_format::number(g.points)),
         stands_passed: grade.is_some_and(|g| g.passed),
         overrides: grade.map_or(0, |g| g.overrides),
+        verification: ShownVerification::of(&app.verification(indexed)),
     }
 }
 

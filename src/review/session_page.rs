@@ -6,6 +6,7 @@ use super::effective_grade::{EffectiveGrade, effective_grade};
 use super::history::{self, HistoryRow};
 use super::http::Response;
 use super::overrides::OverrideEntry;
+use super::verification::ShownVerification;
 use serde::Serialize;
 use typodont_exercise::scenario::Metric;
 use typodont_exercise::score::Verdict;
@@ -42,6 +43,9 @@ pub(super) struct SessionFacts {
     /// Reason for which the session ended early.
     pub broken_off: Option<String>,
     pub device: Option<String>,
+    pub verification: ShownVerification,
+    /// Id and participant of the other sessions with the same recording.
+    pub same_recording: Vec<(String, String)>,
 }
 
 #[derive(Serialize)]
@@ -163,6 +167,7 @@ pub(super) fn facts(
     indexed: &super::index::IndexedSession,
     session: &SessionFile,
 ) -> SessionFacts {
+    let same = app.state().index.same_recording(indexed).unwrap_or_default();
     let broken_off = Some(&session.ended_because).filter(|why| !matches!(why.as_str(), "" | "complete"));
     SessionFacts {
         id: indexed.id.clone(),
@@ -173,6 +178,8 @@ pub(super) fn facts(
         operator: session.operator.as_ref().map(|o| sanitize_display(o, SHOWN_MAX)),
         broken_off: broken_off.map(|why| sanitize_display(why, LONG_MAX)),
         device: session.device.as_ref().map(|d| sanitize_display(&d.name, SHOWN_MAX)),
+        verification: ShownVerification::of(&app.verification(indexed)),
+        same_recording: same.into_iter().map(|other| (other.id.clone(), app.display_name(&other))).collect(),
     }
 }
 

@@ -14,9 +14,11 @@ const TABLES: [&str; 3] = [parquet_tables::SESSIONS, parquet_tables::METRICS, pa
 /// Groups sessions by partition name, such as `class=2026-A/month=2026-11`.
 pub fn by_partition(stored: Vec<StoredSession>) -> BTreeMap<String, Cohort> {
     let mut parts: BTreeMap<String, Cohort> = BTreeMap::new();
-    for StoredSession { class, bundle, month, session, .. } in stored {
+    for StoredSession { id, class, bundle, month, session, verification, .. } in stored {
         let name = format!("class={class}/month={month}");
-        parts.entry(name).or_default().sessions.push((PathBuf::from(bundle), session));
+        let (path, part) = (PathBuf::from(id).join(bundle), parts.entry(name).or_default());
+        part.verification.insert(path.clone(), verification);
+        part.sessions.push((path, session));
     }
     parts
 }

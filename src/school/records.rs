@@ -8,7 +8,7 @@ use std::error::Error as _;
 use std::path::{Component, Path};
 use typodont_core::tick::TICK_S;
 use typodont_integrations::session_id;
-use typodont_report::SessionFile;
+use typodont_report::{SessionFile, VerificationStatus};
 use typodont_review::{LogSnapshot, OverrideEntry};
 
 /// Status of a local session in the database.
@@ -54,6 +54,8 @@ pub struct StoredSession {
     pub manifest: Manifest,
     /// True if a worker's score differs from the station's.
     pub differs: bool,
+    /// Relation of `session` to its recording, as far as workers have scored it.
+    pub verification: VerificationStatus,
 }
 
 /// Selection of sessions.
@@ -281,7 +283,7 @@ pub fn sessions(client: &mut Client, filter: &SessionFilter) -> Result<(Vec<Stor
     let scorer = filter.scorer_version.map(i64::from);
     let sql = "SELECT s.id::text, c.name, s.bundle,
         coalesce(to_char(s.started_at AT TIME ZONE 'UTC', 'YYYY-MM'), 'unknown'), s.result, s.manifest::text, k.result,
-        EXISTS (SELECT FROM typodont.score d WHERE d.session_id = s.id AND NOT d.agrees)
+        (SELECT bool_and(d.agrees) FROM typodont.score d WHERE d.session_id = s.id)
       FROM typodont.session s JOIN typodont.class c ON c.id = s.class_id
       LEFT JOIN typodont.score k ON k.session_id = s.id AND k.scorer_version = $2
       WHERE ($1::text IS NULL OR c.name = $1) AND ($2::bigint IS NULL OR k.session_id IS NOT NULL)";
@@ -304,7 +306,18 @@ pub fn sessions(client: &mut Client, filter: &SessionFilter) -> Result<(Vec<Stor
                 unreadable.push(format!("{id}: \"{bundle}\" is not a valid bundle name"))
             }
             Ok((session, manifest)) => {
-                stored.push(StoredSession { id, class, bundle, month, session, manifest, differs: row.get(7) });
+                let agrees: Option<bool> = row.get(7);
+                let verification = match agrees {
+                    // The result is a worker's own.
+                    _ if scorer.is_some() => VerificationStatus::Verified,
+                    Some(true) => VerificationStatus::Verified,
+                    Some(false) => {
+                        VerificationStatus::Differs(vec!["the worker's score differs from the station's".into()])
+                    }
+                    None => VerificationStatus::Pending,
+                };
+                let differs = agrees == Some(false);
+                stored.push(StoredSession { id, class, bundle, month, session, manifest, differs, verification });
             }
             Err(error) => unreadable.push(format!("{id}: not a session: {error}")),
         }

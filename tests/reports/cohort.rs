@@ -440,13 +440,15 @@ fn whatever_a_person_wrote_stays_a_text() {
     ];
     for text in texts.iter().map(|t| t.to_string()).chain(["x".repeat(10_000), "مرحبا".into()]) {
         for points in [60.0, 80.0] {
-            let mut one = school::session("x", &text, points);
-            one["scenario"]["id"] = json!(text);
+            // Codes and ids are no longer than a reader takes.
+            let [code, id] = [64, 256].map(|most| text.chars().take(most).collect::<String>());
+            let mut one = school::session("x", &code, points);
+            one["scenario"]["id"] = json!(id);
             one["scenario"]["title"] = json!(text);
-            one["questionnaire"]["id"] = json!(text);
-            one["questionnaire"]["items"][0]["category"] = json!(text);
+            one["questionnaire"]["id"] = json!(id);
+            one["questionnaire"]["items"][0]["category"] = json!(id);
             one["grade"]["hard_fails"] = json!([text]);
-            one["metrics"][&text] = json!(1.0);
+            one["metrics"][&id] = json!(1.0);
             school::enter(&folder, &one);
         }
     }
@@ -482,6 +484,8 @@ fn two_thousand_bundles_are_one_page() {
         std::fs::create_dir_all(&bundle).unwrap();
         let mut one = played.clone();
         one["participant"] = json!(format!("student-{:03}", number / 4));
+        // One recording would count once.
+        one["digests"].as_object_mut().unwrap().remove("recording.mcap");
         one["started"] = json!(format!("2026-11-{:02}T08:00:00Z", 1 + number % 4));
         one["grade"]["points"] = json!(30.0 + f64::from(number * 7919 % 600) / 10.0);
         std::fs::write(bundle.join("session.json"), one.to_string()).unwrap();

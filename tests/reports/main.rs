@@ -7,3 +7,4 @@ mod cohort;
 mod pictures;
 mod report_page;
 mod statistics;
+mod verification;

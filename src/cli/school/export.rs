@@ -4,6 +4,7 @@ use super::connection::DbConnection;
 use super::retry::RetryPolicy;
 use super::source::SessionSource;
 use super::store::ObjectStoreHandle;
+use crate::cli::verification::VerificationArguments;
 use crate::cli::{CliError, print_line};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -13,14 +14,15 @@ use typodont_school::records;
 use typodont_school::records::{SessionFilter, StoredSession};
 
 /// Writes all partitions to a folder, or to an object store by URL.
-pub fn write(source: &SessionSource, destination: &Path) -> Result<(), CliError> {
+pub fn write(source: &SessionSource, destination: &Path, verification: &VerificationArguments) -> Result<(), CliError> {
     if source.folder.is_some() {
         return Err(CliError::misuse("give either a folder or --database, not both"));
     }
     let retry_policy = source.at.retry_policy()?;
     let destination = canonical_destination(destination)?;
     let wrong = |e: String| CliError::misuse(format!("--output: {e}"));
-    let (mut connection, stored) = source.stored_sessions()?;
+    let (mut connection, mut stored) = source.stored_sessions()?;
+    verification.retain(&mut stored, |k| k.verification.clone())?;
     let store = ObjectStoreHandle::open_folder_or_url(&destination, retry_policy).map_err(wrong)?;
     record_export(&mut connection, &destination, source.scorer_version()?, &stored)?;
     let count = stored.len();

@@ -90,6 +90,8 @@ impl SessionSource {
         };
         let base = fetched.as_ref().map_or(Path::new(""), |fetched| &fetched.0);
         cohort.sessions = stored.iter().map(|k| (base.join(&k.id).join(&k.bundle), k.session.clone())).collect();
+        cohort.verification =
+            stored.iter().map(|k| (base.join(&k.id).join(&k.bundle), k.verification.clone())).collect();
         audit_read(&mut connection, &stored)?;
         Ok(SourcedCohort {
             cohort,

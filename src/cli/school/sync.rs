@@ -5,7 +5,7 @@ use super::database::DatabaseArguments;
 use super::retry::Transient;
 use super::store::{ObjectStoreHandle, StoreArguments, StoreError};
 use super::store_marker;
-use crate::cli::{CliError, print_line};
+use crate::cli::{CliError, print_line, verification};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
@@ -14,9 +14,9 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 use typodont_integrations::session_id;
-use typodont_report::SessionFile;
 use typodont_report::cohort::{find_bundles, read_session};
 use typodont_report::sanitize_display;
+use typodont_report::{SessionFile, VerificationStatus};
 use typodont_school::records;
 use typodont_school::records::{InsertOutcome, NewSession, SyncStatus};
 use typodont_school::{ArchiveError, BundleArchive};
@@ -172,7 +172,16 @@ fn sync_once(
     store_marker::verify_or_create(connection, store)?;
     let new = select_new(arguments, connection, stats, &found, &mut complain)?;
     let bar = progress_bar(new.len() as u64, "sent");
+    // One after the other: the station's processors belong to the session that is running.
+    let verifier = if new.is_empty() { None } else { verification::verifier().ok() };
     for found in new {
+        let status = verifier.as_ref().map(|verifier| verifier.verify(&found.path, &found.session));
+        if let Some(status) = status.filter(VerificationStatus::differs) {
+            stats.refused += 1;
+            complain(&found.path, &format!("differs: the bundle was not sent: {}", status.note()));
+            bar.inc(1);
+            continue;
+        }
         match upload_session(arguments, connection, store, &station, found)? {
             Ok(InsertOutcome::Inserted) => stats.sent += 1,
             Ok(InsertOutcome::AlreadyInserted | InsertOutcome::OtherStation) => stats.known += 1,

@@ -182,6 +182,25 @@ impl Recording {
         }
     }
 
+    /// Reads the session metadata alone, without the ticks; `name` is used in error messages.
+    ///
+    /// # Errors
+    /// Returns an error if the bytes before the metadata are damaged, or if there is none.
+    pub fn parse_head(name: &str, bytes: &[u8]) -> Result<RecordingHeadFile, RecordingError> {
+        let mut head = None;
+        let walked = mcap_walk::walk(bytes, |record| match record {
+            Record::Metadata(metadata) if metadata.name == HEAD => {
+                let text = metadata.metadata.get("json").map_or("", String::as_str);
+                head = serde_json::from_str(text).ok();
+                // An error ends the walk: nothing after the metadata is needed.
+                Err("the session metadata is invalid".to_string())
+            }
+            _ => Ok(()),
+        });
+        let what = walked.err().unwrap_or("the session metadata is missing".to_string());
+        head.ok_or(RecordingError::Damaged { name: name.to_string(), what })
+    }
+
     /// Returns the workpiece from which the session started.
     ///
     /// # Errors

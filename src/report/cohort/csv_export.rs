@@ -13,6 +13,7 @@ impl Cohort {
         if distance {
             head.extend(["expert_differs_mm3", "expert_dice"].map(String::from));
         }
+        head.extend(["verification", "verification_note"].map(String::from));
         let mut text = csv::format_row(&head);
         for (index, (path, session)) in self.sessions.iter().enumerate() {
             let grade = session.grade.as_ref();
@@ -32,6 +33,8 @@ impl Cohort {
                 line.push(shown(to_experts.map(|d| d.differs_mm3.to_string())));
                 line.push(shown(to_experts.map(|d| d.dice.to_string())));
             }
+            let status = self.status(path);
+            line.extend([status.name().to_string(), status.note()]);
             text += &csv::format_row(&line);
         }
         text

@@ -1,7 +1,7 @@
 //! Finds bundles and reads their results.
 
 use super::Cohort;
-use crate::session_file::{GradeFile, SessionFile, VERSION};
+use crate::session_file::{FILE_BYTES_MAX, SessionFile};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -87,20 +87,15 @@ fn search_folder(found: &mut FoundBundles, folder: &Path, depth: usize) {
 ///
 /// When the file cannot be read or is not a valid session.
 pub fn read_session(file: &Path) -> Result<SessionFile, String> {
-    let text = typodont_formats::read_text(file).map_err(|d| d.message)?;
-    let session: SessionFile = serde_json::from_str(&text.text).map_err(|e| format!("not a session: {e}"))?;
-    if session.grade.as_ref().is_some_and(|grade| !is_valid_grade(grade)) {
-        return Err("not a session: the points of its grade are invalid".into());
-    }
-    match session.version {
-        VERSION => Ok(session),
-        version if version > VERSION => Err(format!("made by a newer program (version {version})")),
-        version => Err(format!("not a session: version {version}")),
-    }
+    SessionFile::from_json(&read_session_text(file)?)
 }
 
-/// True if every maximum of points is finite and not negative. Points above the maximum are left to `verify`.
-fn is_valid_grade(grade: &GradeFile) -> bool {
-    let most = grade.items.iter().map(|item| item.max_points).chain([grade.max_points]);
-    most.into_iter().all(|points| points.is_finite() && points >= 0.0)
+/// Reads the text of one `session.json`, up to its maximum size.
+fn read_session_text(file: &Path) -> Result<String, String> {
+    let size = fs::metadata(file).map_or(0, |meta| meta.len());
+    if size > FILE_BYTES_MAX as u64 {
+        let most = FILE_BYTES_MAX >> 20;
+        return Err(format!("not a session: the file has {} MiB, and the maximum is {most} MiB", size >> 20));
+    }
+    typodont_formats::read_text(file).map(|source| source.text.clone()).map_err(|d| d.message)
 }

@@ -2,9 +2,10 @@
 //!
 //! Takes the `session.json` of every bundle below a folder, and of each that stands in a map its `removal_time.nrrd`. Gives
 //! tables, a page, and maps of what people removed. A file that cannot be read is listed and left out; it never stops the rest.
-//! Never opens more than one recording per questionnaire, and verifies none.
+//! Never shows a result without saying if it follows from its recording.
 
 mod loader;
+mod trust;
 mod summary;
 mod questionnaire;
 mod progress;
@@ -26,6 +27,8 @@ use super::display_format;
 use super::language::Translator;
 use super::session_file::SessionFile;
 use super::templates::{Templates, shipped_languages};
+use super::verification::VerificationStatus;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Sessions that were read, and files that were not.
@@ -41,6 +44,8 @@ pub struct Cohort {
     pub ratings: Vec<ExaminerRating>,
     /// Maps of removed voxels; filled by [`Cohort::map_removals`].
     pub removals: Vec<RemovalMap>,
+    /// Relation of each session's result to its recording, by the path of its bundle; see [`Cohort::verify`].
+    pub verification: BTreeMap<PathBuf, VerificationStatus>,
 }
 
 impl Cohort {

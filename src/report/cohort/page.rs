@@ -9,6 +9,7 @@ use super::{Cohort, POINTS, RemovalMap, charts, points_or_measure};
 use crate::language::{COUNT, Message, Translator};
 use crate::session_file::SessionFile;
 use crate::templates::Templates;
+use crate::verification::VerificationStatus;
 use crate::{display_format, phrases, pictures};
 use base64::Engine;
 use serde::Serialize;
@@ -17,6 +18,9 @@ use typodont_core::frame::Vec3;
 
 /// Most characters of a code, title or path that are shown.
 const SHOWN_MAX: usize = 80;
+
+/// Most characters of the differences of a session that are shown.
+const NOTE_MAX: usize = 300;
 
 /// Teeth of one exercise whose maps are drawn: those that most people worked on.
 const MAPS_MAX: usize = 4;
@@ -104,6 +108,10 @@ struct CohortSessionRow {
     points: String,
     result: String,
     class: &'static str,
+    /// Relation to the recording: a word, and the differences or the reason.
+    verification: String,
+    verification_class: &'static str,
+    verification_note: String,
     cells: Vec<String>,
 }
 
@@ -226,7 +234,8 @@ fn scenario(
     }
     let rows = own.iter().map(|&index| {
         let session = &cohort.sessions[index].1;
-        let mut row = row(translator, session, &links[index], &columns);
+        let status = cohort.status(&cohort.sessions[index].0);
+        let mut row = row(translator, session, status, &links[index], &columns);
         if distances {
             let distance = cohort.distance_to_experts(index);
             row.cells.push(distance.map_or("—".into(), |d| format!("{} mm³", display_format::number(d.differs_mm3))));
@@ -293,7 +302,13 @@ fn scenario(
     })
 }
 
-fn row(translator: Translator, session: &SessionFile, link: &str, columns: &[&str]) -> CohortSessionRow {
+fn row(
+    translator: Translator,
+    session: &SessionFile,
+    status: &VerificationStatus,
+    link: &str,
+    columns: &[&str],
+) -> CohortSessionRow {
     let grade = session.grade.as_ref();
     let (result, class) = match grade {
         Some(grade) if grade.passed => (translator.text("cohort.passed", &[]), "good"),
@@ -308,7 +323,19 @@ fn row(translator: Translator, session: &SessionFile, link: &str, columns: &[&st
         points: grade.map_or("–".into(), |g| display_format::number(g.points)),
         result,
         class,
+        verification: translator.text(verification_key(status), &[]),
+        verification_class: if status.differs() { "bad" } else { "" },
+        verification_note: display_format::sanitize_display(&status.note(), NOTE_MAX),
         cells: columns.iter().map(|c| translator.translate(&phrases::value(c, session.metric(c)))).collect(),
+    }
+}
+
+/// Key of the word for a session's relation to its recording.
+fn verification_key(status: &VerificationStatus) -> &'static str {
+    match status {
+        VerificationStatus::Verified => "cohort.verified",
+        VerificationStatus::Differs(_) => "cohort.differs",
+        VerificationStatus::Pending | VerificationStatus::Unverified(_) => "cohort.not_verified",
     }
 }
 

@@ -4,6 +4,7 @@ use super::pass_mark::PassMarkEstimate;
 use super::progress::{LearningCurves, RepeatedAttempts};
 use super::questionnaire::QuestionnaireSummary;
 use super::removal::RemovalSummary;
+use super::trust::VerificationCounts;
 use super::{Cohort, POINTS, dedup, english, points_or_measure};
 use crate::language::{COUNT, Message, Translator};
 use crate::session_file::{SessionFile, mean};
@@ -20,6 +21,20 @@ pub struct CohortSummary {
     pub scenarios: Vec<ScenarioSummary>,
     pub questionnaires: Vec<QuestionnaireSummary>,
     pub skipped: Vec<SkippedFile>,
+    /// Number of sessions by the relation of their results to their recordings.
+    pub verification: VerificationCounts,
+    /// Sessions that are not verified.
+    pub not_verified: Vec<UnverifiedSession>,
+}
+
+/// Session whose result a replay of its recording has not confirmed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnverifiedSession {
+    pub bundle: String,
+    pub participant: String,
+    /// `not verified` or `differs`.
+    pub verification: &'static str,
+    pub note: String,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -116,7 +131,38 @@ impl Cohort {
             scenarios: ids.into_iter().map(|id| self.scenario(id)).collect(),
             questionnaires: questionnaires.into_iter().map(|id| QuestionnaireSummary::of(self, id)).collect(),
             skipped: skipped.map(|(p, r)| SkippedFile { file: p.display().to_string(), reason: r.clone() }).collect(),
+            verification: self.verification_counts(),
+            not_verified: self.unverified_sessions(),
         }
+    }
+
+    fn unverified_sessions(&self) -> Vec<UnverifiedSession> {
+        let open = self.sessions.iter().map(|(path, session)| (path, session, self.status(path)));
+        open.filter(|(_, _, status)| !status.is_verified())
+            .map(|(path, session, status)| UnverifiedSession {
+                bundle: path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+                participant: session.participant.clone(),
+                verification: status.name(),
+                note: status.note(),
+            })
+            .collect()
+    }
+
+    /// Numbers of an exercise's sessions that differ from their recordings, and that are not verified.
+    fn verification_cautions(&self, id: &str) -> Vec<Message> {
+        let statuses = self.sessions.iter().filter(|(_, s)| s.scenario.id == id).map(|(path, _)| self.status(path));
+        let (mut differing, mut open) = (0, 0);
+        for status in statuses {
+            differing += usize::from(status.differs());
+            open += usize::from(!status.differs() && !status.is_verified());
+        }
+        let caution = |key: &str, count: usize| {
+            (count > 0).then(|| Message::text(key, &[(COUNT, Message::plain(count.to_string()))]))
+        };
+        [caution("cohort.caution_differs", differing), caution("cohort.caution_unverified", open)]
+            .into_iter()
+            .flatten()
+            .collect()
     }
 
     fn scenario(&self, id: &str) -> ScenarioSummary {
@@ -152,7 +198,7 @@ impl Cohort {
             points,
             metrics: metrics.collect(),
             expert_metrics: expert_metrics.collect(),
-            cautions: cautions(&sessions),
+            cautions: self.verification_cautions(id).into_iter().chain(cautions(&sessions)).collect(),
             right: right_counts(&sessions),
             progress: self.progress_by_measure(&attempts),
             repeated: self.repeated_by_measure(&attempts),

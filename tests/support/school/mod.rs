@@ -19,6 +19,8 @@ pub fn session(scenario: &str, participant: &str, points: f64) -> Value {
         let negative = id == "u2";
         json!({ "id": id, "category": "usability", "value": if negative { 2.0 } else { 4.0 }, "counted": 4.0 })
     });
+    // The items add up to the points.
+    let of_caries = f64::min(25.0, points).max(points - 60.0);
     json!({
         "version": 1, "typodont_version": "0.2.0", "scorer_version": 1,
         "scenario": { "id": scenario, "title": "Caries removal", "sha256": "ab12" },
@@ -35,8 +37,12 @@ pub fn session(scenario: &str, participant: &str, points: f64) -> Value {
         "evidence": { "decay_cleared_pct": { "at_s": 31.5, "place_mm": [1.0, 2.0, 3.0] } },
         "grade": {
             "points": points, "max_points": 100.0, "pass_points": 70.0, "finished": true, "passed": points >= 70.0,
-            "hard_fails": [], "items": [{ "title": "Caries removed", "metric": "decay_cleared_pct", "value": 87.5,
-                "points": 25.0, "max_points": 40.0, "full_at": 98.0, "zero_at": 70.0 }],
+            "hard_fails": [], "items": [
+                { "title": "Caries removed", "metric": "decay_cleared_pct", "value": 87.5,
+                    "points": of_caries, "max_points": 40.0, "full_at": 98.0, "zero_at": 70.0 },
+                { "title": "Gentle force", "metric": "force_max_n", "value": null,
+                    "points": points - of_caries, "max_points": 60.0, "full_at": 1.0, "zero_at": 3.0 },
+            ],
         },
         "questionnaire": { "id": "simulator", "items": items, "categories": { "usability": 4.0 } },
         "servo": { "ticks": 61_250, "late_p50_us": null, "late_p99_us": null, "late_max_us": null, "work_max_us": null,

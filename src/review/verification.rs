@@ -1,0 +1,141 @@
+//! Verification of the listed bundles in the background.
+
+use super::app::ReviewApp;
+use super::bundle;
+use super::index::IndexedSession;
+use serde::Serialize;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::UNIX_EPOCH;
+use typodont_report::{VerificationStatus, Verifier, sanitize_display};
+
+/// Maximum displayed length of the differences of a bundle, characters.
+const NOTE_MAX: usize = 600;
+
+/// Judgements of the bundles, and the work that is left.
+#[derive(Default)]
+pub(super) struct VerificationQueue {
+    /// By path of the bundle: its files as they were judged, and the judgement.
+    judged: BTreeMap<PathBuf, (String, VerificationStatus)>,
+    /// Bundles whose digests and sums are compared first, because that is quick.
+    to_check: BTreeSet<PathBuf>,
+    /// Bundles whose recordings are replayed.
+    to_replay: BTreeSet<PathBuf>,
+}
+
+/// A status as it is shown: a word and, for a result that differs, its differences.
+#[derive(Serialize)]
+pub(super) struct ShownVerification {
+    /// `verified`, `pending`, `unverified` or `differs`: the end of the text's key.
+    word: &'static str,
+    note: String,
+}
+
+impl ShownVerification {
+    pub fn of(status: &VerificationStatus) -> ShownVerification {
+        let (word, note) = match status {
+            VerificationStatus::Verified => ("verified", String::new()),
+            VerificationStatus::Pending => ("pending", String::new()),
+            VerificationStatus::Unverified(_) => ("unverified", status.note()),
+            VerificationStatus::Differs(_) => ("differs", status.note()),
+        };
+        ShownVerification { word, note: sanitize_display(&note, NOTE_MAX) }
+    }
+}
+
+/// Number of sessions whose recordings are still to be replayed, of all that are listed.
+#[derive(Clone, Copy, Serialize)]
+pub(super) struct VerificationProgress {
+    left: usize,
+    count: usize,
+}
+
+impl ReviewApp {
+    /// Puts bundles that are new or changed into the queue.
+    pub fn queue_changed_bundles(&self) {
+        let listed = self.state().index.paths().unwrap_or_default();
+        for path in listed {
+            let print = fingerprint(&self.folder.join(&path));
+            let mut queue = self.verification_queue();
+            if queue.judged.get(&path).is_none_or(|(judged, _)| *judged != print) {
+                queue.to_check.insert(path);
+            }
+        }
+    }
+
+    /// Judges the next bundle of the queue; returns false if it is empty. Several threads may call it at the same time.
+    pub fn verify_next(&self, verifier: &Verifier) -> bool {
+        let Some((path, replays)) = self.next_to_verify() else { return false };
+        let own = self.folder.join(&path);
+        let print = fingerprint(&own);
+        let status = match bundle::read_bundle_session(&self.folder, &path) {
+            Ok(session) if replays => verifier.verify(&own, &session),
+            Ok(session) => verifier.check(&own, &session),
+            Err(why) => VerificationStatus::Unverified(why),
+        };
+        let mut queue = self.verification_queue();
+        if status == VerificationStatus::Pending {
+            queue.to_replay.insert(path.clone());
+        }
+        queue.judged.insert(path, (print, status));
+        true
+    }
+
+    /// Takes a bundle out of the queue, and whether its recording is to be replayed.
+    fn next_to_verify(&self) -> Option<(PathBuf, bool)> {
+        let mut queue = self.verification_queue();
+        let quick = queue.to_check.pop_first().map(|path| (path, false));
+        quick.or_else(|| queue.to_replay.pop_first().map(|path| (path, true)))
+    }
+
+    /// Relation of a listed session's result to its recording; pending for a bundle that was changed since.
+    pub(super) fn verification(&self, indexed: &IndexedSession) -> VerificationStatus {
+        let known = self.verification_queue().judged.get(&indexed.path).cloned();
+        let print = fingerprint(&self.folder.join(&indexed.path));
+        known.filter(|(judged, _)| *judged == print).map(|(_, status)| status).unwrap_or_default()
+    }
+
+    pub(super) fn verification_progress(&self, count: usize) -> VerificationProgress {
+        let queue = self.verification_queue();
+        let done = queue.judged.values().filter(|(_, status)| *status != VerificationStatus::Pending).count();
+        VerificationProgress { left: count.saturating_sub(done), count }
+    }
+
+    fn verification_queue(&self) -> MutexGuard<'_, VerificationQueue> {
+        self.verification.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Queue of a new application.
+pub(super) fn new_queue() -> Mutex<VerificationQueue> {
+    Mutex::default()
+}
+
+/// Names, sizes and times of a bundle's files. The time of the last change of a file's metadata is among them where the
+/// system has it, because a user cannot set it back.
+fn fingerprint(bundle: &Path) -> String {
+    let mut lines = Vec::new();
+    for folder in [bundle.to_path_buf(), bundle.join("views")] {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            let Ok(meta) = fs::symlink_metadata(entry.path()) else { continue };
+            let modified = meta.modified().ok().and_then(|t| t.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
+            let name = entry.file_name();
+            lines.push(format!("{name:?} {} {} {}", meta.len(), modified.as_nanos(), changed_at(&meta)));
+        }
+    }
+    lines.sort();
+    lines.join("\n")
+}
+
+#[cfg(unix)]
+fn changed_at(meta: &fs::Metadata) -> i128 {
+    use std::os::unix::fs::MetadataExt;
+    i128::from(meta.ctime()) * 1_000_000_000 + i128::from(meta.ctime_nsec())
+}
+
+#[cfg(not(unix))]
+fn changed_at(_: &fs::Metadata) -> i128 {
+    0
+}
