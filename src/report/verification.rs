@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use typodont_core::parallel;
 use typodont_exercise::record;
-use typodont_exercise::record::{Difference, Recording, RecordingHeadFile, ReplayCheck};
+use typodont_exercise::record::{Recording, RecordingHeadFile, ReplayCheck};
 use typodont_exercise::score;
 use typodont_exercise::score::SCORER_VERSION;
 
@@ -243,8 +243,7 @@ fn replay(bytes: &[u8]) -> Result<ReplayedFile, String> {
         let recording = Recording::parse(record::FILE_NAME, bytes).map_err(|e| e.to_string())?;
         let scored = score::score(&recording, ReplayCheck::Full).map_err(|e| format!("{}: {e}", record::FILE_NAME))?;
         let maps = derive_maps(&recording, &scored)?;
-        // A session that was cut off and finished later is what its recording gives, and its result says so.
-        let difference = scored.replay.difference.as_ref().filter(|d| !matches!(d, Difference::Unsealed));
+        let difference = scored.replay.difference.as_ref();
         Ok(ReplayedFile {
             session: SessionFile { participant: String::new(), ..SessionFile::of(&recording, &scored) },
             maps: maps.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect(),

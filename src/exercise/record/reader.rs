@@ -179,6 +179,7 @@ impl Recording {
             digests: Vec::new(),
             initial_digest: RunningDigest::new(),
             end_bytes: Vec::new(),
+            loss: None,
         }
     }
 
@@ -197,7 +198,7 @@ impl Recording {
             }
             _ => Ok(()),
         });
-        let what = walked.err().unwrap_or("the session metadata is missing".to_string());
+        let what = walked.err().map_or("the session metadata is missing".to_string(), |stop| stop.what);
         head.ok_or(RecordingError::Damaged { name: name.to_string(), what })
     }
 
