@@ -233,11 +233,6 @@ mod tests {
         }
         fs::remove_dir_all(&folder).unwrap();
     }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
 
     #[test]
     #[cfg(target_os = "linux")]

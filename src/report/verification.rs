@@ -398,8 +398,8 @@ mod tests {
             ("scenario", |s| s.scenario.title = "other".into()),
             ("typodont_version", |s| s.typodont_version = "9.9.9".into()),
             ("grade", |s| s.grade.as_mut().unwrap().points = 100.0),
-            ("metrics.dice", |s| drop(s.metrics.insert("dice".into(), Some(1.0)))),
-            ("metrics", |s| drop(s.metrics.insert("invented".into(), Some(1.0)))),
+            ("metrics.dice", |s| s.metrics.extend([("dice".into(), Some(1.0))])),
+            ("metrics", |s| s.metrics.extend([("invented".into(), Some(1.0))])),
             ("stages", |s| s.stages[0].ended_s += 1.0),
         ];
         for (part, change) in changes {
