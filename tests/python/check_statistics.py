@@ -4,7 +4,8 @@
 
 Nothing here is the program's code in another language: sums go by numpy's own functions, α by the covariance matrix, mean
 squares by an analysis of variance, the crossing of two normal curves by a root finder on their densities, lines and
-correlations by scipy.stats. Where pingouin is installed, α and ICC are also compared with its figures. Exits with 1 and a
+correlations by scipy.stats. Where pingouin is installed, α and ICC are also compared with its figures, and
+weighted κ with those of statsmodels, which pingouin brings along. Exits with 1 and a
 line per difference.
 """
 
@@ -20,6 +21,11 @@ try:
     import pingouin
 except ImportError:
     pingouin = None
+
+try:
+    from statsmodels.stats.inter_rater import cohens_kappa
+except ImportError:
+    cohens_kappa = None
 
 #: How far two figures may differ: of their size, or of 1 if that is more.
 TOLERANCE = 1e-9
@@ -37,6 +43,7 @@ def main(arguments):
                 differences.append(f"case {number}, {case['what']}: {name}: {ours} here, {theirs} in Python")
     print("\n".join(differences))
     with_pingouin = f"pingouin {pingouin.__version__}" if pingouin else "no pingouin"
+    with_pingouin += ", statsmodels" if cohens_kappa else ", no statsmodels"
     print(f"{figures} figures of {len(cases)} tables, {with_pingouin}", file=sys.stderr)
     return 1 if differences or not figures else 0
 
@@ -128,6 +135,34 @@ def icc(case):
         found = pingouin.intraclass_corr(table, targets="index", raters="variable", ratings="value").set_index("Type")
         name = next(name for name in found.index if name in ("ICC2", "ICC(A,1)"))
         yield "icc (pingouin)", case["icc"], found.loc[name, "ICC"]
+        # pingouin rounds its interval to hundredths.
+        bounds = next(found.loc[name, column] for column in ("CI95", "CI95%") if column in found.columns)
+        for index, (ours, theirs) in enumerate(zip(case["interval"], bounds, strict=True)):
+            yield f"interval (pingouin)[{index}]", numpy.round(ours, 2), numpy.round(float(theirs), 2)
+
+
+def kappa(case):
+    ratings, count, power = numpy.array(case["pairs"]) - 1, case["categories"], case["power"]
+    n = len(ratings)
+    distance = (numpy.abs(numpy.subtract.outer(numpy.arange(count), numpy.arange(count))) / (count - 1)) ** power
+    table = numpy.zeros((count, count))
+    numpy.add.at(table, (ratings[:, 0], ratings[:, 1]), 1)
+    expected = numpy.outer(table.sum(axis=1), table.sum(axis=0)) / n**2
+    value = 1 - (distance * table).sum() / n / (distance * expected).sum()
+    yield "kappa", case["kappa"], value
+    # The derivative of kappa by each work's cell: an influence function, whose variance over works is that of Fleiss, Cohen
+    # and Everitt without their formula.
+    chance = (distance * expected).sum()
+    by_first, by_second = distance @ table.sum(axis=0) / n, distance.T @ table.sum(axis=1) / n
+    own = distance[ratings[:, 0], ratings[:, 1]]
+    influence = -own / chance + (1 - value) * (by_first[ratings[:, 0]] + by_second[ratings[:, 1]]) / chance
+    half = scipy.stats.norm.ppf(0.975) * influence.std() / numpy.sqrt(n)
+    yield from pairs("interval", case["interval"], [max(value - half, -1), min(value + half, 1)])
+    if cohens_kappa:
+        found = cohens_kappa(table, wt={1: "linear", 2: "quadratic"}[power])
+        yield "kappa (statsmodels)", case["kappa"], found.kappa
+        bounds = [max(found.kappa_low, -1), min(found.kappa_upp, 1)]
+        yield from pairs("interval (statsmodels)", case["interval"], bounds)
 
 
 def contrasting(case):
@@ -166,6 +201,7 @@ CHECKS = {
     "share": share,
     "alpha": alpha,
     "icc": icc,
+    "kappa": kappa,
     "contrasting": contrasting,
     "borderline": borderline,
 }

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
 use typodont_core::statistics;
+use typodont_core::statistics::KappaWeights;
 
 /// Numbers that look like people's: the same every time, in steps of a thousandth.
 struct Made(u64);
@@ -60,6 +61,21 @@ fn cases() -> Vec<Value> {
             let again = statistics::retest(&pairs).unwrap();
             cases.push(json!({ "what": "icc", "values": values, "icc": found.icc, "interval": found.interval,
                 "correlation": again.correlation, "gain": again.gain, "gain_interval": again.gain_interval, "error": again.typical_error }));
+        }
+        // Two raters of known disagreement: one in three works is rated otherwise, up to two categories away.
+        for categories in [3usize, 5] {
+            let rated: Vec<(usize, usize)> = (0..people)
+                .map(|work| {
+                    let first = made.next(1.0, categories as f64 + 0.999) as usize;
+                    let away = if work % 3 == 0 { made.next(-2.0, 2.0).round() as isize } else { 0 };
+                    (first, first.saturating_add_signed(away).clamp(1, categories))
+                })
+                .collect();
+            for (power, weights) in [(1, KappaWeights::Linear), (2, KappaWeights::Quadratic)] {
+                let Some(found) = statistics::weighted_kappa(&rated, categories, weights) else { continue };
+                cases.push(json!({ "what": "kappa", "pairs": rated, "categories": categories, "power": power,
+                    "kappa": found.kappa, "interval": found.interval }));
+            }
         }
         let not_yet: Vec<f64> = (0..people).map(|_| made.next(20.0, 70.0)).collect();
         let competent: Vec<f64> = (0..people + 3).map(|_| made.next(55.0, 98.0)).collect();

@@ -7,6 +7,7 @@
 //! the mathematics library of the platform.
 
 pub mod distribution;
+mod agreement;
 mod alpha;
 mod cut_score;
 mod linear_fit;
@@ -14,6 +15,7 @@ mod reliability;
 mod proportion;
 mod descriptive;
 
+pub use agreement::{KappaWeights, WeightedKappa, weighted_kappa};
 pub use alpha::{CronbachAlpha, ItemFit, cronbach_alpha};
 pub use cut_score::{BorderlineRegression, ContrastingGroups, borderline_regression, contrasting_groups};
 pub use descriptive::{DescriptiveStatistics, describe, quantile};
