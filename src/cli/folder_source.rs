@@ -93,7 +93,7 @@ impl FolderCohort {
     ///
     /// # Errors
     /// Fails if the log cannot be read.
-    pub fn overrides(&mut self) -> Result<typodont_review::LogSnapshot, CliError> {
+    pub fn overrides(&mut self) -> Result<typodont_review::OverrideSnapshot, CliError> {
         super::read_override_log(&self.folder)
     }
 }

@@ -404,7 +404,7 @@ fn recording_path(bundle: &Path) -> PathBuf {
 
 /// The examiners' overrides beside the bundles of a folder; damaged entries are reported on standard error.
 #[cfg(feature = "integrations")]
-fn read_override_log(folder: &Path) -> Result<typodont_review::LogSnapshot, CliError> {
+fn read_override_log(folder: &Path) -> Result<typodont_review::OverrideSnapshot, CliError> {
     let path = folder.join(typodont_review::OVERRIDES);
     let unreadable = |e| CliError::wrong(format!("{}: unreadable-file: {e}", path.display()));
     let log = typodont_review::OverrideLog::of(folder).read(None).map_err(unreadable)?;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use typodont_report::sanitize_display;
-use typodont_review::{AuthMode, PASSWORD_MIN, PageRenderer, ReviewApp, ReviewOptions};
+use typodont_review::{AuthMode, PASSWORD_MIN, PageRenderer, ReviewApp, ReviewOptions, SCALE_MAX, SCALE_MIN};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -54,6 +54,13 @@ pub struct Arguments {
     /// Replace participant codes by random codes
     #[arg(long)]
     anonymous: bool,
+    /// Hide marks and other examiners' judgements of a session until the examiner has rated it; includes --anonymous
+    #[arg(long)]
+    blind: bool,
+    /// Highest value of the rating scale: 1 is a fail, 2 borderline, 3 a pass, and higher values are better
+    #[arg(long, value_name = "N", default_value_t = 5,
+          value_parser = clap::value_parser!(u8).range(i64::from(SCALE_MIN)..=i64::from(SCALE_MAX)))]
+    scale: u8,
 }
 
 /// Interval between two exchanges of overrides with a database.
@@ -66,7 +73,7 @@ const VERIFY_EVERY: Duration = Duration::from_secs(2);
 const PASSWORD: &str = "TYPODONT_REVIEW_PASSWORD";
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let Arguments { folder, port, listen, name, anonymous, .. } = arguments;
+    let Arguments { folder, port, listen, name, anonymous, blind, scale, .. } = arguments;
     if !folder.is_dir() {
         return Err(CliError::wrong(format!("{}: missing-folder: the folder does not exist", folder.display())));
     }
@@ -87,8 +94,15 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let has_password = matches!(auth_mode, AuthMode::Password(_));
     let renderer =
         PageRenderer::in_folder(Path::new("reports/templates"), &load_templates()?).map_err(CliError::Wrong)?;
-    let options =
-        ReviewOptions { folder: folder.clone(), auth_mode, host_names: name.clone(), anonymous: *anonymous, renderer };
+    let options = ReviewOptions {
+        folder: folder.clone(),
+        auth_mode,
+        host_names: name.clone(),
+        anonymous: *anonymous,
+        blind: *blind,
+        scale: *scale,
+        renderer,
+    };
     let (app, token) = ReviewApp::new(options).map_err(CliError::Wrong)?;
     let (sessions, left_out, issues) = app.startup_summary().map_err(CliError::Wrong)?;
     let listener = TcpListener::bind((*listen, *port))

@@ -2,18 +2,21 @@
 
 use super::auth::{Auth, AuthMode, Login};
 use super::bundle;
+use super::chained_log::{IntegrityIssue, LogHead};
 use super::http::{Request, Response};
-use super::index::{IndexedSession, SessionIndex};
+use super::index::{IndexedSession, OVERRIDES_HEAD, RATINGS_HEAD, SessionIndex};
 use super::origin::AllowedHosts;
-use super::overrides::{IntegrityIssue, LogSnapshot, OverrideLog};
+use super::overrides::{OverrideLog, OverrideSnapshot};
 use super::page_renderer::PageRenderer;
 use super::pseudonyms::Pseudonymizer;
+use super::query::Query;
+use super::ratings::{RatingLog, RatingSnapshot};
 use super::router::Route;
 use super::verification::{self, VerificationQueue};
 use jiff::Timestamp;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use typodont_report::{Message, SessionFile, sanitize_display};
 
 /// Configuration of the application.
@@ -25,6 +28,11 @@ pub struct ReviewOptions {
     pub host_names: Vec<String>,
     /// Shows participants as pseudonymous codes.
     pub anonymous: bool,
+    /// Hides marks and other examiners' judgements of a session from an examiner who has not rated it yet. Includes
+    /// `anonymous`.
+    pub blind: bool,
+    /// Highest value of the rating scale, whose lowest is 1.
+    pub scale: u8,
     pub renderer: PageRenderer,
 }
 
@@ -34,6 +42,8 @@ pub struct ReviewApp {
     pub(super) folder: PathBuf,
     pub(super) renderer: PageRenderer,
     pub(super) anonymous: bool,
+    pub(super) blind: bool,
+    pub(super) scale: u8,
     pub(super) allowed_hosts: AllowedHosts,
     state: Mutex<ReviewState>,
     pub(super) verification: Mutex<VerificationQueue>,
@@ -43,9 +53,12 @@ pub struct ReviewApp {
 pub(super) struct ReviewState {
     pub index: SessionIndex,
     pub log: OverrideLog,
+    pub rating_log: RatingLog,
+    /// Ratings at the last refresh.
+    pub ratings: Arc<RatingSnapshot>,
     pub auth: Auth,
-    /// Issues of the log at the last refresh, and messages about them that have not been logged yet.
-    known_issues: Vec<IntegrityIssue>,
+    /// Issues of both logs at the last refresh, and messages about them that have not been logged yet.
+    known_issues: [Vec<IntegrityIssue>; 2],
     pub unreported: Vec<String>,
 }
 
@@ -59,7 +72,8 @@ pub(super) struct RequestContext<'a> {
 
 /// Session read from its bundle, with a snapshot of the override log.
 pub(super) struct LoadedSession {
-    pub log: LogSnapshot,
+    pub log: OverrideSnapshot,
+    pub ratings: Arc<RatingSnapshot>,
     pub indexed: IndexedSession,
     pub session: SessionFile,
 }
@@ -74,10 +88,16 @@ pub(super) struct PageLayout {
     form: String,
     is_in: bool,
     anonymous: bool,
+    blind: bool,
+    /// Examiner's name; empty before it is given.
+    examiner: String,
     troubles: Vec<String>,
-    /// Number of lines in the log, and SHA-256 of the last one.
+    /// Number of lines in the log of overrides, and SHA-256 of the last one.
     lines: u64,
     head: String,
+    /// The same of the log of ratings.
+    rating_lines: u64,
+    rating_head: String,
 }
 
 /// Page content together with the common template values.
@@ -103,7 +123,8 @@ impl ReviewApp {
     /// Returns a message when the folder does not exist, its secret or its index cannot be used, or the system's
     /// random number generator fails.
     pub fn new(options: ReviewOptions) -> Result<(ReviewApp, String), String> {
-        let ReviewOptions { folder, auth_mode, host_names, anonymous, renderer } = options;
+        let ReviewOptions { folder, auth_mode, host_names, anonymous, blind, scale, renderer } = options;
+        let anonymous = anonymous || blind;
         let canonical =
             std::fs::canonicalize(&folder).map_err(|e| format!("{}: missing-folder: {e}", folder.display()))?;
         if !canonical.is_dir() {
@@ -118,14 +139,18 @@ impl ReviewApp {
         let state = ReviewState {
             index,
             log: OverrideLog::of(&canonical),
+            rating_log: RatingLog::of(&canonical),
+            ratings: Arc::default(),
             auth,
-            known_issues: Vec::new(),
+            known_issues: [Vec::new(), Vec::new()],
             unreported: Vec::new(),
         };
         let app = ReviewApp {
             folder: canonical,
             renderer,
             anonymous,
+            blind,
+            scale,
             allowed_hosts: AllowedHosts(host_names),
             state: Mutex::new(state),
             verification: verification::new_queue(),
@@ -143,7 +168,7 @@ impl ReviewApp {
         let mut state = self.state();
         state.refresh(&self.folder)?;
         let lost = |e: rusqlite::Error| format!("{}: unusable-cache: {e}", super::index::FILE_NAME);
-        let (_, count) = state.index.query_sessions(&super::query::Query::parse(&[]), self.anonymous).map_err(lost)?;
+        let (_, count) = state.index.query_sessions(&Query::parse(&[]), self.anonymous).map_err(lost)?;
         let left_out = state.index.left_out().map_err(lost)?.len();
         let mut issues = std::mem::take(&mut state.unreported);
         issues.extend(state.index.fallback_reason.as_ref().map(|why| {
@@ -166,7 +191,7 @@ impl ReviewApp {
     pub(super) fn refresh(
         &self,
         context: &RequestContext,
-    ) -> Result<(MutexGuard<'_, ReviewState>, LogSnapshot), Box<Response>> {
+    ) -> Result<(MutexGuard<'_, ReviewState>, OverrideSnapshot), Box<Response>> {
         let mut state = self.state();
         match state.refresh(&self.folder) {
             Ok(log) => Ok((state, log)),
@@ -187,12 +212,13 @@ impl ReviewApp {
     pub(super) fn load_session(&self, context: &RequestContext, id: &str) -> Result<LoadedSession, Box<Response>> {
         let (state, log) = self.refresh(context)?;
         let listed = state.index.session(id);
+        let ratings = Arc::clone(&state.ratings);
         drop(state);
         let missing = || Box::new(self.error_page(context, 404, &[Message::text("complaint.no_session", &[])]));
         let listed = listed.ok().flatten().ok_or_else(missing)?;
         match bundle::read_bundle_session(&self.folder, &listed.path) {
             Ok(session) if typodont_integrations::session_id(&session) == id => {
-                Ok(LoadedSession { log, indexed: listed, session })
+                Ok(LoadedSession { log, ratings, indexed: listed, session })
             }
             _ => Err(missing()),
         }
@@ -204,8 +230,25 @@ impl ReviewApp {
         self.error_page(context, 500, &[Message::text("complaint.unreadable", &[("why", why)])])
     }
 
+    /// Sets the examiner's name for this login. In blind mode the first name stays, because what an examiner may see
+    /// depends on it.
     pub(super) fn set_display_name(&self, context: &RequestContext, name: &str) {
-        self.state().auth.set_display_name(&context.cookie, name);
+        if !self.blind || context.login.display_name.is_empty() {
+            self.state().auth.set_display_name(&context.cookie, name);
+        }
+    }
+
+    /// Returns true if the examiner may see the marks of a session and other examiners' judgements of it: always, but
+    /// in blind mode only after an own overall rating.
+    pub(super) fn may_see_marks(&self, context: &RequestContext, ratings: &RatingSnapshot, id: &str) -> bool {
+        !self.blind || ratings.has_overall(&context.login.display_name, id)
+    }
+
+    /// Returns the query of a request. In blind mode neither filter nor order depends on marks, from which they could
+    /// be inferred.
+    pub(super) fn list_query(&self, context: &RequestContext) -> Query {
+        let query = Query::parse(&context.request.query_pairs());
+        if self.blind { query.without_marks() } else { query }
     }
 
     /// Appends the draft that `decide` returns to the log. `decide` sees the log while no other program can write to
@@ -217,29 +260,44 @@ impl ReviewApp {
     pub(super) fn append_override<E>(
         &self,
         now: Timestamp,
-        decide: impl FnOnce(&LogSnapshot) -> Result<super::overrides::OverrideDraft, E>,
-    ) -> Result<super::overrides::OverrideEntry, super::overrides::AppendError<E>> {
+        decide: impl FnOnce(&OverrideSnapshot) -> Result<super::overrides::OverrideDraft, E>,
+    ) -> Result<super::overrides::OverrideEntry, super::chained_log::AppendError<E>> {
         let mut state = self.state();
-        let known = state.index.known_head();
+        let known = state.index.known_head(OVERRIDES_HEAD);
         state.log.append(&now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(), known.as_ref(), decide)
+    }
+
+    /// Appends a rating to its log, as [`ReviewApp::append_override`] does for an override.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error when the log cannot be written or `decide` rejects.
+    pub(super) fn append_rating<E>(
+        &self,
+        now: Timestamp,
+        decide: impl FnOnce(&RatingSnapshot) -> Result<super::ratings::RatingDraft, E>,
+    ) -> Result<super::ratings::RatingEntry, super::chained_log::AppendError<E>> {
+        let mut state = self.state();
+        let known = state.index.known_head(RATINGS_HEAD);
+        state.rating_log.append(&now.strftime("%Y-%m-%dT%H:%M:%SZ").to_string(), known.as_ref(), decide)
     }
 
     /// Renders a page with the common layout.
     pub(super) fn page(
         &self,
         context: &RequestContext,
-        log: &LogSnapshot,
+        log: &OverrideSnapshot,
         name: &str,
         body: impl Serialize,
     ) -> Response {
-        let frame = self.layout(&context.language, context.request, &context.login.csrf_token, Some(log));
+        let frame = self.layout(&context.language, context.request, Some(&context.login), Some(log));
         self.renderer.page(200, name, &context.language, &PageWithLayout { frame, body })
     }
 
     /// Renders an error page that lists all messages.
     pub(super) fn error_page(&self, context: &RequestContext, status: u16, messages: &[Message]) -> Response {
         let said = messages.iter().map(|said| self.renderer.translate(&context.language, said)).collect();
-        let frame = self.layout(&context.language, context.request, &context.login.csrf_token, None);
+        let frame = self.layout(&context.language, context.request, Some(&context.login), None);
         self.renderer.page(
             status,
             "complaint.html",
@@ -252,8 +310,8 @@ impl ReviewApp {
         &self,
         language: &str,
         request: &Request,
-        csrf_token: &str,
-        log: Option<&LogSnapshot>,
+        login: Option<&Login>,
+        log: Option<&OverrideSnapshot>,
     ) -> PageLayout {
         let say = |said: &Message| self.renderer.translate(language, said);
         let issue_text = |issue: &IntegrityIssue| {
@@ -272,6 +330,9 @@ impl ReviewApp {
             let mut out = url::form_urlencoded::Serializer::new(String::new());
             format!("/language?{}", out.append_pair("to", code).append_pair("back", &back).finish())
         };
+        let ratings = log.map_or_else(Arc::default, |_| Arc::clone(&self.state().ratings));
+        let of_ratings = |issue| format!("{}: {}", super::RATINGS, issue_text(issue));
+        let troubles = log.iter().flat_map(|log| log.issues.iter().map(issue_text));
         PageLayout {
             language: language.to_string(),
             languages: self
@@ -280,12 +341,16 @@ impl ReviewApp {
                 .iter()
                 .map(|(c, n)| (c.to_string(), n.to_string(), language_link(c)))
                 .collect(),
-            form: csrf_token.to_string(),
-            is_in: !csrf_token.is_empty(),
+            form: login.map(|login| login.csrf_token.clone()).unwrap_or_default(),
+            is_in: login.is_some(),
             anonymous: self.anonymous,
-            troubles: log.map(|log| log.issues.iter().map(issue_text).collect()).unwrap_or_default(),
+            blind: self.blind,
+            examiner: login.map_or_else(String::new, |login| sanitize_display(&login.display_name, 120)),
+            troubles: troubles.chain(ratings.issues.iter().map(of_ratings)).collect(),
             lines: log.map_or(0, |log| log.head.lines),
             head: log.map(|log| log.head.sha256.clone()).unwrap_or_default(),
+            rating_lines: ratings.head.lines,
+            rating_head: ratings.head.sha256.clone(),
         }
     }
 
@@ -312,20 +377,35 @@ impl ReviewApp {
 pub(super) const SHOWN_MAX: usize = 80;
 
 impl ReviewState {
-    fn refresh(&mut self, folder: &Path) -> Result<LogSnapshot, String> {
-        let known = self.index.known_head();
-        let unreadable = |e: std::io::Error| format!("{}: unreadable-file: {e}", super::OVERRIDES);
-        let log = self.log.read(known.as_ref()).map_err(unreadable)?;
-        if log.issues != self.known_issues {
-            self.unreported.extend(log.issues.iter().map(|issue| format!("{}: {issue}", super::OVERRIDES)));
-            self.known_issues.clone_from(&log.issues);
-        }
+    fn refresh(&mut self, folder: &Path) -> Result<OverrideSnapshot, String> {
+        let known = self.index.known_head(OVERRIDES_HEAD);
+        let unreadable = |name: &str, e: std::io::Error| format!("{name}: unreadable-file: {e}");
+        let log = self.log.read(known.as_ref()).map_err(|e| unreadable(super::OVERRIDES, e))?;
+        let known = self.index.known_head(RATINGS_HEAD);
+        let ratings = self.rating_log.read(known.as_ref()).map_err(|e| unreadable(super::RATINGS, e))?;
+        self.report_issues([&log.issues, &ratings.issues]);
         self.index.refresh(folder, &log)?;
-        let is_intact = log.issues.iter().all(IntegrityIssue::is_accident);
-        if is_intact && self.index.known_head().as_ref() != Some(&log.head) && log.head.lines > 0 {
-            self.index.remember_head(&log.head);
-        }
+        self.remember_head(OVERRIDES_HEAD, &log.issues, &log.head);
+        self.remember_head(RATINGS_HEAD, &ratings.issues, &ratings.head);
+        self.ratings = Arc::new(ratings);
         Ok(log)
+    }
+
+    fn report_issues(&mut self, issues: [&Vec<IntegrityIssue>; 2]) {
+        for ((known, found), name) in self.known_issues.iter_mut().zip(issues).zip([super::OVERRIDES, super::RATINGS]) {
+            if known != found {
+                self.unreported.extend(found.iter().map(|issue| format!("{name}: {issue}")));
+                known.clone_from(found);
+            }
+        }
+    }
+
+    /// Remembers the state of an intact log, so that lines that disappear from its end are noticed.
+    fn remember_head(&self, name: &str, issues: &[IntegrityIssue], head: &LogHead) {
+        let is_intact = issues.iter().all(IntegrityIssue::is_accident);
+        if is_intact && self.index.known_head(name).as_ref() != Some(head) && head.lines > 0 {
+            self.index.remember_head(name, head);
+        }
     }
 }
 

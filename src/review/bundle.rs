@@ -30,9 +30,20 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 /// File name of a bundle's report.
 pub const REPORT: &str = "report.html";
 
+/// File name of the tooth as it was at the start.
+pub const INITIAL_VOLUME: &str = "initial.seg.nrrd";
+
+/// Maximum length of the part of a volume's file that is searched for its voxel size, bytes.
+const VOLUME_HEADER_MAX: u64 = 64 << 10;
+
 /// Returns true if `stem` is the stem of one of a bundle's images, such as `map-occlusal`.
 pub fn is_picture(stem: &str) -> bool {
     stem.split_once('-').is_some_and(|(moment, view)| PICTURE_KINDS.contains(&moment) && VIEWS.contains(&view))
+}
+
+/// Returns true if `stem` is the stem of a map, which is coloured by the verdicts of the scorer.
+pub fn is_map(stem: &str) -> bool {
+    stem.starts_with("map-")
 }
 
 /// Returns the path of an image within its bundle.
@@ -63,6 +74,21 @@ pub fn file_within(folder: &Path, bundle: &Path, name: &str) -> Result<PathBuf, 
 /// Returns a message when the file cannot be read or is not a session.
 pub fn read_bundle_session(folder: &Path, bundle: &Path) -> Result<SessionFile, String> {
     file_within(folder, bundle, "session.json").and_then(|path| read_session(&path))
+}
+
+/// Reads the size of the voxels of a bundle's initial volume from the file's header, mm along the first axis; `None` if
+/// there is no such file or it does not state the size.
+pub fn voxel_size(folder: &Path, bundle: &Path) -> Option<f64> {
+    let file = File::open(file_within(folder, bundle, INITIAL_VOLUME).ok()?).ok()?;
+    let mut bytes = Vec::new();
+    file.take(VOLUME_HEADER_MAX).read_to_end(&mut bytes).ok()?;
+    let header = String::from_utf8_lossy(&bytes);
+    let directions = header.lines().take_while(|line| !line.is_empty());
+    let directions = directions.filter_map(|line| line.strip_prefix("space directions:")).next()?;
+    let first = directions.split_once('(')?.1.split_once(')')?.0;
+    let axis: Vec<f64> = first.split(',').map_while(|number| number.trim().parse().ok()).collect();
+    let size = axis.iter().map(|v| v * v).sum::<f64>().sqrt();
+    (axis.len() == 3 && size.is_finite() && size > 0.0).then_some(size)
 }
 
 /// Reads a file of a bundle, up to [`FILE_BYTES_MAX`].

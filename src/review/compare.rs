@@ -20,6 +20,13 @@ struct ComparePage {
     legend: Vec<LegendColour>,
     /// True if the sessions are of different exercises.
     differ: bool,
+    /// Warning that the teeth differ; empty if they are the same.
+    teeth: String,
+    /// Warning that the voxel sizes differ; empty if they are the same.
+    voxels: String,
+    /// Second less first of the automatic points, and of the effective points if anything is overridden.
+    more: String,
+    more_judged: String,
 }
 
 #[derive(Serialize)]
@@ -43,6 +50,8 @@ struct ComparedGrade {
 struct ComparedItemRow {
     title: String,
     cells: [Option<ComparedItemCell>; 2],
+    /// Second less first of the effective points; empty if one of the sessions has no such item.
+    more: String,
 }
 
 #[derive(Serialize)]
@@ -82,6 +91,9 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
         Ok(cases) => cases,
         Err(response) => return *response,
     };
+    if !cases.iter().all(|case| app.may_see_marks(context, &case.ratings, &case.indexed.id)) {
+        return app.error_page(context, 403, &[Message::text("complaint.rate_both", &[])]);
+    }
     let sessions = [&cases[0].session, &cases[1].session];
     let effective_grades = cases.each_ref().map(|case| {
         let grade = case.session.grade.as_ref()?;
@@ -103,6 +115,13 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
         views: pictures.filter(|pair| pair.has != [false; 2]).collect(),
         legend: legend(app, context),
         differ: sessions[0].scenario.id != sessions[1].scenario.id,
+        teeth: teeth(app, context, &cases),
+        voxels: voxels(app, context, &cases),
+        more: grade_difference(sessions.map(|session| Some(session.grade.as_ref()?.points))),
+        more_judged: match effective_grades.iter().flatten().any(|grade| grade.overrides() > 0) {
+            true => grade_difference(effective_grades.each_ref().map(|grade| Some(grade.as_ref()?.points))),
+            false => String::new(),
+        },
     };
     app.page(context, &cases[1].log, "compare.html", body)
 }
@@ -144,6 +163,11 @@ fn items(
             judged: entry.and_then(|e| e.draft.examiner).map(|judged| display_format::number(judged.points)),
         }
     };
+    // Effective points: the examiner's where the item is overridden.
+    let points = |side: usize, index: usize| {
+        let entry = effective_grades[side].as_ref().and_then(|now| now.items[index]);
+        entry.and_then(|e| e.draft.examiner).map_or(of(side)[index].points, |judged| judged.points)
+    };
     let is_like = |a: &ItemResultFile, b: &ItemResultFile| a.metric == b.metric && a.title == b.title;
     let mut unmatched: Vec<usize> = (0..of(1).len()).collect();
     let mut rows = Vec::new();
@@ -151,13 +175,51 @@ fn items(
         let match_index =
             unmatched.iter().position(|other| is_like(item, &of(1)[*other])).map(|place| unmatched.remove(place));
         let cells = [Some(cell(0, index)), match_index.map(|other| cell(1, other))];
-        rows.push(ComparedItemRow { title: sanitize_display(&item.title, 200), cells });
+        let more = match_index
+            .map_or_else(String::new, |other| grade_difference([Some(points(0, index)), Some(points(1, other))]));
+        rows.push(ComparedItemRow { title: sanitize_display(&item.title, 200), cells, more });
     }
     rows.extend(unmatched.into_iter().map(|other| {
         let title = sanitize_display(&of(1)[other].title, 200);
-        ComparedItemRow { title, cells: [None, Some(cell(1, other))] }
+        ComparedItemRow { title, cells: [None, Some(cell(1, other))], more: String::new() }
     }));
     rows
+}
+
+/// Formats the difference of two numbers of points; empty if one is missing.
+fn grade_difference(points: [Option<f64>; 2]) -> String {
+    match points {
+        [Some(first), Some(second)] => signed(second - first, &display_format::number((second - first).abs())),
+        _ => String::new(),
+    }
+}
+
+/// Returns a warning if the sessions began with different teeth: other numbers, or other volumes.
+fn teeth(app: &ReviewApp, context: &RequestContext, cases: &[LoadedSession; 2]) -> String {
+    let numbers = cases.each_ref().map(|case| case.session.tooth_fdi);
+    let volumes = cases.each_ref().map(|case| case.session.digests.get(bundle::INITIAL_VOLUME));
+    match (numbers, volumes) {
+        ([Some(first), Some(second)], _) if first != second => {
+            let numbers = [("first", first), ("second", second)].map(|(name, n)| (name, Message::plain(n.to_string())));
+            app.translate(context, &Message::text("compare.teeth", &numbers))
+        }
+        (_, [Some(first), Some(second)]) if first != second => {
+            app.translate(context, &Message::text("compare.volumes", &[]))
+        }
+        _ => String::new(),
+    }
+}
+
+/// Returns a warning if the voxels of the sessions differ in size.
+fn voxels(app: &ReviewApp, context: &RequestContext, cases: &[LoadedSession; 2]) -> String {
+    match cases.each_ref().map(|case| bundle::voxel_size(&app.folder, &case.indexed.path)) {
+        [Some(first), Some(second)] if (first - second).abs() > 1e-6 => {
+            let sizes = [("first", first), ("second", second)]
+                .map(|(name, size)| (name, Message::plain(display_format::plain_number(size))));
+            app.translate(context, &Message::text("compare.voxels", &sizes))
+        }
+        _ => String::new(),
+    }
 }
 
 fn stages(sessions: [&SessionFile; 2]) -> Vec<ComparedRow> {

@@ -4,7 +4,7 @@
 //! points, no critical error, and the session finished. An override of the whole grade replaces both points and
 //! result.
 
-use super::overrides::{LogSnapshot, OverrideEntry};
+use super::overrides::{OverrideEntry, OverrideSnapshot};
 use typodont_report::GradeFile;
 
 /// Grade after overrides.
@@ -23,14 +23,53 @@ pub struct EffectiveGrade<'a> {
 }
 
 impl EffectiveGrade<'_> {
+    /// Returns the overrides in effect, that of the whole grade first.
+    pub fn entries(&self) -> impl Iterator<Item = &OverrideEntry> {
+        self.whole.into_iter().chain(self.items.iter().flatten().copied())
+    }
+
     /// Returns the number of overrides in effect.
     pub fn overrides(&self) -> usize {
         self.items.iter().flatten().count() + usize::from(self.whole.is_some())
     }
 }
 
+/// Reason for which a session is not passed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureReason {
+    CriticalError,
+    /// The session was ended early or interrupted.
+    Unfinished,
+    TooFewPoints,
+    /// An examiner decided so, regardless of points and critical errors.
+    Examiner,
+}
+
+impl FailureReason {
+    /// Returns the reason for a result that is not a pass. `overridden` is the effective number of points if an
+    /// examiner has changed them.
+    pub fn of(grade: &GradeFile, overridden: Option<f64>) -> FailureReason {
+        match overridden {
+            _ if !grade.hard_fails.is_empty() => FailureReason::CriticalError,
+            _ if !grade.finished => FailureReason::Unfinished,
+            points if points.unwrap_or(grade.points) < grade.pass_points => FailureReason::TooFewPoints,
+            _ => FailureReason::Examiner,
+        }
+    }
+
+    /// Last part of the reason's key in the language files.
+    pub fn key(self) -> &'static str {
+        match self {
+            FailureReason::CriticalError => "critical",
+            FailureReason::Unfinished => "unfinished",
+            FailureReason::TooFewPoints => "points",
+            FailureReason::Examiner => "examiner",
+        }
+    }
+}
+
 /// Computes the effective grade of a session.
-pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a LogSnapshot) -> EffectiveGrade<'a> {
+pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a OverrideSnapshot) -> EffectiveGrade<'a> {
     let mut items: Vec<Option<&OverrideEntry>> = vec![None; grade.items.len()];
     let mut whole = None;
     let mut orphaned = vec![];
@@ -67,7 +106,7 @@ pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a LogSnapsho
 
 /// Returns the grade with all overrides applied, for consumers that take a single grade, and the number of overrides
 /// in effect.
-pub fn with_overrides(grade: &GradeFile, session: &str, log: &LogSnapshot) -> (GradeFile, usize) {
+pub fn with_overrides(grade: &GradeFile, session: &str, log: &OverrideSnapshot) -> (GradeFile, usize) {
     let effective = effective_grade(grade, session, log);
     let mut overridden = grade.clone();
     for (item, entry) in overridden.items.iter_mut().zip(&effective.items) {
@@ -91,7 +130,8 @@ fn tidy(points: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::overrides::{GivenPoints, LogLine, OverrideDraft, RubricItemRef};
+    use crate::chained_log::{LogEntry, LogLine};
+    use crate::overrides::{GivenPoints, OverrideDraft, RubricItemRef};
     use typodont_report::ItemResultFile;
 
     fn grade() -> GradeFile {
@@ -122,10 +162,10 @@ mod tests {
     type TestOverride = (Option<(usize, &'static str)>, Option<GivenPoints>);
 
     /// Builds a log with these overrides, in order.
-    fn log_of(judged: &[TestOverride]) -> LogSnapshot {
+    fn log_of(judged: &[TestOverride]) -> OverrideSnapshot {
         let line = |(number, (item, examiner)): (usize, &TestOverride)| LogLine {
             is_invalid: false,
-            entry: OverrideEntry {
+            entry: LogEntry {
                 version: 1,
                 number: number as u64 + 1,
                 previous: String::new(),
@@ -141,7 +181,7 @@ mod tests {
                 },
             },
         };
-        LogSnapshot { lines: judged.iter().enumerate().map(line).collect(), ..LogSnapshot::default() }
+        OverrideSnapshot { lines: judged.iter().enumerate().map(line).collect(), ..OverrideSnapshot::default() }
     }
 
     fn points(points: f64) -> Option<GivenPoints> {
@@ -150,7 +190,7 @@ mod tests {
 
     #[test]
     fn the_grade_follows_from_the_overrides_in_effect() {
-        let check = |log: LogSnapshot, expected: (f64, bool, usize)| {
+        let check = |log: OverrideSnapshot, expected: (f64, bool, usize)| {
             let now = effective_grade(&grade(), "s", &log);
             assert_eq!((now.points, now.passed, now.overrides()), expected, "{log:?}");
         };
@@ -168,6 +208,18 @@ mod tests {
         check(log_of(&[(Some((0, "jaccard")), points(50.0))]), (60.0, false, 0));
         assert_eq!(effective_grade(&grade(), "s", &log_of(&[(Some((7, "x")), points(1.0))])).orphaned, 1);
         assert_eq!(effective_grade(&grade(), "another", &log_of(&[(dice, points(50.0))])).points, 60.0);
+    }
+
+    #[test]
+    fn too_few_points_are_told_from_a_critical_error() {
+        let mut own = grade();
+        assert_eq!(FailureReason::of(&own, None), FailureReason::TooFewPoints);
+        assert_eq!(FailureReason::of(&own, Some(74.8)), FailureReason::Examiner);
+        own.finished = false;
+        assert_eq!(FailureReason::of(&own, None), FailureReason::Unfinished);
+        own.hard_fails = vec!["Pulp exposed".into()];
+        own.points = 74.8;
+        assert_eq!(FailureReason::of(&own, None), FailureReason::CriticalError);
     }
 
     #[test]

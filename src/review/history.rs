@@ -1,8 +1,9 @@
 //! Page that lists all lines of the override log.
 
 use super::app::{RequestContext, ReviewApp, SHOWN_MAX};
+use super::chained_log::LogLine;
 use super::http::Response;
-use super::overrides::{GivenPoints, LogLine};
+use super::overrides::{GivenPoints, OverrideDraft};
 use serde::Serialize;
 use typodont_report::display_format;
 use typodont_report::sanitize_display;
@@ -55,16 +56,18 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
         let exercise = listed.as_ref().map_or_else(String::new, |l| sanitize_display(&l.title, SHOWN_MAX));
         HistoryEntry { exercise, who: listed.as_ref().map_or_else(String::new, |l| app.display_name(l)), told: row }
     };
-    let history: Vec<HistoryEntry> = rows(log.lines.iter()).into_iter().rev().map(named).collect();
+    // In blind mode a line about a session that the examiner has not rated would tell what others think of it.
+    let shown = log.lines.iter().filter(|line| app.may_see_marks(context, &state.ratings, &line.entry.draft.session));
+    let history: Vec<HistoryEntry> = rows(shown).into_iter().rev().map(named).collect();
     drop(state);
     app.page(context, &log, "history.html", HistoryPage { history })
 }
 
-pub(super) fn rows<'a>(lines: impl Iterator<Item = &'a LogLine>) -> Vec<HistoryRow> {
+pub(super) fn rows<'a>(lines: impl Iterator<Item = &'a LogLine<OverrideDraft>>) -> Vec<HistoryRow> {
     lines.map(history_row).collect()
 }
 
-fn history_row(line: &LogLine) -> HistoryRow {
+fn history_row(line: &LogLine<OverrideDraft>) -> HistoryRow {
     let draft = &line.entry.draft;
     let points =
         |judged: &GivenPoints| HistoryPoints { points: display_format::number(judged.points), passed: judged.passed };

@@ -4,8 +4,9 @@
 //! SQLite only as bound values.
 
 use super::bundle;
+use super::chained_log::{IntegrityIssue, LogHead};
 use super::effective_grade::effective_grade;
-use super::overrides::{IntegrityIssue, LogHead, LogSnapshot};
+use super::overrides::OverrideSnapshot;
 use super::pseudonyms::Pseudonymizer;
 use super::query::{Query, ResultFilter, SortColumn, fold_case};
 use rusqlite::types::Value;
@@ -21,6 +22,10 @@ use typodont_report::cohort::{FoundBundles, find_bundles};
 use typodont_report::{GradeFile, SessionFile};
 
 pub const FILE_NAME: &str = "review.sqlite";
+
+/// Names under which the states of the logs are remembered.
+pub const OVERRIDES_HEAD: &str = "head";
+pub const RATINGS_HEAD: &str = "ratings_head";
 
 /// Version of the tables below. A cache of another version is rebuilt.
 const VERSION: i64 = 2;
@@ -144,7 +149,7 @@ impl SessionIndex {
     /// # Errors
     ///
     /// Returns a message when the index cannot be used even after it is rebuilt.
-    pub fn refresh(&mut self, folder: &Path, log: &LogSnapshot) -> Result<(), String> {
+    pub fn refresh(&mut self, folder: &Path, log: &OverrideSnapshot) -> Result<(), String> {
         let done = self.rescan(folder).and_then(|changed| self.update_effective_grades(log, changed));
         done.or_else(|_| {
             // The cache file was deleted, moved or damaged while it was open, so it is rebuilt.
@@ -227,7 +232,7 @@ impl SessionIndex {
     }
 
     /// Recomputes the effective grades of overridden sessions.
-    fn update_effective_grades(&mut self, log: &LogSnapshot, changed: bool) -> rusqlite::Result<()> {
+    fn update_effective_grades(&mut self, log: &OverrideSnapshot, changed: bool) -> rusqlite::Result<()> {
         let state = (log.head.clone(), log.issues.clone());
         if !changed && self.graded_log.as_ref() == Some(&state) {
             return Ok(());
@@ -355,19 +360,19 @@ impl SessionIndex {
         rows.collect()
     }
 
-    /// Returns the last state of the override log that this index has remembered.
-    pub fn known_head(&self) -> Option<LogHead> {
-        let sql = "SELECT value FROM known WHERE name = 'head'";
-        let text: String = self.connection.prepare(sql).ok()?.query_row([], |row| row.get(0)).ok()?;
+    /// Returns the last state of a log that this index has remembered under a name.
+    pub fn known_head(&self, name: &str) -> Option<LogHead> {
+        let sql = "SELECT value FROM known WHERE name = ?1";
+        let text: String = self.connection.prepare(sql).ok()?.query_row([name], |row| row.get(0)).ok()?;
         let (lines, sha256) = text.split_once(' ')?;
         Some(LogHead { lines: lines.parse().ok()?, sha256: sha256.to_string() })
     }
 
-    /// Remembers the state of the override log. Errors are ignored: a cache that cannot be written does not remember.
-    pub fn remember_head(&self, head: &LogHead) {
-        let sql = "INSERT OR REPLACE INTO known (name, value) VALUES ('head', ?1)";
+    /// Remembers the state of a log under a name. Errors are ignored: a cache that cannot be written does not remember.
+    pub fn remember_head(&self, name: &str, head: &LogHead) {
+        let sql = "INSERT OR REPLACE INTO known (name, value) VALUES (?1, ?2)";
         let text = format!("{} {}", head.lines, head.sha256);
-        let _ = self.connection.execute(sql, [text]);
+        let _ = self.connection.execute(sql, [name, &text]);
     }
 }
 

@@ -1,11 +1,14 @@
 //! Pages that list the sessions, and the files that are left out.
 
 use super::app::{RequestContext, ReviewApp, SHOWN_MAX};
+use super::effective_grade::FailureReason;
 use super::http::Response;
 use super::index::IndexedSession;
 use super::query::{PAGE_LENGTHS, Query, ResultFilter, SortColumn};
+use super::ratings::{RatingSnapshot, examiner_key};
 use super::verification::{ShownVerification, VerificationProgress};
 use serde::Serialize;
+use std::sync::Arc;
 use typodont_report::display_format;
 use typodont_report::sanitize_display;
 
@@ -45,13 +48,21 @@ struct SessionListRow {
     /// Examiner's points, if anything is overridden.
     examiner: Option<String>,
     stands_passed: bool,
+    /// Keys of the reasons for results that are not a pass: `critical`, `unfinished`, `points` or `examiner`.
+    reason: &'static str,
+    stands_reason: &'static str,
     overrides: usize,
+    /// True if the marks are hidden until the examiner has rated the session.
+    hidden: bool,
+    /// The examiner's own overall rating; empty if there is none.
+    rating: String,
     verification: ShownVerification,
 }
 
 #[derive(Serialize)]
 struct ListColumn {
     name: &'static str,
+    /// Address of the list sorted by this column; empty in blind mode for columns of marks.
     link: String,
     /// Value of `aria-sort`; empty if the list is not sorted by this column.
     order: &'static str,
@@ -75,7 +86,7 @@ struct FilterForm {
 }
 
 pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
-    let query = Query::parse(&context.request.query_pairs());
+    let query = app.list_query(context);
     let (state, log) = match app.refresh(context) {
         Ok(now) => now,
         Err(response) => return *response,
@@ -84,6 +95,7 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
     let choices = state.index.filter_options();
     let left_out = state.index.left_out();
     let listed_count = state.index.paths().map_or(0, |paths| paths.len());
+    let ratings = Arc::clone(&state.ratings);
     drop(state);
     let (Ok((rows, count)), Ok(choices), Ok(left_out)) = (found, choices, left_out) else {
         return app.index_failure(context);
@@ -93,13 +105,13 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
     let at = |page: usize| href("/", &Query { page, ..query.clone() });
     let everything = unpaged(&query);
     let body = ListPage {
-        rows: rows.iter().map(|listed| session_row(app, listed)).collect(),
+        rows: rows.iter().map(|listed| session_row(app, context, &ratings, listed)).collect(),
         count,
         first: first + 1,
         last,
         before: (query.page > 1).then(|| at(query.page - 1)),
         after: (last < count).then(|| at(query.page + 1)),
-        columns: SortColumn::ALL.iter().map(|sort| column(&query, *sort)).collect(),
+        columns: SortColumn::ALL.iter().map(|sort| column(&query, *sort, app.blind)).collect(),
         exercises: exercise_options(&choices.exercises, &query),
         folders: if app.anonymous { Vec::new() } else { folder_options(&choices.folders, &query) },
         results: ResultFilter::ALL.iter().map(|o| select_option(o.name(), query.result == Some(*o))).collect(),
@@ -160,8 +172,16 @@ fn is_plain_text(text: &str) -> bool {
     sanitize_display(text, 200) == text
 }
 
-fn session_row(app: &ReviewApp, indexed: &IndexedSession) -> SessionListRow {
-    let grade = indexed.grade.as_ref();
+fn session_row(
+    app: &ReviewApp,
+    context: &RequestContext,
+    ratings: &RatingSnapshot,
+    indexed: &IndexedSession,
+) -> SessionListRow {
+    let hidden = !app.may_see_marks(context, ratings, &indexed.id);
+    let grade = indexed.grade.as_ref().filter(|_| !hidden);
+    let own = examiner_key(&context.login.display_name);
+    let own_rating = ratings.counting(&indexed.id).into_iter().find(|entry| examiner_key(&entry.draft.name) == own);
     let judged = grade.filter(|g| g.overrides > 0);
     SessionListRow {
         id: indexed.id.clone(),
@@ -174,18 +194,23 @@ fn session_row(app: &ReviewApp, indexed: &IndexedSession) -> SessionListRow {
         passed: grade.is_some_and(|g| g.machine.passed),
         examiner: judged.map(|g| display_format::number(g.points)),
         stands_passed: grade.is_some_and(|g| g.passed),
+        reason: grade.map_or("", |g| FailureReason::of(&g.machine, None).key()),
+        stands_reason: grade.map_or("", |g| FailureReason::of(&g.machine, (g.overrides > 0).then_some(g.points)).key()),
         overrides: grade.map_or(0, |g| g.overrides),
-        verification: ShownVerification::of(&app.verification(indexed)),
+        verification: ShownVerification::of(&app.verification(indexed)).without_note_if(hidden),
+        hidden,
+        rating: own_rating.and_then(|entry| entry.draft.overall).map_or_else(String::new, |r| r.to_string()),
     }
 }
 
-fn column(query: &Query, sort: SortColumn) -> ListColumn {
+fn column(query: &Query, sort: SortColumn, blind: bool) -> ListColumn {
     let order = match (query.sort == sort, query.is_descending) {
         (false, _) => "",
         (true, false) => "ascending",
         (true, true) => "descending",
     };
-    ListColumn { name: sort.name(), link: href("/", &query.sorted_by(sort)), order, number: sort.is_number() }
+    let link = if blind && sort.shows_marks() { String::new() } else { href("/", &query.sorted_by(sort)) };
+    ListColumn { name: sort.name(), link, order, number: sort.is_number() }
 }
 
 fn select_option(name: &str, chosen: bool) -> SelectOption {

@@ -1,10 +1,11 @@
 //! Forms that override or withdraw: validation with all errors reported at once, and a single append to the log.
 
 use super::app::{LoadedSession, RequestContext, ReviewApp};
+use super::chained_log::AppendError;
 use super::http::{Response, first_value};
-use super::overrides::{AppendError, GivenPoints, LogSnapshot, OverrideDraft, OverrideEntry, RubricItemRef};
+use super::overrides::{GivenPoints, OverrideDraft, OverrideEntry, OverrideSnapshot, RubricItemRef};
 use std::fmt;
-use typodont_report::{GradeFile, Message, sanitize_display};
+use typodont_report::{GradeFile, ItemResultFile, Message, sanitize_display};
 
 /// Maximum lengths of a reason and a name, characters.
 const REASON_MAX: usize = 2000;
@@ -62,18 +63,24 @@ fn append_override(
     id: &str,
     examiner: impl FnOnce(&GradeFile, &[(String, String)], Option<usize>, &mut Vec<Message>) -> Option<GivenPoints>,
 ) -> Response {
-    let LoadedSession { session, indexed, .. } = match app.load_session(context, id) {
+    let LoadedSession { session, indexed, ratings, .. } = match app.load_session(context, id) {
         Ok(case) => case,
         Err(response) => return *response,
     };
+    if !app.may_see_marks(context, &ratings, id) {
+        return app.error_page(context, 403, &[Message::text("complaint.rate_first", &[])]);
+    }
     let Some(grade) = &session.grade else {
         return app.error_page(context, 422, &[Message::text("complaint.ungraded", &[])]);
     };
     let pairs = context.request.form_pairs();
     let mut errors = Vec::new();
-    let Some(form) = parse_form(&pairs, grade, &mut errors) else {
+    let Some(mut form) = parse_form(&pairs, grade, &mut errors) else {
         return app.error_page(context, 422, &[Message::text("complaint.no_item", &[])]);
     };
+    if app.blind {
+        form.name.clone_from(&context.login.display_name);
+    }
     let given = examiner(grade, &pairs, form.item, &mut errors);
     if !errors.is_empty() {
         return app.error_page(context, 422, &errors);
@@ -82,11 +89,7 @@ fn append_override(
         None => GivenPoints { points: grade.points, passed: Some(grade.passed) },
         Some(index) => GivenPoints { points: grade.items[index].points, passed: None },
     };
-    let item = form.item.map(|index| RubricItemRef {
-        index,
-        metric: grade.items[index].metric.clone(),
-        title: sanitize_display(&grade.items[index].title, TITLE_MAX),
-    });
+    let item = form.item.map(|index| rubric_item(index, &grade.items[index]));
     let draft = OverrideDraft {
         session: id.to_string(),
         recording: indexed.recording.clone(),
@@ -116,9 +119,14 @@ fn append_override(
     }
 }
 
+/// Returns the reference to an item that a log line contains.
+pub(super) fn rubric_item(index: usize, item: &ItemResultFile) -> RubricItemRef {
+    RubricItemRef { index, metric: item.metric.clone(), title: sanitize_display(&item.title, TITLE_MAX) }
+}
+
 /// Accepts or rejects a draft, given the log's current lines.
 fn check_draft(
-    log: &LogSnapshot,
+    log: &OverrideSnapshot,
     draft: OverrideDraft,
     item: Option<usize>,
     last_seen_line: u64,
@@ -143,19 +151,29 @@ fn parse_form(pairs: &[(String, String)], grade: &GradeFile, errors: &mut Vec<Me
         "grade" => None,
         number => Some(number.parse::<usize>().ok().filter(|index| *index < grade.items.len())?),
     };
-    let mut text = |name: &str, most: usize| {
-        let text = first_value(pairs, name).replace("\r\n", "\n").trim().to_string();
-        let letters = text.chars().count();
-        if !text.chars().any(char::is_alphanumeric) {
-            errors.push(Message::text(format!("complaint.no_{name}"), &[]));
-        } else if letters > most {
-            let numbers = [("letters", number(letters)), ("most", number(most))];
-            errors.push(Message::text(format!("complaint.long_{name}"), &numbers));
-        }
-        text
-    };
-    let (reason, name) = (text("reason", REASON_MAX), text("name", NAME_MAX));
+    let reason = parse_text(pairs, "reason", REASON_MAX, errors);
+    let name = parse_name(pairs, errors);
     Some(OverrideForm { item, last_seen_line: first_value(pairs, "seen").parse().ok()?, reason, name })
+}
+
+/// Parses a required text and collects an error message if it is missing or too long.
+fn parse_text(pairs: &[(String, String)], name: &str, most: usize, errors: &mut Vec<Message>) -> String {
+    let text = first_value(pairs, name).replace("\r\n", "\n").trim().to_string();
+    let letters = text.chars().count();
+    if !text.chars().any(char::is_alphanumeric) {
+        errors.push(Message::text(format!("complaint.no_{name}"), &[]));
+    } else if letters > most {
+        let numbers = [("letters", number(letters)), ("most", number(most))];
+        errors.push(Message::text(format!("complaint.long_{name}"), &numbers));
+    }
+    text
+}
+
+/// Parses an examiner's name. A name with an error is returned as an empty one.
+pub(super) fn parse_name(pairs: &[(String, String)], errors: &mut Vec<Message>) -> String {
+    let before = errors.len();
+    let name = parse_text(pairs, "name", NAME_MAX, errors);
+    if errors.len() == before { name } else { String::new() }
 }
 
 /// Parses points from 0 to `most`, with a decimal point or comma.

@@ -14,10 +14,13 @@ use std::sync::Arc;
 use typodont_report::{Languages, Message, Templates};
 
 /// Shipped templates, by their names in the folder `review` of the templates.
-const PAGES: [(&str, &str); 9] = [
+const PAGES: [(&str, &str); 12] = [
     ("layout.html", include_str!("../../reports/templates/review/layout.html")),
     ("list.html", include_str!("../../reports/templates/review/list.html")),
     ("session.html", include_str!("../../reports/templates/review/session.html")),
+    ("blind.html", include_str!("../../reports/templates/review/blind.html")),
+    ("rating.html", include_str!("../../reports/templates/review/rating.html")),
+    ("name.html", include_str!("../../reports/templates/review/name.html")),
     ("compare.html", include_str!("../../reports/templates/review/compare.html")),
     ("history.html", include_str!("../../reports/templates/review/history.html")),
     ("left_out.html", include_str!("../../reports/templates/review/left_out.html")),
@@ -135,7 +138,7 @@ impl PageRenderer {
             Ok(languages.text_in(&code, &Message::Keyed { key, fallback: String::new(), args: filled }))
         });
         environment.add_global("style", Value::from_safe_string(self.pages[STYLE].clone()));
-        for part in ["layout.html", name] {
+        for part in ["layout.html", "rating.html", name] {
             environment.add_template(part, &self.pages[part]).map_err(wrong)?;
         }
         environment.get_template(name).and_then(|t| t.render(Value::from(Serde(page)))).map_err(wrong)

@@ -85,6 +85,11 @@ impl SortColumn {
         }
     }
 
+    /// Returns true if the column shows marks or judgements.
+    pub fn shows_marks(self) -> bool {
+        !matches!(self, SortColumn::Exercise | SortColumn::Participant | SortColumn::Began)
+    }
+
     pub fn is_number(self) -> bool {
         matches!(self, SortColumn::Machine | SortColumn::Examiner | SortColumn::Overrides)
     }
@@ -116,6 +121,12 @@ impl Query {
             page: first_value(pairs, "page").parse().unwrap_or(1).clamp(1, 1_000_000),
             length,
         }
+    }
+
+    /// Returns the query without conditions on marks and without an order by them.
+    pub fn without_marks(self) -> Query {
+        let sort = if self.sort.shows_marks() { SortColumn::Exercise } else { self.sort };
+        Query { result: None, overridden: None, sort, ..self }
     }
 
     /// Formats the query string of an address, without parameters that have their default value.

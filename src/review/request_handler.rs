@@ -6,9 +6,14 @@ use super::bundle;
 use super::http::{BODY_MAX, Request, Response, first_value};
 use super::origin::OriginError;
 use super::router::Route;
-use super::{compare, export, history, list, override_form, session_page};
+use super::{compare, export, history, list, override_form, rating_form, session_page};
 use serde::Serialize;
+use std::sync::Arc;
 use typodont_report::Message;
+
+/// The name page has no values of its own.
+#[derive(Serialize)]
+struct NamePage {}
 
 #[derive(Serialize)]
 struct LoginPage {
@@ -44,7 +49,7 @@ impl ReviewApp {
         let Some(route) = Route::parse(&request.path) else {
             return Response::plain_error(404, "no-page: there is no page at this address");
         };
-        if is_post != route.is_post() && !(is_post && route == Route::Login) {
+        if is_post != route.is_post() && !(is_post && route.is_form_page()) {
             let allowed = if route.is_post() { "POST" } else { "GET, HEAD" };
             return Response::plain_error(405, "wrong-method: this address does not accept the request's method")
                 .with_header("allow", allowed);
@@ -75,18 +80,28 @@ impl ReviewApp {
     }
 
     fn route_logged_in(&self, context: &RequestContext, route: &Route) -> Response {
-        if route.is_post() {
+        let is_post = context.request.method == "POST";
+        if is_post {
             let form = context.request.form_pairs();
             if !self.state().auth.verify_csrf(&context.login, first_value(&form, "form")) {
                 let response = self.error_page(context, 403, &[Message::text("complaint.foreign_form", &[])]);
                 return response.with_log("foreign-form: a form without a valid CSRF token was refused");
             }
         }
+        // What may be shown depends on who asks.
+        if self.blind && context.login.display_name.is_empty() && !matches!(route, Route::Name | Route::Logout) {
+            return if is_post { self.name_page(context, 403) } else { Response::redirect("/name") };
+        }
         match route {
+            Route::Name if is_post => self.set_name(context),
+            Route::Name => self.name_page(context, 200),
+            Route::Rate(id) => rating_form::rate(self, context, id),
+            Route::RatingsCsv => export::ratings_csv(self, context),
+            Route::RatingsJson => export::ratings_json(self, context),
             Route::List => list::page(self, context),
             Route::Session(id) => session_page::page(self, context, id),
             Route::Report(id) => self.report(context, id),
-            Route::Picture(id, stem) => self.picture(id, stem),
+            Route::Picture(id, stem) => self.picture(context, id, stem),
             Route::Override(id) => override_form::override_points(self, context, id),
             Route::Withdraw(id) => override_form::withdraw(self, context, id),
             Route::Compare => compare::page(self, context),
@@ -102,6 +117,23 @@ impl ReviewApp {
             }
             Route::LoginLink | Route::Login | Route::Language => Response::redirect("/"),
         }
+    }
+
+    /// Renders the page on which an examiner gives a name.
+    fn name_page(&self, context: &RequestContext, status: u16) -> Response {
+        let frame = self.layout(&context.language, context.request, Some(&context.login), None);
+        self.renderer.page(status, "name.html", &context.language, &PageWithLayout { frame, body: NamePage {} })
+    }
+
+    fn set_name(&self, context: &RequestContext) -> Response {
+        let form = context.request.form_pairs();
+        let mut errors = Vec::new();
+        let name = override_form::parse_name(&form, &mut errors);
+        if !errors.is_empty() {
+            return self.error_page(context, 422, &errors);
+        }
+        self.set_display_name(context, &name);
+        Response::redirect("/")
     }
 
     fn authenticate<'a>(&self, request: &'a Request, language: &str) -> Option<RequestContext<'a>> {
@@ -151,9 +183,13 @@ impl ReviewApp {
             request.now.as_second(),
         );
         match outcome {
-            Ok(PasswordLogin::LoggedIn { cookie, device_cookie }) => Response::redirect("/")
-                .with_header("set-cookie", session_cookie(request, &cookie))
-                .with_header("set-cookie", device_cookie_header(request, &device_cookie)),
+            Ok(PasswordLogin::LoggedIn { cookie, device_cookie }) => {
+                let name = override_form::parse_name(&form, &mut Vec::new());
+                self.state().auth.set_display_name(&cookie, &name);
+                Response::redirect("/")
+                    .with_header("set-cookie", session_cookie(request, &cookie))
+                    .with_header("set-cookie", device_cookie_header(request, &device_cookie))
+            }
             Ok(PasswordLogin::WrongPassword) => {
                 self.login_page(language, request, 403, "wrong", 0).with_log("wrong-password: a login was refused")
             }
@@ -173,7 +209,7 @@ impl ReviewApp {
     }
 
     fn login_page(&self, language: &str, request: &Request, status: u16, state: &'static str, wait: i64) -> Response {
-        let frame = self.layout(language, request, "", None);
+        let frame = self.layout(language, request, None, None);
         self.renderer.page(status, "door.html", language, &PageWithLayout { frame, body: LoginPage { state, wait } })
     }
 
@@ -205,12 +241,18 @@ impl ReviewApp {
         }
     }
 
-    fn picture(&self, id: &str, stem: &str) -> Response {
-        let listed = self.state().index.session(id);
+    fn picture(&self, context: &RequestContext, id: &str, stem: &str) -> Response {
+        let state = self.state();
+        let (listed, ratings) = (state.index.session(id), Arc::clone(&state.ratings));
+        drop(state);
+        // A map shows the verdict on every voxel.
+        let is_hidden = bundle::is_map(stem) && !self.may_see_marks(context, &ratings, id);
         let bytes = match listed {
-            Ok(Some(listed)) => bundle::read_bundle_session(&self.folder, &listed.path).and_then(|session| {
-                bundle::read_verified(&self.folder, &listed.path, &bundle::picture_path(stem), &session)
-            }),
+            Ok(Some(listed)) if !is_hidden => {
+                bundle::read_bundle_session(&self.folder, &listed.path).and_then(|session| {
+                    bundle::read_verified(&self.folder, &listed.path, &bundle::picture_path(stem), &session)
+                })
+            }
             _ => Err(String::new()),
         };
         match bytes {

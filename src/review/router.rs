@@ -19,11 +19,17 @@ pub enum Route {
     Picture(String, String),
     Override(String),
     Withdraw(String),
+    /// Form that rates a session.
+    Rate(String),
+    /// Examiner's name for this login.
+    Name,
     Compare,
     History,
     LeftOut,
     Csv,
     Json,
+    RatingsCsv,
+    RatingsJson,
 }
 
 impl Route {
@@ -41,6 +47,9 @@ impl Route {
             ["left-out"] => Route::LeftOut,
             ["sessions.csv"] => Route::Csv,
             ["sessions.json"] => Route::Json,
+            ["ratings.csv"] => Route::RatingsCsv,
+            ["ratings.json"] => Route::RatingsJson,
+            ["name"] => Route::Name,
             ["session", id, rest @ ..] if is_session_id(id) => {
                 let id = id.to_string();
                 match rest {
@@ -48,6 +57,7 @@ impl Route {
                     ["report"] => Route::Report(id),
                     ["override"] => Route::Override(id),
                     ["withdraw"] => Route::Withdraw(id),
+                    ["rate"] => Route::Rate(id),
                     ["view", file] => {
                         let stem = file.strip_suffix(".png").filter(|stem| is_picture(stem))?;
                         Route::Picture(id, stem.to_string())
@@ -61,7 +71,12 @@ impl Route {
 
     /// Returns true if the route accepts only POST requests.
     pub fn is_post(&self) -> bool {
-        matches!(self, Route::Override(_) | Route::Withdraw(_) | Route::Logout)
+        matches!(self, Route::Override(_) | Route::Withdraw(_) | Route::Rate(_) | Route::Logout)
+    }
+
+    /// Returns true if the route accepts GET and POST requests: a page with a form of its own.
+    pub fn is_form_page(&self) -> bool {
+        matches!(self, Route::Login | Route::Name)
     }
 
     /// Returns the name used in the log, in place of the address, which may contain user-written text.
@@ -77,11 +92,15 @@ impl Route {
             Route::Picture(..) => "picture",
             Route::Override(_) => "override",
             Route::Withdraw(_) => "withdraw",
+            Route::Rate(_) => "rate",
+            Route::Name => "name",
             Route::Compare => "compare",
             Route::History => "history",
             Route::LeftOut => "left-out",
             Route::Csv => "csv",
             Route::Json => "json",
+            Route::RatingsCsv => "ratings-csv",
+            Route::RatingsJson => "ratings-json",
         }
     }
 }

@@ -1,11 +1,13 @@
 //! Page of one session: metrics, the scorer's grade, the examiners' overrides and the forms to override.
 
 use super::app::{LoadedSession, RequestContext, ReviewApp, SHOWN_MAX};
+use super::blind_page;
 use super::bundle::{self, VIEWS};
 use super::effective_grade::{EffectiveGrade, effective_grade};
 use super::history::{self, HistoryRow};
 use super::http::Response;
 use super::overrides::OverrideEntry;
+use super::rating_form::{self, RatingFields, RatingRow};
 use super::verification::ShownVerification;
 use serde::Serialize;
 use typodont_exercise::scenario::Metric;
@@ -27,6 +29,13 @@ struct ReviewSessionPage {
     measures: Vec<ReviewMeasure>,
     views: Vec<MapView>,
     legend: Vec<LegendColour>,
+    /// Image of the finished tooth, shown beside the forms.
+    after: Option<MapView>,
+    rating: RatingFields,
+    /// Ratings of all examiners, those that count.
+    ratings: Vec<RatingRow>,
+    /// Id of the next session to rate, in blind mode.
+    next: Option<String>,
     /// Examiner's name as last entered.
     name: String,
 }
@@ -135,10 +144,13 @@ pub(super) struct MapView {
 }
 
 pub fn page(app: &ReviewApp, context: &RequestContext, id: &str) -> Response {
-    let LoadedSession { log, indexed, session } = match app.load_session(context, id) {
+    let LoadedSession { log, ratings, indexed, session } = match app.load_session(context, id) {
         Ok(case) => case,
         Err(response) => return *response,
     };
+    if !app.may_see_marks(context, &ratings, id) {
+        return blind_page::page(app, context, &log, &indexed, &session);
+    }
     let localizer = ReviewLocalizer { app, context, session: &session };
     let has = |name: &str| bundle::file_within(&app.folder, &indexed.path, name).is_ok();
     let views = VIEWS.iter().filter(|view| has(&bundle::picture_path(&format!("map-{view}"))));
@@ -156,6 +168,10 @@ pub fn page(app: &ReviewApp, context: &RequestContext, id: &str) -> Response {
         measures: localizer.measures(),
         views: views.map(|view| self::map_view(app, context, view)).collect(),
         legend: legend(app, context),
+        after: after_view(app, context, &has),
+        rating: rating_form::fields(app, context, session.grade.as_ref()),
+        ratings: ratings.counting(id).into_iter().map(rating_form::row).collect(),
+        next: app.blind.then(|| blind_page::next_unrated(app, context)).flatten(),
         name: sanitize_display(&context.login.display_name, 120),
     };
     app.page(context, &log, "session.html", body)
@@ -189,10 +205,21 @@ fn length(session: &SessionFile) -> String {
 
 /// Returns the removal map of a view.
 pub(super) fn map_view(app: &ReviewApp, context: &RequestContext, view: &str) -> MapView {
+    picture_view(app, context, "map", view)
+}
+
+/// Returns the first view of which the bundle has an image of the finished tooth.
+fn after_view(app: &ReviewApp, context: &RequestContext, has: &dyn Fn(&str) -> bool) -> Option<MapView> {
+    let view = VIEWS.iter().find(|view| has(&bundle::picture_path(&format!("after-{view}"))))?;
+    Some(picture_view(app, context, "after", view))
+}
+
+/// Returns an image of a view; `moment` is `before`, `after` or `map`.
+pub(super) fn picture_view(app: &ReviewApp, context: &RequestContext, moment: &str, view: &str) -> MapView {
     let side = Message::text(format!("side.{view}"), &[]);
     MapView {
-        stem: format!("map-{view}"),
-        title: app.translate(context, &Message::text("picture.map", &[("what", side)])),
+        stem: format!("{moment}-{view}"),
+        title: app.translate(context, &Message::text(format!("picture.{moment}"), &[("what", side)])),
     }
 }
 

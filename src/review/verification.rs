@@ -43,6 +43,11 @@ impl ShownVerification {
         };
         ShownVerification { word, note: sanitize_display(&note, NOTE_MAX) }
     }
+
+    /// Leaves out the note, which states points and measures, where the marks of the session are hidden.
+    pub fn without_note_if(self, is_hidden: bool) -> ShownVerification {
+        if is_hidden { ShownVerification { note: String::new(), ..self } } else { self }
+    }
 }
 
 /// Number of sessions whose recordings are still to be replayed, of all that are listed.

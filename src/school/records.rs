@@ -9,7 +9,7 @@ use std::path::{Component, Path};
 use typodont_core::tick::TICK_S;
 use typodont_integrations::session_id;
 use typodont_report::{SessionFile, VerificationStatus};
-use typodont_review::{LogSnapshot, OverrideEntry};
+use typodont_review::{OverrideEntry, OverrideSnapshot};
 
 /// Status of a local session in the database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -346,7 +346,7 @@ fn rescored_in_place(written: &SessionFile, rescored: SessionFile) -> SessionFil
 /// # Errors
 ///
 /// Returns the database error.
-pub fn read_overrides(client: &mut Client) -> Result<LogSnapshot, Error> {
+pub fn read_overrides(client: &mut Client) -> Result<OverrideSnapshot, Error> {
     let rows = client.query("SELECT session_id::text, line FROM typodont.override", &[])?;
     // Access was granted for the row's session, so a line about another session is ignored.
     let entry = |row: &postgres::Row| {
@@ -355,7 +355,7 @@ pub fn read_overrides(client: &mut Client) -> Result<LogSnapshot, Error> {
     };
     let mut entries: Vec<OverrideEntry> = rows.iter().filter_map(entry).collect();
     entries.sort_by(|a, b| (&a.at, a.number).cmp(&(&b.at, b.number)));
-    Ok(LogSnapshot::from_entries(entries))
+    Ok(OverrideSnapshot::from_entries(entries))
 }
 
 /// Inserts lines of an examiner's log, each given as entry, text and SHA-256, and returns the number of new ones.

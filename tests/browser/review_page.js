@@ -110,7 +110,16 @@ const origin = new URL(address).origin;
   // What is missing is asked for by the browser itself.
   await page.locator('#grade summary').first().click();
   await page.locator('#grade button').first().click();
+  claim(await page.evaluate(() => document.activeElement.name) === 'passed', 'passed or not passed is chosen for the examiner');
+  await page.locator('#grade input[name="passed"]').first().check();
+  await page.locator('#grade button').first().click();
   claim(await page.evaluate(() => document.activeElement.name) === 'reason', 'an empty reason is sent');
+  // The forms stand beside the picture of the work.
+  const beside = await page.evaluate(() => {
+    const [picture, form] = ['.work .pictures img', '#item-0 form'].map(one => document.querySelector(one).closest('.pictures, .forms').getBoundingClientRect());
+    return picture.right <= form.left;
+  });
+  claim(beside, 'the forms do not stand beside the picture');
   await looks('session-overridden');
   await page.locator('#item-0 summary').nth(1).click();
   await photograph('session-withdraw.png');

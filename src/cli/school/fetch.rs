@@ -13,7 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use typodont_exercise::scenario::hex;
 use typodont_report::sanitize_display;
-use typodont_review::{AppendError, LogSnapshot, OVERRIDES, OverrideEntry, OverrideLog};
+use typodont_review::{AppendError, OVERRIDES, OverrideEntry, OverrideLog, OverrideSnapshot};
 use typodont_school::records;
 use typodont_school::records::{StoredSession, is_plain_name};
 
@@ -116,7 +116,7 @@ pub fn exchange_overrides(connection: &mut DbConnection, folder: &Path) -> Resul
     let mut log = OverrideLog::of(folder);
     let local_log = log.read(None).map_err(failed)?;
     let remote_log = connection.query_with_retry(records::read_overrides)?;
-    let is_in = |snapshot: &LogSnapshot, entry: &OverrideEntry| {
+    let is_in = |snapshot: &OverrideSnapshot, entry: &OverrideEntry| {
         snapshot.valid_entries().any(|e| e.at == entry.at && e.draft == entry.draft)
     };
     let text = if path.is_file() { typodont_formats::read_text(&path)?.text.clone() } else { String::new() };

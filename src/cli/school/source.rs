@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use typodont_report::cohort::Cohort;
 use typodont_report::sanitize_display;
-use typodont_review::LogSnapshot;
+use typodont_review::OverrideSnapshot;
 use typodont_school::RECORDING;
 use typodont_school::records;
 use typodont_school::records::{SessionFilter, StoredSession};
@@ -161,7 +161,7 @@ impl SourcedCohort {
     ///
     /// # Errors
     /// A message if they cannot be read.
-    pub fn overrides(&mut self) -> Result<LogSnapshot, CliError> {
+    pub fn overrides(&mut self) -> Result<OverrideSnapshot, CliError> {
         if let Some(connection) = &mut self.connection {
             return Ok(connection.query_with_retry(records::read_overrides)?);
         }
