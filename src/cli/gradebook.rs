@@ -3,13 +3,14 @@
 use super::verification::{self, VerificationArguments};
 use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::{Args, ValueEnum};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use typodont_integrations::gradebook::{
-    AttemptPolicy, CriticalErrorPolicy, GradebookOptions, Lms, StudentTable, gradebook,
+    AttemptPolicy, CriticalErrorPolicy, GradeChange, GradebookOptions, Lms, StudentTable, gradebook,
 };
 use typodont_integrations::session_id;
 use typodont_report::cohort::Cohort;
-use typodont_review::{self as review, LogSnapshot};
+use typodont_review::{self as review, OverrideDraft, OverrideSnapshot};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -66,9 +67,10 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let mut sourced = arguments.source.read(false)?;
     let mut cohort = std::mem::take(&mut sourced.cohort);
     verification::settle(&mut cohort, &arguments.verification)?;
-    if arguments.overrides {
-        apply_overrides(&mut cohort, &sourced.overrides()?);
-    }
+    let changes = match arguments.overrides {
+        true => apply_overrides(&mut cohort, &sourced.overrides()?),
+        false => BTreeMap::new(),
+    };
     let students = arguments.students.as_ref().map(|path| -> Result<StudentTable, CliError> {
         let source = typodont_formats::read_text(path)?;
         StudentTable::read(&path.display().to_string(), &source.text).map_err(CliError::Wrong)
@@ -88,7 +90,8 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         CriticalErrorPolicyName::Cap => CriticalErrorPolicy::Cap,
         CriticalErrorPolicyName::Zero => CriticalErrorPolicy::Zero,
     };
-    let options = GradebookOptions { lms, policy, critical, students: students.as_ref(), translator };
+    let options =
+        GradebookOptions { lms, policy, critical, students: students.as_ref(), changes: &changes, translator };
     let made = gradebook(&cohort, &options);
     for what in &made.warnings {
         eprintln!("note: {what}");
@@ -101,15 +104,29 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     print_line(format!("{}: {} students", arguments.output.display(), made.students))
 }
 
-/// Replaces computed grades by those of examiners, and prints their number.
-fn apply_overrides(cohort: &mut Cohort, log: &LogSnapshot) {
-    let mut count = 0;
+/// Replaces computed grades by those of examiners, and prints their number. Returns the changes in effect by session id.
+fn apply_overrides(cohort: &mut Cohort, log: &OverrideSnapshot) -> BTreeMap<String, Vec<GradeChange>> {
+    let mut changes = BTreeMap::new();
     for (_, session) in &mut cohort.sessions {
         let id = session_id(session);
         if let Some(grade) = &mut session.grade {
-            let (taken, overrides) = review::with_overrides(grade, &id, log);
-            (*grade, count) = (taken, count + usize::from(overrides > 0));
+            let effective = review::effective_grade(grade, &id, log);
+            let own: Vec<GradeChange> = effective.entries().filter_map(|entry| grade_change(&entry.draft)).collect();
+            *grade = review::with_overrides(grade, &id, log).0;
+            if !own.is_empty() {
+                changes.insert(id, own);
+            }
         }
     }
-    eprintln!("{count} grades were overridden by an examiner");
+    eprintln!("{} grades were overridden by an examiner", changes.len());
+    changes
+}
+
+fn grade_change(draft: &OverrideDraft) -> Option<GradeChange> {
+    Some(GradeChange {
+        item: draft.item.as_ref().map(|item| item.title.clone()),
+        points: [draft.machine.points, draft.examiner?.points],
+        name: draft.name.clone(),
+        reason: draft.reason.clone(),
+    })
 }

@@ -4,6 +4,7 @@
 //! grades are lost (docs.moodle.org, "Grade import"). Canvas requires its own columns and a row `Points Possible`,
 //! and reads a number in round brackets at the end of a title as an assignment id.
 
+use crate::session_id;
 use std::collections::BTreeMap;
 use typodont_report::cohort::Cohort;
 use typodont_report::{GradeFile, SessionFile, Translator, VerificationStatus, csv, sanitize_display};
@@ -63,6 +64,17 @@ impl CriticalErrorPolicy {
     }
 }
 
+/// Change of a grade by an examiner.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GradeChange {
+    /// Title of the changed item; `None` for the grade as a whole.
+    pub item: Option<String>,
+    /// Points before and after.
+    pub points: [f64; 2],
+    pub name: String,
+    pub reason: String,
+}
+
 /// Contents of a grade table.
 #[derive(Clone, Copy, Debug)]
 pub struct GradebookOptions<'a> {
@@ -72,6 +84,8 @@ pub struct GradebookOptions<'a> {
     /// Identities of the students; without them, participant codes are written to `ID number` (Moodle) or
     /// `SIS User ID` (Canvas).
     pub students: Option<&'a StudentTable>,
+    /// Changes in effect by session id: the cohort's grades include them.
+    pub changes: &'a BTreeMap<String, Vec<GradeChange>>,
     /// Translator into the language of the feedback. The titles of the columns are the same in every language.
     pub translator: Translator<'a>,
 }
@@ -159,7 +173,7 @@ fn is_of(graded: &GradedSession, participant: &str, exercise: &SessionFile) -> b
 /// Builds the grade table of a cohort: one row per participant, one column per exercise (for Moodle also its
 /// feedback).
 pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
-    let GradebookOptions { lms, policy, critical, students, translator } = *options;
+    let GradebookOptions { lms, policy, critical, students, changes, translator } = *options;
     let graded: Vec<GradedSession> = cohort
         .sessions
         .iter()
@@ -218,7 +232,7 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
         table += &csv::format_row(&possible);
     }
     let mut count = 0;
-    let (mut critical_errors, mut not_verified) = (0, 0);
+    let (mut critical_errors, mut not_verified, mut changed) = (0, 0, 0);
     for person in people {
         let identity =
             match students {
@@ -248,6 +262,8 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
             let selected = select_grade(&own, policy);
             critical_errors += usize::from(selected.is_some_and(|g| !g.grade.hard_fails.is_empty() && !g.grade.passed));
             not_verified += usize::from(selected.is_some_and(|g| !g.status.is_verified()));
+            let own_changes = selected.and_then(|g| changes.get(&session_id(g.session))).map_or(&[][..], |c| c);
+            changed += usize::from(!own_changes.is_empty());
             line.push(selected.map_or_else(String::new, |g| critical.points(g.grade).to_string()));
             if !differing.is_empty() {
                 let (person, count) = (sanitize_display(person, 40), differing.len());
@@ -260,7 +276,7 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
             if lms == Lms::Moodle {
                 let without =
                     if differing.is_empty() { String::new() } else { translator.text("gradebook.differs", &[]) };
-                line.push(selected.map_or(without, |g| feedback(g, critical, translator)));
+                line.push(selected.map_or(without, |g| feedback(g, critical, own_changes, translator)));
             }
         }
         table += &csv::format_row(&line);
@@ -273,6 +289,12 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
     }
     if critical_errors > 0 {
         warnings.push(critical.warning(critical_errors));
+    }
+    if changed > 0 && lms == Lms::Canvas {
+        warnings.push(format!(
+            "{changed} of these grades were changed by an examiner; names and reasons are in the export of the review \
+             desk, because this table has no place for them"
+        ));
     }
     Gradebook { csv: table, students: count, warnings }
 }
@@ -303,7 +325,12 @@ fn select_grade<'a>(sessions: &[GradedSession<'a>], policy: AttemptPolicy) -> Op
 }
 
 /// Summarises a grade as the feedback text of a gradebook.
-fn feedback(session: GradedSession, critical: CriticalErrorPolicy, translator: Translator) -> String {
+fn feedback(
+    session: GradedSession,
+    critical: CriticalErrorPolicy,
+    changes: &[GradeChange],
+    translator: Translator,
+) -> String {
     let grade = session.grade;
     let key = if grade.passed { "gradebook.passed" } else { "gradebook.not_passed" };
     let (points, most) = (round(grade.points), round(grade.max_points));
@@ -322,6 +349,14 @@ fn feedback(session: GradedSession, critical: CriticalErrorPolicy, translator: T
     if exported != grade.points {
         sentences.push(translator.text("gradebook.critical_points", &[("points", round(exported))]));
     }
+    // Before the items, so that a long list of them does not cut it off.
+    sentences.extend(changes.iter().map(|change| {
+        let [from, to] = change.points.map(round);
+        let title = change.item.clone().unwrap_or_else(|| translator.text("gradebook.grade", &[]));
+        let reason = change.reason.lines().collect::<Vec<_>>().join(" ");
+        let values = [("name", change.name.clone()), ("title", title), ("from", from), ("to", to), ("reason", reason)];
+        translator.text("gradebook.changed", &values)
+    }));
     sentences.extend(grade.items.iter().map(|item| {
         let (points, most) = (round(item.points), round(item.max_points));
         translator.text("gradebook.item", &[("title", item.title.clone()), ("points", points), ("most", most)])

@@ -587,7 +587,8 @@ fn a_gradebook_takes_the_examiners_grade() {
     let desk = Desk::open(&folder, &[]);
     let browser = desk.browser();
     let id = browser.ids("/?text=anna").remove(0);
-    assert_eq!(browser.judge(&id, "0", &[("points", "35"), ("reason", "r"), ("name", "n")]).status, 303);
+    let given = [("points", "35"), ("reason", "The wall is sound.\r\nSeen on the map."), ("name", "Dr. Öz")];
+    assert_eq!(browser.judge(&id, "0", &given).status, 303);
     let table = |more: &[&str]| {
         let file = folder.join("grades.csv");
         let mut program = std::process::Command::new(env!("CARGO_BIN_EXE_typodont"));
@@ -603,7 +604,71 @@ fn a_gradebook_takes_the_examiners_grade() {
             && judged.contains("Caries removed: 35 of 50"),
         "{judged}"
     );
+    let changed =
+        "Changed by Dr. Öz: Caries removed from 25 to 35 points, because: The wall is sound. Seen on the map.";
+    assert!(judged.contains(changed) && !table(&[]).contains("Changed by"), "{judged}");
     assert!(judged.contains("berk,40,"), "{judged}");
+}
+
+#[test]
+fn a_result_that_is_not_a_pass_says_why() {
+    // Aim: 74.8 points with a critical error do not look like too few points, and nobody is proposed as failed. Method: the
+    // list and the form for the overall grade.
+    let folder = folder("review_reasons");
+    let mut failed = graded("anna", [40.0, 34.8]);
+    failed["grade"]["hard_fails"] = json!(["Pulp exposed"]);
+    failed["grade"]["passed"] = json!(false);
+    let mut unfinished = graded("cem", [45.0, 45.0]);
+    (unfinished["grade"]["finished"], unfinished["grade"]["passed"]) = (json!(false), json!(false));
+    for one in [&failed, &graded("berk", [20.0, 20.0]), &unfinished] {
+        enter(&folder, one);
+    }
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    for (person, reason) in [("anna", "critical error"), ("berk", "too few points"), ("cem", "ended early")] {
+        let page = browser.get(&format!("/?text={person}")).text();
+        assert_eq!(page.matches(&format!("<small>{reason}</small>")).count(), 2, "{person}: {page}");
+    }
+    let id = browser.ids("/?text=anna").remove(0);
+    let page = browser.get(&format!("/session/{id}")).text();
+    assert!(page.contains("value=\"no\" required>") && !page.contains("required checked"), "{page}");
+    let given = [("points", "75"), ("passed", "no"), ("reason", "r"), ("name", "Dr. Öz")];
+    assert_eq!(browser.judge(&id, "grade", &given).status, 303);
+    let id = browser.ids("/?text=berk").remove(0);
+    assert_eq!(browser.judge(&id, "grade", &given).status, 303);
+    let page = browser.get("/?text=berk").text();
+    assert!(page.contains("<small>examiner’s decision</small>"), "{page}");
+    // The name is not asked for again, and may be changed.
+    let page = browser.get(&format!("/session/{id}")).text();
+    assert!(page.contains("<input type=\"hidden\" name=\"name\" value=\"Dr. Öz\">") && page.contains("href=\"/name\""));
+}
+
+#[test]
+fn a_comparison_shows_differences_and_says_where_it_is_unfair() {
+    let folder = folder("review_differences");
+    for (person, points, fdi, size) in [("anna", [25.0, 38.5], 36, "0.2"), ("berk", [40.0, 30.0], 24, "0.1")] {
+        let mut one = graded(person, points);
+        one["tooth_fdi"] = json!(fdi);
+        let bundle = enter(&folder, &one);
+        let header = format!("NRRD0004\ntype: uint8\nspace directions: ({size},0,0) (0,{size},0) (0,0,{size})\n\nxx");
+        fs::write(bundle.join("initial.seg.nrrd"), header).unwrap();
+    }
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    let ids = ["anna", "berk"].map(|person| browser.ids(&format!("/?text={person}")).remove(0));
+    let compare = |ids: [&String; 2]| browser.get(&format!("/compare?session={}&session={}", ids[0], ids[1])).text();
+    let page = compare([&ids[0], &ids[1]]);
+    for expected in ["+6.50", "+15.00", "−8.50", "different teeth (36 and 24, FDI)", "0.2 mm and 0.1 mm"] {
+        assert!(page.contains(expected), "{expected} in {page}");
+    }
+    assert!(compare([&ids[1], &ids[0]]).contains("−6.50"));
+    // An override counts in the difference of the grades that stand.
+    let given = [("points", "35"), ("reason", "r"), ("name", "Dr. Öz")];
+    assert_eq!(browser.judge(&ids[0], "0", &given).status, 303);
+    let page = compare([&ids[0], &ids[1]]);
+    for expected in ["+6.50", "−3.50", "+5.00"] {
+        assert!(page.contains(expected), "{expected} in {page}");
+    }
 }
 
 #[test]
