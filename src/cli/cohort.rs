@@ -4,8 +4,8 @@ use super::verification::{self, VerificationArguments};
 use super::{CliError, DEFAULT_LANGUAGE, SessionSource, load_templates, print_line, write_file};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use typodont_report::cohort::{Cohort, ExaminerRating, read_ratings};
-use typodont_report::{Templates, sanitize_display};
+use typodont_report::cohort::{Cohort, ExaminerRating, read_ratings, recording_of};
+use typodont_report::{SessionFile, Templates, sanitize_display};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -26,10 +26,10 @@ pub struct Arguments {
     /// Participants with whom the others are compared
     #[arg(long, value_name = "CODE[,CODE]", value_delimiter = ',')]
     expert: Vec<String>,
-    /// Examiners' global ratings, from which pass marks are derived: a CSV file with the columns participant, rating (1 to 5) and,
-    /// optionally, scenario
+    /// Examiners' ratings, from which pass marks and the examiners' agreement are derived: a CSV file of the review desk, or one
+    /// with the columns participant, rating (1 to 5) and, optionally, scenario and rater; may be given several times
     #[arg(long, value_name = "FILE.csv")]
-    ratings: Option<PathBuf>,
+    ratings: Vec<PathBuf>,
     /// Folder for NRRD maps of the proportion of participants who removed each voxel
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
@@ -68,8 +68,10 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let mut cohort = std::mem::take(&mut sourced.cohort);
     verification::settle(&mut cohort, &arguments.verification)?;
     cohort.experts = known_experts(&cohort, &arguments.expert)?;
-    cohort.ratings =
-        arguments.ratings.as_deref().map(|path| load_ratings(&cohort, path)).transpose()?.unwrap_or_default();
+    for path in &arguments.ratings {
+        let found = load_ratings(&cohort, path)?;
+        cohort.ratings.extend(found);
+    }
     let reported_count = cohort.skipped.len();
     if html.is_some() || json.is_some() || maps.is_some() || csv.is_some() && !cohort.experts.is_empty() {
         cohort.map_removals();
@@ -128,7 +130,18 @@ fn load_ratings(cohort: &Cohort, path: &Path) -> Result<Vec<ExaminerRating>, Cli
     let source = typodont_formats::read_text(path)?;
     let found = read_ratings(&path.display().to_string(), &source.text).map_err(|e| CliError::Wrong(e.join("\n")))?;
     for rating in &found {
-        if !cohort.sessions.iter().any(|(_, s)| s.participant == rating.participant) {
+        let is_own = |session: &SessionFile| match rating.recording.is_empty() {
+            true => session.participant == rating.participant,
+            false => recording_of(session) == rating.recording,
+        };
+        if !rating.recording.is_empty() && !cohort.sessions.iter().any(|(_, session)| is_own(session)) {
+            let start: String = rating.recording.chars().take(12).collect();
+            eprintln!(
+                "{}: no-session: there is no session with the recording {}…; the rating is ignored",
+                path.display(),
+                sanitize_display(&start, 12)
+            );
+        } else if !cohort.sessions.iter().any(|(_, session)| is_own(session)) {
             let code = sanitize_display(&rating.participant, 40);
             eprintln!(
                 "{}: no-session: there is no session of participant \"{code}\"; the rating is ignored",

@@ -2,6 +2,8 @@
 
 #[path = "../support/mod.rs"]
 mod support;
+mod agreement;
+mod blind;
 mod handover;
 mod review;
 mod review_page;

@@ -10,12 +10,16 @@ mod summary;
 mod questionnaire;
 mod progress;
 mod pass_mark;
+mod agreement;
+mod measurement_error;
 mod removal;
 mod csv_export;
 mod charts;
 mod page;
 
+pub use agreement::{AgreementFile, AgreementPair, IccFile, KappaFile, MACHINE, RatedItemFile, recording_of};
 pub use loader::{FoundBundles, find_bundles, read_session};
+pub use measurement_error::{DoubtfulResult, MeasurementErrorFile};
 pub use pass_mark::{ExaminerRating, read_ratings};
 pub use progress::LearningCurves;
 pub use questionnaire::{QuestionnaireSummary, wording};
@@ -92,6 +96,7 @@ impl Cohort {
                     lines.push(format!("  {}: {mean} on average", display_format::measure_title(name)));
                 }
             }
+            lines.extend(scenario.agreement.iter().flat_map(|about| page::agreement_lines(english(), about)));
             let cautions = scenario.cautions.iter().map(|caution| english().translate(caution));
             lines.extend(cautions.map(|caution| format!("  caution: {caution}")));
         }

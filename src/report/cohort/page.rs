@@ -1,7 +1,9 @@
 //! The cohort's page: its contents in the words of one language, for the template `cohort.html`.
 
+use super::agreement::{AgreementFile, AgreementPair, IccFile, KappaFile, MACHINE};
 use super::charts::CurveLabels;
 use super::loader::read_session;
+use super::measurement_error::{DoubtfulResult, MeasurementErrorFile};
 use super::pass_mark::PassMarkEstimate;
 use super::questionnaire::{QuestionnaireStatement, QuestionnaireSummary};
 use super::summary::{CohortSummary, ScenarioSummary, SpreadFile, summary_lines};
@@ -15,6 +17,7 @@ use base64::Engine;
 use serde::Serialize;
 use std::path::Path;
 use typodont_core::frame::Vec3;
+use typodont_core::statistics::Interval;
 
 /// Most characters of a code, title or path that are shown.
 const SHOWN_MAX: usize = 80;
@@ -96,6 +99,8 @@ struct ScenarioPart {
     progress: Vec<(String, String)>,
     repeated: Vec<RepeatedLine>,
     standard: Option<StandardPart>,
+    agreement: Vec<AgreementPart>,
+    measurement_error: Option<MeasurementErrorPart>,
     maps: Vec<MapPart>,
     more_maps: usize,
 }
@@ -148,6 +153,30 @@ struct StandardPart {
     pass_points: String,
     contrasting: Option<String>,
     regression: Option<String>,
+}
+
+#[derive(Serialize)]
+struct AgreementPart {
+    title: String,
+    rows: Vec<AgreementLine>,
+    /// ICC of all raters, where there are more than two.
+    all: Option<String>,
+}
+
+#[derive(Serialize)]
+struct AgreementLine {
+    raters: String,
+    works: usize,
+    linear: String,
+    quadratic: String,
+    icc: String,
+}
+
+#[derive(Serialize)]
+struct MeasurementErrorPart {
+    text: String,
+    /// Participant, start, points and result.
+    rows: Vec<[String; 4]>,
 }
 
 #[derive(Serialize)]
@@ -292,6 +321,8 @@ fn scenario(
         progress: progress.collect(),
         repeated: summary.repeated.iter().map(|(name, r)| repeated(translator, name, r)).collect(),
         standard: summary.standard.as_ref().map(|s| standard(translator, s)),
+        agreement: summary.agreement.iter().map(|a| agreement(translator, a)).collect(),
+        measurement_error: summary.measurement_error.as_ref().map(|e| measurement_error(translator, e)),
         more_maps: own_removals.len().saturating_sub(MAPS_MAX),
         maps: own_removals
             .into_iter()
@@ -446,6 +477,86 @@ fn standard(translator: Translator, standard: &PassMarkEstimate) -> StandardPart
         contrasting,
         regression,
     }
+}
+
+/// Formats a coefficient with its interval: "0.62 (0.40 to 0.84)"; "–" where there is none.
+fn coefficient(translator: Translator, value: Option<(f64, Option<Interval>)>) -> String {
+    let two = |v: f64| format!("{v:.2}");
+    match value {
+        None => "–".into(),
+        Some((value, None)) => two(value),
+        Some((value, Some(bounds))) => format!("{} ({})", two(value), interval(translator, &bounds, two)),
+    }
+}
+
+fn agreement(translator: Translator, about: &AgreementFile) -> AgreementPart {
+    let name = |rater: &String| match rater.as_str() {
+        MACHINE => translator.text("cohort.agreement_machine", &[]),
+        "" => translator.text("cohort.agreement_unnamed", &[]),
+        rater => sanitize(rater),
+    };
+    let kappa = |found: Option<KappaFile>| coefficient(translator, found.map(|k| (k.kappa, Some(k.interval))));
+    let icc = |found: Option<IccFile>| coefficient(translator, found.map(|i| (i.icc, i.interval)));
+    let row = |pair: &AgreementPair| AgreementLine {
+        raters: pair.raters.each_ref().map(name).join(" – "),
+        works: pair.works,
+        linear: kappa(pair.kappa_linear),
+        quadratic: kappa(pair.kappa_quadratic),
+        icc: icc(pair.icc),
+    };
+    let scale = ("scale", about.scale.to_string());
+    let all = about.icc.filter(|_| about.raters.len() > 2).map(|found| {
+        let values = [("raters", about.raters.len().to_string()), ("works", found.works.to_string())];
+        translator.text("cohort.agreement_all", &[&values[..], &[("icc", icc(Some(found)))]].concat())
+    });
+    AgreementPart {
+        title: match &about.item {
+            None => translator.text("cohort.agreement_overall", &[scale]),
+            Some(item) => translator.text("cohort.agreement_item", &[("title", sanitize(&item.title)), scale]),
+        },
+        rows: about.pairs.iter().map(row).collect(),
+        all,
+    }
+}
+
+/// Returns the agreement about the works as a whole as lines for a terminal.
+pub(super) fn agreement_lines(translator: Translator, about: &AgreementFile) -> Vec<String> {
+    if about.item.is_some() {
+        return Vec::new();
+    }
+    let part = agreement(translator, about);
+    let line = |row: &AgreementLine| {
+        format!(
+            "  agreement, {}: κ {}, quadratic κ {}, ICC(2,1) {}, n {}",
+            row.raters, row.linear, row.quadratic, row.icc, row.works
+        )
+    };
+    part.rows.iter().map(line).chain(part.all.iter().map(|all| format!("  {all}"))).collect()
+}
+
+fn measurement_error(translator: Translator, error: &MeasurementErrorFile) -> MeasurementErrorPart {
+    let number = |value: f64| display_format::number(value);
+    let key = if error.method == "repeated_attempts" { "cohort.error_by_attempts" } else { "cohort.error_by_items" };
+    let values = [
+        ("sem", number(error.sem)),
+        ("people", error.people.to_string()),
+        ("points", display_format::plain_number(error.pass_points)),
+        ("low", number(error.pass_points - error.sem)),
+        ("high", number(error.pass_points + error.sem)),
+        ("doubtful", error.in_doubt.len().to_string()),
+        ("decided", error.decided.to_string()),
+    ];
+    let text = format!("{} {}", translator.text(key, &values), translator.text("cohort.error_doubtful", &values));
+    let row = |result: &DoubtfulResult| {
+        let key = if result.passed { "cohort.passed" } else { "cohort.not_passed" };
+        [
+            sanitize(&result.participant),
+            sanitize(&result.started.replace('T', " ").replace('Z', "")),
+            number(result.points),
+            translator.text(key, &[]),
+        ]
+    };
+    MeasurementErrorPart { text, rows: error.in_doubt.iter().map(row).collect() }
 }
 
 fn map_part(translator: Translator, removal: &RemovalMap, summary: &super::removal::RemovalSummary) -> MapPart {

@@ -2,7 +2,9 @@
 
 use super::{Cohort, POINTS, points_or_measure};
 use crate::csv;
+use crate::session_file::mean;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use typodont_core::statistics::{
     BorderlineRegression, ContrastingGroups, Interval, borderline_regression, contrasting_groups,
 };
@@ -14,14 +16,26 @@ const BORDERLINE: f64 = 2.0;
 const RATING_WORDS: [(&str, f64); 5] =
     [("fail", 1.0), ("borderline", BORDERLINE), ("pass", 3.0), ("good", 4.0), ("excellent", 5.0)];
 
-/// An examiner's global rating of a participant's work, given without knowledge of the points.
+/// Highest value of the scale where a table does not say.
+const SCALE: u8 = 5;
+
+/// An examiner's rating of a participant's work, given without knowledge of the points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExaminerRating {
+    /// Empty where the work is named by its recording.
     pub participant: String,
+    /// SHA-256 of the recording of the rated session; empty if the rating applies to the participant's last one.
+    pub recording: String,
     /// The exercise rated; `None` if the rating applies to every exercise.
     pub scenario: Option<String>,
+    /// Title and measure of the rated item of the rubric; `None` for the work as a whole.
+    pub item: Option<(String, String)>,
+    /// Name of the examiner; empty if the table does not say.
+    pub rater: String,
     /// 1 failed, 2 borderline, 3 passed, and better from there.
     pub rating: f64,
+    /// Highest value of the scale.
+    pub scale: u8,
 }
 
 /// Pass marks as the judgements give them. Whoever sets the mark still decides.
@@ -63,30 +77,39 @@ pub struct BorderlineRegressionFile {
     pub explained: f64,
 }
 
-/// Reads examiners' judgements: a table with the columns `participant`, `rating` and, where it matters, `scenario`. Ratings are
-/// 1 to 5 or the words fail, borderline, pass, good, excellent.
+/// Reads examiners' judgements: a table with the columns `rating` and `participant` or `recording`, and where it matters
+/// `scenario`, `rater`, `item`, `metric` and `scale`, as the review desk exports it. Ratings are 1 to 5, or to the
+/// row's `scale`, or the words fail, borderline, pass, good, excellent.
 ///
 /// `Err` holds every complaint, a line each.
 pub fn read_ratings(name: &str, text: &str) -> Result<Vec<ExaminerRating>, Vec<String>> {
     let rows = csv::parse_rows(text).map_err(|e| vec![format!("{name}: wrong-table: {e}")])?;
     let (head, lines) = rows.split_first().ok_or(vec![format!("{name}: wrong-table: the file is empty")])?;
     let column = |title: &str| head.iter().position(|c| c.trim().eq_ignore_ascii_case(title));
-    let (Some(participant), Some(rating)) = (column("participant"), column("rating")) else {
+    let (participant, recording) = (column("participant"), column("recording"));
+    let Some(rating) = column("rating").filter(|_| participant.or(recording).is_some()) else {
         let what = "the first line must contain the columns participant and rating (and, optionally, scenario)";
         return Err(vec![format!("{name}: wrong-table: {what}")]);
     };
-    let scenario = column("scenario");
+    let [scenario, rater, item, metric, scale] = ["scenario", "rater", "item", "metric", "scale"].map(column);
     let (mut read, mut wrong) = (Vec::new(), Vec::new());
     for (number, row) in (2..).zip(lines) {
         let cell = |column: usize| row.get(column).map_or("", |c| c.trim());
-        match parse_rating(cell(rating)) {
+        let text = |column: Option<usize>| column.map_or("", cell).to_string();
+        let scale =
+            scale.map(cell).and_then(|text| text.parse().ok()).filter(|s| (3..=10).contains(s)).unwrap_or(SCALE);
+        match parse_rating(cell(rating), scale) {
             Some(rating) => read.push(ExaminerRating {
-                participant: cell(participant).into(),
-                scenario: scenario.map(cell).filter(|s| !s.is_empty()).map(String::from),
+                participant: text(participant),
+                recording: text(recording),
+                scenario: Some(text(scenario)).filter(|s| !s.is_empty()),
+                item: Some((text(item), text(metric))).filter(|(title, _)| !title.is_empty()),
+                rater: text(rater),
                 rating,
+                scale,
             }),
             None => wrong.push(format!(
-                "{name}: row {number}: wrong-rating: \"{}\" is not a rating; write 1 to 5, or fail, borderline, pass, \
+                "{name}: row {number}: wrong-rating: \"{}\" is not a rating; write 1 to {scale}, or fail, borderline, pass, \
                 good, excellent",
                 crate::display_format::sanitize_display(cell(rating), 40)
             )),
@@ -95,27 +118,39 @@ pub fn read_ratings(name: &str, text: &str) -> Result<Vec<ExaminerRating>, Vec<S
     if wrong.is_empty() { Ok(read) } else { Err(wrong) }
 }
 
-fn parse_rating(text: &str) -> Option<f64> {
-    let word = RATING_WORDS.iter().find(|(word, _)| text.eq_ignore_ascii_case(word)).map(|(_, value)| *value);
-    word.or_else(|| text.replace(',', ".").parse().ok().filter(|v| (1.0..=5.0).contains(v)))
+fn parse_rating(text: &str, scale: u8) -> Option<f64> {
+    let most = f64::from(scale);
+    let word = RATING_WORDS.iter().find(|(word, _)| text.eq_ignore_ascii_case(word)).map(|(_, value)| value.min(most));
+    word.or_else(|| text.replace(',', ".").parse().ok().filter(|v| (1.0..=most).contains(v)))
 }
 
 impl Cohort {
-    pub(super) fn pass_mark(&self, scenario: &str, attempts: &[Vec<usize>]) -> Option<PassMarkEstimate> {
+    /// Mean of the examiners' ratings of each session as a whole, each examiner with the last one.
+    fn mean_ratings(&self, attempts: &[Vec<usize>]) -> BTreeMap<usize, f64> {
+        let mut by_work: BTreeMap<usize, BTreeMap<&str, f64>> = BTreeMap::new();
+        for rating in self.ratings.iter().filter(|rating| rating.item.is_none()) {
+            if let Some(work) = self.rated_work(rating, attempts) {
+                by_work.entry(work).or_default().insert(&rating.rater, rating.rating);
+            }
+        }
+        let mean = |(work, by_rater): (usize, BTreeMap<&str, f64>)| Some((work, mean(by_rater.into_values())?));
+        by_work.into_iter().filter_map(mean).collect()
+    }
+
+    pub(super) fn pass_mark(&self, attempts: &[Vec<usize>]) -> Option<PassMarkEstimate> {
         // Of each person the last session with points.
-        let last = |person: &Vec<usize>| {
-            let graded = person.iter().rev().map(|&i| &self.sessions[i].1);
-            graded.filter_map(|s| Some((s.participant.as_str(), points_or_measure(s, POINTS)?))).next()
+        let graded = |index: usize| {
+            let session = &self.sessions[index].1;
+            Some((session.participant.as_str(), points_or_measure(session, POINTS)?))
         };
+        let last = |person: &Vec<usize>| person.iter().rev().find_map(|&index| graded(index));
         let people: Vec<(&str, f64)> = attempts.iter().filter_map(last).collect();
-        let rating = |participant: &str| {
-            let of = |r: &&ExaminerRating| {
-                r.participant == participant && r.scenario.as_deref().is_none_or(|s| s == scenario)
-            };
-            self.ratings.iter().rev().find(of).map(|r| r.rating)
+        // Of each person the last session that was rated.
+        let ratings = self.mean_ratings(attempts);
+        let rated = |person: &Vec<usize>| {
+            person.iter().rev().find_map(|&index| Some((*ratings.get(&index)?, graded(index)?.1)))
         };
-        let judged: Vec<(f64, f64)> =
-            people.iter().filter_map(|(code, points)| Some((rating(code)?, *points))).collect();
+        let judged: Vec<(f64, f64)> = attempts.iter().filter_map(rated).collect();
         let (judged_by, judged) = match (judged.is_empty(), self.experts.is_empty()) {
             (false, _) => ("examiners", judged),
             (true, false) => {

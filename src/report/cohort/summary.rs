@@ -1,5 +1,7 @@
 //! Statistics of a cohort, by exercise: `cohort.json`.
 
+use super::agreement::AgreementFile;
+use super::measurement_error::MeasurementErrorFile;
 use super::pass_mark::PassMarkEstimate;
 use super::progress::{LearningCurves, RepeatedAttempts};
 use super::questionnaire::QuestionnaireSummary;
@@ -71,6 +73,10 @@ pub struct ScenarioSummary {
     pub repeated: BTreeMap<String, RepeatedAttempts>,
     /// Pass mark as estimated from examiners' judgements; null without judgements.
     pub standard: Option<PassMarkEstimate>,
+    /// Agreement of examiners with each other and with the computed marks; empty without judgements.
+    pub agreement: Vec<AgreementFile>,
+    /// Error of measurement around the pass mark; null with too few people.
+    pub measurement_error: Option<MeasurementErrorFile>,
     /// Summary of the removed volume, for each tooth as it was at the start.
     pub removals: Vec<RemovalSummary>,
 }
@@ -186,6 +192,7 @@ impl Cohort {
         });
         let points: Vec<f64> = grades.iter().map(|g| g.points).collect();
         let points = SpreadFile::of(&points);
+        let repeated = self.repeated_by_measure(&attempts);
         ScenarioSummary {
             id: id.into(),
             title: sessions.iter().map(|s| s.scenario.title.as_str()).find(|t| !t.is_empty()).unwrap_or(id).into(),
@@ -201,8 +208,10 @@ impl Cohort {
             cautions: self.verification_cautions(id).into_iter().chain(cautions(&sessions)).collect(),
             right: right_counts(&sessions),
             progress: self.progress_by_measure(&attempts),
-            repeated: self.repeated_by_measure(&attempts),
-            standard: self.pass_mark(id, &attempts),
+            measurement_error: self.measurement_error(&attempts, &repeated),
+            repeated,
+            agreement: self.agreement(&attempts),
+            standard: self.pass_mark(&attempts),
             removals: self.removals.iter().filter(|r| r.scenario == id).map(|r| RemovalSummary::of(self, r)).collect(),
         }
     }
