@@ -16,7 +16,7 @@ use std::path::Path;
 const SECRETS: [&str; 15] = [
     "61.37",
     "23.61",
-    "37.76",
+    "30.76",
     "86.43",
     "0.444",
     "Pulp laid bare",
@@ -31,7 +31,8 @@ const SECRETS: [&str; 15] = [
     "report-secret",
 ];
 
-/// A session with something to hide in each of its parts, and a report and pictures beside it.
+/// A session with something to hide in each of its parts, and a report and pictures beside it. Its items do not add up to
+/// its points, so that a note about this would tell both.
 fn secretive(folder: &Path, number: usize) -> String {
     let mut one = session("5-grinding", "anna-secret", 61.37);
     one["started"] = json!(format!("2026-11-2{number}T08:15:00Z"));
@@ -41,7 +42,7 @@ fn secretive(folder: &Path, number: usize) -> String {
     one["stages"][0]["ended_by"] = json!("stage-end-secret");
     let item = |title: &str, metric: &str, points: f64| json!({ "title": title, "metric": metric, "value": 86.43, "points": points, "max_points": 50.0, "full_at": 98.0, "zero_at": 70.0 });
     one["grade"]["items"] =
-        json!([item("Caries removed", "decay_cleared_pct", 23.61), item("Gentle force", "force_max_n", 37.76)]);
+        json!([item("Caries removed", "decay_cleared_pct", 23.61), item("Gentle force", "force_max_n", 30.76)]);
     one["grade"]["hard_fails"] = json!(["Pulp laid bare"]);
     one["grade"]["hard_fail_checks"] =
         json!([{ "title": "Pulp laid bare", "metric": "pulp_exposed", "value": 1.0, "above": 0.0, "failed": true }]);
