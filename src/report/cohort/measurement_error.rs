@@ -1,10 +1,8 @@
 //! Standard error of measurement of the points, and the sessions that it leaves in doubt at the pass mark.
 
-use super::progress::RepeatedAttempts;
-use super::{Cohort, POINTS};
+use super::Cohort;
 use crate::session_file::SessionFile;
 use serde::Serialize;
-use std::collections::BTreeMap;
 use typodont_core::statistics::{cronbach_alpha, describe};
 
 /// Fewest people from whom an error of measurement is estimated.
@@ -35,20 +33,19 @@ pub struct DoubtfulResult {
 }
 
 impl Cohort {
-    /// Estimates the error of the points of one exercise; `attempts` holds each person's sessions, as indices. `None` with
-    /// too few people, or if sessions disagree about the pass mark.
+    /// Estimates the error of the points of one exercise. `attempts` holds each person's sessions, as indices; `repeated`
+    /// the error by repeated attempts and the number of people who made them. `None` with too few people, or if sessions disagree about the pass mark.
     pub(super) fn measurement_error(
         &self,
         attempts: &[Vec<usize>],
-        repeated: &BTreeMap<String, RepeatedAttempts>,
+        repeated: Option<(f64, usize)>,
     ) -> Option<MeasurementErrorFile> {
         let sessions: Vec<&SessionFile> = attempts.iter().flatten().map(|&index| &self.sessions[index].1).collect();
         let mut marks: Vec<f64> = sessions.iter().filter_map(|s| Some(s.grade.as_ref()?.pass_points)).collect();
         marks.dedup();
         let [pass_points] = marks[..] else { return None };
-        let by_attempts = repeated.get(POINTS).filter(|found| found.people >= PEOPLE_MIN);
-        let (sem, method, people) = match by_attempts {
-            Some(found) => (found.error, "repeated_attempts", found.people),
+        let (sem, method, people) = match repeated.filter(|(_, people)| *people >= PEOPLE_MIN) {
+            Some((error, people)) => (error, "repeated_attempts", people),
             None => {
                 let (sem, people) = self.error_by_items(attempts)?;
                 (sem, "rubric_items", people)

@@ -208,7 +208,8 @@ impl Cohort {
             cautions: self.verification_cautions(id).into_iter().chain(cautions(&sessions)).collect(),
             right: right_counts(&sessions),
             progress: self.progress_by_measure(&attempts),
-            measurement_error: self.measurement_error(&attempts, &repeated),
+            measurement_error: self
+                .measurement_error(&attempts, repeated.get(POINTS).map(|found| (found.error, found.people))),
             repeated,
             agreement: self.agreement(&attempts),
             standard: self.pass_mark(&attempts),
