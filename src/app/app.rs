@@ -129,16 +129,8 @@ impl App {
             editor.poll(ctx.input(|input| input.time));
         }
         let Screen::Lesson(lesson) = &mut self.screen else { return };
-        let was_captured = lesson.is_pointer_captured;
         lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
-        if was_captured && !lesson.is_pointer_captured {
-            set_pointer_capture(ctx, false);
-        }
-        let end = lesson.outcome.take();
-        if end.is_some() {
-            set_pointer_capture(ctx, false);
-        }
-        match end {
+        match lesson.outcome.take() {
             Some(Ok(bundle)) => match LessonResults::load(bundle, ctx) {
                 Ok(results) => self.screen = Screen::Results(Box::new(results)),
                 Err(why) => self.screen = Screen::Failed(why),
@@ -170,16 +162,16 @@ impl App {
             }
             AppCommand::OpenReport => self.open_report(ctx),
             AppCommand::ShowShortcuts(is_open) => {
-                self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false }, ctx)
+                self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false })
             }
             AppCommand::ShowSettings(is_open) => {
-                self.open_overlay(shortcuts::OverlayState { shortcuts: false, settings: is_open }, ctx)
+                self.open_overlay(shortcuts::OverlayState { shortcuts: false, settings: is_open })
             }
             AppCommand::CloseWindow(is_closing) => self.confirm_close(is_closing, ctx),
             AppCommand::ApplySettings(settings) => self.apply_settings(*settings, ctx),
             AppCommand::Practice(command) => {
                 if let Screen::Lesson(lesson) = &mut self.screen {
-                    execute_in_lesson(lesson, command, ctx);
+                    execute_in_lesson(lesson, command);
                 }
             }
             AppCommand::Camera(command) => self.move_camera(command),
@@ -238,13 +230,12 @@ impl App {
     }
 
     /// Shows one page over the screen, or none. The pointer is released while a page is shown.
-    fn open_overlay(&mut self, overlay: shortcuts::OverlayState, ctx: &egui::Context) {
+    fn open_overlay(&mut self, overlay: shortcuts::OverlayState) {
         self.overlay = overlay;
         if let Screen::Lesson(lesson) = &mut self.screen
             && lesson.is_pointer_captured
         {
             lesson.release_pointer();
-            set_pointer_capture(ctx, false);
         }
     }
 
@@ -331,7 +322,7 @@ impl App {
         if ctx.input(|input| input.viewport().close_requested()) && is_in_lesson {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
             if self.closing == CloseState::No {
-                self.open_overlay(shortcuts::OverlayState::default(), ctx);
+                self.open_overlay(shortcuts::OverlayState::default());
                 self.closing = CloseState::Asked;
             }
         }
@@ -588,16 +579,13 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState) {
 }
 
 /// Carries out commands of a lesson.
-fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand, ctx: &egui::Context) {
+fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
     match command {
         PracticeCommand::SelectInstrument(instrument) => lesson.submit(Input::Take { instrument }),
         PracticeCommand::AnswerQuestion(question, value) => lesson.answer_question(question, value),
         PracticeCommand::AddToChart(sign) => lesson.add_to_chart(sign),
         PracticeCommand::ConfirmStage => lesson.confirm_stage(),
-        PracticeCommand::Pause(is_paused) => {
-            lesson.pause(is_paused);
-            set_pointer_capture(ctx, lesson.is_pointer_captured);
-        }
+        PracticeCommand::Pause(is_paused) => lesson.pause(is_paused),
         PracticeCommand::AskToAbort(is_giving_up) => lesson.is_confirming_abort = is_giving_up,
         PracticeCommand::Abort => lesson.abort(),
         PracticeCommand::AdjustCoefficient(label, coefficient, value) => lesson.adjust(label, coefficient, value),
@@ -608,23 +596,10 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand, ctx: &e
                 lesson.display_mode = DisplayMode::Drawn;
             }
         }
-        PracticeCommand::CapturePointer(is_held) => capture_pointer(lesson, is_held, ctx),
-        PracticeCommand::CentrePointer(at) => ctx.send_viewport_cmd(ViewportCommand::CursorPosition(at)),
-        PracticeCommand::MoveHand { right, down } => {
-            if let Some(mouse) = lesson.mouse() {
-                mouse.move_by_pixels(right, down, lesson.orbit.world_from_view());
-            }
-        }
-        PracticeCommand::MoveHandDepth(steps) => {
-            if let Some(mouse) = lesson.mouse() {
-                mouse.move_by_wheel(steps, lesson.orbit.world_from_view());
-            }
-        }
-        PracticeCommand::SetDeviceButton { bit, is_down } => {
-            if let Some(mouse) = lesson.mouse() {
-                mouse.set_button(bit, is_down);
-            }
-        }
+        PracticeCommand::CapturePointer(is_held) => capture_pointer(lesson, is_held),
+        PracticeCommand::PointAt(place) => lesson.point_at(place),
+        PracticeCommand::ChangeStrength(steps) => lesson.change_strength(steps),
+        PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
         PracticeCommand::AdjustMouthOpening(by) => {
             if let Some(scene) = &mut lesson.scene {
                 scene.open_mouth(by);
@@ -647,12 +622,11 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand, ctx: &e
 }
 
 /// Makes the pointer act as the device if the lesson has a mouse and is not paused, or releases it.
-fn capture_pointer(lesson: &mut LessonState, is_held: bool, ctx: &egui::Context) {
+fn capture_pointer(lesson: &mut LessonState, is_held: bool) {
     lesson.is_pointer_captured = is_held && lesson.has_mouse() && !lesson.is_paused;
     if !is_held {
         lesson.release_pointer();
     }
-    set_pointer_capture(ctx, lesson.is_pointer_captured);
 }
 
 /// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the settings folder.
@@ -662,15 +636,6 @@ fn sounds_folder() -> PathBuf {
         Some(folder) if !beside.is_dir() => folder.join("sounds"),
         _ => beside,
     }
-}
-
-/// Locks and hides the pointer while it acts as the device.
-fn set_pointer_capture(ctx: &egui::Context, is_captured: bool) {
-    // X11 cannot lock a pointer, and reports each movement twice while it is confined; there the pointer is moved back
-    // to the centre instead.
-    let grab_mode = egui::CursorGrab::Locked;
-    ctx.send_viewport_cmd(ViewportCommand::CursorGrab(if is_captured { grab_mode } else { egui::CursorGrab::None }));
-    ctx.send_viewport_cmd(ViewportCommand::CursorVisible(!is_captured));
 }
 
 impl eframe::App for App {

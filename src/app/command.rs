@@ -3,9 +3,9 @@
 use super::camera_preset::CameraPreset;
 use super::editor::EditorCommand;
 use super::lesson_scene::DisplayMode;
+use super::pointer_hand::PointedPlace;
 use super::settings::Settings;
 use super::transfer_function_draft::TransferFunctionDraft;
-use eframe::egui;
 use std::path::PathBuf;
 use typodont_core::touch::Coefficient;
 use typodont_core::volume::Label;
@@ -61,15 +61,10 @@ pub enum PracticeCommand {
     SetTransferFunction(Box<TransferFunctionDraft>),
     /// Makes the pointer act as the device, or releases it.
     CapturePointer(bool),
-    /// Moves the pointer back to a position in the window, points.
-    CentrePointer(egui::Pos2),
-    /// Moves the hand in the plane of the view, mouse counts.
-    MoveHand {
-        right: f32,
-        down: f32,
-    },
-    /// Moves the hand in depth, steps of the mouse wheel.
-    MoveHandDepth(f32),
+    /// Aims the hand at the surface under the pointer; `None` while the pointer is outside the view.
+    PointAt(Option<PointedPlace>),
+    /// Changes the strength of a press, steps of the mouse wheel.
+    ChangeStrength(f32),
     SetDeviceButton {
         bit: u32,
         is_down: bool,

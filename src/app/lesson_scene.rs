@@ -11,7 +11,7 @@ use typodont_formats::diagnostic::Diagnostic;
 use typodont_render::{LabelPalette, MeshInstance, RenderMode, TransferFunction};
 use typodont_scene::particles;
 use typodont_scene::particles::ParticleField;
-use typodont_scene::{self as scene, Mouth};
+use typodont_scene::{self as scene, ContraAngle, Mouth};
 
 /// Maximum opening angle of the mouth, degrees: 50 mm between the incisors.
 const MAX_MOUTH_OPENING: f32 = 35.0;
@@ -29,6 +29,8 @@ pub struct LessonScene {
     /// Solids around the tooth.
     pub surroundings: Vec<MeshInstance>,
     pub instruments: Vec<MeshInstance>,
+    /// The instruments as a pointer holds them; `None` for those that no handpiece turns.
+    pub contra_angles: Vec<Option<ContraAngle>>,
     /// Dust and water, if the exercise has any.
     pub particles: Option<ParticleField>,
     /// Model of the saliva ejector, which removes dust and water.
@@ -77,6 +79,7 @@ impl LessonScene {
             particles: options.is_any().then(|| ParticleField::new(options, &scenario.instruments, suction_inlet)),
             ejector,
             instruments,
+            contra_angles: scenario.instruments.iter().map(scene::contra_angle).collect(),
             workpiece,
             is_new: true,
         };

@@ -4,6 +4,7 @@ use super::answer_draft::parse_draft;
 use super::lesson_scene::{DisplayMode, LessonScene};
 use super::lesson_thread::{LessonCommand, LessonConfig, LessonEvent, LessonThread};
 use super::messages::{self, PauseReason, SecondHandStatus};
+use super::pointer_hand::{PointedPlace, PointerHand};
 use super::snapshot::LessonSnapshot;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -54,6 +55,7 @@ pub struct LessonState {
     pub is_paused: bool,
     /// True while the pointer acts as the device.
     pub is_pointer_captured: bool,
+    pub pointer_hand: PointerHand,
     pub is_confirming_abort: bool,
     pub orbit: Orbit,
     /// Source of the instruments' models.
@@ -114,6 +116,7 @@ impl LessonState {
             second_hand: None,
             is_paused: false,
             is_pointer_captured: false,
+            pointer_hand: PointerHand::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
             library,
@@ -337,8 +340,47 @@ impl LessonState {
     /// Releases the pointer: the instrument stays in place without force.
     pub fn release_pointer(&mut self) {
         self.is_pointer_captured = false;
+        (self.pointer_hand.is_pressing, self.pointer_hand.spot) = (false, None);
         if let Some((mouse, seen)) = self.mouse().zip(self.snapshot.as_ref()) {
             mouse.release_at(seen.tip);
+        }
+    }
+
+    /// Aims the hand at the surface under the pointer.
+    pub fn point_at(&mut self, place: Option<PointedPlace>) {
+        let LessonState { thread, scene: Some(scene), snapshot: Some(snapshot), scenario, orbit, pointer_hand, .. } =
+            self
+        else {
+            return;
+        };
+        let Some(mouse) = thread.mouse.as_ref().filter(|_| self.is_pointer_captured) else { return };
+        if let Some(instrument) = scenario.instruments.get(snapshot.instrument as usize) {
+            pointer_hand.point_at(place, mouse, orbit, scene, snapshot, instrument);
+        }
+    }
+
+    /// Instrument in use, and the maximum force of a press with it, N, if the pointer is the device.
+    pub fn press_strength(&self) -> Option<f32> {
+        let index = self.snapshot?.instrument as usize;
+        let instrument = self.scenario.instruments.get(index)?;
+        self.has_mouse().then(|| self.pointer_hand.strength(index, instrument))
+    }
+
+    /// Changes the strength of a press with the instrument in use, by steps of the wheel.
+    pub fn change_strength(&mut self, steps: f32) {
+        let Some(index) = self.snapshot.map(|seen| seen.instrument as usize) else { return };
+        if let Some(instrument) = self.scenario.instruments.get(index) {
+            self.pointer_hand.change_strength(steps, index, instrument);
+        }
+    }
+
+    /// Presses or releases a button of the pointer; the main one presses the instrument.
+    pub fn set_pointer_button(&mut self, bit: u32, is_down: bool) {
+        if bit == 0 {
+            self.pointer_hand.is_pressing = is_down;
+        }
+        if let Some(mouse) = self.mouse() {
+            mouse.set_button(bit, is_down);
         }
     }
 

@@ -37,6 +37,8 @@ mod settings_screen;
 mod exercise_list;
 mod lesson_state;
 mod lesson_scene;
+mod pointer_hand;
+mod section_view;
 mod lesson_sound;
 mod messages;
 mod transfer_function_editor;

@@ -6,11 +6,11 @@ use super::lesson_state::LessonState;
 use super::settings::Settings;
 use super::snapshot::LessonSnapshot;
 use super::viewport::{EyeWindow, Viewport};
-use super::{periodontal_chart, questions, theme, tools_panel, viewport_input};
+use super::{periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_exercise::catalog::TissueRole;
-use typodont_render::{Changes, Eye, Lamp, Lights, MeshInstance, RenderScene, VolumeInstance};
+use typodont_render::{Changes, Eye, Lamp, Lights, MeshInstance, RenderScene, Viewpoint, VolumeInstance};
 use typodont_scene as scene;
 use typodont_scene::particles::ParticleField;
 
@@ -19,9 +19,6 @@ const BAR_FULL: f32 = 3.3;
 
 /// Force above which a warning is shown, N: the thesis's dentists cut with less.
 const HIGH_FORCE: f32 = 2.0;
-
-/// Distance that a captured pointer may move from the centre of the view, points.
-const CENTRE_TOLERANCE: f32 = 40.0;
 
 /// Formats a time, s, as minutes and seconds.
 pub fn format_time(seconds: f64) -> String {
@@ -151,7 +148,14 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
         let width = rect.width() * (force / BAR_FULL).clamp(0.0, 1.0);
         let fill = if force > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
         painter.rect_filled(Rect::from_min_size(rect.min, egui::vec2(width, rect.height())), 5, fill);
+        if let Some(strength) = lesson.press_strength() {
+            let x = rect.min.x + rect.width() * (strength / BAR_FULL).clamp(0.0, 1.0);
+            painter.vline(x, rect.y_range(), Stroke::new(2.5, theme::ACCENT));
+        }
         ui.monospace(format!("{force:4.1} N"));
+        if let Some(strength) = lesson.press_strength() {
+            ui.weak(words.format("practice.strength", format!("{strength:.1}")));
+        }
         if let Some(key) = warning(lesson, &snapshot) {
             ui.add_space(16.0);
             ui.label(egui::RichText::new(format!("! {}", words.get(key))).strong().color(theme::ERROR));
@@ -163,10 +167,12 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
 fn warning(lesson: &LessonState, snapshot: &LessonSnapshot) -> Option<&'static str> {
     let cuts = lesson.scenario.instruments.get(snapshot.instrument as usize).is_some_and(|i| i.is_bur());
     let is_cutting = cuts && lesson.stage().is_some_and(|stage| stage.cutting);
+    let is_decay_shown = lesson.is_decay_shown();
     match snapshot.touch.and_then(|label| lesson.scenario.tissues.role(label)) {
         Some(TissueRole::Soft) if is_cutting => Some("practice.warn_soft"),
         Some(TissueRole::Neighbour) if is_cutting => Some("practice.warn_neighbour"),
         Some(TissueRole::Vulnerable) if is_cutting => Some("practice.warn_pulp"),
+        Some(TissueRole::Sound) if snapshot.cutting && is_decay_shown => Some("practice.warn_sound"),
         _ if snapshot.spring > HIGH_FORCE => Some("practice.warn_force"),
         _ => None,
     }
@@ -185,13 +191,8 @@ fn view_ui(
     let view = ui.interact(rect, ui.scope_id().with("view"), Sense::click_and_drag());
     view.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, words.get("practice.view")));
     viewport_input::collect_commands(ui, &view, lesson.is_pointer_captured, commands);
-    if lesson.is_pointer_captured {
-        let (is_focused, at) = ui.input(|input| (input.focused, input.pointer.latest_pos()));
-        if !is_focused {
-            commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));
-        } else if at.is_none_or(|at| at.distance(rect.center()) > CENTRE_TOLERANCE) {
-            commands.push(AppCommand::Practice(PracticeCommand::CentrePointer(rect.center())));
-        }
+    if lesson.is_pointer_captured && !ui.input(|input| input.focused) {
+        commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));
     }
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
@@ -201,7 +202,13 @@ fn view_ui(
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, Color32::WHITE);
             if settings.stereo().is_none() {
-                hand_spring(ui, lesson, rect);
+                pointer_ring(ui, lesson, rect);
+            }
+            if let (Some(scene), Some(snapshot)) = (&lesson.scene, &lesson.snapshot)
+                && let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize)
+                && is_section_allowed(lesson)
+            {
+                section_view::section_ui(ui, rect, scene, &lesson.orbit, snapshot, instrument);
             }
         }
         Some(Ok(None)) => {
@@ -223,10 +230,18 @@ fn view_ui(
     if lesson.has_mouse() && lesson.scene.is_some() {
         let key = if lesson.is_pointer_captured { "practice.held" } else { "practice.free" };
         let at = rect.center_bottom() - egui::vec2(0.0, 26.0);
-        let place = Rect::from_center_size(at, egui::vec2((rect.width() - 24.0).clamp(40.0, 440.0), 32.0));
+        let place = Rect::from_center_size(at, egui::vec2((rect.width() - 24.0).clamp(40.0, 620.0), 32.0));
         ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
-        ui.put(place, egui::Label::new(egui::RichText::new(words.get(key)).color(Color32::WHITE)).selectable(false));
+        ui.put(
+            place,
+            egui::Label::new(egui::RichText::new(words.get(key)).size(13.0).color(Color32::WHITE)).selectable(false),
+        );
     }
+}
+
+/// True if the section may show what lies beneath the surface: where decay is hidden, it would give it away.
+fn is_section_allowed(lesson: &LessonState) -> bool {
+    lesson.has_mouse() && lesson.is_pointer_captured && lesson.stage().is_some_and(|stage| stage.show_decay)
 }
 
 /// Draws the lesson's scene; `None` before it is built.
@@ -237,6 +252,7 @@ fn draw_view(
     size: [u32; 2],
 ) -> Result<Option<egui::TextureId>, typodont_render::RenderError> {
     let (viewpoint, mode, snapshot) = (lesson.orbit.viewpoint(), lesson.display_mode, lesson.snapshot);
+    let is_pointer = lesson.has_mouse();
     let Some(lesson_scene) = &mut lesson.scene else { return Ok(None) };
     let changed = lesson_scene.volume.take_dirty();
     let mut solids = lesson_scene.surroundings.clone();
@@ -249,7 +265,17 @@ fn draw_view(
         && let Some(instrument) = lesson_scene.instruments.get(snapshot.instrument as usize)
     {
         let world_from_tip = Pose { position: snapshot.tip, orientation: snapshot.orientation };
-        solids.push(MeshInstance { world_from_solid: world_from_tip, ..instrument.clone() });
+        let index = snapshot.instrument as usize;
+        let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
+        match lesson_scene.contra_angles.get(index).and_then(Option::as_ref).filter(|_| is_pointer) {
+            Some(held) => {
+                solids.push(placed(&held.bur));
+                if !hides_tip(&viewpoint, world_from_tip) {
+                    solids.push(placed(&held.handpiece));
+                }
+            }
+            None => solids.push(placed(instrument)),
+        }
         mirror = lesson
             .scenario
             .instruments
@@ -287,6 +313,13 @@ fn draw_view(
     drawn.map(Some)
 }
 
+/// True if a handpiece over the working end would hide the work: it is seen from above, within 42° of its axis.
+fn hides_tip(viewpoint: &Viewpoint, world_from_tip: Pose) -> bool {
+    const COSINE: f32 = 0.74;
+    let to_eye = (viewpoint.position - world_from_tip.position).normalize_or(Vec3::Y);
+    to_eye.dot(world_from_tip.rotate(Vec3::Z)) > COSINE
+}
+
 /// The window of the right eye; if the system supports only one window, a panel within it.
 fn second_eye_window(ctx: &egui::Context, viewport: &mut Viewport, words: &Translations) {
     let title = words.get("practice.right_eye");
@@ -305,33 +338,39 @@ fn second_eye_window(ctx: &egui::Context, viewport: &mut Viewport, words: &Trans
     });
 }
 
-/// Draws a spring from the instrument to the hand's position, to show the force that a mouse cannot render.
-fn hand_spring(ui: &egui::Ui, lesson: &LessonState, rect: Rect) {
-    /// Distance below which hand and instrument count as being at the same position, mm.
-    const SLACK: f32 = 0.05;
-    let Some(snapshot) = lesson.snapshot else { return };
-    if !lesson.has_mouse() || snapshot.hand.distance(snapshot.tip) < SLACK {
+/// Draws the working end's ring on the surface under the pointer, and the share of the strength with which it presses.
+fn pointer_ring(ui: &egui::Ui, lesson: &LessonState, rect: Rect) {
+    const CORNERS: usize = 32;
+    /// Distance of the gauge from the ring, points.
+    const GAUGE: f32 = 7.0;
+    let (Some(snapshot), Some(spot), Some(strength)) =
+        (lesson.snapshot, lesson.pointer_hand.spot, lesson.press_strength())
+    else {
         return;
-    }
-    let eye = lesson.orbit.viewpoint().eye(rect.width() / rect.height());
-    let [Some(tip), Some(hand)] = [snapshot.tip, snapshot.hand].map(|point| project(&eye, point, rect)) else { return };
-    let colour = if snapshot.spring > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
-    let along = hand - tip;
-    let aside = egui::vec2(-along.y, along.x).normalized() * 5.0;
-    const TURNS: usize = 14;
-    let bend = |i: usize| {
-        let side = if i == 0 || i == TURNS {
-            0.0
-        } else if i.is_multiple_of(2) {
-            1.0
-        } else {
-            -1.0
-        };
-        tip + along * (i as f32 / TURNS as f32) + aside * side
     };
-    let points: Vec<Pos2> = (0..=TURNS).map(bend).collect();
-    ui.painter().add(egui::Shape::line(points, Stroke::new(2.5, colour)));
-    ui.painter().circle(hand, 6.0, Color32::WHITE, Stroke::new(2.5, colour));
+    let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize) else { return };
+    let eye = lesson.orbit.viewpoint().eye(rect.width() / rect.height());
+    let radius = scene::pointing::ring_radius(&instrument.end);
+    let side = spot.normal.any_orthonormal_vector();
+    let corner = |i: usize| {
+        let (sin, cos) = (std::f32::consts::TAU * i as f32 / CORNERS as f32).sin_cos();
+        project(&eye, spot.place + (side * cos + spot.normal.cross(side) * sin) * radius, rect)
+    };
+    let colour = if snapshot.spring > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
+    let ring: Vec<Pos2> = (0..=CORNERS).filter_map(corner).collect();
+    ui.painter().add(egui::Shape::line(ring.clone(), Stroke::new(4.0, Color32::from_black_alpha(90))));
+    ui.painter().add(egui::Shape::line(ring.clone(), Stroke::new(2.0, Color32::WHITE)));
+    let Some(middle) = project(&eye, spot.place, rect) else { return };
+    let share = (snapshot.spring / strength.max(0.1)).clamp(0.0, 1.0);
+    if lesson.pointer_hand.is_pressing && share > 0.02 {
+        let reach = ring.iter().map(|p| p.distance(middle)).fold(8.0, f32::max) + GAUGE;
+        let end = (CORNERS as f32 * share).round() as usize;
+        let at = |i: usize| {
+            let angle = std::f32::consts::TAU * i as f32 / CORNERS as f32 - std::f32::consts::FRAC_PI_2;
+            middle + egui::vec2(angle.cos(), angle.sin()) * reach
+        };
+        ui.painter().add(egui::Shape::line((0..=end).map(at).collect(), Stroke::new(4.0, colour)));
+    }
 }
 
 /// Screen position of a point of the world; `None` behind the camera.

@@ -1,10 +1,12 @@
 //! The pointer over the practice view: it acts as the device, or moves the camera.
 //!
 //! While it is free, its buttons move the camera as in the thesis: left rotates, right zooms, middle shifts. While it
-//! is captured, its movement moves the hand, the wheel moves the hand in depth, and the same buttons with the Ctrl key
-//! still move the camera.
+//! acts as the device, the hand follows the surface under the pointer, the left button presses, the wheel sets the
+//! strength, and the right button rotates the view; with the Ctrl key the buttons and the wheel move the camera as
+//! before.
 
 use super::command::{AppCommand, CameraCommand, PracticeCommand};
+use super::pointer_hand::PointedPlace;
 use eframe::egui::{self, Event, MouseWheelUnit, PointerButton};
 
 /// Rotation by a drag across one point of the screen, rad: half a turn in 300 points.
@@ -73,7 +75,7 @@ fn free_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppComm
     {
         commands.push(camera_command(drag, view.drag_motion(), height));
     }
-    if view.double_clicked() {
+    if view.clicked() {
         commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(true)));
     }
     let steps = wheel(ui);
@@ -82,38 +84,54 @@ fn free_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppComm
     }
 }
 
+/// Share of the pointer's movement that the hand follows while Shift is held.
+const FINE_SHARE: f32 = 0.25;
+
 fn captured_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppCommand>) {
-    let by = motion(ui);
-    let (is_camera, in_depth) = ui.input(|input| (input.modifiers.command, input.modifiers.shift));
-    let drag = ui.input(camera_drag).filter(|_| is_camera);
-    match drag {
-        Some(drag) if by != egui::Vec2::ZERO => commands.push(camera_command(drag, by, view.rect.height().max(1.0))),
-        Some(_) => {}
-        // A touchpad has no wheel: with Shift, its vertical movement is depth.
-        None if in_depth && by.y != 0.0 => {
-            commands.push(AppCommand::Practice(PracticeCommand::MoveHandDepth(-by.y / POINTS_PER_STEP)))
-        }
-        None if by != egui::Vec2::ZERO => {
-            commands.push(AppCommand::Practice(PracticeCommand::MoveHand { right: by.x, down: by.y }))
-        }
-        None => {}
+    view.clone().on_hover_cursor(egui::CursorIcon::Crosshair);
+    let rect = view.rect;
+    let (modifiers, at, is_pressed) =
+        ui.input(|input| (input.modifiers, input.pointer.latest_pos(), input.pointer.primary_down()));
+    let is_on_view = view.contains_pointer() || view.is_pointer_button_down_on();
+    let drag = match (ui.input(camera_drag), modifiers.command) {
+        (drag, true) => drag,
+        (Some(CameraDrag::Zoom), false) => Some(CameraDrag::Orbit),
+        (Some(CameraDrag::Pan), false) => Some(CameraDrag::Pan),
+        (Some(CameraDrag::Orbit) | None, false) => None,
+    };
+    if view.dragged()
+        && let Some(drag) = drag
+        && view.drag_motion() != egui::Vec2::ZERO
+    {
+        commands.push(camera_command(drag, view.drag_motion(), rect.height().max(1.0)));
     }
     let steps = wheel(ui);
-    if steps != 0.0 {
-        commands.push(AppCommand::Practice(PracticeCommand::MoveHandDepth(steps)));
+    if view.hovered() && steps != 0.0 {
+        commands.push(match modifiers.command {
+            true => AppCommand::Camera(CameraCommand::Zoom((-steps * ZOOM_PER_WHEEL_STEP).exp())),
+            false => AppCommand::Practice(PracticeCommand::ChangeStrength(steps)),
+        });
     }
-    for (bit, button) in [PointerButton::Primary, PointerButton::Secondary].into_iter().enumerate() {
-        let (pressed, released) = ui.input(|i| (i.pointer.button_pressed(button), i.pointer.button_released(button)));
-        if (pressed && !is_camera) || released {
-            commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: bit as u32, is_down: pressed }));
-        }
-    }
+    let is_working = is_on_view && drag.is_none();
+    let is_down = is_working && is_pressed && view.is_pointer_button_down_on();
+    commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
+    let place = at.filter(|_| is_working).map(|at| {
+        let share = (fine_position(ui, view.id, at, modifiers.shift) - rect.min) / rect.size();
+        PointedPlace { share: [share.x, share.y], aspect: rect.width() / rect.height().max(1.0) }
+    });
+    commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
 }
 
-/// Movement of the mouse itself, counts; the pointer stops at the window's edges and is moved back to the centre.
-fn motion(ui: &egui::Ui) -> egui::Vec2 {
-    let moved = |event: &Event| if let Event::MouseMoved(by) = event { Some(*by) } else { None };
-    ui.input(|input| input.events.iter().filter_map(moved).fold(egui::Vec2::ZERO, |sum, by| sum + by))
+/// Position at which the hand points: that of the pointer, or, while Shift is held, one that follows it more finely
+/// from where it was.
+fn fine_position(ui: &egui::Ui, view: egui::Id, at: egui::Pos2, is_fine: bool) -> egui::Pos2 {
+    let anchor = view.with("fine");
+    if !is_fine {
+        ui.data_mut(|data| data.remove_temp::<egui::Pos2>(anchor));
+        return at;
+    }
+    let start = ui.data_mut(|data| *data.get_temp_mut_or_insert_with(anchor, || at));
+    start + (at - start) * FINE_SHARE
 }
 
 /// Steps of the wheel since the last frame; forward is positive.

@@ -26,5 +26,5 @@ pub use defaults::{default_entry, default_variant, new_exercise};
 pub use draft::ExerciseDraft;
 pub use edit::{EditError, pointer_at};
 pub use file_io::{FileStamp, Overwrite, SaveError, autosave, read, save};
-pub use picking::{SurfaceLocation, raycast, surface_location};
+pub use picking::{SurfaceLocation, surface_location};
 pub use schema_form::{FieldKind, SchemaField, SchemaForm, SchemaVariant};

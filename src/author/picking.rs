@@ -1,7 +1,6 @@
 //! The conversion of a point selected on the tooth to the position of decay in the scenario.
 
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{ISO, Volume};
 use typodont_exercise::scenario::ToothBounds;
 use typodont_exercise::scenario::file::SurfaceFile;
 
@@ -11,24 +10,6 @@ pub struct SurfaceLocation {
     pub surface: SurfaceFile,
     /// Offset from the centre of the surface along its two directions, mm, rounded to 0.1.
     pub offset: [f32; 2],
-}
-
-/// Returns the first point of matter along a ray and the outward normal there; tooth space, mm. `along` is a unit
-/// vector.
-pub fn raycast(volume: &Volume, from: Vec3, along: Vec3) -> Option<(Vec3, Vec3)> {
-    /// Maximum length of the ray, mm: more than the distance of any viewpoint.
-    const FARTHEST: f32 = 700.0;
-    let step = 0.5 * volume.grid().spacing.min_element();
-    let [low, high] = volume.grid().extent();
-    // The search begins at the point at which the ray enters the grid.
-    let (a, b) = ((low - from) / along, (high - from) / along);
-    let enters = a.min(b).max_element().max(0.0);
-    let leaves = a.max(b).min_element().min(FARTHEST);
-    let steps = ((leaves - enters).max(0.0) / step) as u32;
-    let point = |i: u32| from + along * (enters + i as f32 * step);
-    let hit = (0..steps).map(point).find(|&p| volume.density_at(p) >= ISO)?;
-    let outward = -volume.density_and_gradient_at(hit).1;
-    Some((hit, outward.normalize_or(-along)))
 }
 
 /// Returns the surface of a tooth on which a point lies, determined by the outward normal there, and the position on
@@ -88,7 +69,7 @@ mod tests {
                 (distal * 40.0 + Vec3::Z * (place.crown_high.z - 3.0), -distal, SurfaceFile::D),
             ];
             for (from, along, surface) in rays {
-                let (point, outward) = raycast(&made.volume, from, along).unwrap();
+                let (point, outward) = made.volume.raycast(from, along).unwrap();
                 let spot = surface_location(place, point, outward);
                 assert_eq!(spot.surface, surface, "{fdi}: {outward}");
                 let at = "/scene/jaw/tooth/decay/0";
@@ -102,7 +83,7 @@ mod tests {
                 let lesion = &workpiece(&draft).lesions[0];
                 assert!(lesion.centre.distance(point) < 0.3, "{fdi} {surface:?}: {} for {point}", lesion.centre);
             }
-            assert_eq!(raycast(&made.volume, Vec3::new(30.0, 30.0, 40.0), Vec3::NEG_Z), None);
+            assert_eq!(made.volume.raycast(Vec3::new(30.0, 30.0, 40.0), Vec3::NEG_Z), None);
         }
     }
 }

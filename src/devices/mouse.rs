@@ -1,7 +1,8 @@
-//! A plain mouse as a device: the screen plane and the wheel. It renders no force; the window draws a spring instead.
+//! A pointer (mouse, pen or finger) as a device. It renders no force; instead its hand presses with limited force.
 //!
-//! Takes pointer events of a window, through a [`Mouse`] that any thread may hold. Gives a device whose hand follows
-//! the pointer and, to the window, the position of that hand and the force it would feel. Never reads a mouse itself.
+//! Takes targets from a window, which chooses them on the surface under the pointer, through a [`Mouse`] that any
+//! thread may hold. Gives a device whose hand approaches the target and, to the window, the position of that hand and
+//! the force it would feel. Never reads a mouse itself.
 
 use crate::{Driver, FoundDevice, OpenError};
 use std::sync::Arc;
@@ -11,26 +12,50 @@ use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mailbox::SeqLock;
 use typodont_core::tick::TICK_S;
 
-/// Half the box that the pointer can reach, mm: a tooth with room around it. Beyond 40 one sweep of the screen is too
-/// short.
-const WORKSPACE_HALF: Vec3 = Vec3::new(30.0, 25.0, 20.0);
+/// Half the box that the hand can reach, mm: the teeth of a quadrant with room around them.
+const WORKSPACE_HALF: Vec3 = Vec3::new(60.0, 50.0, 40.0);
 
-/// Hand displacement per pixel, mm. Chosen so that a pixel is smaller than a voxel (0.1–0.2 mm) and a sweep of 600
-/// pixels crosses the workspace.
-const MM_PER_PIXEL: f32 = 0.1;
-
-/// Hand displacement per step of the wheel, mm.
-const MM_PER_STEP: f32 = 0.5;
-
-/// Time constant with which the hand approaches the pointer, s. Windows sample the pointer 60 to 125 times a second;
+/// Time constant with which the hand approaches its target, s. Windows sample the pointer 60 to 125 times a second;
 /// the hand smooths these steps instead of jumping through tissue.
 const FOLLOW_TIME: f32 = 0.02;
 
-/// Maximum speed of the hand, mm/s: that of a fast hand with an instrument.
+/// Maximum speed of the free hand, mm/s: that of a fast hand with an instrument.
 const FOLLOW_SPEED: f32 = 250.0;
 
-/// Positions are stored in µm, as integers, so that any thread may add to them.
+/// Speed of the hand against resistance, mm/s, as long as it meets none of its maximum force; the speed falls in
+/// proportion to the force. On enamel, felt with 1 N/mm, the force rises by at most 8 N/s, on soft caries by 0.7 N/s.
+const PRESS_SPEED: f32 = 8.0;
+
+/// Share of a force above the maximum that the hand gives way to in a tick. Tissue is felt with at most the stiffness of
+/// the device, so that less than 1 never gives way too far.
+const YIELD_SHARE: f32 = 0.5;
+
+/// Time constant of the measured force, s.
+const FORCE_TIME: f32 = 0.002;
+
+/// Force below which the hand is free, N.
+const FREE_FORCE: f32 = 0.02;
+
+/// Time constant with which the handle turns, s.
+const TURN_TIME: f32 = 0.15;
+
+/// Positions are stored in µm and forces in mN, as integers, so that any thread may set them.
 const UM_PER_MM: f32 = 1000.0;
+const MN_PER_N: f32 = 1000.0;
+
+/// Angles are stored in units of 10⁻⁴ rad.
+const ANGLE_UNITS: f32 = 1e4;
+
+/// Target of the hand: set by the window, approached by the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HandTarget {
+    /// World space, mm. Within matter it is never reached: the hand presses on the surface before it.
+    pub place: Vec3,
+    /// Maximum force of the hand against resistance, N. The hand gives way to a larger one.
+    pub max_force: f32,
+    /// Rotation of the upright handle around the vertical axis, rad.
+    pub yaw: f32,
+}
 
 /// A mouse as seen by a window. Clones refer to the same mouse.
 #[derive(Clone, Debug)]
@@ -38,8 +63,11 @@ pub struct Mouse(Arc<MouseState>);
 
 #[derive(Debug)]
 struct MouseState {
-    /// Position of the pointer, world space, µm.
-    pointer: [AtomicI32; 3],
+    /// Place of the target, world space, µm.
+    place: [AtomicI32; 3],
+    /// mN
+    max_force: AtomicU32,
+    yaw: AtomicI32,
     buttons: AtomicU32,
     /// Hand position and force, three floats each. Written only by the device.
     feedback: SeqLock<6>,
@@ -48,22 +76,34 @@ struct MouseState {
 impl Mouse {
     /// Creates a mouse and the device that it moves; the hand starts at the origin.
     pub fn new() -> (Mouse, MouseDevice) {
-        let shared =
-            Arc::new(MouseState { pointer: Default::default(), buttons: AtomicU32::new(0), feedback: SeqLock::new() });
-        let device = MouseDevice { shared: shared.clone(), spec: spec(), hand: Vec3::ZERO };
+        let shared = Arc::new(MouseState {
+            place: Default::default(),
+            max_force: AtomicU32::new(0),
+            yaw: AtomicI32::new(0),
+            buttons: AtomicU32::new(0),
+            feedback: SeqLock::new(),
+        });
+        let device = MouseDevice {
+            shared: shared.clone(),
+            spec: spec(),
+            hand: Vec3::ZERO,
+            orientation: UPRIGHT,
+            felt_force: Vec3::ZERO,
+        };
         (Mouse(shared), device)
     }
 
-    /// Moves the pointer by pixels to the right and down, as windows count them. `world_from_view` is the orientation
-    /// of the view under the pointer (right, up, toward the eye) in the world.
-    pub fn move_by_pixels(&self, right_px: f32, down_px: f32, world_from_view: Quat) {
-        self.move_by(world_from_view * Vec3::new(nan_to_zero(right_px), -nan_to_zero(down_px), 0.0) * MM_PER_PIXEL);
-    }
-
-    /// Moves the pointer by steps of the wheel. Forward, away from the user, is positive and moves the hand into the
-    /// picture.
-    pub fn move_by_wheel(&self, steps: f32, world_from_view: Quat) {
-        self.move_by(world_from_view * Vec3::new(0.0, 0.0, -nan_to_zero(steps)) * MM_PER_STEP);
+    /// Sets the target of the hand, within the workspace. A value that is not finite leaves the target unchanged.
+    pub fn aim(&self, target: HandTarget) {
+        let HandTarget { place, max_force, yaw } = target;
+        if !(place.is_finite() && max_force.is_finite() && yaw.is_finite()) {
+            return;
+        }
+        for ((at, mm), half) in self.0.place.iter().zip(place.to_array()).zip(WORKSPACE_HALF.to_array()) {
+            at.store((mm.clamp(-half, half) * UM_PER_MM).round() as i32, Ordering::Relaxed);
+        }
+        self.0.max_force.store((max_force.clamp(0.0, spec().max_force) * MN_PER_N).round() as u32, Ordering::Relaxed);
+        self.0.yaw.store((yaw * ANGLE_UNITS).round() as i32, Ordering::Relaxed);
     }
 
     /// Presses or releases a button; bit 0 is the main one. There are 32.
@@ -75,12 +115,10 @@ impl Mouse {
         };
     }
 
-    /// Releases all buttons and moves the pointer to `place` (world space, mm). At the position of the working end
+    /// Releases all buttons and aims at `place` (world space, mm) without force. At the position of the working end
     /// this ends all contact force.
     pub fn release_at(&self, place: Vec3) {
-        for ((at, mm), half) in self.0.pointer.iter().zip(place.to_array()).zip(WORKSPACE_HALF.to_array()) {
-            at.store((mm.clamp(-half, half) * UM_PER_MM).round() as i32, Ordering::Relaxed);
-        }
+        self.aim(HandTarget { place, max_force: 0.0, ..self.0.target() });
         self.0.buttons.store(0, Ordering::Relaxed);
     }
 
@@ -90,29 +128,54 @@ impl Mouse {
         let [a, b, c, d, e, f] = self.0.feedback.read()?.1.map(f32::from_bits);
         Some((Vec3::new(a, b, c), Vec3::new(d, e, f)))
     }
+}
 
-    /// Moves the pointer within the workspace, so that it responds at once when it turns back from the border.
-    fn move_by(&self, by: Vec3) {
-        for ((at, by), half) in self.0.pointer.iter().zip(by.to_array()).zip(WORKSPACE_HALF.to_array()) {
-            let (by_um, half_um) = ((by * UM_PER_MM).round() as i32, (half * UM_PER_MM) as i32);
-            let moved = |um: i32| Some(um.saturating_add(by_um).clamp(-half_um, half_um));
-            // Always `Ok`: the closure never returns `None`.
-            let _ = at.fetch_update(Ordering::Relaxed, Ordering::Relaxed, moved);
+impl MouseState {
+    fn target(&self) -> HandTarget {
+        let place = [0, 1, 2].map(|i| self.place[i].load(Ordering::Relaxed) as f32 / UM_PER_MM);
+        HandTarget {
+            place: Vec3::from_array(place),
+            max_force: self.max_force.load(Ordering::Relaxed) as f32 / MN_PER_N,
+            yaw: self.yaw.load(Ordering::Relaxed) as f32 / ANGLE_UNITS,
         }
     }
 }
 
-/// Replaces NaN by zero, since NaN in one direction would spread to the others.
-fn nan_to_zero(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value }
-}
-
 /// Device whose hand follows a [`Mouse`].
+///
+/// Free, the hand goes straight to its target. Against resistance it presses like a light hand: the force rises slowly
+/// to the maximum that the target allows, and the hand gives way to more, so that it slides along a surface.
 #[derive(Debug)]
 pub struct MouseDevice {
     shared: Arc<MouseState>,
     spec: DeviceSpec,
     hand: Vec3,
+    orientation: Quat,
+    /// Smoothed force on the hand, N.
+    felt_force: Vec3,
+}
+
+impl MouseDevice {
+    /// Returns the displacement of the hand in one tick, mm.
+    fn displacement(&self, target: &HandTarget) -> Vec3 {
+        const TICK: f32 = TICK_S as f32;
+        /// Keeps the share of the maximum force finite, N.
+        const LEAST_FORCE: f32 = 0.01;
+        let toward = target.place - self.hand;
+        let free = (toward * (TICK / FOLLOW_TIME)).clamp_length_max(FOLLOW_SPEED * TICK);
+        let load = self.felt_force.length();
+        if load < FREE_FORCE {
+            return free;
+        }
+        let out = self.felt_force / load;
+        let inward = (-free.dot(out)).max(0.0);
+        let unused = target.max_force.max(LEAST_FORCE) - load;
+        let advance = match unused > 0.0 {
+            true => inward.min(PRESS_SPEED * TICK) * unused / (unused + load),
+            false => (YIELD_SHARE * unused / self.spec.max_stiffness).max(-FOLLOW_SPEED * TICK),
+        };
+        free + out * (inward - advance)
+    }
 }
 
 impl Device for MouseDevice {
@@ -125,14 +188,16 @@ impl Device for MouseDevice {
     }
 
     fn exchange(&mut self, output: &Wrench) -> Result<Reading, DeviceError> {
-        let pointer = Vec3::from_array([0, 1, 2].map(|i| self.shared.pointer[i].load(Ordering::Relaxed) as f32));
-        let toward = pointer / UM_PER_MM - self.hand;
-        let step = toward * (TICK_S as f32 / FOLLOW_TIME);
-        self.hand += step.clamp_length_max(FOLLOW_SPEED * TICK_S as f32);
+        const TICK: f32 = TICK_S as f32;
+        let target = self.shared.target();
+        self.felt_force += (output.force - self.felt_force) * (TICK / FORCE_TIME);
+        self.hand += self.displacement(&target);
+        let upright = Quat::from_rotation_y(target.yaw) * UPRIGHT;
+        self.orientation = self.orientation.slerp(upright, TICK / TURN_TIME).normalize();
         let [a, b, c] = self.hand.to_array().map(f32::to_bits);
         let [d, e, f] = output.force.to_array().map(f32::to_bits);
         self.shared.feedback.write([a, b, c, d, e, f]);
-        let pose = Pose { position: self.hand, orientation: UPRIGHT };
+        let pose = Pose { position: self.hand, orientation: self.orientation };
         Ok(Reading { pose, buttons: self.shared.buttons.load(Ordering::Relaxed) })
     }
 }
@@ -158,7 +223,7 @@ impl Driver for MouseDriver {
     }
 
     fn description(&self) -> &'static str {
-        "a plain mouse: screen plane and wheel, no force; only in the desktop program's window"
+        "a mouse, pen or touch screen: points at the surface, no force; only in the desktop program's window"
     }
 
     fn discover(&self) -> Result<Vec<FoundDevice>, OpenError> {

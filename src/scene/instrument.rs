@@ -32,6 +32,41 @@ pub fn procedural_instrument(entry: &InstrumentEntry) -> MeshInstance {
     }
 }
 
+/// A bur in a contra-angle handpiece, in two parts: the bur with its shank, and the handpiece.
+pub struct ContraAngle {
+    pub bur: MeshInstance,
+    pub handpiece: MeshInstance,
+}
+
+/// Direction of a contra-angle's handle from its head: toward the operator, who sits in front of the picture and is
+/// right-handed, and upward by 20°. Handle space; unit vector.
+const HANDLE_DIRECTION: Vec3 = Vec3::new(0.423, -0.840, 0.342);
+
+/// Returns a bur in a contra-angle handpiece, as a pointer holds it; `None` for other instruments and for those with a
+/// mesh of their own.
+pub fn contra_angle(entry: &InstrumentEntry) -> Option<ContraAngle> {
+    /// Head: radius, and height over its lower rim, mm.
+    const HEAD_RADIUS: f32 = 4.4;
+    const HEAD_HEIGHT: f32 = 12.5;
+    let profile = bur_profile(&entry.end);
+    if !entry.is_bur() || entry.mesh.is_some() || profile.is_empty() {
+        return None;
+    }
+    let plain = |mesh: Mesh| MeshInstance::plain(Arc::new(mesh), Pose::IDENTITY, STEEL);
+    let head = head_height(&entry.end);
+    let bur = revolve(&[&profile[..], &shank(&profile)].concat());
+    let rims = [[0.0, 0.0], [3.2, 0.0], [HEAD_RADIUS, 1.2], [HEAD_RADIUS, HEAD_HEIGHT - 2.0]];
+    let cap = [[HEAD_RADIUS - 1.6, HEAD_HEIGHT - 0.4], [2.4, HEAD_HEIGHT], [0.0, HEAD_HEIGHT]];
+    let mut mesh = transformed(revolve(&[&rims[..], &cap].concat()), Pose::at(Vec3::Z * head));
+    // Neck and handle: distance along the handle from the middle of the head, and radius there.
+    const STATIONS: [[f32; 2]; 7] =
+        [[0.0, 3.4], [7.0, 3.3], [20.0, 3.9], [26.0, 5.6], [40.0, 6.6], [95.0, 7.4], [110.0, 6.2]];
+    let middle = Vec3::Z * (head + 0.5 * HEAD_HEIGHT);
+    let ring = |[along, radius]: [f32; 2]| (middle + HANDLE_DIRECTION * along, HANDLE_DIRECTION, radius);
+    mesh.append(tube(&STATIONS.map(ring)));
+    Some(ContraAngle { bur: plain(bur), handpiece: plain(mesh) })
+}
+
 /// A periodontal probe with its marks and bands, so that a depth can be read; the middle of its end at the origin.
 fn probe_solid(probe: &ProbeEntry) -> MeshInstance {
     /// A line is so broad, mm, and paint so dark.
@@ -203,11 +238,15 @@ fn end_mesh(end: &WorkingEndEntry) -> Mesh {
         _ => {}
     }
     let tip = bur_profile(end);
-    let [radius, top] = tip.last().copied().unwrap_or_default();
-    // Neck, friction grip shank (ISO 1797: 1.6 mm) and the handpiece's head.
-    let behind = [[0.8 * radius, top + 0.2], [0.8, top + 3.0], [0.8, top + NECK], [4.5, top + NECK], [5.2, top + 12.0]];
-    let head = [[5.2, top + 22.0], [0.0, top + 22.0]];
-    revolve(&[&tip[..], &behind, &head].concat())
+    let [_, top] = tip.last().copied().unwrap_or_default();
+    let head = [[4.5, top + NECK], [5.2, top + 12.0], [5.2, top + 22.0], [0.0, top + 22.0]];
+    revolve(&[&tip[..], &shank(&tip), &head].concat())
+}
+
+/// Neck and friction grip shank (ISO 1797: 1.6 mm) behind a bur's outline, up to the handpiece's head.
+fn shank(profile: &[[f32; 2]]) -> [[f32; 2]; 3] {
+    let [radius, top] = profile.last().copied().unwrap_or_default();
+    [[0.8 * radius, top + 0.2], [0.8, top + 3.0], [0.8, top + NECK]]
 }
 
 /// A bur's outline: radius and height, from the tip upward, mm. None for what does not turn.
@@ -298,6 +337,18 @@ mod tests {
         let (broken, complaint) = instrument_solid(&entry, &library);
         assert_eq!(broken.mesh, plain.mesh);
         assert!(complaint.unwrap().headline().contains("bur.obj"));
+    }
+
+    #[test]
+    fn a_contra_angle_leads_to_the_operator_and_leaves_the_bur_free() {
+        // Aim: handle and head are away from the work. Method: handle space of an upright handpiece has the operator at -y.
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        assert!(contra_angle(table.by_id("explorer").unwrap()).is_none());
+        let held = contra_angle(table.by_id("round_bur_014").unwrap()).unwrap();
+        let lowest = held.handpiece.mesh.positions.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
+        let end = held.handpiece.mesh.positions.iter().copied().min_by(|a, b| a.y.total_cmp(&b.y)).unwrap();
+        assert!(lowest > 8.0 && end.y < -80.0 && end.z > 30.0, "{lowest} {end}");
+        assert!(held.bur.mesh.positions.iter().all(|p| p.truncate().length() < 1.0 && p.z < lowest + 0.1));
     }
 
     #[test]

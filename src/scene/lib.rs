@@ -24,9 +24,10 @@ pub mod particles;
 mod instrument;
 mod jaw;
 mod palette;
+pub mod pointing;
 mod views;
 
-pub use instrument::{instrument_solid, mirror_face, procedural_instrument};
+pub use instrument::{ContraAngle, contra_angle, instrument_solid, mirror_face, procedural_instrument};
 pub use jaw::{Jaw, Mouth, StandaloneJaw, WORKING_OPENING_DEG};
 pub use palette::tissue_palette;
 pub use surroundings::surrounding_solids;

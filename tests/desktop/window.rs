@@ -33,12 +33,11 @@ use typodont_render::Orbit;
 /// Maximum distance of one mouse movement, pixels.
 const STRETCH: f32 = 120.0;
 
-/// Movement of the hand for one pixel and for one step of the wheel, mm: see `device::mouse`.
-const MM_PER_PIXEL: f32 = 0.1;
-const MM_PER_STEP: f32 = 0.5;
+/// Pixels of the view to a millimetre, at least: the pointer then approaches a place without passing it.
+const PIXELS_PER_MM: f32 = 8.0;
 
-/// Distance at which the hand counts as arrived, mm: slightly more than one step of the wheel.
-const NEAR: f32 = 0.6;
+/// Distance across the line of sight at which the hand counts as arrived, mm.
+const NEAR: f32 = 0.4;
 
 /// Actions of a trainee at the window.
 impl Desk {
@@ -66,39 +65,34 @@ impl Desk {
         orbit.world_from_view()
     }
 
-    /// Moves the mouse and turns its wheel until the hand is at a place of world space, as one does: by looking.
-    fn reach(&mut self, goal: Vec3) {
+    /// Moves the mouse until the hand is over or under a place of world space, as one sees it in the picture.
+    fn point_at(&mut self, goal: Vec3) {
         let begun = Instant::now();
         loop {
             let hand = self.hand();
-            let away = goal - hand;
-            if away.length() < NEAR {
+            let away = self.world_from_view().inverse() * (goal - hand);
+            if away.truncate().length() < NEAR {
                 return;
             }
             assert!(begun.elapsed() < PATIENCE, "the hand stays at {hand}, away from {goal}");
-            let away = self.world_from_view().inverse() * away;
-            // Half of the way at a time: whoever looks gets there whatever the display makes of a pixel.
-            let pixels = [away.x, -away.y].map(|mm| (0.5 * mm / MM_PER_PIXEL).clamp(-STRETCH, STRETCH).round());
-            if pixels != [0.0; 2] {
-                let [right, down] = pixels.map(|px| px.to_string());
-                self.display.xdotool(&["mousemove_relative", "--", &right, &down]);
-            }
-            // The wheel forward takes the hand into the screen.
-            // A display that emulates a wheel tells of each step twice: half of them, and less than one is none.
-            let steps = (-0.5 * away.z / MM_PER_STEP).round();
-            if steps != 0.0 {
-                let button = if steps > 0.0 { "4" } else { "5" };
-                self.display.xdotool(&[
-                    "click",
-                    "--repeat",
-                    &steps.abs().min(10.0).to_string(),
-                    "--delay",
-                    "5",
-                    button,
-                ]);
-            }
+            let pixels = [away.x, -away.y].map(|mm| (mm * PIXELS_PER_MM).clamp(-STRETCH, STRETCH).round());
+            let [right, down] = pixels.map(|px| px.to_string());
+            self.display.xdotool(&["mousemove_relative", "--", &right, &down]);
             self.settle(hand);
         }
+    }
+
+    /// Presses the instrument around a place, a little farther round each time, until something is true.
+    fn press_around(&mut self, place: Vec3, mut is_done: impl FnMut(&Desk, usize) -> bool) -> bool {
+        (0..40).any(|round| {
+            let (sin, cos) = (0.8 * round as f32).sin_cos();
+            self.point_at(place + Vec3::new(cos, 0.0, sin) * 0.6);
+            self.display.xdotool(&["mousedown", "1"]);
+            std::thread::sleep(Duration::from_millis(1500));
+            let is_enough = is_done(self, round);
+            self.display.xdotool(&["mouseup", "1"]);
+            is_enough
+        })
     }
 
     /// Until the hand that was somewhere has moved and come to rest, or does not move at all.
@@ -150,21 +144,14 @@ fn a_trainee_grinds_with_the_mouse_and_leaves_a_bundle_that_holds() {
     desk.press("o", "pointer", "held");
 
     let lesion = lesion_in_world("scenarios/5-grinding.json", seed);
-    desk.reach(lesion + Vec3::Y * 5.0);
+    desk.point_at(lesion);
     desk.picture("5-practice");
-    let mut cleared = 0.0;
-    for round in 0..40 {
-        // Into the decay, a little farther round each time.
-        let angle = round as f32 * 0.8;
-        let aside = Vec3::new(angle.cos(), 0.0, angle.sin()) * 0.6;
-        desk.reach(lesion + aside - Vec3::Y * 1.2);
-        cleared = desk.latest("cleared").unwrap().parse().unwrap();
-        if cleared >= 10.0 {
-            break;
-        }
-    }
+    let is_cleared = desk.press_around(lesion, |desk, _| {
+        let cleared: f32 = desk.latest("cleared").unwrap().parse().unwrap();
+        cleared >= 10.0
+    });
     desk.picture("6-cutting");
-    assert!(cleared >= 10.0, "{cleared} % of the decay is gone");
+    assert!(is_cleared, "{:?} % of the decay is gone", desk.latest("cleared"));
     desk.press("Escape", "pointer", "free");
     desk.press("v", "shown", "Iso");
     desk.press("v", "shown", "Tissue");
@@ -206,23 +193,18 @@ fn dust_flies_water_sprays_and_both_stand_still_with_the_lesson() {
     desk.until("water", |drops| count(drops) > 10);
     desk.press("o", "pointer", "held");
     let lesion = lesion_in_world(exercise, 1);
-    desk.reach(lesion + Vec3::Y * 3.0);
+    desk.point_at(lesion);
     desk.picture("10-spray");
     // Water soon takes it along again.
     let has_flown = |desk: &Desk| {
         let state_log = fs::read_to_string(&desk.state_log).unwrap();
         state_log.lines().filter_map(|line| line.strip_prefix("dust ")).any(|chips| count(chips) > 5)
     };
-    for round in 0..40 {
-        let angle = round as f32 * 0.8;
-        let aside = Vec3::new(angle.cos(), 0.0, angle.sin()) * 0.6;
-        desk.reach(lesion + aside - Vec3::Y * 1.2);
+    let flies = desk.press_around(lesion, |desk, round| {
         desk.picture(&format!("11-dust-{round}"));
-        if has_flown(&desk) {
-            break;
-        }
-    }
-    assert!(has_flown(&desk), "no dust: {:?} % of the decay is gone", desk.latest("cleared"));
+        has_flown(desk)
+    });
+    assert!(flies, "no dust: {:?} % of the decay is gone", desk.latest("cleared"));
     desk.press("p", "paused", "true");
     let still = |desk: &Desk| ["dust", "water"].map(|topic| desk.latest(topic).unwrap());
     std::thread::sleep(Duration::from_secs(1));
@@ -336,7 +318,7 @@ fn what_the_window_does_is_heard_at_a_real_server() {
     desk.until("hand", |_| true);
     desk.press("o", "pointer", "held");
     let lesion = lesion_in_world("scenarios/5-grinding.json", 1);
-    desk.reach(lesion + Vec3::Y * 6.0);
+    desk.point_at(lesion);
     let mut recorder = Recorder::start(&ears);
     const WHILE: usize = hearing::RATE as usize / 4;
     let heard = |recorder: &mut Recorder| Spectrum::of(&recorder.take(0.25));
@@ -352,12 +334,10 @@ fn what_the_window_does_is_heard_at_a_real_server() {
     let grinds = |heard: &Spectrum| {
         heard.peak(2500.0, 5500.0) < 0.95 * free.peak(3000.0, 5500.0) && hiss(heard) > 1.3 * hiss(&free)
     };
-    // The sound is analysed along the whole path, and each path goes deeper: at its end the bur has cut itself free.
-    let is_ground = (0..40).map(|round| round as f32).any(|round| {
-        let (sin, cos) = (0.8 * round).sin_cos();
+    let is_ground = desk.press_around(lesion, |_, _| {
         recorder.catch_up();
-        desk.reach(lesion + Vec3::new(0.6 * cos, -1.2 - 0.1 * round, 0.6 * sin));
-        recorder.rest().chunks_exact(WHILE).any(|part| grinds(&Spectrum::of(part)))
+        let heard = recorder.take(1.0);
+        heard.chunks_exact(WHILE).any(|part| grinds(&Spectrum::of(part)))
     });
     assert!(is_ground, "nobody hears that the handpiece grinds");
     desk.press("Escape", "pointer", "free");

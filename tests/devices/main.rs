@@ -12,6 +12,7 @@ mod mouse;
 mod native;
 mod open_handle;
 mod pipe;
+mod pointer_policy;
 mod polhem;
 mod rig;
 mod servo;

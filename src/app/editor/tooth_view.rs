@@ -11,7 +11,6 @@ use super::slice_views::slices_ui;
 use super::ui_anchors::anchor;
 use super::{EditorCommand, decay};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense};
-use typodont_author::raycast;
 use typodont_core::frame::Vec3;
 use typodont_render::{Changes, Eye, Lamp, Lights, RenderScene, VolumeInstance};
 
@@ -178,5 +177,5 @@ fn pick(editor: &EditorState, eye: &Eye, rect: Rect, at: Pos2) -> Option<(Vec3, 
     let tooth_from_world = build.workpiece.world_from_tooth.inverse();
     let from = tooth_from_world * eye.position;
     let along = tooth_from_world.rotate(eye.ray(share.x, share.y)).try_normalize()?;
-    raycast(&build.workpiece.volume, from, along)
+    build.workpiece.volume.raycast(from, along)
 }

@@ -1,0 +1,124 @@
+//! The hand of a trainee who works with a mouse, a pen or a finger: where it points, and how hard it presses.
+
+use super::lesson_scene::LessonScene;
+use super::snapshot::LessonSnapshot;
+use typodont_core::device::UPRIGHT;
+use typodont_core::frame::{Quat, Vec3};
+use typodont_devices::mouse::{HandTarget, Mouse};
+use typodont_exercise::catalog::InstrumentEntry;
+use typodont_render::{Eye, Orbit};
+use typodont_scene::particles::CollisionWorld;
+use typodont_scene::pointing::{HandAction, REST_FORCE, SurfaceSpot, hand_at_spot, spot_under_ray};
+
+/// Range of the strength of a press, N: from a probe in a pocket to the maximum force of the device.
+const STRENGTH_RANGE: [f32; 2] = [0.1, 3.3];
+
+/// Change of the strength by one step of the wheel, N.
+const STRENGTH_STEP: f32 = 0.1;
+
+/// Strength of a bur at the start, N: it cuts caries; in exercises whose tissues have a cutting force, not sound tissue.
+const BUR_STRENGTH: f32 = 1.2;
+
+/// Strength of any other instrument at the start, N: that of probing (0.25 N, World Health Organization) for probes, and
+/// of an explorer that feels for soft tissue.
+const PROBE_STRENGTH: f32 = 0.25;
+const EXPLORER_STRENGTH: f32 = 0.5;
+
+/// Point of the view under the pointer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointedPlace {
+    /// Shares of the view's width and height, from its upper left corner.
+    pub share: [f32; 2],
+    /// Width of the view divided by its height.
+    pub aspect: f32,
+}
+
+/// State of the pointer's hand.
+#[derive(Clone, Debug, Default)]
+pub struct PointerHand {
+    pub is_pressing: bool,
+    /// Surface under the pointer.
+    pub spot: Option<SurfaceSpot>,
+    /// Maximum force of a press, N, by instrument, where the trainee has changed it.
+    strengths: Vec<Option<f32>>,
+}
+
+impl PointerHand {
+    /// Maximum force of a press with an instrument, N.
+    pub fn strength(&self, index: usize, instrument: &InstrumentEntry) -> f32 {
+        self.strengths.get(index).copied().flatten().unwrap_or_else(|| first_strength(instrument))
+    }
+
+    /// Changes the strength by steps of the wheel; forward is stronger.
+    pub fn change_strength(&mut self, steps: f32, index: usize, instrument: &InstrumentEntry) {
+        let strength = self.strength(index, instrument) + STRENGTH_STEP * steps;
+        let [least, most] = STRENGTH_RANGE;
+        if self.strengths.len() <= index {
+            self.strengths.resize(index + 1, None);
+        }
+        self.strengths[index] = Some(((strength * 10.0).round() / 10.0).clamp(least, most));
+    }
+
+    /// Aims the hand at the surface under the pointer. `None`: the pointer is outside the view, and the hand stays where
+    /// it is, without force.
+    pub fn point_at(
+        &mut self,
+        place: Option<PointedPlace>,
+        mouse: &Mouse,
+        orbit: &Orbit,
+        scene: &LessonScene,
+        snapshot: &LessonSnapshot,
+        instrument: &InstrumentEntry,
+    ) {
+        let Some(place) = place else {
+            self.spot = None;
+            return mouse.release_at(snapshot.tip);
+        };
+        let eye = orbit.viewpoint().eye(place.aspect);
+        let along = eye.ray(place.share[0], place.share[1]).normalize_or(eye.forward);
+        let world = CollisionWorld {
+            volume: &scene.volume,
+            world_from_tooth: scene.workpiece.world_from_tooth,
+            obstacles: &scene.workpiece.surroundings,
+        };
+        self.spot = spot_under_ray(&world, eye.position, along);
+        let yaw = handle_yaw(orbit);
+        let (place, max_force) = match self.spot {
+            Some(spot) => {
+                let action = match self.is_pressing {
+                    true => HandAction::Press { max_force: self.strength(snapshot.instrument as usize, instrument) },
+                    false => HandAction::Rest,
+                };
+                let world_from_handle = Quat::from_rotation_y(yaw) * UPRIGHT;
+                let hand = hand_at_spot(&spot, snapshot.tip, instrument, world_from_handle, action);
+                (hand.place, hand.max_force)
+            }
+            None => (beside_the_tooth(&eye, along, snapshot.tip), REST_FORCE),
+        };
+        mouse.aim(HandTarget { place, max_force, yaw });
+    }
+}
+
+fn first_strength(instrument: &InstrumentEntry) -> f32 {
+    use typodont_exercise::catalog::WorkingEndEntry;
+    match &instrument.end {
+        _ if instrument.cuts => BUR_STRENGTH,
+        WorkingEndEntry::Probe(_) => PROBE_STRENGTH,
+        WorkingEndEntry::Point | WorkingEndEntry::Bent(_) => EXPLORER_STRENGTH,
+        _ => BUR_STRENGTH,
+    }
+}
+
+/// Rotation of the handle around the vertical axis, rad: it turns with the view, so that a handpiece leads to the
+/// operator's side.
+fn handle_yaw(orbit: &Orbit) -> f32 {
+    orbit.azimuth
+}
+
+/// Point on a ray beside everything, as far away as the working end.
+fn beside_the_tooth(eye: &Eye, along: Vec3, tip: Vec3) -> Vec3 {
+    /// mm; a hand behind the eye would be of no use.
+    const NEAREST: f32 = 5.0;
+    let depth = (tip - eye.position).dot(eye.forward).max(NEAREST);
+    eye.position + along * (depth / along.dot(eye.forward).max(1e-3))
+}
