@@ -4,7 +4,7 @@ use super::{CliError, print_line};
 use clap::Args;
 use std::path::PathBuf;
 use typodont_report::Templates;
-use typodont_report::bundle::{self, VerificationStatus};
+use typodont_report::bundle::{self, VerificationOutcome};
 
 #[derive(Args)]
 #[command(after_help = "\
@@ -29,10 +29,10 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     for line in verification.complaints.iter().chain(&verification.remarks) {
         eprintln!("{shown}: {line}");
     }
-    match verification.status() {
-        VerificationStatus::Verified => print_line(format!("{shown}: verified")),
-        VerificationStatus::Differs => Err(CliError::AlreadyReported),
-        VerificationStatus::PartlyVerified => {
+    match verification.outcome() {
+        VerificationOutcome::Verified => print_line(format!("{shown}: verified")),
+        VerificationOutcome::Differs => Err(CliError::AlreadyReported),
+        VerificationOutcome::PartlyVerified => {
             let unjudged = verification.unverified.join("; ");
             print_line(format!("{shown}: holds, but this was not judged: {unjudged}"))?;
             Err(CliError::PartlyVerified)

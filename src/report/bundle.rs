@@ -261,7 +261,7 @@ pub struct Verification {
 
 /// Answer of a [`Verification`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum VerificationStatus {
+pub enum VerificationOutcome {
     /// Everything was judged and follows from the recording.
     Verified,
     /// Everything that could be judged follows from the recording.
@@ -271,11 +271,11 @@ pub enum VerificationStatus {
 }
 
 impl Verification {
-    pub fn status(&self) -> VerificationStatus {
+    pub fn outcome(&self) -> VerificationOutcome {
         match (self.complaints.is_empty(), self.unverified.is_empty()) {
-            (false, _) => VerificationStatus::Differs,
-            (true, false) => VerificationStatus::PartlyVerified,
-            (true, true) => VerificationStatus::Verified,
+            (false, _) => VerificationOutcome::Differs,
+            (true, false) => VerificationOutcome::PartlyVerified,
+            (true, true) => VerificationOutcome::Verified,
         }
     }
 }

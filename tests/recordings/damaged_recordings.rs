@@ -199,7 +199,7 @@ fn check_damaged(count: usize, seed: u64) {
                 let is_told = recording.loss.is_some() || (kind == 3 && kept == ticks);
                 assert!(is_told, "kind {kind}, byte {place}: the damage is not named");
                 // A replay compares every force and every digest that was kept.
-                if n % 20 < 4 {
+                if n % 100 < 8 {
                     let again = replay(&recording, recording.workpiece().unwrap(), ReplayCheck::Full, |_, _, _, _| ());
                     assert_eq!(again.difference, None, "kind {kind}, byte {place}");
                     replayed += 1;
@@ -208,7 +208,7 @@ fn check_damaged(count: usize, seed: u64) {
         }
     }
     println!("{count} damaged recordings: {refused} without an intact tick, {replayed} replayed without a difference");
-    assert!(refused < count / 5 && replayed > count / 10);
+    assert!(refused < count / 5 && replayed > count / 20);
 }
 
 #[test]

@@ -104,7 +104,7 @@ fn kill_after(tick: u64, folder: &Path) -> u64 {
     let started = Instant::now();
     while ticks_reported(folder) < tick {
         assert!(child.try_wait().unwrap().is_none(), "the session ended by itself");
-        assert!(started.elapsed() < Duration::from_secs(120), "the session makes no progress");
+        assert!(started.elapsed() < Duration::from_secs(600), "the session makes no progress");
         std::thread::sleep(Duration::from_millis(1));
     }
     child.kill().unwrap();
