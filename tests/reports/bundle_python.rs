@@ -8,7 +8,7 @@ use crate::support::folder;
 use bundle::*;
 use folder::folder;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Output};
 
 /// External program that a test needs; without it the test prints SKIPPED.
 fn needed(name: &str) -> Option<PathBuf> {
@@ -63,13 +63,46 @@ fn coarse(name: &str) -> String {
     file.to_str().unwrap().to_string()
 }
 
-/// Derives the facts of all sentences of some bundles again; prints how many there were.
-fn check_sentences(bundles: &[PathBuf]) {
-    let Some(python) = needed("TYPODONT_PYTHON") else { return };
+/// Derives the facts of all sentences of some bundles again; `None` without Python.
+fn derive_sentences(bundles: &[PathBuf]) -> Option<Output> {
+    let python = needed("TYPODONT_PYTHON")?;
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/check_feedback.py");
-    let output = Command::new(&python).arg(script).args(bundles).output().unwrap();
+    Some(Command::new(&python).arg(script).args(bundles).output().unwrap())
+}
+
+/// Asserts that all facts follow from the recordings, and prints how many there were.
+fn check_sentences(bundles: &[PathBuf]) {
+    let Some(output) = derive_sentences(bundles) else { return };
     println!("{}", told(&output).lines().last().unwrap_or_default());
     assert!(output.status.success(), "{}{}", told(&output), complained(&output));
+}
+
+#[test]
+fn a_wrong_fact_in_the_feedback_is_found() {
+    // Aim: the test below can fail. Method: one value of the evidence is changed at a time.
+    let bundle = run(&coarse("5-grinding"), "hasty", &folder("wrong_sentences"), &[]);
+    let file = bundle.join("session.json");
+    let original = session(&bundle);
+    let episodes = original["episodes"].as_array().unwrap();
+    let first = |kind: &str| episodes.iter().position(|e| e["kind"] == kind).unwrap();
+    let (cut, press) = (first("overcut"), first("force"));
+    let changes: [(String, serde_json::Value); 7] = [
+        (format!("/episodes/{cut}/tissue"), "pulp".into()),
+        (format!("/episodes/{cut}/wall"), "none".into()),
+        (format!("/episodes/{cut}/at_s"), 0.001.into()),
+        (format!("/episodes/{press}/tissue"), "neighbour".into()),
+        (format!("/episodes/{press}/force_n"), 9.0.into()),
+        ("/evidence/overcut_depth_max_mm/wall".into(), "none".into()),
+        ("/evidence/overcut_depth_max_mm/force_n".into(), 9.0.into()),
+    ];
+    for (path, value) in changes {
+        let mut changed = original.clone();
+        *changed.pointer_mut(&path).unwrap() = value;
+        std::fs::write(&file, changed.to_string()).unwrap();
+        let Some(output) = derive_sentences(std::slice::from_ref(&bundle)) else { return };
+        assert_eq!(output.status.code(), Some(1), "{path}: {}{}", told(&output), complained(&output));
+        assert!(complained(&output).is_empty(), "{path}: {}", complained(&output));
+    }
 }
 
 #[test]
