@@ -52,7 +52,7 @@ function fell(voxel) {
 
   const file = path.resolve(bundle, 'report.html');
   const began = Date.now();
-  await page.goto(`file://${file}`);
+  await page.goto(`file://${file}`, { timeout: 120000 });
   await page.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
   const shown_ms = Date.now() - began;
   const settled = async change => {
