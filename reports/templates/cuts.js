@@ -1,7 +1,11 @@
 // Sections through the tooth, drawn voxel by voxel on a 2D canvas, without WebGL.
 
-/** Viewing side of each section: its right and upward directions in tooth space, as in the program's pictures. */
-const SECTIONS = [SIDES.mesial, SIDES.buccal, SIDES.occlusal];
+/**
+ * Right and upward directions of each section in tooth space. Mesial is on the left of both sections that show it: where y
+ * runs toward mesial, those are seen from the other side.
+ */
+const SECTIONS = [SIDES.mesial, SIDES.buccal, [[0, 1, 0], [-1, 0, 0]]];
+const MIRRORED_SECTIONS = [SIDES.mesial, SIDES.lingual, SIDES.occlusal];
 
 /** Space around the work, mm. */
 const AROUND = 1.8;
@@ -24,18 +28,24 @@ function packed(colour) {
   return (255 << 24 | b << 16 | g << 8 | r) >>> 0;
 }
 
-const PAPER = packed([1, 1, 1]), LINE = packed([0.22, 0.2, 0.18]);
+const PAPER = packed([1, 1, 1]), LINE = packed([0.22, 0.2, 0.18]), IDEAL = packed([0.02, 0.2, 0.62]);
+
+/** Length of the dashes of the ideal outline, pixels. */
+const DASH = 5;
 
 class Cut {
   constructor(canvas, number, voxels, palette) {
     this.canvas = canvas;
-    [this.right, this.up] = SECTIONS[number];
+    [this.right, this.up] = (voxels.mirrored ? MIRRORED_SECTIONS : SECTIONS)[number];
     this.across = this.right.findIndex(v => v !== 0);
     this.along = this.up.findIndex(v => v !== 0);
     this.axis = 3 - this.across - this.along;
     this.voxels = voxels;
     this.palette = palette;
     this.byVerdict = true;
+    this.byDeviation = false;
+    /** Signed distances from the ideal cavity; null where there is none. */
+    this.deviation = null;
     this.patterns = true;
     canvas.width = canvas.height = PIXELS;
     const span = axis => voxels.size[axis] * voxels.spacing[axis];
@@ -92,8 +102,42 @@ class Cut {
     for (let pixel = PIXELS; pixel < kinds.length; pixel++) {
       if (kinds[pixel] !== kinds[pixel - 1] || kinds[pixel] !== kinds[pixel - PIXELS]) pixels[pixel] = LINE;
     }
+    if (this.deviation) this.outline(pixels, kinds);
     context.putImageData(image, 0, 0);
     this.write(context, asked, others);
+  }
+
+  /** Draws the outline of the ideal cavity, dashed; and, in colours of the deviation, the border of the cut one. */
+  outline(pixels, kinds) {
+    const point = this.under(0.5 / PIXELS, 0.5 / PIXELS), begin = point[this.across];
+    const step = axis => 2 * this.half / PIXELS / this.voxels.spacing[axis];
+    const dx = this.right[this.across] * step(this.across), dy = -this.up[this.along] * step(this.along);
+    const mm = new Float32Array(kinds.length).fill(NaN);
+    for (let y = 0, pixel = 0; y < PIXELS; y++, point[this.along] += dy) {
+      point[this.across] = begin;
+      for (let x = 0; x < PIXELS; x++, pixel++, point[this.across] += dx) {
+        const at = kinds[pixel] ? this.deviation.at(...point) : null;
+        if (at !== null) mm[pixel] = at;
+      }
+    }
+    const isBorder = pixel => kinds[pixel] * kinds[pixel - 1] === 2 || kinds[pixel] * kinds[pixel - PIXELS] === 2;
+    for (let pixel = PIXELS; this.byDeviation && pixel < kinds.length; pixel++) {
+      if (!isBorder(pixel) || Number.isNaN(mm[pixel])) continue;
+      const colour = packed(deviationColour(mm[pixel]));
+      for (const beside of [0, 1, -1, PIXELS, -PIXELS, 2, -2, 2 * PIXELS, -2 * PIXELS]) {
+        if (kinds[pixel + beside]) pixels[pixel + beside] = colour;
+      }
+    }
+    for (let pixel = PIXELS; pixel < kinds.length; pixel++) {
+      const isCrossed = beside => mm[pixel] < 0 !== mm[beside] < 0 && !Number.isNaN(mm[pixel]) && !Number.isNaN(mm[beside]);
+      const isDash = Math.floor((pixel % PIXELS + Math.floor(pixel / PIXELS)) / DASH) % 2 === 0;
+      if (isDash && (isCrossed(pixel - 1) || isCrossed(pixel - PIXELS))) pixels[pixel] = pixels[pixel - 1] = IDEAL;
+    }
+  }
+
+  /** Angle between the walls in this section, degrees; null where there are no two walls, or the section is level. */
+  taper() {
+    return this.along === 2 ? wallTaper(this.voxels, this.across, this.middle) : null;
   }
 
   /** Colours every pixel and says of each whether nothing is there, something stands, or it is gone. */
@@ -128,6 +172,7 @@ class Cut {
 
   colour(label, verdict, stands, stripe) {
     const { palette } = this, hatched = this.byVerdict && this.patterns && stripe;
+    if (this.byDeviation) return packed(stands ? palette.tissue(label).map(c => 0.45 + 0.55 * c) : [0.97, 0.97, 0.97]);
     if (stands) {
       const colour = this.byVerdict ? palette.standing(label, verdict) : palette.tissue(label);
       return packed(colour.map(c => (hatched && verdict === VERDICT.left ? c + 0.3 : c)));
@@ -171,12 +216,33 @@ class Cut {
       context.fillText(t, x, y);
     };
     text(letter(this.right, this.across, true), PIXELS - 10, PIXELS / 2);
-    text(letter(this.right, this.across, false), 10, PIXELS / 2);
+    text(letter(this.right, this.across, false), 26, PIXELS / 2);
     text(letter(this.up, this.along, true), PIXELS / 2, 15);
-    text(letter(this.up, this.along, false), PIXELS / 2, PIXELS - 6);
-    const millimetre = PIXELS / (2 * this.half);
-    context.fillStyle = '#333';
-    context.fillRect(10, PIXELS - 10, millimetre, 3);
-    text('1 mm', 10 + Math.max(millimetre / 2, 16), PIXELS - 15);
+    text(letter(this.up, this.along, false), PIXELS / 2, PIXELS - 20);
+    this.rule(context);
+  }
+
+  /** Rulers along the left and lower edges: a tick for each millimetre, from a corner, with its number where there is room. */
+  rule(context) {
+    const millimetre = PIXELS / (2 * this.half), every = millimetre < 16 ? 5 : millimetre < 26 ? 2 : 1;
+    context.font = '9px sans-serif';
+    context.fillStyle = context.strokeStyle = '#333';
+    context.lineWidth = 1;
+    for (let mm = 0; mm * millimetre < PIXELS - 20; mm++) {
+      const at = Math.round(mm * millimetre) + 0.5, length = mm % 5 === 0 ? 7 : 4;
+      context.beginPath();
+      context.moveTo(at, PIXELS);
+      context.lineTo(at, PIXELS - length);
+      context.moveTo(0, PIXELS - at);
+      context.lineTo(length, PIXELS - at);
+      context.stroke();
+      if (mm === 0 || mm % every) continue;
+      context.textAlign = 'center';
+      context.fillText(mm, at, PIXELS - 9);
+      context.textAlign = 'left';
+      context.fillText(mm, 9, PIXELS - at + 3);
+    }
+    context.textAlign = 'left';
+    context.fillText('mm', 3, PIXELS - 9);
   }
 }

@@ -42,8 +42,12 @@ class Page {
     this.ring = null;
     this.mark = null;
     this.cuts = [0, 1, 2].map(number => new Cut(byId(`cut-${number}`), number, voxels, this.palette));
+    this.deviation = Deviation.of(voxels);
+    for (const cut of this.cuts) cut.deviation = this.deviation;
     byId('explore').hidden = false;
     this.solid = this.inSpace(begun);
+    if (this.solid && this.deviation) this.solid.take(this.deviation);
+    for (const part of document.querySelectorAll('.of-deviation')) part.hidden = !this.deviation;
     this.playing = 0;
     /** Part of the canvas's pixels along each side while things move. */
     this.share = 0.22;
@@ -150,9 +154,12 @@ class Page {
     const parts = [tissue === 0 ? this.say('script.air') : this.say(fall ? 'script.fell' : 'script.kept', values)];
     if (fall && fall.tick > voxels.moment) parts.push(this.say('script.falls_later'));
     if (this.mark !== null) parts.unshift(this.say('script.mark', { number: this.mark }));
+    const mm = this.deviation && tissue !== 0 ? this.deviation.at(...cell) : null;
+    const isSeen = fall || verdict === VERDICT.left;
+    if (mm !== null && isSeen) parts.push(this.say(mm > 0 ? 'script.deep' : 'script.shallow', { mm: Math.abs(mm).toFixed(1) }));
     told.textContent = `${parts.join(' ')} ${this.say('script.place', values)}`;
     // The same for whoever reads the page by program.
-    Object.assign(told.dataset, { voxel: voxels.inBundle(cell).join(' '), tissue, verdict, seconds: fall ? fall.tick / 1000 : '' });
+    Object.assign(told.dataset, { voxel: voxels.inBundle(cell).join(' '), tissue, verdict, seconds: fall ? fall.tick / 1000 : '', deviation: mm === null || !isSeen ? '' : mm.toFixed(3) });
   }
 
   /** Shows a place of tooth space, mm, as it was at a moment. */
@@ -245,6 +252,7 @@ class Page {
   drawFine() {
     if (this.isDirty) return;
     this.drawSolid(Math.min(1, FINER * this.share));
+    this.showTaper();
     document.documentElement.dataset.drawn = this.moment.toFixed(3);
   }
 
@@ -253,6 +261,38 @@ class Page {
     if (!this.areCutsOld) return;
     this.areCutsOld = false;
     for (const cut of this.cuts) cut.draw(this.asked, this.cuts.filter(other => other !== cut));
+  }
+
+  /** Says below each upright section how the walls stand to each other. */
+  showTaper() {
+    this.cuts.forEach((cut, number) => {
+      const degrees = cut.taper(), line = byId(`taper-${number}`);
+      if (!line) return;
+      const shown = degrees === null ? 0 : Math.round(degrees);
+      line.textContent = degrees === null ? '' : this.say(shown < 0 ? 'script.undercut' : 'script.taper', { degrees: Math.abs(shown) });
+      line.dataset.degrees = degrees === null ? '' : degrees.toFixed(1);
+    });
+  }
+
+  /**
+   * Pictures for paper, where no browser prints what a graphics adapter drew: the tooth by assessment and by deviation, at
+   * full resolution, from the same side.
+   */
+  drawForPaper() {
+    const { solid } = this;
+    if (!solid) return;
+    const { byVerdict, byDeviation } = solid;
+    for (const [id, deviates] of [['solid-print', false], ['deviation-print', true]]) {
+      if (deviates && !this.deviation) continue;
+      solid.byVerdict = true;
+      solid.byDeviation = deviates;
+      solid.draw(1);
+      const paper = byId(id);
+      [paper.width, paper.height] = [solid.canvas.width, solid.canvas.height];
+      paper.getContext('2d').drawImage(solid.canvas, 0, 0);
+    }
+    Object.assign(solid, { byVerdict, byDeviation });
+    this.drawSoon(false);
   }
 
   drawSolid(share) {
@@ -289,7 +329,10 @@ class Page {
     this.wireCurves();
     for (const button of document.querySelectorAll('[data-side]')) button.onclick = () => this.look(button.dataset.side);
     for (const choice of document.querySelectorAll('[name="colours"]')) {
-      choice.onchange = () => this.colourBy(view => { view.byVerdict = choice.value === 'verdict'; });
+      choice.onchange = () => this.colourBy(view => {
+        view.byVerdict = choice.value === 'verdict';
+        view.byDeviation = choice.value === 'deviation';
+      });
     }
     byId('patterns').onchange = event => this.colourBy(view => { view.patterns = event.target.checked; });
     for (const button of document.querySelectorAll('.show')) {
@@ -300,8 +343,8 @@ class Page {
         else this.visit([x, y, z].map(Number), at === undefined ? null : Number(at), null);
       };
     }
-    document.addEventListener('language', () => this.tell());
-    window.addEventListener('beforeprint', () => this.drawSolid(1));
+    document.addEventListener('language', () => { this.tell(); this.showTaper(); });
+    window.addEventListener('beforeprint', () => this.drawForPaper());
     window.addEventListener('resize', () => this.drawSoon(false));
   }
 

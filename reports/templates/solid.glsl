@@ -18,6 +18,14 @@ uniform vec3 right;          // from the middle to the edge, voxels
 uniform vec3 up;
 uniform vec3 away;           // from the eye: one mm, voxels
 uniform bool byVerdict;
+uniform bool byDeviation;
+uniform sampler3D deviations; // distances from the ideal cavity, -deviationMost to deviationMost mm as 0 to 1
+uniform vec3 deviationLow;    // the part that they cover, voxels
+uniform vec3 deviationSize;
+uniform float deviationMost;
+uniform vec3 shallow;         // colours of the scale
+uniform vec3 planned;
+uniform vec3 deep;
 uniform bool patterns;
 uniform bool hasRing;
 uniform vec3 ring;           // a place that is marked by a ring, voxels
@@ -59,13 +67,20 @@ bool isGone(ivec3 cell) {
   return now(cell) < 0.5 && (number == RIGHTLY || number == LEEWAY || number == OVERCUT || number == VULNERABLE);
 }
 
+// As deviationColour in deviation.js.
+vec3 deviated(vec3 p) {
+  float share = 2.0 * texture(deviations, (p - deviationLow + 0.5) / deviationSize).r - 1.0;
+  return mix(planned, share < 0.0 ? shallow : deep, sqrt(abs(share)));
+}
+
 // What a place on the surface shows: the verdict on what was taken away from it, else what stands there.
 vec3 shown(vec3 p, vec3 n) {
   vec3 inward = p - 0.6 * n / spacing * min(spacing.x, min(spacing.y, spacing.z));
   uvec2 here = meant(ivec3(round(inward)));
-  if (!byVerdict) return tissue(here.r);
-  vec3 kept = standing(here.r, here.g);
-  bool isLeft = kept == verdict(LEFT);
+  if (!byVerdict && !byDeviation) return tissue(here.r);
+  vec3 kept = byDeviation ? 0.45 + 0.55 * tissue(here.r) : standing(here.r, here.g);
+  bool isLeft = byDeviation ? here.g == LEFT : kept == verdict(LEFT);
+  if (byDeviation && isLeft) return deviated(p);
   vec3 beside = p + 1.2 * n / spacing * min(spacing.x, min(spacing.y, spacing.z));
   ivec3 base = ivec3(floor(beside));
   vec3 share = beside - vec3(base), sum = vec3(0.0);
@@ -76,12 +91,13 @@ vec3 shown(vec3 p, vec3 n) {
     vec3 w = mix(1.0 - share, share, vec3(corner));
     uint number = meant(base + corner).g;
     float part = w.x * w.y * w.z;
-    sum += part * verdict(number);
+    sum += part * (byDeviation ? deviated(p) : verdict(number));
     weight += part;
     if (number == OVERCUT || number == VULNERABLE) wrong += part;
   }
   vec3 found = kept;
   if (weight > 0.0 && !isLeft) found = mix(kept, sum / weight, smoothstep(0.1, 0.5, weight));
+  if (byDeviation) return found;
   bool isWrong = isLeft ? here.g == LEFT : wrong > 0.5 * max(weight, 0.2);
   float stripe = mod(dot(p * spacing, vec3(1.0)), 0.5);
   if (patterns && isWrong && stripe < 0.16) found = isLeft ? mix(found, vec3(1.0), 0.35) : found * 0.62;
@@ -111,7 +127,7 @@ void main() {
   if (at(p) > 0.5) {
     // A section: cut open by the clip planes, lit from nowhere.
     uvec2 here = meant(ivec3(round(p)));
-    vec3 c = byVerdict ? standing(here.r, here.g) : tissue(here.r);
+    vec3 c = byVerdict && !byDeviation ? standing(here.r, here.g) : tissue(here.r);
     colour = marked(vec4(c * 0.94, 1.0), origin, t);
     return;
   }

@@ -113,6 +113,7 @@ class Solid {
     /** The place that is marked by a ring, mm of tooth space. */
     this.ring = null;
     this.byVerdict = true;
+    this.byDeviation = false;
     this.patterns = true;
     const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS);
     const names = Array.from({ length: count }, (_, number) => gl.getActiveUniform(program, number).name);
@@ -120,8 +121,20 @@ class Solid {
   }
 
   /** Shows what another one showed: after an adapter was lost and a new one begins with nothing in it. */
-  resume({ eye, clips, ring, byVerdict, patterns }) {
-    return Object.assign(this, { eye, clips, ring, byVerdict, patterns });
+  resume({ eye, clips, ring, byVerdict, byDeviation, patterns, deviation }) {
+    if (deviation) this.take(deviation);
+    return Object.assign(this, { eye, clips, ring, byVerdict, byDeviation, patterns });
+  }
+
+  /** Takes the signed distances from the ideal cavity. */
+  take(deviation) {
+    const { gl } = this;
+    this.deviation = deviation;
+    gl.activeTexture(gl.TEXTURE5);
+    gl.texImage3D(gl.TEXTURE_3D, 0, gl.R8, ...deviation.size, 0, gl.RED, gl.UNSIGNED_BYTE, deviation.bytes());
+    gl.uniform3fv(gl.getUniformLocation(this.program, 'deviationLow'), deviation.low);
+    gl.uniform3fv(gl.getUniformLocation(this.program, 'deviationSize'), deviation.size);
+    gl.uniform1f(gl.getUniformLocation(this.program, 'deviationMost'), DEVIATION_MOST);
   }
 
   textures(palette) {
@@ -147,6 +160,8 @@ class Solid {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 256, 4, 0, gl.RGBA, gl.UNSIGNED_BYTE, this.colours(palette));
     gl.uniform1i(gl.getUniformLocation(this.program, 'palette'), 4);
+    volume(5, 'deviations', gl.R8, gl.RED, gl.LINEAR, [1, 1, 1], new Uint8Array(1));
+    for (const [name, colour] of [['shallow', SHALLOW], ['planned', PLANNED], ['deep', DEEP]]) gl.uniform3fv(gl.getUniformLocation(this.program, name), colour);
   }
 
   /** Bricks that ever held matter that a ray could meet: a sample in one sees a voxel beyond its edge. */
@@ -229,6 +244,7 @@ class Solid {
     const clips = this.clips.map((at, axis) => (at === null ? null : voxels.pointOf([at, at, at])[axis]));
     canvas.dataset.view = JSON.stringify({ middle, right, up, half, clips, ring: this.ring, ratio: width / height });
     gl.uniform1i(this.uniforms.byVerdict, this.byVerdict);
+    gl.uniform1i(this.uniforms.byDeviation, this.byDeviation);
     gl.uniform1i(this.uniforms.patterns, this.patterns);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);

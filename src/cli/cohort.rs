@@ -8,6 +8,7 @@ use typodont_report::cohort::{Cohort, ExaminerRating, read_ratings, recording_of
 use typodont_report::{SessionFile, Templates, sanitize_display};
 
 #[derive(Args)]
+#[command(group = clap::ArgGroup::new("pages").args(["html", "trainees"]).multiple(true))]
 pub struct Arguments {
     #[command(flatten)]
     source: SessionSource,
@@ -17,8 +18,11 @@ pub struct Arguments {
     /// Page to write: distributions, maps, learning curves, reliability, pass marks, questionnaire
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
-    /// Language of the page, by its code: en, tr, or one that the school added
-    #[arg(long, value_name = "CODE", default_value = DEFAULT_LANGUAGE, requires = "html")]
+    /// Folder for a page for each participant: own attempts, rank in the class, progress since the last attempt
+    #[arg(long, value_name = "DIR")]
+    trainees: Option<PathBuf>,
+    /// Language of the pages, by its code: en, tr, or one that the school added
+    #[arg(long, value_name = "CODE", default_value = DEFAULT_LANGUAGE, requires = "pages")]
     language: String,
     /// File to write with the same figures as JSON
     #[arg(long, value_name = "FILE")]
@@ -40,7 +44,7 @@ pub struct Arguments {
 /// Maximum length of a printed path or reason, characters.
 const PRINTED_MAX: usize = 300;
 
-/// Page of a cohort that is to be written.
+/// Page of a cohort, or folder of pages, that is to be written.
 pub struct PageRequest<'a> {
     path: &'a Path,
     templates: Templates,
@@ -61,7 +65,8 @@ impl<'a> PageRequest<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
-    let Arguments { csv, html, json, maps, .. } = arguments;
+    let Arguments { csv, html, json, maps, trainees, .. } = arguments;
+    let trainees = trainees.as_deref().map(|path| PageRequest::new(path, &arguments.language)).transpose()?;
     let page = html.as_deref().map(|path| PageRequest::new(path, &arguments.language)).transpose()?;
     let compares = csv.is_some() && !arguments.expert.is_empty();
     let mut sourced = arguments.source.read(html.is_some() || json.is_some() || maps.is_some() || compares)?;
@@ -78,6 +83,9 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     }
     report_skipped(&cohort, reported_count);
     write_all(&cohort, page.as_ref(), csv.as_deref(), json.as_deref())?;
+    if let Some(request) = trainees {
+        write_trainee_pages(&cohort, &request)?;
+    }
     if let Some(folder) = maps {
         write_maps(&cohort, folder)?;
     }
@@ -167,6 +175,18 @@ pub fn write_all(
     }
     if let Some(path) = json {
         write_file(path, cohort.json())?;
+    }
+    Ok(())
+}
+
+/// Writes a page for each participant into the folder of the request.
+fn write_trainee_pages(cohort: &Cohort, request: &PageRequest) -> Result<(), CliError> {
+    let PageRequest { path: folder, templates, language } = request;
+    let pages = cohort.trainee_pages(templates, folder, language).map_err(CliError::wrong)?;
+    let unwritable = |e: std::io::Error| CliError::wrong(format!("{}: unwritable-folder: {e}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(unwritable)?;
+    for page in pages {
+        write_file(&folder.join(page.file_name), page.html)?;
     }
     Ok(())
 }

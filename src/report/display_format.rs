@@ -24,6 +24,63 @@ pub fn number(value: f64) -> String {
     if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0".into() } else { text }
 }
 
+/// A number with a number of significant digits, and no zeros behind the point: 43.01 is 43, 2.917 is 2.9, 0.2243 is 0.22.
+/// Whole parts keep all their digits.
+pub fn significant(value: f64, digits: usize) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return number(value);
+    }
+    let decimals_of = |v: f64| (digits as i32 - 1 - v.abs().log10().floor() as i32).max(0) as usize;
+    // 9.96 with two digits is 10, not 10.0.
+    let decimals = decimals_of(value);
+    let rounded: f64 = format!("{value:.decimals$}").parse().unwrap_or(value);
+    let decimals = if rounded == 0.0 { decimals } else { decimals.min(decimals_of(rounded)) };
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// Points as a reader meets them: whole, or with as many decimals as it takes to show on which side of the pass mark they
+/// are.
+pub fn points(points: f64, pass_points: f64) -> String {
+    let text = |decimals: usize| format!("{points:.decimals$}");
+    let is_told =
+        |text: &String| text.parse::<f64>().is_ok_and(|shown| (shown < pass_points) == (points < pass_points));
+    let told = (0..6).map(text).find(is_told).unwrap_or_else(|| plain_number(points));
+    if told == "-0" { "0".into() } else { told }
+}
+
+/// Significant digits of a measure: lengths, forces, volumes and times carry two, since a voxel is a tenth of a
+/// millimetre and a device a hundredth of its force; percentages carry three, so that 99.6 % is not 100 %.
+fn digits_of(unit: &str) -> usize {
+    if unit == "%" { 3 } else { 2 }
+}
+
+/// A measured value with its unit, in no more digits than the measure has; "—" where there is none.
+pub fn measured(name: &str, value: Option<f64>) -> String {
+    let unit = Metric::parse(name).map_or("", |m| m.info.unit);
+    match (name, unit, value) {
+        ("pulp_exposed" | "detect_tooth" | "detect_quadrant", _, _) | (_, "s", _) | (_, _, None) => {
+            measure(name, value)
+        }
+        (_, unit, Some(value)) => with_unit(significant(value, digits_of(unit)), unit),
+    }
+}
+
+/// A value that an author wrote, with the unit of its measure and all its digits.
+pub fn written(name: &str, value: f64) -> String {
+    let unit = Metric::parse(name).map_or("", |m| m.info.unit);
+    match (name, unit) {
+        ("pulp_exposed" | "detect_tooth" | "detect_quadrant", _) => measure(name, Some(value)),
+        (_, "s") if value >= 60.0 => duration(value),
+        (_, unit) => with_unit(plain_number(value), unit),
+    }
+}
+
+fn with_unit(number: String, unit: &str) -> String {
+    if unit.is_empty() { number } else { format!("{number} {unit}") }
+}
+
 /// A measure's value with its unit; "—" where there is none.
 pub fn measure(name: &str, value: Option<f64>) -> String {
     let Some(value) = value else { return "—".into() };
@@ -82,6 +139,43 @@ pub fn measure_title(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_more_digits_are_shown_than_a_measure_has() {
+        for (value, text) in [
+            (43.01, "43"),
+            (2.917, "2.9"),
+            (0.2243, "0.22"),
+            (9.96, "10"),
+            (1234.5, "1234"),
+            (0.0, "0"),
+            (2.0, "2"),
+            (0.996, "1"),
+            (-0.004, "-0.004"),
+        ] {
+            assert_eq!(significant(value, 2), text, "{value}");
+        }
+        for (name, value, text) in [
+            ("force_max_n", 3.317, "3.3 N"),
+            ("decay_cleared_pct", 99.168, "99.2 %"),
+            ("dice", 0.8731, "0.87"),
+            ("pulp_exposed", 1.0, "yes"),
+            ("session_time_s", 15.93, "15.9 s"),
+        ] {
+            assert_eq!(measured(name, Some(value)), text);
+        }
+        assert_eq!(measured("dice", None), "—");
+        assert_eq!([written("force_max_n", 1.8), written("decay_cleared_pct", 97.25)], ["1.8 N", "97.25 %"]);
+    }
+
+    #[test]
+    fn points_stay_on_their_side_of_the_pass_mark() {
+        for (value, text) in
+            [(43.01, "43"), (69.96, "69.96"), (69.9, "69.9"), (70.0, "70"), (70.4, "70"), (100.0, "100")]
+        {
+            assert_eq!(points(value, 70.0), text);
+        }
+    }
 
     #[test]
     fn durations_read_as_the_thesis_writes_them() {

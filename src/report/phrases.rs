@@ -101,6 +101,7 @@ pub fn correctness(given: &AnswerResultFile) -> Option<Message> {
     }
 }
 
-fn value_text(text: String) -> Message {
+/// A value as text, whose words such as "right" are translated.
+pub fn value_text(text: String) -> Message {
     Message::text_or(format!("value.{text}"), text)
 }

@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value as Json;
+use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use typodont_core::device::DeviceSpec;
 use typodont_core::tick::Tick;
 use typodont_core::volume::Label;
-use typodont_exercise::catalog::CoefficientName;
+use typodont_exercise::catalog::{CoefficientName, TissueRole, TissueTable};
 use typodont_exercise::record::{DeviceSpecFile, Recording, ServoStatsFile, ended_by_name};
-use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire, Scenario};
+use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire, Scenario, Workpiece, hex};
 use typodont_exercise::score;
 use typodont_exercise::score::{EpisodeKind, ErrorEpisode, Evidence, Grade, SCORER_VERSION, Scored, SiteResult};
 use typodont_exercise::session::{AnswerRecord, AnswerValue};
@@ -71,6 +72,13 @@ pub struct SessionFile {
     /// Number of the tooth that places are measured on, the first of several.
     #[serde(default)]
     pub tooth_fdi: Option<u8>,
+    /// Size of a voxel of the tooth along its three axes, mm; absent for values entered by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub voxel_mm: Option<[f64; 3]>,
+    /// SHA-256 of the form of the teeth before any caries, cavity and deposit, by which other teeth with the same number
+    /// are told apart; absent for values entered by hand.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tooth_sha256: Option<String>,
     #[serde(default)]
     pub stages: Vec<StageResultFile>,
     /// The periodontal chart; left out where none was asked for.
@@ -334,6 +342,8 @@ impl SessionFile {
             operator: head.operator.clone(),
             device: Some(DeviceFile::from(&DeviceSpec::from(&head.device))),
             tooth_fdi: scenario.scene.teeth.first().map(|tooth| tooth.fdi),
+            voxel_mm: Some(voxel_mm(&scored.replay.workpiece)),
+            tooth_sha256: Some(tooth_sha256(&scored.replay.workpiece, &scenario.tissues)),
             stages: stages(recording, scored),
             chart: scored.chart.iter().flatten().map(site).collect(),
             metrics: metrics.collect(),
@@ -483,6 +493,25 @@ fn check_points(grade: &GradeFile) -> Result<(), String> {
         true => Ok(()),
         false => Err("the points of its grade are invalid".into()),
     }
+}
+
+fn voxel_mm(workpiece: &Workpiece) -> [f64; 3] {
+    workpiece.volume.grid().spacing.to_array().map(|mm| (f64::from(mm) * 1e6).round() / 1e6)
+}
+
+/// Digest of the form of a workpiece's teeth: the size of the grid, and the voxels that are solid. Caries and stains
+/// change tissues and no form; the volume before a cavity was cut is taken, and deposits count as air.
+fn tooth_sha256(workpiece: &Workpiece, tissues: &TissueTable) -> String {
+    let volume = workpiece.original.as_ref().unwrap_or(&workpiece.volume);
+    let is_tooth: [bool; 256] = std::array::from_fn(|label| {
+        let label = Label(label as u8);
+        label != Label::AIR && tissues.role(label) != Some(TissueRole::Deposit)
+    });
+    let mut digest = Sha256::new();
+    volume.grid().dims.iter().for_each(|n| digest.update(n.to_le_bytes()));
+    let solid: Vec<u8> = volume.tissues().map(|tissue| u8::from(is_tooth[usize::from(tissue.0)])).collect();
+    digest.update(solid);
+    hex(&digest.finalize())
 }
 
 fn site(result: &SiteResult) -> SiteReadingFile {

@@ -9,7 +9,7 @@ use super::display_format;
 use super::feedback::{self, Feedback, FeedbackFinding, FeedbackMoment};
 use super::language::{Languages, Message};
 use super::phrases;
-use super::pictures::{EncodedPicture, ViewKind};
+use super::pictures::{EncodedPicture, ViewKind, srgb_to_linear};
 use super::templates::Templates;
 use super::voxels::{self, VoxelHeader};
 use base64::Engine;
@@ -131,6 +131,8 @@ struct ReportMeasure {
     title: Value,
     formula: Value,
     value: Value,
+    /// False for a measure without a value.
+    applies: bool,
     r#where: Value,
     spot: Option<ReportPlace>,
 }
@@ -219,7 +221,7 @@ pub fn render(
         summary: &recording.scenario.summary,
         started: session.started.replace('T', " ").replace('Z', " UTC"),
         length: display_format::duration(session.servo.ticks as f64 * typodont_core::tick::TICK_S),
-        points: grade.map(|g| display_format::number(g.points)),
+        points: grade.map(|g| display_format::points(g.points, g.pass_points)),
         max_points: grade.map(|g| display_format::plain_number(g.max_points)),
         pass_points: grade.map(|g| display_format::plain_number(g.pass_points)),
         items: grade.map(|g| g.items.iter().map(|i| localizer.item(i)).collect()).unwrap_or_default(),
@@ -387,7 +389,7 @@ impl ReportLocalizer<'_> {
     }
 
     fn value(&self, metric: &str, value: Option<f64>) -> Value {
-        self.html(&phrases::value(metric, value))
+        self.html(&phrases::value_text(display_format::measured(metric, value)))
     }
 
     fn formula(&self, metric: &str) -> Value {
@@ -407,7 +409,7 @@ impl ReportLocalizer<'_> {
     }
 
     fn item(&self, item: &super::ItemResultFile) -> ReportItem {
-        let value = |v: f64| self.value(&item.metric, Some(v));
+        let written = |v: f64| self.html(&phrases::value_text(display_format::written(&item.metric, v)));
         ReportItem {
             title: item.title.clone(),
             formula: self.formula(&item.metric),
@@ -415,9 +417,9 @@ impl ReportLocalizer<'_> {
             value: self.value(&item.metric, item.value),
             r#where: self.place(&item.metric),
             spot: self.evidence_place(&item.metric),
-            full_at: value(item.full_at),
-            zero_at: value(item.zero_at),
-            points: display_format::number(item.points),
+            full_at: written(item.full_at),
+            zero_at: written(item.zero_at),
+            points: display_format::significant(item.points, 2),
             max_points: display_format::plain_number(item.max_points),
             percent: (100.0 * item.points / item.max_points).round().clamp(0.0, 100.0) as u32,
         }
@@ -445,6 +447,7 @@ impl ReportLocalizer<'_> {
                 title: self.html(&phrases::measure(&m.metric)),
                 formula: self.formula(&name),
                 value: self.value(&name, m.value),
+                applies: m.value.is_some(),
                 r#where: self.place(&name),
                 spot: self.evidence_place(&name),
                 name,
@@ -459,14 +462,16 @@ impl ReportLocalizer<'_> {
         let entry = |verdict: &Verdict| {
             let count = scored.verdicts.iter().filter(|v| *v == verdict).count();
             let [r, g, b] = verdict.color();
-            let is_dark = 0.3 * r + 0.59 * g + 0.11 * b < 0.5;
+            // Black is read better from this luminance on (WCAG 2): (0.179 + 0.05)² ≈ 1.05·0.05.
+            let [red, green, blue] = srgb_to_linear([r, g, b]);
+            let is_dark = 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.179;
             let [r, g, b] = [r, g, b].map(|c| (c * 255.0).round() as u8);
             ReportLegendEntry {
                 title: self.word(format!("verdict.{}", verdict.id()), verdict.title()),
                 color: format!("#{r:02x}{g:02x}{b:02x}"),
                 ink: if is_dark { "#fff" } else { "#000" },
                 sign: verdict.sign(),
-                amount: format!("{} mm³", display_format::number(count as f64 * voxel)),
+                amount: format!("{} mm³", display_format::significant(count as f64 * voxel, 2)),
             }
         };
         shown_verdicts(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
@@ -664,8 +669,11 @@ mod tests {
         let quoted = regex_lite::Regex::new(r#""((?:cohort|gradebook)\.[a-z_]+)""#).unwrap();
         let users = [
             "reports/templates/cohort.html",
+            "reports/templates/trainee.html",
+            "src/report/cohort/groups.rs",
             "src/report/cohort/page.rs",
             "src/report/cohort/summary.rs",
+            "src/report/cohort/trainee.rs",
             "src/integrations/gradebook.rs",
         ];
         let users = users.map(|path| std::fs::read_to_string(format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"))));

@@ -14,14 +14,25 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::LazyLock;
 
-const COHORT_PAGE: &str = include_str!("../../reports/templates/cohort.html");
+/// Files from which the pages of a cohort are made, by name: that of the teacher, those of the trainees, and their style
+/// sheet.
+const COHORT_FILES: [(&str, &str); 3] = [
+    (COHORT, include_str!("../../reports/templates/cohort.html")),
+    (TRAINEE, include_str!("../../reports/templates/trainee.html")),
+    (COHORT_STYLE, include_str!("../../reports/templates/cohort.css")),
+];
+
+const COHORT: &str = "cohort.html";
+const TRAINEE: &str = "trainee.html";
+const COHORT_STYLE: &str = "cohort.css";
 
 /// Files from which a session's page is made, by name: the page, its style sheet, its scripts and shader, and the rules
 /// of the feedback.
-const SESSION_FILES: [(&str, &str); 8] = [
+const SESSION_FILES: [(&str, &str); 9] = [
     (REPORT, include_str!("../../reports/templates/report.html")),
     ("report.css", include_str!("../../reports/templates/report.css")),
     ("voxels.js", include_str!("../../reports/templates/voxels.js")),
+    ("deviation.js", include_str!("../../reports/templates/deviation.js")),
     ("solid.js", include_str!("../../reports/templates/solid.js")),
     ("solid.glsl", include_str!("../../reports/templates/solid.glsl")),
     ("cuts.js", include_str!("../../reports/templates/cuts.js")),
@@ -29,7 +40,7 @@ const SESSION_FILES: [(&str, &str); 8] = [
     (FEEDBACK, include_str!("../../reports/templates/feedback.json")),
 ];
 /// Parts of the page's script, in the order in which they are joined.
-const SCRIPTS: [&str; 4] = ["voxels.js", "solid.js", "cuts.js", "report.js"];
+const SCRIPTS: [&str; 5] = ["voxels.js", "deviation.js", "solid.js", "cuts.js", "report.js"];
 
 const REPORT: &str = "report.html";
 const FEEDBACK: &str = "feedback.json";
@@ -51,8 +62,8 @@ pub fn shipped_languages() -> &'static Languages {
 /// Templates, style sheets, scripts, language files and feedback rules from which pages are made.
 #[derive(Clone, Debug)]
 pub struct Templates {
-    /// Template of a cohort's page.
-    cohort_page: String,
+    /// Files of a cohort's pages, by name.
+    cohort_files: BTreeMap<String, String>,
     /// Files of a session's page, by name.
     session_files: BTreeMap<String, String>,
     /// Texts of every language, by code.
@@ -65,7 +76,7 @@ pub struct Templates {
 impl Templates {
     /// Templates that ship with the program.
     pub fn shipped() -> Templates {
-        Templates::assemble(COHORT_PAGE.into(), by_name(&SESSION_FILES), by_name(&LANGUAGES))
+        Templates::assemble(by_name(&COHORT_FILES), by_name(&SESSION_FILES), by_name(&LANGUAGES))
             .expect("what ships is sound")
     }
 
@@ -87,6 +98,10 @@ impl Templates {
         for (name, otherwise) in SESSION_FILES {
             session.insert(name.to_string(), read(name, otherwise)?);
         }
+        let mut cohort = BTreeMap::new();
+        for (name, otherwise) in COHORT_FILES {
+            cohort.insert(name.to_string(), read(name, otherwise)?);
+        }
         let mut languages = by_name(&LANGUAGES);
         let mut files: Vec<_> =
             fs::read_dir(folder.join("languages")).into_iter().flatten().flatten().map(|e| e.path()).collect();
@@ -100,25 +115,24 @@ impl Templates {
             let text = fs::read_to_string(&path).map_err(|e| format!("{}: unreadable-file: {e}", path.display()))?;
             languages.insert(code, text);
         }
-        Templates::assemble(read("cohort.html", COHORT_PAGE)?, session, languages)
-            .map_err(|e| format!("{}/{e}", folder.display()))
+        Templates::assemble(cohort, session, languages).map_err(|e| format!("{}/{e}", folder.display()))
     }
 
     /// `Err` names the first invalid file and its fault.
     fn assemble(
-        cohort: String,
+        cohort: BTreeMap<String, String>,
         session: BTreeMap<String, String>,
         languages: BTreeMap<String, String>,
     ) -> Result<Templates, String> {
         // A browser reads line ends as `\n` before it takes a script's digest.
         let session: BTreeMap<String, String> =
             session.into_iter().map(|(name, text)| (name, text.replace("\r\n", "\n"))).collect();
-        for (name, text) in [(REPORT, &session[REPORT]), ("cohort.html", &cohort)] {
+        for (name, text) in [(REPORT, &session[REPORT]), (COHORT, &cohort[COHORT]), (TRAINEE, &cohort[TRAINEE])] {
             let parsed = Environment::new().add_template("page", text).map(drop);
             parsed.map_err(|e| format!("{name}: wrong-template: {e}"))?;
         }
         let is_inlined = |name: &str| [".js", ".css", ".glsl"].iter().any(|end| name.ends_with(end));
-        for (name, text) in session.iter().filter(|(name, _)| is_inlined(name)) {
+        for (name, text) in session.iter().chain(&cohort).filter(|(name, _)| is_inlined(name)) {
             // Such a text would end the element into which it is written.
             if text.to_ascii_lowercase().contains("</s") {
                 return Err(format!("{name}: wrong-template: it has \"</s\", which would end it within the page"));
@@ -129,7 +143,7 @@ impl Templates {
         let all = session.iter().chain(&languages);
         let session_source_text = all.map(|(name, text)| format!("{name} {}\n{text}", text.len())).collect();
         Ok(Templates {
-            cohort_page: cohort,
+            cohort_files: cohort,
             session_files: session,
             languages: parsed_languages,
             rules,
@@ -171,15 +185,33 @@ impl Templates {
         render(REPORT, self.session_file(REPORT), page, to_html)
     }
 
+    /// Style sheet of a cohort's pages.
+    pub fn cohort_style(&self) -> &str {
+        &self.cohort_files[COHORT_STYLE]
+    }
+
     /// Renders a cohort's page in one language with the values of `page`.
     ///
     /// # Errors
     ///
     /// When the template fails; the text names the template and the place.
     pub fn render_cohort(&self, page: &impl Serialize, language: &str) -> Result<String, String> {
+        self.render_in(COHORT, page, language)
+    }
+
+    /// Renders the page of one participant of a cohort in one language with the values of `page`.
+    ///
+    /// # Errors
+    ///
+    /// When the template fails; the text names the template and the place.
+    pub fn render_trainee(&self, page: &impl Serialize, language: &str) -> Result<String, String> {
+        self.render_in(TRAINEE, page, language)
+    }
+
+    fn render_in(&self, template: &str, page: &impl Serialize, language: &str) -> Result<String, String> {
         let (languages, code) = (self.languages.clone(), language.to_string());
         let to_html = move |message: &Message| escape_html(&languages.text_in(&code, message));
-        render("cohort.html", &self.cohort_page, page, to_html)
+        render(template, &self.cohort_files[template], page, to_html)
     }
 }
 

@@ -10,6 +10,7 @@ const zlib = require('zlib');
 
 const [playwright, executablePath, bundle, pictures] = process.argv.slice(2);
 const { chromium } = require(playwright);
+const { appearance } = require('./page_checks.js');
 
 const wrong = [];
 const claim = (holds, what) => { if (!holds) wrong.push(what); };
@@ -51,7 +52,7 @@ function fell(voxel) {
 
   const file = path.resolve(bundle, 'report.html');
   const began = Date.now();
-  await page.goto(`file://${file}`);
+  await page.goto(`file://${file}`, { timeout: 120000 });
   await page.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
   const shown_ms = Date.now() - began;
   const settled = async change => {
@@ -212,13 +213,87 @@ function fell(voxel) {
   await page.evaluate(() => window.scrollTo(0, 0));
   await photograph('report-turkish.png');
 
-  // A narrow window has nothing beside it; a print holds the pictures.
+  // The signed distance from the ideal cavity, by its definition: what was to be removed is the ideal cavity; of a place within
+  // it the distance to the nearest tissue that should stay, of another the distance to the ideal cavity, each to the border
+  // halfway between two voxels.
+  await page.locator('[data-language="en"]').click();
+  const isIdeal = cell => [2, 5].includes(verdicts.at(cell));
+  const deviation = cell => {
+    const reach = 14, within = isIdeal(cell), own = Math.min(...tissues.spacing);
+    let least = Infinity;
+    for (let k = -reach; k <= reach; k++) for (let j = -reach; j <= reach; j++) for (let i = -reach; i <= reach; i++) {
+      const other = [cell[0] + i, cell[1] + j, cell[2] + k];
+      if (!other.every((v, axis) => v >= 0 && v < tissues.sizes[axis])) continue;
+      if (within ? isIdeal(other) || tissues.at(other) === 0 : !isIdeal(other)) continue;
+      least = Math.min(least, Math.hypot(i * tissues.spacing[0], j * tissues.spacing[1], k * tissues.spacing[2]));
+    }
+    return { mm: within ? 0.5 * own - least : least - 0.5 * own, isNear: least < reach * own };
+  };
+  await settled(() => page.locator('[name="colours"][value="deviation"]').check());
+  await photograph('report-deviation.png');
+  let compared = 0;
+  for (const id of ids) {
+    const box = await page.locator(`#${id}`).boundingBox();
+    for (const [x, y] of [[0.5, 0.5], [0.45, 0.55], [0.55, 0.45], [0.4, 0.5], [0.6, 0.55]]) {
+      await page.locator(`#${id}`).click({ position: { x: x * box.width, y: y * box.height } });
+      const shown = await told();
+      if (!shown.deviation) continue;
+      const expected = deviation(shown.voxel.split(' ').map(Number));
+      if (!expected.isNear) continue;
+      compared++;
+      claim(Math.abs(Number(shown.deviation) - expected.mm) < 0.002, `voxel ${shown.voxel}: deviation ${shown.deviation}, by its definition ${expected.mm}`);
+      claim(/beyond the ideal cavity|within the ideal cavity/.test(shown.text), `voxel ${shown.voxel}: told is ${shown.text}`);
+    }
+  }
+  claim(compared >= 5, `${compared} deviations were compared`);
+
+  // Walls that diverge by a known angle, and by none where they are round.
+  const tapers = await page.evaluate(() => {
+    const soft = half => ({ dims: [80, 80, 60], spacing: [0.1, 0.1, 0.1], sample: (x, y, z) => (z > 50 ? 0 : z < 10 ? 1 : Math.min(Math.max(0.5 + Math.abs(x - 40) - half(z), 0), 1)) });
+    const walls = degrees => soft(z => 10 + (z - 10) * Math.tan(degrees / 2 * Math.PI / 180));
+    const bowl = soft(z => Math.sqrt(Math.max(40 * 40 - (50 - z) ** 2, 0)) * 0.8);
+    return [...[12, 0, -8].map(degrees => wallTaper(walls(degrees), 0, [40, 40, 30])), wallTaper(bowl, 0, [40, 40, 30])];
+  });
+  [12, 0, -8].forEach((degrees, n) => claim(Math.abs(tapers[n] - degrees) < 0.5, `walls of ${degrees}° are told as ${tapers[n]}°`));
+  claim(tapers[3] === null, `a round cavity has walls of ${tapers[3]}°`);
+
+  // Mesial is on the left of both sections that show it.
+  const sides = await page.evaluate(() => ({ plain: SECTIONS, mirrored: MIRRORED_SECTIONS }));
+  for (const [name, mesial] of [['plain', -1], ['mirrored', 1]]) {
+    for (const section of [1, 2]) claim(sides[name][section][0][1] === -mesial, `${name} section ${section}: mesial is not on the left`);
+  }
+
+  // On paper: the summary on one page, six pages at most, and the tooth in them.
+  await settled(() => page.locator('[name="colours"][value="verdict"]').check());
+  const pdf = await page.pdf({ format: 'A4', printBackground: true });
+  if (pictures) fs.writeFileSync(path.join(pictures, 'report.pdf'), pdf);
+  const source = pdf.toString('latin1'), sheets = (source.match(/\/Type\s*\/Page\b(?!s)/g) || []).length;
+  claim(sheets >= 2 && sheets <= 6, `${sheets} pages on paper`);
+  const printed = await page.evaluate(() => ['solid-print', 'deviation-print'].map(id => {
+    const canvas = document.getElementById(id), { width, height } = canvas;
+    const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
+    return { width, height, colours: new Set(pixels).size };
+  }));
+  for (const { width, height, colours } of printed) {
+    const isIn = source.includes(`/Width ${width}`) && source.includes(`/Height ${height}`);
+    claim(colours > 100 && isIn, `the tooth on paper: ${width} × ${height} pixels, ${colours} colours, ${isIn ? 'in' : 'not in'} the file`);
+  }
+  await page.emulateMedia({ media: 'print' });
+  await page.setViewportSize({ width: Math.floor(184 / 25.4 * 96), height: 900 });
+  const first = await page.evaluate(() => document.getElementById('explore').getBoundingClientRect().top + window.scrollY);
+  claim(first <= 273 / 25.4 * 96, `the summary is ${Math.round(first)} pixels high on paper`);
+  const unwanted = await page.evaluate(() => [...document.querySelectorAll('.screen, .formula, .time')].filter(e => e.offsetParent !== null).map(e => e.textContent.trim().slice(0, 40)));
+  claim(unwanted.length === 0, `printed: ${unwanted.join(' | ')}`);
+  await page.emulateMedia({ media: null });
+  wrong.push(...await appearance(page));
+
+  // A narrow window has nothing beside it.
   await page.setViewportSize({ width: 400, height: 800 });
   const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
   claim(beyond <= 0, `${beyond} pixels stand out of a window of 400`);
   claim(asked.length === 0, `asked of a network: ${asked.join(' ')}`);
   await browser.close();
-  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, shown, clicked, fallen }));
+  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, shown, clicked, fallen, compared, sheets, summary_px: Math.round(first) }));
   for (const line of wrong) console.error(line);
   process.exit(wrong.length ? 1 : 0);
 })().catch(error => { console.error(error); process.exit(1); });

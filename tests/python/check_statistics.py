@@ -14,6 +14,7 @@ import sys
 
 import numpy
 import scipy.optimize
+import scipy.special
 import scipy.stats
 
 try:
@@ -55,6 +56,18 @@ def near(ours, theirs, tolerance=TOLERANCE):
 def pairs(name, ours, theirs):
     for index, (a, b) in enumerate(zip(ours, theirs, strict=True)):
         yield f"{name}[{index}]", a, float(b)
+
+
+def bounded(case):
+    """Student's intervals of the logarithm and of the logit of the mean, their standard errors by the delta method."""
+    amounts, shares = numpy.array(case["amounts"]), numpy.array(case["percentages"]) / 100
+    scale = scipy.stats.sem(amounts) / amounts.mean()
+    interval = scipy.stats.t.interval(0.95, len(amounts) - 1, loc=numpy.log(amounts.mean()), scale=scale)
+    yield from pairs("amounts", case["intervals"][0], numpy.exp(interval))
+    mean = shares.mean()
+    scale = scipy.stats.sem(shares) / (mean * (1 - mean))
+    interval = scipy.stats.t.interval(0.95, len(shares) - 1, loc=scipy.special.logit(mean), scale=scale)
+    yield from pairs("percentages", case["intervals"][1], 100 * scipy.special.expit(interval))
 
 
 def spread(case):
@@ -197,6 +210,7 @@ def borderline(case):
 
 
 CHECKS = {
+    "bounded": bounded,
     "spread": spread,
     "share": share,
     "alpha": alpha,

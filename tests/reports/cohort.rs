@@ -413,7 +413,8 @@ fn a_cohorts_page_is_written_in_one_language() {
         }
     }
     let numbers = |page: &str| -> Vec<String> {
-        let cells = page.split("<td class=\"n\">").skip(1).map(|cell| cell.split('<').next().unwrap());
+        let cells = page.split("<td class=\"n\"").skip(1).map(|cell| cell.split("</td>").next().unwrap());
+        let cells = cells.map(|cell| cell.split_once('>').unwrap().1).flat_map(|cell| cell.split(['<', '>']));
         let parts = cells.flat_map(|cell| cell.split(|c: char| !c.is_ascii_digit() && !".:-".contains(c)));
         parts.filter(|part| !part.is_empty()).map(String::from).collect()
     };

@@ -4,6 +4,7 @@
 mod support;
 mod bundle_python;
 mod cohort;
+mod cohort_page;
 mod pictures;
 mod report_page;
 mod statistics;

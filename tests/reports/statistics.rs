@@ -33,6 +33,14 @@ fn cases() -> Vec<Value> {
         cases
             .push(json!({ "what": "spread", "values": values, "mean": s.mean, "sd": s.sd, "interval": s.mean_interval,
             "quartiles": s.quartiles, "median": s.median }));
+        let amounts: Vec<f64> = values.iter().map(|v| v.abs()).collect();
+        let percentages: Vec<f64> = values.iter().map(|v| v.clamp(0.0, 99.0)).collect();
+        let intervals = [
+            statistics::mean_interval_in(&amounts, statistics::ValueRange::NonNegative),
+            statistics::mean_interval_in(&percentages, statistics::ValueRange::Within(0.0, 100.0)),
+        ];
+        cases
+            .push(json!({ "what": "bounded", "amounts": amounts, "percentages": percentages, "intervals": intervals }));
         let had = (made.next(0.0, 1.0) * people as f64) as usize;
         let share = statistics::proportion(had, people).unwrap();
         cases.push(json!({ "what": "share", "had": had, "of": people, "interval": share.interval }));

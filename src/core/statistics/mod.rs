@@ -14,6 +14,7 @@ mod linear_fit;
 mod reliability;
 mod proportion;
 mod descriptive;
+mod value_range;
 
 pub use agreement::{KappaWeights, WeightedKappa, weighted_kappa};
 pub use alpha::{CronbachAlpha, ItemFit, cronbach_alpha};
@@ -22,6 +23,7 @@ pub use descriptive::{DescriptiveStatistics, describe, quantile};
 pub use linear_fit::{LinearFit, linear_fit};
 pub use proportion::{Proportion, proportion};
 pub use reliability::{IntraclassCorrelation, Retest, icc, retest};
+pub use value_range::{ValueRange, describe_in, mean_interval_in};
 
 /// Confidence level of all intervals.
 pub const CONFIDENCE: f64 = 0.95;

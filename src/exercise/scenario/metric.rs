@@ -301,8 +301,8 @@ pub const PLAIN: &[MetricInfo] = &[
         "within near_mm of the pulp at the start; 0 if never there",
     ),
     info("path_length_mm", "Path length of the tip", "mm", Neither, "sum of the displacements of the tip over 20 ms"),
-    info("drilling_time_s", "Time spent cutting", "s", Neither, "cycles in which material was cut"),
-    info("contact_time_s", "Contact time", "s", Neither, "cycles in which anything was touched"),
+    info("drilling_time_s", "Cutting time", "s", Neither, "time during which material was cut"),
+    info("contact_time_s", "Contact time", "s", Neither, "time during which anything was touched"),
     info(
         "efficiency_pct_s",
         "Caries removed per second of cutting",
@@ -322,14 +322,14 @@ pub const PLAIN: &[MetricInfo] = &[
         "Time with the running bur on soft tissue",
         "s",
         Lower,
-        "cycles in which a running bur touched gingiva or other soft tissue",
+        "time during which a running bur touched gingiva or other soft tissue",
     ),
     info(
         "neighbour_drilled_s",
         "Time with the running bur on an adjacent tooth",
         "s",
         Lower,
-        "cycles in which a running bur touched an adjacent tooth",
+        "time during which a running bur touched an adjacent tooth",
     ),
     info("session_time_s", "Duration of the session", "s", Neither, "all stages together"),
 ];

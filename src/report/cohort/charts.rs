@@ -26,8 +26,8 @@ pub fn strip_plot(values: &[f64], spread: &SpreadFile, alt: &str) -> String {
     let [q1, q3] = spread.quartiles.map(x);
     let _ = write!(
         svg,
-        "<rect x=\"{q1:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"12\" fill=\"#dbe7f0\" stroke=\"#7a98ad\"/>\
-         <line x1=\"{m:.1}\" x2=\"{m:.1}\" y1=\"{:.1}\" y2=\"{:.1}\" stroke=\"#345\" stroke-width=\"1.5\"/>",
+        "<rect x=\"{q1:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"12\" class=\"box\"/>\
+         <line x1=\"{m:.1}\" x2=\"{m:.1}\" y1=\"{:.1}\" y2=\"{:.1}\" class=\"median\"/>",
         middle - 6.0,
         (q3 - q1).max(1.0),
         middle - 6.0,
@@ -42,11 +42,122 @@ pub fn strip_plot(values: &[f64], spread: &SpreadFile, alt: &str) -> String {
     if let Some([low, high]) = spread.mean_interval.map(|i| i.map(x)) {
         let _ = write!(
             svg,
-            "<line x1=\"{low:.1}\" x2=\"{high:.1}\" y1=\"{middle}\" y2=\"{middle}\" stroke=\"#a03c00\" stroke-width=\"2\"/>"
+            "<line x1=\"{low:.1}\" x2=\"{high:.1}\" y1=\"{middle}\" y2=\"{middle}\" class=\"mean\" stroke-width=\"2\"/>"
         );
     }
-    let _ = write!(svg, "<path d=\"M{mean:.1} {:.1}l4 4l-4 4l-4 -4z\" fill=\"#a03c00\"/></svg>", middle - 4.0);
+    let _ = write!(svg, "<path d=\"M{mean:.1} {:.1}l4 4l-4 4l-4 -4z\" class=\"mean\"/></svg>", middle - 4.0);
     svg
+}
+
+/// Points of sessions, and what they are compared with.
+pub struct PointsHistogram<'a> {
+    pub points: &'a [f64],
+    /// Most points that can be had.
+    pub most: f64,
+    pub mark: Option<f64>,
+    /// Points of the session that is pointed out.
+    pub own: Option<f64>,
+}
+
+/// Texts of a histogram of points.
+pub struct HistogramLabels {
+    /// Description for readers who cannot see the drawing.
+    pub alt: String,
+    /// Text at the pass mark; `None` without one.
+    pub mark: Option<String>,
+    /// Text at the points of the session that is pointed out.
+    pub own: String,
+    /// Titles of the axes.
+    pub points: String,
+    pub sessions: String,
+}
+
+/// Number of sessions by points in twenty equal classes, each from its lower bound to below the next, the last with its
+/// upper bound; a line at the pass mark.
+pub fn points_histogram(data: &PointsHistogram, labels: &HistogramLabels) -> String {
+    const SIZE: (f64, f64) = (620.0, 220.0);
+    const LEFT: f64 = 44.0;
+    const RIGHT: f64 = 14.0;
+    const TOP: f64 = 40.0;
+    const BOTTOM: f64 = 40.0;
+    const CLASSES: usize = 20;
+    let PointsHistogram { points, most, mark, own } = *data;
+    let most = if most > 0.0 { most } else { 1.0 };
+    let mut counts = [0u32; CLASSES];
+    for value in points {
+        counts[((value / most * CLASSES as f64) as usize).min(CLASSES - 1)] += 1;
+    }
+    let tallest = counts.iter().copied().max().unwrap_or(0).max(1);
+    let x = |value: f64| LEFT + (SIZE.0 - LEFT - RIGHT) * (value / most).clamp(0.0, 1.0);
+    let y = |count: f64| SIZE.1 - BOTTOM - (SIZE.1 - BOTTOM - TOP) * count / f64::from(tallest);
+    let mut svg = format!(
+        "<svg class=\"histogram\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
+        SIZE.0,
+        SIZE.1,
+        escape(&labels.alt)
+    );
+    for (class, &count) in counts.iter().enumerate().filter(|(_, c)| **c > 0) {
+        let (from, to) = (x(most * class as f64 / CLASSES as f64), x(most * (class + 1) as f64 / CLASSES as f64));
+        let top = y(f64::from(count));
+        let _ = write!(
+            svg,
+            "<rect x=\"{:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"dot\" fill-opacity=\".75\"/>",
+            from + 1.0,
+            to - from - 2.0,
+            SIZE.1 - BOTTOM - top,
+        );
+    }
+    let base = SIZE.1 - BOTTOM;
+    let _ =
+        write!(svg, "<line x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{base}\" y2=\"{base}\" class=\"axis\"/>", SIZE.0 - RIGHT);
+    for count in [0, tallest] {
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" class=\"soft\">{count}</text>",
+            LEFT - 6.0,
+            y(f64::from(count)) + 4.0
+        );
+    }
+    for step in 0..=5 {
+        let value = most * f64::from(step) / 5.0;
+        let _ = write!(
+            svg,
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>",
+            x(value),
+            base + 15.0,
+            display_format::plain_number(value)
+        );
+    }
+    let _ = write!(
+        svg,
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>\
+         <text x=\"12\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\" transform=\"rotate(-90 12 {:.1})\">{}</text>",
+        0.5 * (LEFT + SIZE.0 - RIGHT),
+        SIZE.1 - 6.0,
+        escape(&labels.points),
+        0.5 * (TOP + base),
+        0.5 * (TOP + base),
+        escape(&labels.sessions)
+    );
+    if let (Some(mark), Some(text)) = (mark, &labels.mark) {
+        draw_flag(&mut svg, (x(mark), TOP - 6.0, base), "mark", text, SIZE.0);
+    }
+    if let Some(own) = own {
+        draw_flag(&mut svg, (x(own), TOP - 22.0, base), "own", &labels.own, SIZE.0);
+    }
+    svg + "</svg>"
+}
+
+/// A vertical line with a text at its upper end, to the left of it in the right half of the drawing.
+fn draw_flag(svg: &mut String, (x, top, base): (f64, f64, f64), class: &str, text: &str, width: f64) {
+    let (at, anchor) = if x > 0.5 * width { (x - 4.0, "end") } else { (x + 4.0, "start") };
+    let _ = write!(
+        svg,
+        "<line x1=\"{x:.1}\" x2=\"{x:.1}\" y1=\"{:.1}\" y2=\"{base}\" class=\"{class}\"/>\
+         <text x=\"{at:.1}\" y=\"{top:.1}\" text-anchor=\"{anchor}\" class=\"{class}\">{}</text>",
+        top - 8.0,
+        escape(text)
+    );
 }
 
 /// Dots that would cover each other are stacked.
@@ -57,11 +168,8 @@ fn draw_dots(svg: &mut String, values: &[f64], x: &dyn Fn(f64) -> f64) {
         let place = stacked.entry((x(value) / APART).round() as i64).or_insert(0);
         let y = 14.0 - 4.0 * f64::from((*place).min(3));
         *place += 1;
-        let _ = write!(
-            svg,
-            "<circle cx=\"{:.1}\" cy=\"{y:.1}\" r=\"2.2\" fill=\"#0b6ea8\" fill-opacity=\".6\"/>",
-            x(value)
-        );
+        let _ =
+            write!(svg, "<circle cx=\"{:.1}\" cy=\"{y:.1}\" r=\"2.2\" class=\"dot\" fill-opacity=\".6\"/>", x(value));
     }
 }
 
@@ -79,7 +187,7 @@ fn draw_histogram(svg: &mut String, values: &[f64], spread: &SpreadFile) {
         let x = EDGE + wide * column as f64;
         let _ = write!(
             svg,
-            "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{tall:.1}\" fill=\"#0b6ea8\" fill-opacity=\".7\"/>",
+            "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{tall:.1}\" class=\"dot\" fill-opacity=\".7\"/>",
             19.0 - tall,
             wide - 0.6
         );
@@ -98,8 +206,8 @@ pub fn answer_histogram(counts: &BTreeMap<String, usize>, steps: usize, alt: &st
         let (x, tall) = (WIDE * (step - 1) as f64, 14.0 * count as f64 / most);
         let _ = write!(
             svg,
-            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"#0b6ea8\" fill-opacity=\".7\"/>\
-             <text x=\"{m:.1}\" y=\"39\" text-anchor=\"middle\" fill=\"#57606a\">{step}</text>",
+            "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"dot\" fill-opacity=\".7\"/>\
+             <text x=\"{m:.1}\" y=\"39\" text-anchor=\"middle\" class=\"soft\">{step}</text>",
             x + 2.0,
             27.0 - tall,
             WIDE - 4.0,
@@ -109,7 +217,7 @@ pub fn answer_histogram(counts: &BTreeMap<String, usize>, steps: usize, alt: &st
         if count > 0 {
             let _ = write!(
                 svg,
-                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#222\">{count}</text>",
+                "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"ink\">{count}</text>",
                 x + 0.5 * WIDE,
                 25.0 - tall
             );
@@ -149,8 +257,8 @@ pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveL
         let label = escape(&display_format::measure(measure, Some(value)));
         let _ = write!(
             svg,
-            "<line x1=\"{LEFT}\" x2=\"{:.0}\" y1=\"{at:.1}\" y2=\"{at:.1}\" stroke=\"#d5dae0\"/>\
-             <text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\" fill=\"#57606a\">{label}</text>",
+            "<line x1=\"{LEFT}\" x2=\"{:.0}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"axis\"/>\
+             <text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\" class=\"soft\">{label}</text>",
             SIZE.0 - 10.0,
             LEFT - 6.0,
             at + 4.0
@@ -160,7 +268,7 @@ pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveL
     for n in (0..longest).filter(|n| n % every == 0) {
         let _ = write!(
             svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#57606a\">{}</text>",
+            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>",
             x(n),
             SIZE.1 - 16.0,
             n + 1
@@ -168,7 +276,7 @@ pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveL
     }
     let _ = write!(
         svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#57606a\">{}</text>",
+        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>",
         0.5 * (LEFT + SIZE.0),
         SIZE.1 - 2.0,
         escape(&labels.attempt)
@@ -181,24 +289,23 @@ pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveL
         let points = points.collect::<Vec<_>>().join(" ");
         let _ = write!(
             svg,
-            "<polyline points=\"{points}\" fill=\"none\" stroke=\"#0b6ea8\" stroke-opacity=\"{faint:.2}\"><title>{name}</title></polyline>"
+            "<polyline points=\"{points}\" class=\"person\" stroke-opacity=\"{faint:.2}\"><title>{name}</title></polyline>"
         );
     }
     let means: Vec<String> =
         progress.by_attempt.iter().enumerate().map(|(n, s)| format!("{:.1},{:.1}", x(n), y(s.mean))).collect();
-    let _ =
-        write!(svg, "<polyline points=\"{}\" fill=\"none\" stroke=\"#a03c00\" stroke-width=\"3\"/>", means.join(" "));
+    let _ = write!(svg, "<polyline points=\"{}\" class=\"mean line\" stroke-width=\"3\"/>", means.join(" "));
     for (n, spread) in progress.by_attempt.iter().enumerate() {
         let (at, mean) = (x(n), y(spread.mean));
         if let Some([low, high]) = spread.mean_interval {
             let _ = write!(
                 svg,
-                "<line x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{:.1}\" y2=\"{:.1}\" stroke=\"#a03c00\" stroke-width=\"1.5\"/>",
+                "<line x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{:.1}\" y2=\"{:.1}\" class=\"mean\" stroke-width=\"1.5\"/>",
                 y(low),
                 y(high)
             );
         }
-        let _ = write!(svg, "<circle cx=\"{at:.1}\" cy=\"{mean:.1}\" r=\"4\" fill=\"#a03c00\"/>");
+        let _ = write!(svg, "<circle cx=\"{at:.1}\" cy=\"{mean:.1}\" r=\"4\" class=\"mean\"/>");
     }
     svg + "</svg>"
 }

@@ -4,6 +4,11 @@ use super::{Cohort, dedup};
 use crate::csv;
 use typodont_exercise::scenario::metric;
 
+/// Size of a voxel: one number, or three where the sides differ.
+fn voxel_text([x, y, z]: [f64; 3]) -> String {
+    if x == y && y == z { x.to_string() } else { format!("{x} {y} {z}") }
+}
+
 impl Cohort {
     pub fn csv(&self) -> String {
         let metrics = self.metric_names();
@@ -14,6 +19,7 @@ impl Cohort {
             head.extend(["expert_differs_mm3", "expert_dice"].map(String::from));
         }
         head.extend(["verification", "verification_note"].map(String::from));
+        head.extend(["tooth_fdi", "voxel_mm", "scorer_version"].map(String::from));
         let mut text = csv::format_row(&head);
         for (index, (path, session)) in self.sessions.iter().enumerate() {
             let grade = session.grade.as_ref();
@@ -35,6 +41,9 @@ impl Cohort {
             }
             let status = self.status(path);
             line.extend([status.name().to_string(), status.note()]);
+            line.push(shown(session.tooth_fdi.map(|fdi| fdi.to_string())));
+            line.push(shown(session.voxel_mm.map(voxel_text)));
+            line.push(session.scorer_version.to_string());
             text += &csv::format_row(&line);
         }
         text

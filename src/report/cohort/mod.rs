@@ -6,6 +6,8 @@
 
 mod loader;
 mod trust;
+mod groups;
+mod ranges;
 mod summary;
 mod questionnaire;
 mod progress;
@@ -16,8 +18,10 @@ mod removal;
 mod csv_export;
 mod charts;
 mod page;
+mod trainee;
 
 pub use agreement::{AgreementFile, AgreementPair, IccFile, KappaFile, MACHINE, RatedItemFile, recording_of};
+pub use groups::ComparableGroup;
 pub use loader::{FoundBundles, find_bundles, read_session};
 pub use measurement_error::{DoubtfulResult, MeasurementErrorFile};
 pub use pass_mark::{ExaminerRating, read_ratings};
@@ -26,6 +30,7 @@ pub use questionnaire::{QuestionnaireSummary, wording};
 pub use removal::{ExpertDistance, RemovalMap};
 use summary::summary_lines;
 pub use summary::{CohortSummary, RightCount, ScenarioSummary, SpreadFile};
+pub use trainee::TraineePage;
 
 use super::display_format;
 use super::language::Translator;
@@ -75,11 +80,13 @@ impl Cohort {
     pub fn text(&self) -> String {
         let mut lines = Vec::new();
         for scenario in self.summary().scenarios {
+            let conditions = scenario.conditions.as_ref().map(|said| format!("; {}", english().translate(said)));
             let plural = if scenario.sessions == 1 { "" } else { "s" };
             lines.push(format!(
-                "{} ({} session{plural})",
+                "{} ({} session{plural}{})",
                 display_format::sanitize_display(&scenario.title, 100),
-                scenario.sessions
+                scenario.sessions,
+                conditions.unwrap_or_default()
             ));
             if let Some(points) = scenario.points_mean {
                 let (passed, graded) = (scenario.passed, scenario.graded);
@@ -125,12 +132,13 @@ impl Cohort {
         self.removals.iter().flat_map(|r| &r.distances).find(|(index, _)| *index == session).map(|(_, d)| d)
     }
 
-    /// Each participant's sessions of an exercise in the order of time, as indices. People without a code are nobody's second
+    /// Each participant's sessions of a group in the order of time, as indices. People without a code are nobody's second
     /// attempt: each of their sessions stands alone.
-    fn attempts_by_participant(&self, scenario: &str) -> Vec<Vec<usize>> {
+    fn attempts_by_participant(&self, group: &ComparableGroup) -> Vec<Vec<usize>> {
         let mut people: Vec<Vec<usize>> = Vec::new();
         // Sessions stand in the order of participant and beginning.
-        for (index, (_, session)) in self.sessions.iter().enumerate().filter(|(_, (_, s))| s.scenario.id == scenario) {
+        for index in self.sessions_of(group) {
+            let session = &self.sessions[index].1;
             match people.last_mut().filter(|p| is_same_person(&self.sessions[p[0]].1, session)) {
                 Some(person) => person.push(index),
                 None => people.push(vec![index]),

@@ -1,19 +1,21 @@
 //! The cohort's page: its contents in the words of one language, for the template `cohort.html`.
 
 use super::agreement::{AgreementFile, AgreementPair, IccFile, KappaFile, MACHINE};
-use super::charts::CurveLabels;
+use super::charts::{CurveLabels, HistogramLabels};
 use super::loader::read_session;
 use super::measurement_error::{DoubtfulResult, MeasurementErrorFile};
 use super::pass_mark::PassMarkEstimate;
 use super::questionnaire::{QuestionnaireStatement, QuestionnaireSummary};
+use super::ranges::FLAGS;
 use super::summary::{CohortSummary, ScenarioSummary, SpreadFile, summary_lines};
 use super::{Cohort, POINTS, RemovalMap, charts, points_or_measure};
 use crate::language::{COUNT, Message, Translator};
-use crate::session_file::SessionFile;
+use crate::session_file::{GradeFile, SessionFile};
 use crate::templates::Templates;
 use crate::verification::VerificationStatus;
 use crate::{display_format, phrases, pictures};
 use base64::Engine;
+use minijinja::value::Value;
 use serde::Serialize;
 use std::path::Path;
 use typodont_core::frame::Vec3;
@@ -52,6 +54,7 @@ pub fn html(templates: &Templates, cohort: &Cohort, links: &[String], language: 
     let scenarios = summary.scenarios.iter().map(|s| scenario(translator, cohort, s, links));
     let page = CohortPage {
         language: translator.code(),
+        style: Value::from_safe_string(templates.cohort_style().into()),
         scenarios: scenarios.collect::<Result<_, _>>()?,
         questionnaires: summary.questionnaires.iter().map(|q| questionnaire(translator, q)).collect(),
         skipped: summary.skipped.iter().map(|f| (sanitize(&f.file), sanitize(&f.reason))).collect(),
@@ -67,6 +70,8 @@ pub fn html(templates: &Templates, cohort: &Cohort, links: &[String], language: 
 struct CohortPage<'a> {
     /// Code of the page's language.
     language: &'a str,
+    /// Style sheet, which is inserted unescaped.
+    style: Value,
     summary: &'a CohortSummary,
     scenarios: Vec<ScenarioPart>,
     questionnaires: Vec<QuestionnairePart>,
@@ -85,6 +90,10 @@ struct ShareBand {
 #[derive(Serialize)]
 struct ScenarioPart {
     title: String,
+    /// Tooth, voxel size and scorer version; empty if all sessions of the exercise agree in them.
+    conditions: String,
+    /// Drawing of the distribution of points with the pass mark; empty if nothing was graded.
+    histogram: String,
     sessions: usize,
     participants: usize,
     passed: usize,
@@ -127,9 +136,9 @@ struct SpreadLine {
     mean: String,
     interval: String,
     sd: String,
-    min: String,
     median: String,
-    max: String,
+    /// Minimum and maximum.
+    extremes: String,
     /// Mean and standard deviation of the experts' sessions; empty without.
     experts: String,
     experts_sd: String,
@@ -254,8 +263,7 @@ fn scenario(
     links: &[String],
 ) -> Result<ScenarioPart, String> {
     let columns: Vec<&str> = SESSION_MEASURES.into_iter().filter(|name| summary.metrics.contains_key(*name)).collect();
-    let own: Vec<usize> =
-        (0..cohort.sessions.len()).filter(|&i| cohort.sessions[i].1.scenario.id == summary.id).collect();
+    let own = cohort.sessions_of(&summary.group);
     let distances = own.iter().any(|&i| cohort.distance_to_experts(i).is_some());
     let mut titles: Vec<String> = columns.iter().map(|c| measure_title(translator, c)).collect();
     if distances {
@@ -287,7 +295,7 @@ fn scenario(
     let metric = |name: &String| {
         let spread = summary.metrics.get(name)?;
         // A mean of right and wrong is a share, not "right".
-        let is_flag = matches!(name.as_str(), "detect_tooth" | "detect_quadrant" | "pulp_exposed");
+        let is_flag = FLAGS.contains(&name.as_str());
         let to_text = |v: f64| if is_flag { display_format::number(v) } else { display_format::measure(name, Some(v)) };
         let title = sanitize(&measure_title(translator, name));
         let line = spread_line(translator, title, spread, to_text, &values(name));
@@ -302,9 +310,11 @@ fn scenario(
         let svg = charts::learning_curves(progress, name, &labels);
         (title, svg)
     });
-    let own_removals: Vec<&RemovalMap> = cohort.removals.iter().filter(|r| r.scenario == summary.id).collect();
+    let own_removals: Vec<&RemovalMap> = cohort.removals.iter().filter(|r| r.group == summary.group).collect();
     Ok(ScenarioPart {
         title: sanitize(&summary.title),
+        conditions: summary.conditions.as_ref().map_or(String::new(), |message| translator.translate(message)),
+        histogram: histogram(translator, cohort, &own, None),
         sessions: summary.sessions,
         participants: summary.participants,
         passed: summary.passed,
@@ -333,6 +343,45 @@ fn scenario(
     })
 }
 
+/// Drawing of the points of sessions, with the pass mark if it is the same for all, and with one session's own points.
+/// Empty if nothing was graded.
+pub(super) fn histogram(translator: Translator, cohort: &Cohort, sessions: &[usize], own: Option<f64>) -> String {
+    let grades: Vec<&GradeFile> = sessions.iter().filter_map(|&i| cohort.sessions[i].1.grade.as_ref()).collect();
+    let points: Vec<f64> = grades.iter().map(|grade| grade.points).collect();
+    if points.is_empty() {
+        return String::new();
+    }
+    let most = grades.iter().map(|grade| grade.max_points).chain(points.iter().copied()).fold(0.0, f64::max);
+    let mark = grades.iter().all(|grade| grade.pass_points == grades[0].pass_points).then(|| grades[0].pass_points);
+    let below = mark.map_or(0, |mark| points.iter().filter(|p| **p < mark).count());
+    let described = [
+        ("sessions", counted(translator, "cohort.sessions", points.len())),
+        ("mark", mark.map_or("–".into(), display_format::plain_number)),
+        ("below", below.to_string()),
+    ];
+    let labels = HistogramLabels {
+        alt: translator.text("cohort.histogram_alt", &described),
+        mark: mark
+            .map(|mark| translator.text("cohort.histogram_mark", &[("points", display_format::plain_number(mark))])),
+        own: translator.text("cohort.histogram_own", &[]),
+        points: translator.text("cohort.points", &[]),
+        sessions: translator.text("cohort.sessions_title", &[]),
+    };
+    charts::points_histogram(&charts::PointsHistogram { points: &points, most, mark, own }, &labels)
+}
+
+/// Result of a session in words, with the reason if it was not passed, and the class of its colour.
+pub(super) fn result_of(translator: Translator, session: &SessionFile) -> (String, &'static str) {
+    let not_passed = |key: &str| (translator.text(key, &[]), "bad");
+    match &session.grade {
+        None => ("–".to_string(), ""),
+        Some(grade) if grade.passed => (translator.text("cohort.passed", &[]), "good"),
+        Some(grade) if !grade.hard_fails.is_empty() => not_passed("cohort.failed"),
+        Some(grade) if !grade.finished => not_passed("cohort.unfinished"),
+        Some(_) => not_passed("cohort.not_passed"),
+    }
+}
+
 fn row(
     translator: Translator,
     session: &SessionFile,
@@ -341,12 +390,7 @@ fn row(
     columns: &[&str],
 ) -> CohortSessionRow {
     let grade = session.grade.as_ref();
-    let (result, class) = match grade {
-        Some(grade) if grade.passed => (translator.text("cohort.passed", &[]), "good"),
-        Some(grade) if !grade.hard_fails.is_empty() => (translator.text("cohort.failed", &[]), "bad"),
-        Some(_) => (translator.text("cohort.not_passed", &[]), "bad"),
-        None => ("–".to_string(), ""),
-    };
+    let (result, class) = result_of(translator, session);
     CohortSessionRow {
         participant: sanitize(&session.participant),
         started: sanitize(&session.started.replace('T', " ").replace('Z', "")),
@@ -404,14 +448,10 @@ fn spread_line(
     SpreadLine {
         n: spread.n,
         mean: to_text(spread.mean),
-        interval: spread
-            .mean_interval
-            .as_ref()
-            .map_or("–".into(), |i| interval(translator, i, display_format::number)),
+        interval: spread.mean_interval.as_ref().map_or("–".into(), |i| interval(translator, i, &to_text)),
         sd: spread.sd.map_or("–".into(), &to_text),
-        min: to_text(spread.min),
         median: to_text(spread.median),
-        max: to_text(spread.max),
+        extremes: interval(translator, &[spread.min, spread.max], &to_text),
         svg: charts::strip_plot(values, spread, &alt),
         experts: String::new(),
         experts_sd: String::new(),

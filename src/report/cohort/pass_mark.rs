@@ -6,7 +6,7 @@ use crate::session_file::mean;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use typodont_core::statistics::{
-    BorderlineRegression, ContrastingGroups, Interval, borderline_regression, contrasting_groups,
+    BorderlineRegression, ContrastingGroups, Interval, ValueRange, borderline_regression, contrasting_groups,
 };
 
 /// The rating that is neither passed nor failed.
@@ -137,7 +137,12 @@ impl Cohort {
         by_work.into_iter().filter_map(mean).collect()
     }
 
-    pub(super) fn pass_mark(&self, attempts: &[Vec<usize>]) -> Option<PassMarkEstimate> {
+    pub(super) fn pass_mark(&self, own: &[usize], attempts: &[Vec<usize>]) -> Option<PassMarkEstimate> {
+        // The regression is linear and knows no limits; beyond the possible points its interval means nothing.
+        let possible = |points: f64| match self.range_of(POINTS, own) {
+            ValueRange::Within(low, high) => points.clamp(low, high),
+            _ => points.max(0.0),
+        };
         // Of each person the last session with points.
         let graded = |index: usize| {
             let session = &self.sessions[index].1;
@@ -172,6 +177,7 @@ impl Cohort {
             contrasting_groups: groups.map(contrasting_groups_file),
             borderline_regression: regression.map(|r| {
                 let BorderlineRegression { people, cut, interval, slope, r_squared: explained } = r;
+                let interval = interval.map(possible);
                 BorderlineRegressionFile { people, cut, interval, points_per_step: slope, explained }
             }),
         })

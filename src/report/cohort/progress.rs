@@ -46,14 +46,18 @@ pub struct RepeatedAttempts {
 }
 
 impl Cohort {
-    pub(super) fn progress_by_measure(&self, attempts: &[Vec<usize>]) -> BTreeMap<String, LearningCurves> {
+    pub(super) fn progress_by_measure(
+        &self,
+        own: &[usize],
+        attempts: &[Vec<usize>],
+    ) -> BTreeMap<String, LearningCurves> {
         let followed = TRACKED_MEASURES
             .iter()
-            .filter_map(|measure| Some((measure.to_string(), self.learning_curves(attempts, measure)?)));
+            .filter_map(|measure| Some((measure.to_string(), self.learning_curves(own, attempts, measure)?)));
         followed.collect()
     }
 
-    fn learning_curves(&self, attempts: &[Vec<usize>], measure: &str) -> Option<LearningCurves> {
+    fn learning_curves(&self, own: &[usize], attempts: &[Vec<usize>], measure: &str) -> Option<LearningCurves> {
         let curve = |person: &Vec<usize>| {
             let values: Vec<Option<f64>> =
                 person.iter().map(|&i| points_or_measure(&self.sessions[i].1, measure)).collect();
@@ -69,16 +73,24 @@ impl Cohort {
         let participants: Vec<LearningCurve> = attempts.iter().filter_map(curve).collect();
         let longest = participants.iter().map(|p| p.values.len()).max()?;
         let at = |n: usize| participants.iter().filter_map(|p| *p.values.get(n)?).collect::<Vec<f64>>();
-        let by_attempt = (0..longest).map(at).take_while(|v| v.len() > 1).filter_map(|v| SpreadFile::of(&v)).collect();
+        let range = self.range_of(measure, own);
+        let by_attempt = (0..longest).map(at).take_while(|v| v.len() > 1);
+        let by_attempt = by_attempt.filter_map(|values| SpreadFile::of(&values, range)).collect();
         Some(LearningCurves { participants, by_attempt })
     }
 
-    pub(super) fn repeated_by_measure(&self, attempts: &[Vec<usize>]) -> BTreeMap<String, RepeatedAttempts> {
+    pub(super) fn repeated_by_measure(
+        &self,
+        own: &[usize],
+        attempts: &[Vec<usize>],
+    ) -> BTreeMap<String, RepeatedAttempts> {
         let repeated = TRACKED_MEASURES.iter().filter_map(|measure| {
             let of = |i: usize| points_or_measure(&self.sessions[i].1, measure);
             let pairs: Vec<(f64, f64)> =
                 attempts.iter().filter(|p| p.len() > 1).filter_map(|p| Some((of(p[0])?, of(p[1])?))).collect();
             let retest = statistics::retest(&pairs)?;
+            let gains: Vec<f64> = pairs.iter().map(|(first, second)| second - first).collect();
+            let possible = self.range_of(measure, own).of_difference();
             let icc = statistics::icc(&pairs.iter().map(|(a, b)| vec![*a, *b]).collect::<Vec<_>>());
             let repeated = RepeatedAttempts {
                 people: retest.people,
@@ -86,7 +98,7 @@ impl Cohort {
                 icc_interval: icc.and_then(|i| i.interval),
                 correlation: retest.correlation,
                 gain: retest.gain,
-                gain_interval: retest.gain_interval,
+                gain_interval: statistics::mean_interval_in(&gains, possible).unwrap_or(retest.gain_interval),
                 error: retest.typical_error,
             };
             Some((measure.to_string(), repeated))

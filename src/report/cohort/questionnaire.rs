@@ -5,7 +5,7 @@ use crate::session_file::QuestionnaireFile;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use typodont_core::statistics;
-use typodont_core::statistics::Interval;
+use typodont_core::statistics::{Interval, ValueRange};
 use typodont_exercise::record;
 use typodont_exercise::record::Recording;
 use typodont_exercise::scenario::Questionnaire;
@@ -62,7 +62,8 @@ impl QuestionnaireSummary {
     pub fn of(cohort: &Cohort, id: &str) -> QuestionnaireSummary {
         let filled: Vec<&QuestionnaireFile> = answered_forms(cohort, id).map(|(_, form)| form).collect();
         let wording = wording(cohort, id);
-        let mut statements = statements(&filled, wording.as_ref());
+        let answers = answer_range(&filled, wording.as_ref());
+        let mut statements = statements(&filled, wording.as_ref(), answers);
         let last = last_forms(cohort, id);
         let mut alphas = Vec::new();
         let mut categories: Vec<String> = Vec::new();
@@ -96,7 +97,10 @@ impl QuestionnaireSummary {
             id: id.into(),
             title: wording.map_or_else(String::new, |w| w.title),
             n: filled.len(),
-            categories: means.into_iter().filter_map(|(name, values)| Some((name, SpreadFile::of(&values)?))).collect(),
+            categories: means
+                .into_iter()
+                .filter_map(|(name, values)| Some((name, SpreadFile::of(&values, answers)?)))
+                .collect(),
             items: items.collect(),
             statements,
             alphas,
@@ -133,7 +137,17 @@ fn complete_answers(forms: &[&QuestionnaireFile], statements: Vec<&str>) -> Vec<
     forms.iter().filter_map(|form| statements.iter().map(|id| answer(form, id)).collect()).collect()
 }
 
-fn statements(filled: &[&QuestionnaireFile], wording: Option<&Questionnaire>) -> Vec<QuestionnaireStatement> {
+/// Range of an answer: from 1 to the questionnaire's steps; without its words, to 5 or the greatest answer.
+fn answer_range(filled: &[&QuestionnaireFile], wording: Option<&Questionnaire>) -> ValueRange {
+    let given = filled.iter().flat_map(|form| &form.items).filter_map(|item| item.value);
+    ValueRange::Within(1.0, wording.map_or_else(|| given.fold(5.0, f64::max), |words| f64::from(words.steps)))
+}
+
+fn statements(
+    filled: &[&QuestionnaireFile],
+    wording: Option<&Questionnaire>,
+    answers: ValueRange,
+) -> Vec<QuestionnaireStatement> {
     let mut ids: Vec<(&str, &str)> = Vec::new();
     for item in filled.iter().flat_map(|form| &form.items) {
         if !ids.contains(&(item.id.as_str(), item.category.as_str())) {
@@ -154,8 +168,8 @@ fn statements(filled: &[&QuestionnaireFile], wording: Option<&Questionnaire>) ->
             category: category.into(),
             text: words.map_or_else(String::new, |w| w.text.clone()),
             mirrored: words.map(|w| w.negative).or(is_answered_mirrored.then_some(true)),
-            answered: SpreadFile::of(&answered),
-            counted: SpreadFile::of(&counted),
+            answered: SpreadFile::of(&answered, answers),
+            counted: SpreadFile::of(&counted, answers),
             counts,
             with_rest: None,
             alpha_without: None,

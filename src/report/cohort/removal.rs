@@ -1,6 +1,6 @@
 //! Maps of removed voxels over many people, and the distance of each person's cavity from the experts'.
 
-use super::Cohort;
+use super::{Cohort, ComparableGroup};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,11 +22,13 @@ const ALIGNMENT_TOLERANCE: f32 = 0.02;
 /// Voxels that people removed from one tooth, given its state at the start.
 #[derive(Clone, Debug)]
 pub struct RemovalMap {
-    pub scenario: String,
+    pub group: ComparableGroup,
     /// SHA-256 of the tooth's label map before the first cut: only identical teeth are compared.
     pub start: String,
     /// A bundle that holds this tooth.
     pub tooth: PathBuf,
+    /// True if sessions of another scorer version begin with the same tooth; their map is a file of its own.
+    pub is_start_shared: bool,
     /// Number of people in the map; the last session of each counts.
     pub people: usize,
     pub experts: usize,
@@ -121,35 +123,41 @@ impl RemovalMap {
     /// A name for its file: the exercise's, as far as it fits into one, and the beginning of the tooth's digest.
     pub fn file_name(&self) -> String {
         let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '_' };
-        let name: String = self.scenario.chars().take(60).map(plain).collect();
+        let name: String = self.group.scenario.chars().take(60).map(plain).collect();
         let start: String = self.start.chars().take(8).map(plain).collect();
-        format!("{name}-{start}.removed-share.nrrd")
+        let scorer =
+            if self.is_start_shared { format!("-scorer-{}", self.group.scorer_version) } else { String::new() };
+        format!("{name}-{start}{scorer}.removed-share.nrrd")
     }
 }
 
 impl Cohort {
     /// Adds up the cavities of identical teeth, for each tooth on which two or more people worked.
     pub fn map_removals(&mut self) {
-        let mut groups: BTreeMap<(String, String), Vec<usize>> = BTreeMap::new();
+        let mut groups: BTreeMap<(ComparableGroup, String), Vec<usize>> = BTreeMap::new();
         for (index, (_, session)) in self.sessions.iter().enumerate() {
             if let (Some(start), true) =
                 (session.digests.get(INITIAL_VOLUME_FILE), session.digests.contains_key(REMOVAL_TIMES_FILE))
             {
-                groups.entry((session.scenario.id.clone(), start.clone())).or_default().push(index);
+                groups.entry((ComparableGroup::of(session), start.clone())).or_default().push(index);
             }
         }
         let mut removals = Vec::new();
-        for ((scenario, start), sessions) in groups {
-            removals.extend(self.removal(scenario, start, &sessions));
+        let starts: Vec<(String, String)> =
+            groups.keys().map(|(group, start)| (group.scenario.clone(), start.clone())).collect();
+        for ((group, start), sessions) in groups {
+            let same = starts.iter().filter(|(scenario, s)| (scenario, s) == (&group.scenario, &start)).count();
+            let removal = self.removal(group, start, &sessions);
+            removals.extend(removal.map(|removal| RemovalMap { is_start_shared: same > 1, ..removal }));
         }
         // The tooth with the most people first.
-        removals.sort_by(|a, b| (&a.scenario, b.people, &a.start).cmp(&(&b.scenario, a.people, &b.start)));
+        removals.sort_by(|a, b| (&a.group, b.people, &a.start).cmp(&(&b.group, a.people, &b.start)));
         self.removals = removals;
     }
 
-    fn removal(&mut self, scenario: String, start: String, sessions: &[usize]) -> Option<RemovalMap> {
+    fn removal(&mut self, group: ComparableGroup, start: String, sessions: &[usize]) -> Option<RemovalMap> {
         let people: Vec<Vec<usize>> = self
-            .attempts_by_participant(&scenario)
+            .attempts_by_participant(&group)
             .into_iter()
             .filter_map(|person| {
                 let of_them: Vec<usize> = person.into_iter().filter(|i| sessions.contains(i)).collect();
@@ -187,9 +195,10 @@ impl Cohort {
         let share = all_counts.counts.iter().map(|&c| c as f32 / all_counts.masks as f32).collect();
         let (people, experts) = (all_counts.masks as usize, experts.masks as usize);
         (people > 1).then(|| RemovalMap {
-            scenario,
+            group,
             start,
             tooth,
+            is_start_shared: false,
             people,
             experts,
             grid: all_counts.grid(),

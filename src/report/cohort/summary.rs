@@ -7,14 +7,14 @@ use super::progress::{LearningCurves, RepeatedAttempts};
 use super::questionnaire::QuestionnaireSummary;
 use super::removal::RemovalSummary;
 use super::trust::VerificationCounts;
-use super::{Cohort, POINTS, dedup, english, points_or_measure};
+use super::{Cohort, ComparableGroup, POINTS, dedup, english, points_or_measure};
 use crate::language::{COUNT, Message, Translator};
 use crate::session_file::{SessionFile, mean};
 use crate::{display_format, phrases};
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use typodont_core::statistics;
-use typodont_core::statistics::Interval;
+use typodont_core::statistics::{Interval, ValueRange};
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CohortSummary {
@@ -49,6 +49,17 @@ pub struct SkippedFile {
 pub struct ScenarioSummary {
     pub id: String,
     pub title: String,
+    /// Conditions that all these sessions share; sessions under other conditions are an entry of their own. Null where
+    /// the sessions do not say; the scorer version is 0 for values entered by hand.
+    pub tooth_fdi: Option<u8>,
+    pub tooth_sha256: Option<String>,
+    pub voxel_mm: Option<[f64; 3]>,
+    pub scorer_version: u32,
+    /// The conditions in words; null if all sessions of the exercise share them. In English in the file.
+    #[serde(serialize_with = "text_in_english")]
+    pub conditions: Option<Message>,
+    #[serde(skip)]
+    pub group: ComparableGroup,
     pub sessions: usize,
     /// People: a code counts once, a session without a code for itself.
     pub participants: usize,
@@ -88,7 +99,7 @@ pub struct SpreadFile {
     pub mean: f64,
     /// Standard deviation of the sample; none of one session.
     pub sd: Option<f64>,
-    /// Of the mean, at 95 %; none of one session.
+    /// Of the mean, at 95 %, within the values that are possible ([`statistics::mean_interval_in`]); none of one session.
     pub mean_interval: Option<Interval>,
     pub min: f64,
     pub quartiles: Interval,
@@ -118,9 +129,9 @@ const ANSWER_MEASURES: [(&str, &str, Option<&str>); 2] = [
 ];
 
 impl SpreadFile {
-    pub fn of(values: &[f64]) -> Option<SpreadFile> {
+    pub fn of(values: &[f64], range: ValueRange) -> Option<SpreadFile> {
         let statistics::DescriptiveStatistics { n, mean, sd, mean_interval, min, median, quartiles, max } =
-            statistics::describe(values)?;
+            statistics::describe_in(values, range)?;
         Some(SpreadFile { n, mean, sd, mean_interval, min, quartiles, median, max })
     }
 }
@@ -134,7 +145,7 @@ impl Cohort {
         CohortSummary {
             version: 1,
             sessions: self.sessions.len(),
-            scenarios: ids.into_iter().map(|id| self.scenario(id)).collect(),
+            scenarios: ids.into_iter().flat_map(|id| self.scenarios(id)).collect(),
             questionnaires: questionnaires.into_iter().map(|id| QuestionnaireSummary::of(self, id)).collect(),
             skipped: skipped.map(|(p, r)| SkippedFile { file: p.display().to_string(), reason: r.clone() }).collect(),
             verification: self.verification_counts(),
@@ -154,9 +165,9 @@ impl Cohort {
             .collect()
     }
 
-    /// Numbers of an exercise's sessions that differ from their recordings, and that are not verified.
-    fn verification_cautions(&self, id: &str) -> Vec<Message> {
-        let statuses = self.sessions.iter().filter(|(_, s)| s.scenario.id == id).map(|(path, _)| self.status(path));
+    /// Numbers of sessions that differ from their recordings, and that are not verified.
+    fn verification_cautions(&self, sessions: &[usize]) -> Vec<Message> {
+        let statuses = sessions.iter().map(|&index| self.status(&self.sessions[index].0));
         let (mut differing, mut open) = (0, 0);
         for status in statuses {
             differing += usize::from(status.differs());
@@ -171,16 +182,23 @@ impl Cohort {
             .collect()
     }
 
-    fn scenario(&self, id: &str) -> ScenarioSummary {
-        let sessions: Vec<&SessionFile> =
-            self.sessions.iter().map(|(_, s)| s).filter(|s| s.scenario.id == id).collect();
-        let attempts = self.attempts_by_participant(id);
+    /// Summaries of the sessions of an exercise: one for each group that may be compared.
+    fn scenarios(&self, id: &str) -> Vec<ScenarioSummary> {
+        let groups = self.groups_of(id);
+        groups.iter().map(|group| self.scenario(group, &groups)).collect()
+    }
+
+    fn scenario(&self, group: &ComparableGroup, all: &[ComparableGroup]) -> ScenarioSummary {
+        let own = self.sessions_of(group);
+        let sessions: Vec<&SessionFile> = own.iter().map(|&index| &self.sessions[index].1).collect();
+        let spread = |name: &str, values: &[f64]| SpreadFile::of(values, self.range_of(name, &own));
+        let attempts = self.attempts_by_participant(group);
         let grades: Vec<_> = sessions.iter().filter_map(|s| s.grade.as_ref()).collect();
         let passed = grades.iter().filter(|g| g.passed).count();
         let names = dedup(sessions.iter().flat_map(|s| s.metrics.keys().map(String::as_str)));
         let metrics = names.into_iter().filter_map(|name| {
             let values: Vec<f64> = sessions.iter().filter_map(|s| s.metric(name)).collect();
-            Some((name.to_string(), SpreadFile::of(&values)?))
+            Some((name.to_string(), spread(name, &values)?))
         });
         let expert_sessions: Vec<&&SessionFile> = sessions.iter().filter(|s| self.is_expert(s)).collect();
         let measures = dedup(expert_sessions.iter().flat_map(|s| s.metrics.keys().map(String::as_str)))
@@ -188,14 +206,21 @@ impl Cohort {
             .chain([POINTS]);
         let expert_metrics = measures.filter_map(|name| {
             let values: Vec<f64> = expert_sessions.iter().filter_map(|s| points_or_measure(s, name)).collect();
-            Some((name.to_string(), SpreadFile::of(&values)?))
+            Some((name.to_string(), spread(name, &values)?))
         });
         let points: Vec<f64> = grades.iter().map(|g| g.points).collect();
-        let points = SpreadFile::of(&points);
-        let repeated = self.repeated_by_measure(&attempts);
+        let points = spread(POINTS, &points);
+        let titles = sessions.iter().map(|s| s.scenario.title.as_str());
+        let repeated = self.repeated_by_measure(&own, &attempts);
         ScenarioSummary {
-            id: id.into(),
-            title: sessions.iter().map(|s| s.scenario.title.as_str()).find(|t| !t.is_empty()).unwrap_or(id).into(),
+            id: group.scenario.clone(),
+            title: titles.into_iter().find(|t| !t.is_empty()).unwrap_or(&group.scenario).into(),
+            tooth_fdi: group.tooth_fdi,
+            tooth_sha256: group.tooth_sha256.clone(),
+            voxel_mm: group.voxel_mm(),
+            scorer_version: group.scorer_version,
+            group: group.clone(),
+            conditions: (all.len() > 1).then(|| group.description(all)),
             sessions: sessions.len(),
             participants: attempts.len(),
             passed,
@@ -205,15 +230,15 @@ impl Cohort {
             points,
             metrics: metrics.collect(),
             expert_metrics: expert_metrics.collect(),
-            cautions: self.verification_cautions(id).into_iter().chain(cautions(&sessions)).collect(),
+            cautions: self.verification_cautions(&own).into_iter().chain(cautions(&sessions, all.len())).collect(),
             right: right_counts(&sessions),
-            progress: self.progress_by_measure(&attempts),
+            progress: self.progress_by_measure(&own, &attempts),
             measurement_error: self
                 .measurement_error(&attempts, repeated.get(POINTS).map(|found| (found.error, found.people))),
             repeated,
             agreement: self.agreement(&attempts),
-            standard: self.pass_mark(&attempts),
-            removals: self.removals.iter().filter(|r| r.scenario == id).map(|r| RemovalSummary::of(self, r)).collect(),
+            standard: self.pass_mark(&own, &attempts),
+            removals: self.removals.iter().filter(|r| r.group == *group).map(|r| RemovalSummary::of(self, r)).collect(),
         }
     }
 }
@@ -241,19 +266,15 @@ fn right_counts(sessions: &[&SessionFile]) -> BTreeMap<String, RightCount> {
     ANSWER_MEASURES.iter().filter_map(count).collect()
 }
 
-/// Reasons why sessions of an exercise may not be comparable.
-fn cautions(sessions: &[&SessionFile]) -> Vec<Message> {
+/// Reasons why sessions of an exercise may not be comparable. `groups` is the number of groups that are kept apart.
+fn cautions(sessions: &[&SessionFile], groups: usize) -> Vec<Message> {
     let mut found = Vec::new();
+    if groups > 1 {
+        found.push(Message::text("cohort.caution_apart", &[(COUNT, Message::plain(groups.to_string()))]));
+    }
     let versions = dedup(sessions.iter().map(|s| s.scenario.sha256.as_str()).filter(|s| !s.is_empty())).len();
     if versions > 1 {
         found.push(Message::text("cohort.caution_versions", &[(COUNT, Message::plain(versions.to_string()))]));
-    }
-    let mut formulae: Vec<u32> = sessions.iter().map(|s| s.scorer_version).filter(|v| *v > 0).collect();
-    formulae.sort_unstable();
-    formulae.dedup();
-    if formulae.len() > 1 {
-        let versions = Message::plain(format!("{formulae:?}"));
-        found.push(Message::text("cohort.caution_formulae", &[("versions", versions)]));
     }
     let ended_early = |s: &&&SessionFile| !matches!(s.ended_because.as_str(), "" | "complete");
     let unfinished = sessions.iter().filter(ended_early).count();
@@ -261,6 +282,10 @@ fn cautions(sessions: &[&SessionFile]) -> Vec<Message> {
         found.push(Message::text("cohort.caution_early", &[(COUNT, Message::plain(unfinished.to_string()))]));
     }
     found
+}
+
+fn text_in_english<S: Serializer>(message: &Option<Message>, serializer: S) -> Result<S::Ok, S::Error> {
+    message.as_ref().map(|message| english().translate(message)).serialize(serializer)
 }
 
 fn in_english<S: Serializer>(messages: &[Message], serializer: S) -> Result<S::Ok, S::Error> {

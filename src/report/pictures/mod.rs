@@ -148,7 +148,9 @@ fn section_pictures(
     middle: Vec3,
 ) -> [RawPicture; 3] {
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
+    let distal = scored.replay.workpiece.distal();
     let plane = crown_image_plane(side, nearest_tooth(&scored.replay.workpiece.teeth, middle));
+    let plane = ImagePlane { camera: plane.camera.with_mesial_left(distal), ..plane };
     let cut = |volume: &Volume| raycast::slice(volume, &plane, middle, |label, _| palette.tissue(label));
     let line = |volume: &Volume, colour| raycast::contour(volume, &plane, middle, colour, CONTOUR_WIDTH);
     let verdict = |label, voxel: usize| match scored.verdicts[voxel] {
@@ -169,7 +171,7 @@ fn section_pictures(
         let mut layers = layers.into_iter();
         let mut pixels = layers.next().unwrap_or_else(|| PixelBuffer::transparent(SIZE, SIZE));
         layers.for_each(|layer| pixels.composite(&layer));
-        RawPicture::new(shows, name, title, annotations::annotate(&pixels, &plane, scored.replay.workpiece.distal()))
+        RawPicture::new(shows, name, title, annotations::annotate(&pixels, &plane, distal))
     })
 }
 

@@ -69,6 +69,7 @@ pub fn draw_removal_share(
     let mut drawn = vec![("occlusal", "Occlusal view", raycast::render_iso(&volume, &above, colour), above)];
     for (side, name, title) in SECTIONS {
         let shot = shot(side);
+        let shot = ImagePlane { camera: shot.camera.with_mesial_left(distal), ..shot };
         let mut pixels = raycast::slice(&volume, &shot, middle, colour);
         for (part, line, width) in
             [(&half, CONTOUR, HALF_LINE_FACTOR * CONTOUR_WIDTH), (&decay, DECAY_LINE, CONTOUR_WIDTH)]

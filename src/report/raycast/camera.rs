@@ -67,6 +67,16 @@ impl OrthographicCamera {
         OrthographicCamera { middle: 0.5 * (low + high), right, up, half_height }
     }
 
+    /// The same camera, or one that sees the plane of a section so that mesial is on the left: an upright section from its
+    /// other side, a level one turned by half. `distal` is the distal direction in tooth space.
+    pub fn with_mesial_left(self, distal: Vec3) -> OrthographicCamera {
+        if self.right.dot(distal) > -0.5 {
+            return self;
+        }
+        let is_level = self.up.z == 0.0;
+        OrthographicCamera { right: -self.right, up: if is_level { -self.up } else { self.up }, ..self }
+    }
+
     /// From the tooth to the eye.
     pub fn back(&self) -> Vec3 {
         self.right.cross(self.up)
@@ -111,6 +121,19 @@ mod tests {
         let from = [Vec3::Z, Vec3::X, Vec3::NEG_X, Vec3::NEG_Y, Vec3::Y, Vec3::NEG_Z];
         for (side, from) in ViewSide::ALL.into_iter().zip(from) {
             assert_eq!(OrthographicCamera::framing_box(side, Vec3::ZERO, Vec3::ONE, 1.0).back(), from, "{side:?}");
+        }
+    }
+
+    #[test]
+    fn sections_that_show_mesial_have_it_on_the_left() {
+        for distal in [Vec3::Y, Vec3::NEG_Y] {
+            for side in [ViewSide::Mesial, ViewSide::Buccal, ViewSide::Occlusal] {
+                let camera = OrthographicCamera::framing_box(side, Vec3::ZERO, Vec3::ONE, 1.0).with_mesial_left(distal);
+                let expected = if side == ViewSide::Mesial { 0.0 } else { 1.0 };
+                assert_eq!(camera.right.dot(distal), expected, "{side:?}");
+                // An upright section has the crown up; a level one is seen from above.
+                assert_eq!(if side == ViewSide::Occlusal { camera.back().z } else { camera.up.z }, 1.0, "{side:?}");
+            }
         }
     }
 
