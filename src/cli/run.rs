@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Run without a window, as fast as the computer allows
     #[arg(long)]
     headless: bool,
-    /// Scripted operator in the place of a trainee: careful, expert, hasty, timid, or a file
+    /// Scripted operator in the place of a trainee: careful, expert, guess, hasty, timid, or a file
     #[arg(long, value_name = "NAME|FILE.json", default_value = "careful", requires = "headless")]
     operator: String,
     /// Device of the trainee; see `typodont devices`

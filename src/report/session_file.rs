@@ -515,9 +515,9 @@ fn round_to_nine_decimals(value: f64) -> f64 {
 
 fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
     let results = recording.scenario.stages.iter().zip(&scored.replay.outcome.stages).zip(&scored.led_ticks);
-    let stage = |((stage, result), &led): (
-        (&typodont_exercise::scenario::Stage, &typodont_exercise::session::StageResult),
-        &u64,
+    let stage = |(index, ((stage, result), &led)): (
+        usize,
+        ((&typodont_exercise::scenario::Stage, &typodont_exercise::session::StageResult), &u64),
     )| {
         let answers = stage.ask.iter().zip(&result.answers).filter_map(|(question, given)| {
             let AnswerRecord { value, at, correct: right, step } = given.as_ref()?;
@@ -527,7 +527,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
                 value: answer_value(value),
                 at_s: at.seconds(),
                 right: *right,
-                truth: truth(&question.kind, scored),
+                truth: truth(recording, index, &question.kind, scored),
                 level: step.map(|(level, _)| (f64::from(level) * 1e6).round() / 1e6),
             })
         });
@@ -547,7 +547,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
             answers: answers.collect(),
         }
     };
-    results.map(stage).collect()
+    results.enumerate().map(stage).collect()
 }
 
 fn answer_value(value: &AnswerValue) -> Json {
@@ -559,9 +559,9 @@ fn answer_value(value: &AnswerValue) -> Json {
     }
 }
 
-fn truth(kind: &QuestionKind, scored: &Scored) -> Json {
+fn truth(recording: &Recording, stage: usize, kind: &QuestionKind, scored: &Scored) -> Json {
     let workpiece = &scored.replay.workpiece;
-    let lesion = |name: &str| workpiece.lesions.iter().find(|l| l.id == name);
+    let lesion = |name: &str| workpiece.lesion(&recording.scenario, stage, name);
     match kind {
         QuestionKind::ToothWith { decay } => {
             lesion(decay).map_or(Json::Null, |l| Json::from(workpiece.teeth[l.tooth].id.as_str()))

@@ -20,7 +20,7 @@ pub use alpha::{CronbachAlpha, ItemFit, cronbach_alpha};
 pub use cut_score::{BorderlineRegression, ContrastingGroups, borderline_regression, contrasting_groups};
 pub use descriptive::{DescriptiveStatistics, describe, quantile};
 pub use linear_fit::{LinearFit, linear_fit};
-pub use proportion::{Proportion, proportion};
+pub use proportion::{Proportion, proportion, wilson_interval};
 pub use reliability::{IntraclassCorrelation, Retest, icc, retest};
 
 /// Confidence level of all intervals.

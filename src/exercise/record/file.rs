@@ -301,6 +301,11 @@ pub enum CommandFile {
         coefficient: CoefficientName,
         value: f32,
     },
+    /// Properties of one tissue given to another.
+    SetMaterial {
+        label: u8,
+        like: u8,
+    },
     RunBur {
         running: bool,
     },
@@ -322,6 +327,7 @@ impl From<&Command> for CommandFile {
             Command::SetCoefficient { label, coefficient, value } => {
                 CommandFile::Set { label: label.0, coefficient: coefficient.into(), value }
             }
+            Command::SetMaterial { label, like } => CommandFile::SetMaterial { label: label.0, like: like.0 },
             Command::RunBur { running } => CommandFile::RunBur { running },
             Command::SetGuidance { guidance } => CommandFile::Guide { guidance },
             Command::SetFilling { label } => CommandFile::Fill { label: label.map(|l| l.0) },
@@ -339,6 +345,7 @@ impl From<&CommandFile> for Command {
             CommandFile::Set { label, coefficient, value } => {
                 Command::SetCoefficient { label: Label(label), coefficient: coefficient.into(), value }
             }
+            CommandFile::SetMaterial { label, like } => Command::SetMaterial { label: Label(label), like: Label(like) },
             CommandFile::RunBur { running } => Command::RunBur { running },
             CommandFile::Guide { guidance } => Command::SetGuidance { guidance },
             CommandFile::Fill { label } => Command::SetFilling { label: label.map(Label) },
