@@ -7,7 +7,7 @@ use typodont_core::device::DeviceSpec;
 use typodont_core::tick::Tick;
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::CoefficientName;
-use typodont_exercise::record::{DeviceSpecFile, Recording, ServoStatsFile, ended_by_name};
+use typodont_exercise::record::{DeviceSpecFile, Recording, SeedOriginFile, ServoStatsFile, ended_by_name};
 use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire, Scenario};
 use typodont_exercise::score;
 use typodont_exercise::score::{EpisodeKind, ErrorEpisode, Evidence, Grade, SCORER_VERSION, Scored, SiteResult};
@@ -57,6 +57,9 @@ pub struct SessionFile {
     pub participant: String,
     #[serde(default)]
     pub seed: u64,
+    /// Source of the seed; absent in results made before it was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed_origin: Option<SeedOriginFile>,
     /// When the session began, RFC 3339.
     #[serde(default)]
     pub started: String,
@@ -329,6 +332,7 @@ impl SessionFile {
             },
             participant: head.participant.clone(),
             seed: head.seed,
+            seed_origin: head.seed_origin,
             started: head.started.clone(),
             ended_because: ended,
             operator: head.operator.clone(),

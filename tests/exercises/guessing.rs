@@ -15,6 +15,7 @@ use typodont_core::sim::{Command, Simulation, Step, Touch};
 use typodont_core::statistics;
 use typodont_core::tick::Tick;
 use typodont_core::volume::{Edit, Label};
+use typodont_exercise::record::Recording;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece, resolve};
 use typodont_exercise::score::TrialSummary;
 use typodont_exercise::session::{
@@ -151,7 +152,10 @@ fn an_answer_counts_after_contact_with_the_place_that_it_names() {
     };
     let touch = |session: &mut Session, tick: u64, label: Label| {
         let touch = Touch { label, spring: 0.3, normal: Vec3::Y };
-        let step = Step { touch: Some(touch), ..Simulation::new(idle_setup(&scenario, &workpiece)).step(&Reading::at(Vec3::ZERO)) };
+        let step = Step {
+            touch: Some(touch),
+            ..Simulation::new(idle_setup(&scenario, &workpiece)).step(&Reading::at(Vec3::ZERO))
+        };
         session.advance(SessionEvent::Tick { step: &Step { tick: Tick(tick), ..step }, edits: &[] });
     };
     let refused = vec![Effect::Refused { why: InputError::NotExamined }];
@@ -252,10 +256,10 @@ fn check_reports_an_answer_that_stands_in_the_file() {
     let output = typodont(&["check", file.to_str().unwrap(), "--format", "json"]);
     let found: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found.len(), 1, "{found:?}");
-    assert_eq!((&found[0]["code"], &found[0]["path"]), (
-        &json!("fixed-answer"),
-        &json!("/stages/0/ask/0/answer/tooth_with")
-    ));
+    assert_eq!(
+        (&found[0]["code"], &found[0]["path"]),
+        (&json!("fixed-answer"), &json!("/stages/0/ask/0/answer/tooth_with"))
+    );
     for id in SEARCHES {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{id}.json"));
         let output = typodont(&["check", path.to_str().unwrap()]);
@@ -265,4 +269,90 @@ fn check_reports_an_answer_that_stands_in_the_file() {
 
 fn coarse_text(value: &Value) -> String {
     value.to_string().replace("\"spacing_mm\":0.1", "\"spacing_mm\":0.3")
+}
+
+/// The code of an examiner.
+const CODE: &str = "a code of the school";
+
+#[test]
+fn a_sealed_draw_is_revealed_at_the_end_and_not_before() {
+    // Aim: nothing that stands in the folder of a running examination tells the draws; a session that was cut off is
+    // finished with the code and with no other; a revealed seed cannot be exchanged. Method: a whole sealed session, and
+    // its recording without its last part, as a session that is still running or was cut off has it.
+    let (out, file) = written("sealed", &coarse("9-stain"));
+    let [code, wrong] = [("code", CODE), ("wrong", "another code of it")].map(|(name, text)| {
+        let path = out.join(format!("{name}.txt"));
+        std::fs::write(&path, format!("{text}\n")).unwrap();
+        path.to_str().unwrap().to_string()
+    });
+    let exercise = file.to_str().unwrap();
+    let bundle = {
+        let arguments = ["run", exercise, "--headless", "--operator", "guess", "--participant", "anna"];
+        let output = typodont(&[&arguments[..], &["--seed-sealed", &code, "--out", out.to_str().unwrap()]].concat());
+        assert!(output.status.success(), "{}", complained(&output));
+        PathBuf::from(String::from_utf8_lossy(&output.stdout).lines().last().unwrap())
+    };
+    let whole = session(&bundle);
+    assert_eq!(whole["seed_origin"], "sealed");
+    assert_eq!(truths(&whole).len(), 8);
+    assert!(typodont(&["verify", bundle.to_str().unwrap()]).status.success());
+    let bytes = std::fs::read(bundle.join("recording.mcap")).unwrap();
+    let recording = Recording::parse("sealed", &bytes).unwrap();
+    assert_eq!(Some(recording.head.seed), whole["seed"].as_u64());
+    let hidden = recording.commands.iter().filter(|(_, command)| command.is_none()).count();
+    assert_eq!(hidden, 8 * 8, "eight sites in each of eight trials");
+    assert!(!recording.commands.iter().any(|(_, c)| matches!(c, Some(Command::SetMaterial { .. }))));
+
+    // The seed is in the last records only: no text of it stands before them.
+    let seed = whole["seed"].as_u64().unwrap().to_string();
+    let place = bytes.windows(seed.len()).position(|part| part == seed.as_bytes()).expect("the seed is revealed");
+    assert!(place > bytes.len() * 9 / 10, "the seed stands at byte {place} of {}", bytes.len());
+    let running = &bytes[..place - 200];
+    let refused = Recording::parse("running", running).unwrap_err().to_string();
+    assert!(refused.contains("sealed-recording") && refused.contains("--seed-sealed"), "{refused}");
+
+    let partial = out.join("cut-off.partial");
+    std::fs::create_dir(&partial).unwrap();
+    std::fs::write(partial.join("recording.mcap"), running).unwrap();
+    let finish = |more: &[&str]| typodont(&[&["finish", partial.to_str().unwrap()], more].concat());
+    assert!(complained(&finish(&[])).contains("sealed-recording"));
+    assert!(complained(&finish(&["--seed-sealed", &wrong])).contains("not the code"));
+    let finished = finish(&["--seed-sealed", &code]);
+    assert!(finished.status.success(), "{}", complained(&finished));
+    let again = session(&out.join("cut-off"));
+    assert_eq!(again["seed"], whole["seed"]);
+    let kept = truths(&again);
+    assert!(kept.len() >= 7 && truths(&whole).starts_with(&kept), "{kept:?}");
+
+    let mut exchanged = bytes.clone();
+    exchanged[place] = if bytes[place] == b'1' { b'2' } else { b'1' };
+    let refused = Recording::parse("exchanged", &exchanged);
+    assert!(refused.is_err(), "a recording holds only with the seed that it began with");
+}
+
+#[test]
+fn a_seed_is_sealed_only_where_that_conceals_the_draws() {
+    let (out, file) = written("unsealed", &coarse("9-stain"));
+    let path = out.join("code.txt");
+    let run = |exercise: &str, code: &str| {
+        std::fs::write(&path, code).unwrap();
+        let sealed = ["--seed-sealed", path.to_str().unwrap(), "--out", out.to_str().unwrap()];
+        complained(&typodont(&[&["run", exercise, "--headless"], &sealed[..]].concat()))
+    };
+    assert!(run(file.to_str().unwrap(), "short").contains("short-code"));
+    assert!(run("scenarios/5-grinding.json", CODE).contains("not-sealable"));
+}
+
+#[test]
+fn a_seed_that_nobody_gives_is_drawn_by_the_system() {
+    let (out, file) = written("system_seed", &coarse("4-diagnosis"));
+    let seed = || {
+        let arguments = ["run", file.to_str().unwrap(), "--headless", "--operator", "guess", "--out"];
+        let output = typodont(&[&arguments[..], &[out.to_str().unwrap()]].concat());
+        assert!(output.status.success(), "{}", complained(&output));
+        let done = session(&PathBuf::from(String::from_utf8_lossy(&output.stdout).lines().last().unwrap()));
+        assert_eq!(done["seed_origin"], "system");
+        done["seed"].as_u64().unwrap()
+    };
+    assert_ne!(seed(), seed());
 }

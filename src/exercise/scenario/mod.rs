@@ -498,6 +498,17 @@ impl Scenario {
         self.stages.iter().take(stage + 1).filter(is_first).count().saturating_sub(1)
     }
 
+    /// Returns true if the seed decides anything about the volume: a position, or one of several depths.
+    pub fn is_workpiece_drawn(&self) -> bool {
+        let is_drawn = |place: &DecayPlace| matches!(place, DecayPlace::Random | DecayPlace::RandomQuadrant);
+        let has_depths = |shape: &DecayShape| matches!(shape, DecayShape::Grown(grown) if grown.depths.len() > 1);
+        self.scene.teeth.iter().any(|tooth| {
+            let mut patches = tooth.decay.iter().chain(&tooth.stains);
+            let is_cavity_drawn = tooth.cavity.as_ref().is_some_and(|cavity| is_drawn(&cavity.place));
+            is_cavity_drawn || patches.any(|patch| is_drawn(&patch.place) || has_depths(&patch.shape))
+        })
+    }
+
     /// Returns true if something is to be removed: decay, or tissue in a target zone.
     pub fn has_target(&self) -> bool {
         let has_zone = self.zones.iter().any(|zone| zone.role == ZoneRole::Target);
