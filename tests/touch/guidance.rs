@@ -310,7 +310,7 @@ fn a_guided_session_is_a_proof() {
         let tick = |key: &str| (stages[1][key].as_f64().unwrap() * 1e3).round() as u64;
         let expected = [(tick("started_s"), Some(0)), (tick("ended_s"), None)];
         let told = commands.iter().map(|(at, c)| match c {
-            Command::SetGuidance { guidance } => (at.0, *guidance),
+            Some(Command::SetGuidance { guidance }) => (at.0, *guidance),
             _ => unreachable!("filtered above"),
         });
         assert_eq!(told.collect::<Vec<_>>(), expected);

@@ -211,10 +211,15 @@ impl Workpiece {
         let world_from_tooth =
             world_from_tooth_above(Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z));
         let periodontium = gum.map(Arc::new);
-        let drawn = scenario.stages.iter().map(|stage| drawn_lesion(stage, &lesions, seed)).collect();
+        let drawn = Workpiece::draw(scenario, &lesions, seed);
         let arch = scenario.scene.arch.clone();
         let surroundings = around;
         Ok(Workpiece { volume, original, teeth, lesions, drawn, surroundings, periodontium, arch, world_from_tooth })
+    }
+
+    /// Returns, for each stage, the lesion that a seed draws, as an index into `lesions`; `None` without a draw.
+    pub fn draw(scenario: &Scenario, lesions: &[Lesion], seed: u64) -> Vec<Option<usize>> {
+        scenario.stages.iter().map(|stage| drawn_lesion(stage, lesions, seed)).collect()
     }
 
     /// Returns the lesion to which a question of a stage refers by an id: the lesion that was drawn, if the id is that of
