@@ -154,11 +154,11 @@ mod tests {
     /// Sums the result of every possible session of six guesses, each weighted by its probability.
     #[test]
     fn a_guess_has_an_expected_result_of_zero() {
-        for chance in [0.5, 0.25, 0.125] {
-            let mut expected = 0.0;
+        for chance in [0.5f64, 0.25, 0.125] {
+            let mut expected = 0.0f64;
             for outcome in 0..1u32 << 6 {
                 let correct = outcome.count_ones() as usize;
-                let probability = chance.powi(correct as i32) * (1.0f64 - chance).powi(6 - correct as i32);
+                let probability = chance.powi(correct as i32) * (1.0 - chance).powi(6 - correct as i32);
                 let result = summary(correct, 6 - correct, 0, chance).measure("detect_corrected_pct").unwrap();
                 expected += probability * result;
             }
