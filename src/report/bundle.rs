@@ -131,7 +131,7 @@ impl PartialBundle {
     /// When the recording cannot be read or written, is not sealed, or was sealed with another code.
     pub fn reveal_seed(&self, code: &str) -> Result<(), BundleError> {
         let path = self.recording_path();
-        let unmade = |why: String| BundleError { path: self.partial.clone(), why };
+        let unmade = |why: String| BundleError::new(&self.partial, why);
         let bytes = fs::read(&path).map_err(|e| unmade(e.to_string()))?;
         let revealed = record::reveal(&bytes, code).map_err(unmade)?;
         // The recording is replaced as a whole, so that a power cut leaves one or the other.

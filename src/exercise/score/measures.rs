@@ -272,7 +272,7 @@ impl MeasureSource<'_> {
         }
         if let Some(trials) = self.trials.as_ref().filter(|_| OF_DRAWS.iter().any(|about| about.name == name)) {
             let first_error = trials.first_error.filter(|_| name == "detect_corrected_pct");
-            let evidence = first_error.map(|(at, place)| Evidence { at: Some(at), place });
+            let evidence = first_error.map(|(at, place)| Evidence { at: Some(at), ..Evidence::at_place(place) });
             return ComputedValue { value: trials.measure(name), evidence };
         }
         self.chart.and_then(|chart| charting::measure(name, chart)).into()

@@ -46,7 +46,9 @@ pub enum ResolveMode {
 pub fn resolve(source: Arc<SourceText>, library: &Library, mode: ResolveMode) -> Result<Scenario, Vec<Diagnostic>> {
     let read = match mode {
         ResolveMode::FromRecording => json::read_recorded::<ScenarioFile>(source.clone())?,
-        ResolveMode::MakeWorkpiece | ResolveMode::ReadScans => json::read::<ScenarioFile>(source.clone())?,
+        ResolveMode::MakeWorkpiece | ResolveMode::Check | ResolveMode::ReadScans => {
+            json::read::<ScenarioFile>(source.clone())?
+        }
     };
     let mut found = Vec::new();
     let tissues = TissueTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
