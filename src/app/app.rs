@@ -28,6 +28,7 @@ use typodont_exercise::session::Input;
 use typodont_formats::Library;
 use typodont_formats::diagnostic::headlines;
 use typodont_lesson as lesson;
+use typodont_lesson::SessionSeed;
 
 pub struct App {
     options: AppOptions,
@@ -360,9 +361,21 @@ impl App {
             },
         };
         let started = jiff::Timestamp::now();
+        let seed = match (&self.options.seed_code, self.options.seed) {
+            (Some(code), _) => SessionSeed::sealed(code, &self.participant, started, &scenario),
+            (None, Some(seed)) => Ok(SessionSeed::given(seed)),
+            (None, None) => SessionSeed::drawn(),
+        };
+        let seed = match seed {
+            Ok(seed) => seed,
+            Err(why) => {
+                self.screen = Screen::Failed(why.to_string());
+                return;
+            }
+        };
         let config = LessonConfig {
             scenario,
-            seed: self.options.seed.unwrap_or_else(|| lesson::seed_from_time(started)),
+            seed,
             participant: self.participant.clone(),
             out,
             templates: self.options.templates.clone(),
@@ -372,12 +385,11 @@ impl App {
             digests,
             wake: repaint_waker(ctx),
         };
-        self.state_log.record("seed", config.seed);
-        let output = PlaybackOptions {
-            seed: config.seed,
-            replacements: self.replacements.clone(),
-            ..PlaybackOptions::default()
-        };
+        // A sealed seed is shown nowhere; the sound does not need it.
+        let shown_seed = if seed.is_sealed() { 0 } else { seed.value };
+        self.state_log.record("seed", shown_seed);
+        let output =
+            PlaybackOptions { seed: shown_seed, replacements: self.replacements.clone(), ..PlaybackOptions::default() };
         let mode = if self.has_graphics { DisplayMode::Iso } else { DisplayMode::Surface };
         self.screen = match LessonState::begin(config, library, output, mode) {
             Ok(lesson) => Screen::Lesson(Box::new(lesson)),

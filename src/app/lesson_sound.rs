@@ -7,7 +7,7 @@ use typodont_core::sim::Step;
 use typodont_core::tick::TICK_S;
 use typodont_core::touch::CuttingLaw;
 use typodont_exercise::catalog::{TissueRole, ToolKind};
-use typodont_exercise::scenario::Scenario;
+use typodont_exercise::scenario::{Scenario, anatomy_tissues};
 
 /// Speed of a bur for which the scenario gives none, 1/min: an air turbine under light load, and a contra-angle with
 /// round steel burs. Handpieces of ISO 14457.
@@ -83,9 +83,12 @@ impl LessonSound {
             speed: 0.0,
             time_since_pain: RELIEF,
         };
+        let enamel = scenario.tissues.by_label(anatomy_tissues(&scenario.tissues).enamel);
         for entry in scenario.tissues.entries() {
             let place = usize::from(entry.id);
-            sound.hardness[place] = entry.hardness_hv.unwrap_or(0.0);
+            // All possible sites of a draw sound alike, drawn or not: they are to be found by touch.
+            let heard = enamel.filter(|_| entry.site_of.is_some()).unwrap_or(entry);
+            sound.hardness[place] = heard.hardness_hv.unwrap_or(0.0);
             sound.is_soft[place] = entry.role == TissueRole::Soft;
         }
         sound

@@ -22,7 +22,7 @@ use typodont_exercise::scenario::{Scenario, Workpiece};
 use typodont_exercise::session::Input;
 use typodont_lesson::live::LiveEvent;
 use typodont_lesson::{
-    Lesson, LessonError, OpenDevice, PendingSecondHand, PreparedSession, SessionConfig, second_hand,
+    Lesson, LessonError, OpenDevice, PendingSecondHand, PreparedSession, SessionConfig, SessionSeed, second_hand,
 };
 use typodont_report::Templates;
 
@@ -68,7 +68,7 @@ pub enum LessonEvent {
 /// Configuration of a lesson in the window.
 pub struct LessonConfig {
     pub scenario: Arc<Scenario>,
-    pub seed: u64,
+    pub seed: SessionSeed,
     pub participant: String,
     pub out: PathBuf,
     pub templates: Templates,

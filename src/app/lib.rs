@@ -70,8 +70,10 @@ pub struct AppOptions {
     pub editor_mode: Option<OpenMode>,
     /// The input device, as in `--device`; without it that of the settings.
     pub device: Option<String>,
-    /// Seed of the random choices of exercises; without one it is taken from the clock.
+    /// Seed of the random choices of exercises; without one it is drawn from the operating system.
     pub seed: Option<u64>,
+    /// Examiner's code, from which the seed is derived and sealed until the session ends.
+    pub seed_code: Option<String>,
     /// A code for the trainee; never a name.
     pub participant: String,
     /// Folder in which bundles are written.
@@ -84,7 +86,7 @@ pub struct AppOptions {
 impl AppOptions {
     /// Options of a window that opens at the exercise list.
     pub fn at_exercise_list(out: impl Into<PathBuf>, templates: Templates) -> AppOptions {
-        let (exercise, seed, frame_delay) = (None, None, None);
+        let (exercise, seed, seed_code, frame_delay) = (None, None, None, None);
         AppOptions {
             exercise,
             tooth: None,
@@ -93,6 +95,7 @@ impl AppOptions {
             editor_mode: None,
             device: None,
             seed,
+            seed_code,
             participant: String::new(),
             out: out.into(),
             templates,

@@ -19,6 +19,7 @@ pub fn refusal_key(why: InputError) -> &'static str {
         InputError::NoCoefficient => "refused.no_coefficient",
         InputError::NotAsked => "refused.not_asked",
         InputError::NoAnswer => "refused.no_answer",
+        InputError::NotExamined => "refused.not_examined",
         InputError::NoQuestionnaire => "refused.no_questionnaire",
         InputError::NoStep => "refused.no_step",
         InputError::NoStatement => "refused.no_statement",

@@ -97,7 +97,8 @@ fn materials_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, c
     let is_by_force = matches!(lesson.scenario.carving.law, CuttingLaw::Threshold);
     let coefficients = egui::CollapsingHeader::new(words.get("menu.coefficients"));
     coefficients.show(ui, |ui| {
-        for entry in lesson.scenario.tissues.entries() {
+        // Possible sites of a draw have the properties of their decay, which is listed once.
+        for entry in lesson.scenario.tissues.entries().iter().filter(|entry| entry.site_of.is_none()) {
             ui.label(egui::RichText::new(&entry.title).size(14.0).strong());
             // A stage that changes a stiffness in steps tests whether the trainee feels it: only the exercise's own
             // value is shown there.

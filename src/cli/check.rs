@@ -75,7 +75,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 
 /// The warnings about one scenario, or all complaints if it cannot be run.
 fn check(path: &Path) -> Result<Vec<Diagnostic>, Vec<Diagnostic>> {
-    let scenario = Arc::new(lesson::read_scenario(path, ResolveMode::MakeWorkpiece)?);
+    let scenario = Arc::new(lesson::read_scenario(path, ResolveMode::Check)?);
     let name = path.display().to_string();
     let about_file = |why: String| vec![Diagnostic::about_file(&name, "impossible-scene", why, None)];
     let warnings = lesson::exercise_warnings(&scenario).map_err(about_file)?;

@@ -1,6 +1,6 @@
 //! `typodont demo`: runs the shipped exercises with a scripted operator and writes a page about them.
 
-use super::run::{RunRequest, SessionDriver, operator, run_session};
+use super::run::{RunRequest, SeedSource, SessionDriver, operator, run_session};
 use super::{CliError, DEFAULT_LANGUAGE, SESSIONS, cohort, print_line};
 use clap::Args;
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         let run = RunRequest {
             scenario: Arc::new(scenario),
             driver: SessionDriver::Script(Box::new(operator.clone())),
-            seed: SEED,
+            seed: SeedSource::Given(SEED),
             participant: "demo",
             out: &arguments.out,
             digests: BTreeMap::new(),

@@ -18,7 +18,7 @@ use typodont_devices::servo::SecondHandRole;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
 use typodont_exercise::session::OperatorFile;
 use typodont_formats::Library;
-use typodont_lesson::{self as lesson, LessonError, SessionConfig, ToothScan};
+use typodont_lesson::{self as lesson, LessonError, SessionConfig, SessionSeed, ToothScan};
 #[cfg(feature = "devices")]
 use typodont_lesson::{PendingSecondHand, second_hand};
 
@@ -35,7 +35,7 @@ pub struct Arguments {
     /// Run without a window, as fast as the computer allows
     #[arg(long)]
     headless: bool,
-    /// Scripted operator in the place of a trainee: careful, expert, hasty, timid, or a file
+    /// Scripted operator in the place of a trainee: careful, expert, guess, hasty, timid, or a file
     #[arg(long, value_name = "NAME|FILE.json", default_value = "careful", requires = "headless")]
     operator: String,
     /// Device of the trainee; see `typodont devices`
@@ -57,9 +57,13 @@ pub struct Arguments {
     /// Purpose of the second device
     #[arg(long, value_enum, default_value_t)]
     second_role: SecondHandRoleName,
-    /// Seed of the random choices of the exercise; by default taken from the clock
-    #[arg(long)]
+    /// Seed of the random choices of the exercise; by default drawn from the operating system
+    #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Examination: file with the examiner's code, from which the seed is derived; "-" reads the code from the standard
+    /// input. What is drawn stays unknown until the end of the session
+    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
+    seed_sealed: Option<PathBuf>,
     /// CT volume, or label map as written by `typodont import` (NRRD), used instead of the exercise's own tooth
     #[arg(long, value_name = "VOLUME")]
     tooth: Option<PathBuf>,
@@ -131,11 +135,20 @@ fn participant(text: &str) -> Result<String, String> {
 pub struct RunRequest<'a> {
     pub scenario: Arc<Scenario>,
     pub driver: SessionDriver,
-    pub seed: u64,
+    pub seed: SeedSource,
     pub participant: &'a str,
     pub out: &'a Path,
     /// SHA-256 of files that the scenario does not name, by name.
     pub digests: BTreeMap<String, String>,
+}
+
+/// Source of a session's seed, before the time of its start is known.
+pub enum SeedSource {
+    /// The operating system.
+    System,
+    Given(u64),
+    /// The examiner's code.
+    Sealed(String),
 }
 
 /// Source of the hand's movement.
@@ -156,7 +169,6 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let library = lesson::library_for(&arguments.scenario);
     let mut scenario = lesson::read_scenario(&arguments.scenario, ResolveMode::MakeWorkpiece)?;
     let mut digests = BTreeMap::new();
-    let seed = arguments.seed.unwrap_or_else(|| lesson::seed_from_time(jiff::Timestamp::now()));
     if let Some(scan) = read_tooth_scan(arguments)? {
         scan.replace_teeth(&mut scenario)?;
         if arguments.fdi.is_none()
@@ -165,7 +177,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
             let number = tooth.fdi;
             eprintln!("note: the volume counts as tooth {number}, the exercise's own; --fdi gives it another number");
         }
-        if let Ok(workpiece) = Workpiece::make(&scenario, seed) {
+        if let Ok(workpiece) = Workpiece::make(&scenario, arguments.seed.unwrap_or_default()) {
             let warnings = lesson::caries_warnings(&scenario, &workpiece);
             warnings.iter().for_each(|w| eprintln!("warning: {}: {}; {}", w.code, w.message, w.help));
         }
@@ -178,7 +190,11 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let run = RunRequest {
         scenario: Arc::new(scenario),
         driver,
-        seed,
+        seed: match (read_code(arguments.seed_sealed.as_deref())?, arguments.seed) {
+            (Some(code), _) => SeedSource::Sealed(code),
+            (None, Some(seed)) => SeedSource::Given(seed),
+            (None, None) => SeedSource::System,
+        },
         participant: &arguments.participant,
         out: &arguments.out,
         digests,
@@ -218,6 +234,7 @@ fn open_in_window(arguments: &Arguments) -> Result<(), CliError> {
         editor_mode: None,
         device: (arguments.device == MOUSE).then(|| MOUSE.into()),
         seed: arguments.seed,
+        seed_code: read_code(arguments.seed_sealed.as_deref())?,
         participant: arguments.participant.clone(),
         out: arguments.out.clone(),
         templates: super::load_templates()?,
@@ -240,6 +257,16 @@ fn second_hand_source(
         (None, None) => return Ok(None),
     };
     Ok(Some((from, arguments.second_role.into())))
+}
+
+/// Reads an examiner's code: the first line of a file, or of the standard input for "-".
+pub fn read_code(path: Option<&Path>) -> Result<Option<String>, CliError> {
+    let Some(path) = path else { return Ok(None) };
+    let text = match path == Path::new("-") {
+        true => std::io::read_to_string(std::io::stdin()).map_err(|e| CliError::Wrong(format!("no code: {e}")))?,
+        false => typodont_formats::read_text(path)?.text.clone(),
+    };
+    Ok(Some(text.lines().next().unwrap_or_default().trim().to_string()))
 }
 
 /// Reads the scan that replaces the exercise's own tooth.
@@ -279,6 +306,11 @@ pub fn run_session(run: RunRequest) -> Result<PathBuf, CliError> {
     // Invalid templates must be reported before the session, not after.
     let templates = super::load_templates()?;
     let started = jiff::Timestamp::now();
+    let seed = match seed {
+        SeedSource::System => SessionSeed::drawn()?,
+        SeedSource::Given(seed) => SessionSeed::given(seed),
+        SeedSource::Sealed(code) => SessionSeed::sealed(&code, participant, started, &scenario)?,
+    };
     let config = SessionConfig { scenario, seed, participant, out, digests, templates, started };
     let workpiece = config.make_workpiece()?;
     let recorded = match driver {

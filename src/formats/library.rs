@@ -28,6 +28,7 @@ const SHIPPED: &[(&str, &str)] = &[
     ("content/touch.json", include_str!("../../content/touch.json")),
     ("content/operators/careful.json", include_str!("../../content/operators/careful.json")),
     ("content/operators/expert.json", include_str!("../../content/operators/expert.json")),
+    ("content/operators/guess.json", include_str!("../../content/operators/guess.json")),
     ("content/operators/hasty.json", include_str!("../../content/operators/hasty.json")),
     ("content/operators/timid.json", include_str!("../../content/operators/timid.json")),
     ("content/questionnaires/simulator.json", include_str!("../../content/questionnaires/simulator.json")),

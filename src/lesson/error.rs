@@ -17,6 +17,12 @@ pub enum LessonError {
     RecordingNotStarted(RecorderError),
     /// The recording cannot be synced to the disk; no session began.
     NoDiskSync { path: PathBuf, why: io::Error },
+    /// The operating system gives no random numbers for the seed.
+    NoRandomness { why: String },
+    /// An examiner's code with fewer than `least` characters.
+    ShortCode { least: usize },
+    /// The random choices of the exercise cannot be sealed.
+    NotSealable { scenario: String },
     /// The bundle's folder cannot be made or filled.
     Bundle(BundleError),
     /// The session stopped; `folder` holds its recording up to then.
@@ -53,6 +59,17 @@ impl fmt::Display for LessonError {
             LessonError::NoDiskSync { path, why } => {
                 write!(f, "{}: unwritable-file: the recording cannot be synced to the disk: {why}", path.display())
             }
+            LessonError::NoRandomness { why } => {
+                write!(f, "no-randomness: the operating system gives no random numbers: {why}; give a seed")
+            }
+            LessonError::ShortCode { least } => {
+                write!(f, "short-code: the examiner's code must have at least {least} characters, or it can be guessed")
+            }
+            LessonError::NotSealable { scenario } => write!(
+                f,
+                "{scenario}: not-sealable: a sealed seed requires an exercise with \"draw\" and without other random \
+                 positions or depths, which the recording contains from the beginning"
+            ),
             LessonError::Bundle(unmade) => unmade.fmt(f),
             LessonError::Stopped { why, folder } => {
                 write!(

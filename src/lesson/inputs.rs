@@ -49,8 +49,3 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
 pub fn is_valid_participant_code(text: &str) -> bool {
     text.len() <= 64 && text.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
 }
-
-/// Seed from the time at which a lesson begins; below 2⁵³, so that every JSON reader keeps it exactly.
-pub fn seed_from_time(started: jiff::Timestamp) -> u64 {
-    (started.as_nanosecond() as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11
-}

@@ -6,14 +6,14 @@
 //! ```no_run
 //! use std::{collections::BTreeMap, path::Path, sync::Arc};
 //! use typodont_exercise::scenario::ResolveMode;
-//! use typodont_lesson::{SessionConfig, open_device, read_scenario};
+//! use typodont_lesson::{SessionConfig, SessionSeed, open_device, read_scenario};
 //! use typodont_report::Templates;
 //!
 //! let opened = open_device("haply")?;
 //! let scenario = read_scenario(Path::new("scenarios/10-class-one.json"), ResolveMode::ReadScans).unwrap();
 //! let config = SessionConfig {
 //!     scenario: Arc::new(scenario),
-//!     seed: 1,
+//!     seed: SessionSeed::drawn()?,
 //!     participant: "trainee-7",
 //!     out: Path::new("sessions"),
 //!     digests: BTreeMap::new(),
@@ -36,6 +36,7 @@ mod error;
 mod exercise_warnings;
 mod inputs;
 mod preparation;
+mod seed;
 mod tooth_scan;
 #[cfg(feature = "devices")]
 mod device_selection;
@@ -48,8 +49,9 @@ pub mod second_hand;
 
 pub use error::LessonError;
 pub use exercise_warnings::{ExerciseWarning, IDLE_POINTS_MAX, caries_warnings, exercise_warnings};
-pub use inputs::{is_valid_participant_code, library_for, read_scenario, scenario_files, seed_from_time};
+pub use inputs::{is_valid_participant_code, library_for, read_scenario, scenario_files};
 pub use preparation::{PreparedSession, RecordedSession, SessionConfig};
+pub use seed::SessionSeed;
 pub use tooth_scan::ToothScan;
 
 #[cfg(feature = "devices")]

@@ -2,6 +2,7 @@
 
 use super::LessonError;
 use super::disk_sync::DiskSync;
+use super::seed::{SessionSeed, started_text};
 #[cfg(feature = "devices")]
 use super::{Lesson, PendingSecondHand, live::LiveEvent};
 use jiff::Timestamp;
@@ -13,7 +14,7 @@ use std::sync::Arc;
 use typodont_core::device::Device;
 use typodont_core::device::DeviceSpec;
 use typodont_core::sim::Simulation;
-use typodont_exercise::record::{Recorder, RecordingEndFile, RecordingHeadFile, ServoStatsFile};
+use typodont_exercise::record::{Recorder, RecordingEndFile, RecordingHeadFile, SeedOriginFile, ServoStatsFile};
 use typodont_exercise::scenario::{Scenario, Workpiece, hex};
 use typodont_exercise::session::{Operator, OperatorFile, RunEnd, Session};
 use typodont_report::Templates;
@@ -22,9 +23,8 @@ use typodont_report::bundle::PartialBundle;
 /// Configuration of a session.
 pub struct SessionConfig<'a> {
     pub scenario: Arc<Scenario>,
-    /// Seed of all random choices of the exercise; at most 2⁵³, the largest whole number that every JSON reader keeps
-    /// exactly.
-    pub seed: u64,
+    /// Seed of all random choices of the exercise.
+    pub seed: SessionSeed,
     /// A code of up to 64 letters; never a name.
     pub participant: &'a str,
     /// Folder in which the bundle is made.
@@ -56,7 +56,7 @@ impl SessionConfig<'_> {
     ///
     /// [`LessonError::ImpossibleScene`] if the exercise cannot be made with this seed.
     pub fn make_workpiece(&self) -> Result<Arc<Workpiece>, LessonError> {
-        let made = Workpiece::make(&self.scenario, self.seed);
+        let made = Workpiece::make(&self.scenario, self.seed.value);
         made.map(Arc::new).map_err(|why| LessonError::ImpossibleScene { scenario: self.scenario.id.clone(), why })
     }
 
@@ -75,11 +75,12 @@ impl SessionConfig<'_> {
         let SessionConfig { scenario, seed, participant, out, digests, templates, started } = self;
         let head = RecordingHeadFile {
             participant: participant.to_string(),
-            started: format!("{started:.0}"),
+            started: started_text(started),
+            seed_origin: Some(seed.origin),
             live: operator.is_none(),
             operator: operator.map(|o| o.id.clone()),
             digests,
-            ..RecordingHeadFile::of(&scenario, &spec, seed)
+            ..RecordingHeadFile::of(&scenario, &spec, seed.value)
         };
         let partial_bundle = PartialBundle::create(out, &bundle_name(&head, started))?;
         let path = partial_bundle.recording_path();
@@ -90,6 +91,7 @@ impl SessionConfig<'_> {
         });
         match opened {
             Ok((recorder, disk_sync)) => {
+                let seed = seed.value;
                 Ok(PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, spec, seed })
             }
             Err(error) => {
@@ -103,7 +105,9 @@ impl SessionConfig<'_> {
 /// Name `exercise_time_digest`: it sorts by exercise and time, differs for two sessions of the same second, and
 /// contains no participant code.
 fn bundle_name(head: &RecordingHeadFile, started: Timestamp) -> String {
-    let digest = Sha256::digest(format!("{}/{}/{}/{started}", head.participant, head.seed, std::process::id()));
+    // The name of a folder must not help to find a sealed seed.
+    let seed = if head.seed_origin == Some(SeedOriginFile::Sealed) { 0 } else { head.seed };
+    let digest = Sha256::digest(format!("{}/{seed}/{}/{started}", head.participant, std::process::id()));
     format!("{}_{}_{}", head.scenario_id, started.strftime("%Y%m%dT%H%M%SZ"), hex(&digest[..4]))
 }
 

@@ -124,6 +124,21 @@ impl PartialBundle {
         self.partial.join(record::FILE_NAME)
     }
 
+    /// Reveals the seed of a sealed session that was cut off, by the examiner's code.
+    ///
+    /// # Errors
+    ///
+    /// When the recording cannot be read or written, is not sealed, or was sealed with another code.
+    pub fn reveal_seed(&self, code: &str) -> Result<(), BundleError> {
+        let path = self.recording_path();
+        let unmade = |why: String| BundleError::new(&self.partial, why);
+        let bytes = fs::read(&path).map_err(|e| unmade(e.to_string()))?;
+        let revealed = record::reveal(&bytes, code).map_err(unmade)?;
+        // The recording is replaced as a whole, so that a power cut leaves one or the other.
+        let copy = path.with_extension("revealed");
+        fs::write(&copy, revealed).and_then(|()| fs::rename(&copy, &path)).map_err(|e| unmade(e.to_string()))
+    }
+
     /// Scores the finished recording, writes all files that follow from it, and renames the folder.
     ///
     /// # Errors

@@ -89,6 +89,7 @@ pub fn measure(name: &str, value: Option<f64>) -> String {
     match (name, unit) {
         ("pulp_exposed", _) => yes_no(value != 0.0).into(),
         ("detect_tooth" | "detect_quadrant", _) => (if value != 0.0 { "right" } else { "wrong" }).into(),
+        ("detect_trials_right", _) => plain_number(value),
         (_, "s") => duration(value),
         (_, "") => number(value),
         (_, "%") => format!("{} %", number(value)),

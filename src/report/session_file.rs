@@ -8,7 +8,7 @@ use typodont_core::device::DeviceSpec;
 use typodont_core::tick::Tick;
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{CoefficientName, TissueRole, TissueTable};
-use typodont_exercise::record::{DeviceSpecFile, Recording, ServoStatsFile, ended_by_name};
+use typodont_exercise::record::{DeviceSpecFile, Recording, SeedOriginFile, ServoStatsFile, ended_by_name};
 use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire, Scenario, Workpiece, hex};
 use typodont_exercise::score;
 use typodont_exercise::score::{EpisodeKind, ErrorEpisode, Evidence, Grade, SCORER_VERSION, Scored, SiteResult};
@@ -58,6 +58,9 @@ pub struct SessionFile {
     pub participant: String,
     #[serde(default)]
     pub seed: u64,
+    /// Source of the seed; absent in results made before it was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed_origin: Option<SeedOriginFile>,
     /// When the session began, RFC 3339.
     #[serde(default)]
     pub started: String,
@@ -337,6 +340,7 @@ impl SessionFile {
             },
             participant: head.participant.clone(),
             seed: head.seed,
+            seed_origin: head.seed_origin,
             started: head.started.clone(),
             ended_because: ended,
             operator: head.operator.clone(),
@@ -544,9 +548,9 @@ fn round_to_nine_decimals(value: f64) -> f64 {
 
 fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
     let results = recording.scenario.stages.iter().zip(&scored.replay.outcome.stages).zip(&scored.led_ticks);
-    let stage = |((stage, result), &led): (
-        (&typodont_exercise::scenario::Stage, &typodont_exercise::session::StageResult),
-        &u64,
+    let stage = |(index, ((stage, result), &led)): (
+        usize,
+        ((&typodont_exercise::scenario::Stage, &typodont_exercise::session::StageResult), &u64),
     )| {
         let answers = stage.ask.iter().zip(&result.answers).filter_map(|(question, given)| {
             let AnswerRecord { value, at, correct: right, step } = given.as_ref()?;
@@ -556,7 +560,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
                 value: answer_value(value),
                 at_s: at.seconds(),
                 right: *right,
-                truth: truth(&question.kind, scored),
+                truth: truth(recording, index, &question.kind, scored),
                 level: step.map(|(level, _)| (f64::from(level) * 1e6).round() / 1e6),
             })
         });
@@ -576,7 +580,7 @@ fn stages(recording: &Recording, scored: &Scored) -> Vec<StageResultFile> {
             answers: answers.collect(),
         }
     };
-    results.map(stage).collect()
+    results.enumerate().map(stage).collect()
 }
 
 fn answer_value(value: &AnswerValue) -> Json {
@@ -588,9 +592,9 @@ fn answer_value(value: &AnswerValue) -> Json {
     }
 }
 
-fn truth(kind: &QuestionKind, scored: &Scored) -> Json {
+fn truth(recording: &Recording, stage: usize, kind: &QuestionKind, scored: &Scored) -> Json {
     let workpiece = &scored.replay.workpiece;
-    let lesion = |name: &str| workpiece.lesions.iter().find(|l| l.id == name);
+    let lesion = |name: &str| workpiece.lesion(&recording.scenario, stage, name);
     match kind {
         QuestionKind::ToothWith { decay } => {
             lesion(decay).map_or(Json::Null, |l| Json::from(workpiece.teeth[l.tooth].id.as_str()))

@@ -257,11 +257,13 @@ fn names_that_lead_nowhere() {
         &[("unknown-tissue", "/zones/0/region/around/tissue")],
     );
     let text = edited("3-detection.json", "/stages/0/ask/0/answer/tooth_with", Some(json!("leison")));
-    check_text("question about no decay", &text, &[("unknown-decay", "/stages/0/ask/0/answer/tooth_with")]);
+    let expected = [("no-question", "/stages/0/draw"), ("unknown-decay", "/stages/0/ask/0/answer/tooth_with")];
+    check_text("question about no decay", &text, &expected);
     let text = edited("3-detection.json", "/stages/0/stiffness_steps/tissue", Some(json!("decay")));
     check_text("steps of no tissue", &text, &[("unknown-tissue", "/stages/0/stiffness_steps/tissue")]);
     let text = edited("3-detection.json", "/stages/0/adjustable", Some(json!(true)));
-    check_text("what is tested is left to the trainee", &text, &[("adjustable-steps", "/stages/0/adjustable")]);
+    let expected = [("adjustable-steps", "/stages/0/adjustable"), ("shown-draw", "/stages/0/adjustable")];
+    check_text("what is tested is left to the trainee", &text, &expected);
     let choice = json!([{ "id": "q", "text": "?", "answer": { "choice": { "options": [{ "id": "a", "text": "A" }, { "id": "b", "text": "B" }], "correct": "c" } } }]);
     check(
         "right answer not offered",
@@ -378,9 +380,7 @@ fn parts_that_do_not_fit_together() {
         &[("unknown-zone", "/rubric/hard_fails/1/metric"), ("duplicate-id", "/zones/1/id")],
     );
     let one_tooth = edited("4-diagnosis.json", "/stages/0/ask/0/answer", Some(json!({ "tooth_with": "lesion" })));
-    // The rubric's points were for the quadrant, which nobody asks any more.
-    let unasked = ["/rubric/items/0/metric", "/rubric/items/1/metric"].map(|at| ("no-question", at));
-    check_text("which tooth of one", &one_tooth, &[unasked[0], unasked[1], ("no-choice", "/stages/0/ask/0/answer")]);
+    check_text("which tooth of one", &one_tooth, &[("no-choice", "/stages/0/ask/0/answer")]);
     let tissue = json!([{ "id": 1, "name": "enamel", "title": "E", "role": "sound", "color": "red", "stiffness": 1, "damping": 1, "static_friction": 0, "dynamic_friction": 0, "cut_force_n": 1 }]);
     check("a new tissue that clashes", "/new_tissues", tissue, &[("wrong-form", "/new_tissues/0/color")]);
     let pair = edited("2-decay.json", "/scene/pair/right/form/procedural/spacing_mm", Some(json!(0.2)));

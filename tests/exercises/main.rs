@@ -7,6 +7,7 @@ mod broken_scenarios;
 mod charting;
 mod fairness;
 mod fuzz_scenario;
+mod guessing;
 mod operators;
 mod restoring;
 mod schema;

@@ -172,10 +172,8 @@ fn charting_tells_them_apart() {
 #[test]
 #[ignore = "scripts/test --long"]
 fn searching_tells_them_apart() {
-    for (scenario, right, time) in [
-        ("scenarios/3-detection.json", "detect_tooth", "detect_level_time_s"),
-        ("scenarios/4-diagnosis.json", "detect_quadrant", "detect_quadrant_time_s"),
-    ] {
+    let (right, time) = ("detect_corrected_pct", "detect_trial_time_s");
+    for scenario in ["scenarios/3-detection.json", "scenarios/4-diagnosis.json"] {
         let mean = means(scenario);
         for operator in OPERATORS {
             println!("{scenario} {operator}: right {:?}, after {:?} s", mean(operator, right), mean(operator, time));
@@ -183,13 +181,13 @@ fn searching_tells_them_apart() {
         grows(&mean, "force_max_n", &["timid", "hasty"]);
         grows(&mean, "force_max_n", &["careful", "hasty"]);
         match scenario.contains("detection") {
-            // The stiffer the decay still was, the finer the hand that found it.
-            true => grows(&mean, "detect_level", &["timid", "hasty", "careful"]),
+            // The stiffer the decay still was, the finer and the quicker the hand that found it.
+            true => grows(&mean, "detect_level_corrected", &["timid", "careful", "expert"]),
             false => grows(&mean, time, &["hasty", "expert", "careful"]),
         }
         grows(&mean, time, &["expert", "careful"]);
-        assert_eq!(mean("expert", right), Some(1.0), "the expert finds it: {scenario}");
-        assert_eq!(mean("careful", right), Some(1.0), "the careful one finds it: {scenario}");
+        assert_eq!(mean("expert", right), Some(100.0), "the expert finds it: {scenario}");
+        assert_eq!(mean("careful", right), Some(100.0), "the careful one finds it: {scenario}");
     }
 }
 
@@ -199,7 +197,7 @@ fn stain_misleads_nobody_who_feels() {
     let mean = means("scenarios/9-stain.json");
     grows(&mean, "session_time_s", &["hasty", "expert", "careful"]);
     for operator in ["expert", "careful"] {
-        assert_eq!(mean(operator, "detect_tooth"), Some(1.0), "{operator} finds it");
+        assert_eq!(mean(operator, "detect_corrected_pct"), Some(100.0), "{operator} finds it");
     }
 }
 

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use typodont_core::device::{DeviceSpec, PlaybackDevice};
 use typodont_exercise::record::Recording;
 use typodont_exercise::scenario::ResolveMode;
-use typodont_lesson::{Lesson, SessionConfig, read_scenario};
+use typodont_lesson::{Lesson, SessionConfig, SessionSeed, read_scenario};
 use typodont_report::Templates;
 
 /// Maximum loss that is promised, ticks.
@@ -27,7 +27,7 @@ fn begin(out: &Path) -> Lesson {
     let scenario = read_scenario(Path::new("scenarios/5-grinding.json"), ResolveMode::MakeWorkpiece).unwrap();
     let config = SessionConfig {
         scenario: Arc::new(scenario),
-        seed: 4,
+        seed: SessionSeed::given(4),
         participant: "",
         out,
         digests: BTreeMap::new(),

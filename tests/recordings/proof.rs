@@ -169,7 +169,7 @@ fn a_forgery_in_the_right_format_is_located_by_its_tick() {
 fn changes_of_the_session_metadata_are_detected() {
     // Aim: the seed determines the correct quadrant, and the head the device and the participant; none can be
     // changed.
-    let whole = run("scenarios/4-diagnosis.json", "careful", &folder("seal_whole"), &[]);
+    let whole = run("scenarios/4-diagnosis.json", "hasty", &folder("seal_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
     let heads: [(&str, &str, &str); 3] = [
         ("seed", "\"seed\":1,", "\"seed\":2,"),
@@ -189,7 +189,7 @@ fn changes_of_the_session_metadata_are_detected() {
 
 #[test]
 fn events_added_after_the_end_or_dropped_are_detected() {
-    let whole = run("scenarios/4-diagnosis.json", "careful", &folder("strays_whole"), &[]);
+    let whole = run("scenarios/4-diagnosis.json", "hasty", &folder("strays_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
     // Ratings come after the last tick. In one forgery the last is moved to a later tick, in the other it is dropped.
     let mut last = 0;
@@ -417,7 +417,7 @@ fn a_forged_grade_is_named() {
 
 #[test]
 fn scoring_again_gives_the_same_metrics() {
-    let bundle = run("scenarios/4-diagnosis.json", "careful", &folder("again"), &[]);
+    let bundle = run("scenarios/4-diagnosis.json", "hasty", &folder("again"), &[]);
     let output = typodont(&["score", bundle.to_str().unwrap()]);
     let again: serde_json::Value = serde_json::from_str(&told(&output)).unwrap();
     let first = session(&bundle);

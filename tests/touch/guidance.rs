@@ -304,13 +304,13 @@ fn a_guided_session_is_a_proof() {
         let recording = Recording::read(&bundle.join("recording.mcap")).unwrap();
         assert!(recording.scenario.files.contains_key(table), "{:?}", recording.scenario.files.keys());
         let commands: Vec<_> =
-            recording.commands.iter().filter(|(_, c)| matches!(c, Command::SetGuidance { .. })).collect();
+            recording.commands.iter().filter(|(_, c)| matches!(c, Some(Command::SetGuidance { .. }))).collect();
         let stages = &session(&bundle)["stages"];
         assert_eq!([0, 1, 2].map(|i| stages[i]["guided"].as_bool()), [None, Some(true), None]);
         let tick = |key: &str| (stages[1][key].as_f64().unwrap() * 1e3).round() as u64;
         let expected = [(tick("started_s"), Some(0)), (tick("ended_s"), None)];
         let told = commands.iter().map(|(at, c)| match c {
-            Command::SetGuidance { guidance } => (at.0, *guidance),
+            Some(Command::SetGuidance { guidance }) => (at.0, *guidance),
             _ => unreachable!("filtered above"),
         });
         assert_eq!(told.collect::<Vec<_>>(), expected);

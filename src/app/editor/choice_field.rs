@@ -25,7 +25,10 @@ pub fn named_choices(form: &FormContext, pointer: &str) -> Option<Vec<NamedChoic
     let plain = |names: Vec<String>| {
         names.into_iter().map(|name| NamedChoice { title: name.clone(), name, description: String::new() }).collect()
     };
-    let teeth = editor.tooth_pointers();
+    let decay = || {
+        let teeth = editor.tooth_pointers();
+        editor.ids(&teeth.iter().map(|tooth| format!("{tooth}/decay")).collect::<Vec<_>>())
+    };
     match last_segment(pointer) {
         "tissue" | "of" | "to" => Some(
             editor
@@ -36,9 +39,8 @@ pub fn named_choices(form: &FormContext, pointer: &str) -> Option<Vec<NamedChoic
         ),
         "metric" => Some(metric_choices(form)),
         "counts_with" => Some(other_item_choices(form, pointer)),
-        "tooth_with" | "quadrant_of" => {
-            Some(plain(editor.ids(&teeth.iter().map(|tooth| format!("{tooth}/decay")).collect::<Vec<_>>())))
-        }
+        "tooth_with" | "quadrant_of" => Some(plain(editor.draw_ids().into_iter().chain(decay()).collect())),
+        _ if is_entry_of(pointer, "one_of") => Some(plain(decay())),
         "questionnaire" => Some(plain(editor.questionnaires.clone())),
         "correct" => {
             let (choice, _) = pointer.rsplit_once('/')?;

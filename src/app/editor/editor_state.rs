@@ -443,6 +443,12 @@ impl EditorState {
         let all = lists.iter().filter_map(|list| self.draft.value_at(list)?.as_array()).flatten();
         all.filter_map(|entry| entry.get("id")?.as_str().map(str::to_string)).collect()
     }
+
+    /// Returns the ids of the draws of all stages.
+    pub fn draw_ids(&self) -> Vec<String> {
+        let stages = self.draft.value_at("/stages").and_then(|stages| stages.as_array()).into_iter().flatten();
+        stages.filter_map(|stage| stage.pointer("/draw/id")?.as_str().map(str::to_string)).collect()
+    }
 }
 
 /// Folder of the automatically saved drafts.

@@ -3,7 +3,7 @@
 use super::percentiles::{Percentiles, time_repeated};
 use super::volumes::{SEED, TempPath, exercise, grinding_workpiece};
 use super::{DIMS, grow_tooth, name_of};
-use crate::cli::run::{RunRequest, SessionDriver, run_session};
+use crate::cli::run::{RunRequest, SeedSource, SessionDriver, run_session};
 use std::collections::BTreeMap;
 use std::process::Command;
 use std::sync::Arc;
@@ -98,7 +98,7 @@ pub fn print_peak(dims: &str) -> Result<(), String> {
     let run = RunRequest {
         scenario: Arc::new(exercise(grow_tooth(dims)?)?),
         driver: SessionDriver::Script(Box::new(careful_operator()?)),
-        seed: SEED,
+        seed: SeedSource::Given(SEED),
         participant: "",
         out: &folder.0,
         digests: BTreeMap::new(),

@@ -49,6 +49,8 @@ pub enum Command {
     SelectInstrument { instrument: usize },
     /// Sets a coefficient of a tissue to a value, in its unit, before the scales of each instrument are applied.
     SetCoefficient { label: Label, coefficient: Coefficient, value: f32 },
+    /// Gives a tissue all properties of another, as each instrument feels that tissue now.
+    SetMaterial { label: Label, like: Label },
     /// Starts or stops burs.
     RunBur { running: bool },
     /// Starts a guidance from its beginning, or ends guidance.
@@ -419,6 +421,11 @@ impl Simulation {
                         continue;
                     }
                     materials.set(label, materials.get(label).with(coefficient, value));
+                }
+            }
+            Command::SetMaterial { label, like } => {
+                for materials in &mut self.materials {
+                    materials.set(label, *materials.get(like));
                 }
             }
             Command::RunBur { running } => self.tooling.bur_runs = running,

@@ -21,7 +21,7 @@ pub use alpha::{CronbachAlpha, ItemFit, cronbach_alpha};
 pub use cut_score::{BorderlineRegression, ContrastingGroups, borderline_regression, contrasting_groups};
 pub use descriptive::{DescriptiveStatistics, describe, quantile};
 pub use linear_fit::{LinearFit, linear_fit};
-pub use proportion::{Proportion, proportion};
+pub use proportion::{Proportion, proportion, wilson_interval};
 pub use reliability::{IntraclassCorrelation, Retest, icc, retest};
 pub use value_range::{ValueRange, describe_in, mean_interval_in};
 

@@ -18,9 +18,15 @@ pub fn proportion(count: usize, of: usize) -> Option<Proportion> {
     if of == 0 {
         return None;
     }
-    let (n, p) = (of as f64, count as f64 / of as f64);
+    let interval = wilson_interval(count as f64 / of as f64, of);
+    Some(Proportion { count, total: of, interval })
+}
+
+/// Returns Wilson's score interval for a share `p`, 0 to 1, of `of` observations; `of` is at least 1.
+pub fn wilson_interval(p: f64, of: usize) -> Interval {
+    let n = of as f64;
     let z = normal_quantile(0.5 + 0.5 * CONFIDENCE);
     let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
     let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
-    Some(Proportion { count, total: of, interval: [(middle - half).max(0.0), (middle + half).min(1.0)] })
+    [(middle - half).max(0.0), (middle + half).min(1.0)]
 }

@@ -71,6 +71,10 @@ pub struct TissueEntry {
     /// Properties for placing and condensing, for filling materials.
     #[serde(default)]
     pub packing: Option<PackingEntry>,
+    /// Label of the decay that this tissue becomes in a trial in which its site is drawn; `None` for all tissues of the
+    /// table, and for those that a scenario adds.
+    #[serde(skip)]
+    pub site_of: Option<Label>,
 }
 
 /// Properties of a filling material for placing and condensing.
@@ -177,6 +181,18 @@ impl TissueTable {
             complain("name", "duplicate-id", message, "give each tissue its own name".into());
         }
         self.entries.push(entry);
+    }
+
+    /// Adds the tissue of a possible site of decay: the decay under a number of its own, so that each site can be given
+    /// its properties separately. Returns its label; `None` if all 255 numbers are in use.
+    pub fn add_site(&mut self, decay: Label, site: &str) -> Option<Label> {
+        let id = (1..=255u8).rev().find(|id| self.by_label(Label(*id)).is_none())?;
+        let own = self.by_label(decay)?;
+        // A colon cannot occur in the name of another tissue.
+        let (name, title) = (format!("{}:{site}", own.name), format!("{} ({site})", own.title));
+        let entry = TissueEntry { id, name, title, site_of: Some(decay), ..own.clone() };
+        self.entries.push(entry);
+        Some(Label(id))
     }
 
     pub fn entries(&self) -> &[TissueEntry] {

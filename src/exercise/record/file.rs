@@ -30,7 +30,14 @@ pub struct RecordingHeadFile {
     pub scenario_sha256: String,
     /// Code of the participant, never a name.
     pub participant: String,
+    /// Seed of everything that the exercise leaves to chance. The file of a sealed session has 0 here.
     pub seed: u64,
+    /// Source of the seed; `None` in recordings made before it was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed_origin: Option<SeedOriginFile>,
+    /// Digest of the seed of a sealed session, hexadecimal; the seed itself follows at the end of the recording.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed_sha256: Option<String>,
     /// Duration of a tick, s.
     pub tick_s: f64,
     /// Start of the session, RFC 3339; for information, not used by the score.
@@ -59,6 +66,8 @@ impl RecordingHeadFile {
             scenario_sha256: scenario.sha256.clone(),
             participant: String::new(),
             seed,
+            seed_origin: None,
+            seed_sha256: None,
             tick_s: TICK_S,
             started: String::new(),
             operator: None,
@@ -68,6 +77,18 @@ impl RecordingHeadFile {
             digests: BTreeMap::new(),
         }
     }
+}
+
+/// Source of a session's seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SeedOriginFile {
+    /// Drawn from the operating system when the session began.
+    System,
+    /// Given by the person who started the session, who can have known what it draws.
+    Given,
+    /// Derived from an examiner's code, and revealed at the end of the session.
+    Sealed,
 }
 
 /// Metadata known after the last tick.
@@ -200,6 +221,8 @@ pub enum EventKindFile {
     Input(InputFile),
     /// Command applied to the simulation.
     Command(CommandFile),
+    /// Command of a sealed session that would reveal a draw. A replay issues it again.
+    SealedCommand {},
     StageStarted {
         stage: String,
     },
@@ -301,6 +324,11 @@ pub enum CommandFile {
         coefficient: CoefficientName,
         value: f32,
     },
+    /// Properties of one tissue given to another.
+    SetMaterial {
+        label: u8,
+        like: u8,
+    },
     RunBur {
         running: bool,
     },
@@ -322,6 +350,7 @@ impl From<&Command> for CommandFile {
             Command::SetCoefficient { label, coefficient, value } => {
                 CommandFile::Set { label: label.0, coefficient: coefficient.into(), value }
             }
+            Command::SetMaterial { label, like } => CommandFile::SetMaterial { label: label.0, like: like.0 },
             Command::RunBur { running } => CommandFile::RunBur { running },
             Command::SetGuidance { guidance } => CommandFile::Guide { guidance },
             Command::SetFilling { label } => CommandFile::Fill { label: label.map(|l| l.0) },
@@ -339,6 +368,7 @@ impl From<&CommandFile> for Command {
             CommandFile::Set { label, coefficient, value } => {
                 Command::SetCoefficient { label: Label(label), coefficient: coefficient.into(), value }
             }
+            CommandFile::SetMaterial { label, like } => Command::SetMaterial { label: Label(label), like: Label(like) },
             CommandFile::RunBur { running } => Command::RunBur { running },
             CommandFile::Guide { guidance } => Command::SetGuidance { guidance },
             CommandFile::Fill { label } => Command::SetFilling { label: label.map(Label) },

@@ -14,12 +14,16 @@ mod file;
 mod mcap_walk;
 mod reader;
 mod replay;
+mod seal;
 mod volume;
 mod writer;
 
-pub use file::{DeviceSpecFile, RecordingEndFile, RecordingHeadFile, ServoStatsFile, VERSION, ended_by_name};
+pub use file::{
+    DeviceSpecFile, RecordingEndFile, RecordingHeadFile, SeedOriginFile, ServoStatsFile, VERSION, ended_by_name,
+};
 pub use reader::{Recording, RecordingError, RecordingLoss};
 pub use replay::{Difference, Replay, ReplayCheck, replay};
+pub use seal::{CODE_MIN, reveal, sealed_seed};
 pub use tick_record::TickRecord;
 pub use writer::{Recorder, RecorderError};
 

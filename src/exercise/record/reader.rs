@@ -9,6 +9,7 @@ use super::file::{
 use super::mcap_walk;
 use super::mcap_walk::Stop;
 use super::replay::RunningDigest;
+use super::seal::{SEED, SeedFile, commitment};
 use super::tick_record::{TickLayout, TickRecord};
 use super::volume;
 use crate::scenario;
@@ -42,8 +43,9 @@ pub struct Recording {
     pub ticks: Vec<TickRecord>,
     /// Inputs in order, each before the step of its tick.
     pub inputs: Vec<(Tick, Input)>,
-    /// Commands in order, each before the step of its tick.
-    pub commands: Vec<(Tick, Command)>,
+    /// Commands in order, each before the step of its tick; `None` for a command of a sealed session that would have
+    /// revealed a draw.
+    pub commands: Vec<(Tick, Option<Command>)>,
     /// Bytes of the `/event` messages, in order, for the digest.
     pub(super) events: Vec<(Tick, Vec<u8>)>,
     pub(super) digests: Vec<DigestFile>,
@@ -75,6 +77,8 @@ pub enum RecordingError {
     NothingRecorded { name: String },
     /// The recording was made by a newer program.
     Newer { name: String, version: u32 },
+    /// The session is sealed, and was cut off before its seed was revealed.
+    Sealed { name: String },
     /// A part is missing or damaged.
     Damaged { name: String, what: String },
     /// This program no longer accepts the recording's scenario or tables.
@@ -94,6 +98,11 @@ impl fmt::Display for RecordingError {
                     "{name}: newer-recording: the recording has version {version}, this program reads up to {VERSION}"
                 )
             }
+            RecordingError::Sealed { name } => write!(
+                f,
+                "{name}: sealed-recording: the examination was cut off before its seed was revealed; give the \
+                 examiner's code: typodont finish FOLDER --seed-sealed FILE"
+            ),
             RecordingError::Damaged { name, what } => write!(f, "{name}: damaged-recording: {what}"),
             RecordingError::Scenario(found) => f.write_str(&headlines(found)),
         }
@@ -112,7 +121,9 @@ struct RecordingParts {
     ticks: Vec<TickRecord>,
     events: Vec<(Tick, Vec<u8>)>,
     inputs: Vec<(Tick, Input)>,
-    commands: Vec<(Tick, Command)>,
+    commands: Vec<(Tick, Option<Command>)>,
+    /// Seed that a sealed session revealed.
+    revealed_seed: Option<u64>,
     digests: Vec<DigestFile>,
     initial_digest: RunningDigest,
     end_bytes: Vec<u8>,
@@ -276,6 +287,10 @@ impl RecordingParts {
                         self.initial_digest.part(HEAD, text.as_bytes());
                         self.head = Some(serde_json::from_str(text).map_err(broken)?);
                     }
+                    SEED => {
+                        let SeedFile { seed } = serde_json::from_str(text).map_err(broken)?;
+                        self.revealed_seed = Some(seed);
+                    }
                     END => {
                         self.end_bytes = text.as_bytes().to_vec();
                         self.end = Some(serde_json::from_str(text).map_err(broken)?);
@@ -330,7 +345,8 @@ impl RecordingParts {
         }
         match &event.what {
             EventKindFile::Input(input) => self.inputs.push((tick, Input::from(InputFile::clone(input)))),
-            EventKindFile::Command(command) => self.commands.push((tick, Command::from(command))),
+            EventKindFile::Command(command) => self.commands.push((tick, Some(Command::from(command)))),
+            EventKindFile::SealedCommand {} => self.commands.push((tick, None)),
             _ => {}
         }
         self.events.push((tick, data.to_vec()));
@@ -350,11 +366,19 @@ impl RecordingParts {
             digests,
             initial_digest,
             end_bytes,
+            revealed_seed,
             ..
         } = self;
-        let head = head.ok_or(damaged("the session metadata is missing"))?;
+        let mut head = head.ok_or(damaged("the session metadata is missing"))?;
         if head.version > VERSION {
             return Err(RecordingError::Newer { name: name.to_string(), version: head.version });
+        }
+        if let Some(expected) = &head.seed_sha256 {
+            let seed = revealed_seed.ok_or(RecordingError::Sealed { name: name.to_string() })?;
+            if commitment(&head, seed) != *expected {
+                return Err(damaged("the seed is not the one to which the recording committed itself at the start"));
+            }
+            head.seed = seed;
         }
         let text = files.remove("scenario.json").ok_or(damaged("the scenario is missing"))?;
         let text = String::from_utf8(text).map_err(|_| damaged("the scenario is not valid UTF-8"))?;

@@ -130,8 +130,12 @@ pub fn replay(
             expected_commands.push_effects(tick, &session.advance(SessionEvent::Input(input)));
         }
         while let Some((at, command)) = commands.next_if(|(at, _)| *at <= tick) {
-            verifier.command(tick, expected_commands.take_matching(*at, command));
-            simulation.apply(command);
+            let (issued, matches) = expected_commands.take_matching(*at, command.as_ref());
+            verifier.command(tick, matches);
+            // A sealed command is not in the recording: the session issues it again.
+            if let Some(command) = command.as_ref().or(issued.as_ref()) {
+                simulation.apply(command);
+            }
         }
         let Ok(reading) = hand.exchange(&output) else { break };
         simulation.set_coupling_force(haptic.lead);
@@ -147,7 +151,7 @@ pub fn replay(
         expected_commands.push_effects(last, &session.advance(SessionEvent::Input(input)));
     }
     for (at, command) in commands {
-        verifier.command(last, expected_commands.take_matching(*at, command));
+        verifier.command(last, expected_commands.take_matching(*at, command.as_ref()).1);
     }
     let counted = ServoStatsFile::of(&simulation);
     let is_counted = recording.end.as_ref().is_none_or(|end| end.servo.has_same_counts(&counted));
@@ -170,10 +174,12 @@ impl ExpectedCommands {
         self.expected.extend(commands.map(|command| (at, command)));
     }
 
-    /// Removes the next expected command and returns true if it equals the recorded one within the permitted lag.
-    fn take_matching(&mut self, at: Tick, command: &Command) -> bool {
-        let Some((given, expected)) = self.expected.pop_front() else { return false };
-        expected == *command && (given..=Tick(given.0 + self.lag)).contains(&at)
+    /// Removes the next expected command and returns it, with true if it equals the recorded one, unless that is
+    /// sealed, within the permitted lag.
+    fn take_matching(&mut self, at: Tick, command: Option<&Command>) -> (Option<Command>, bool) {
+        let Some((given, expected)) = self.expected.pop_front() else { return (None, false) };
+        let is_same = command.is_none_or(|command| *command == expected);
+        (Some(expected), is_same && (given..=Tick(given.0 + self.lag)).contains(&at))
     }
 
     fn is_empty(&self) -> bool {

@@ -2,8 +2,9 @@
 
 use super::file::{
     CommandFile, DigestFile, END, EventFile, EventKindFile, HEAD, InputFile, RecordingEndFile, RecordingHeadFile,
-    ended_by_name,
+    SeedOriginFile, ended_by_name,
 };
+use super::seal::{SEED, SeedFile, commitment};
 use super::tick_record::{self, TickLayout, TickRecord};
 use super::{replay::RunningDigest, volume};
 use crate::scenario::{Scenario, Workpiece};
@@ -51,10 +52,13 @@ pub struct Recorder {
     digest_channel: u16,
     sequence: u32,
     running_digest: RunningDigest,
+    /// Seed to be revealed at the end; `None` for a session that is not sealed.
+    sealed_seed: Option<u64>,
 }
 
 impl Recorder {
-    /// Creates a recording and writes everything that is known before the first tick.
+    /// Creates a recording and writes everything that is known before the first tick. The seed of a head with the origin
+    /// [`SeedOriginFile::Sealed`] is written only when the recording is finished.
     ///
     /// # Errors
     /// Returns an error if the file cannot be created or written, or if a volume cannot be encoded.
@@ -65,6 +69,11 @@ impl Recorder {
         workpiece: &Workpiece,
     ) -> Result<Recorder, RecorderError> {
         let failed = |why: String| RecorderError { path: path.to_path_buf(), why };
+        let sealed_seed = (head.seed_origin == Some(SeedOriginFile::Sealed)).then_some(head.seed);
+        let head = &match sealed_seed {
+            Some(seed) => RecordingHeadFile { seed: 0, seed_sha256: Some(commitment(head, seed)), ..head.clone() },
+            None => head.clone(),
+        };
         let (density, label) = volume::bytes(&workpiece.volume).map_err(|e| failed(e.to_string()))?;
         let original = workpiece.original.as_ref().map(|o| volume::bytes(o)).transpose();
         let original = original.map_err(|e| failed(e.to_string()))?;
@@ -112,6 +121,7 @@ impl Recorder {
                 digest_channel,
                 sequence: 0,
                 running_digest: running,
+                sealed_seed,
             })
         };
         attempt().map_err(|e| failed(reason(&e)))
@@ -143,7 +153,9 @@ impl Recorder {
         self.running_digest.part(END, &json(end));
         let digest = DigestFile { tick: tick.0, sha256: self.running_digest.sha256() };
         self.write(self.digest_channel, tick, &json(&digest))?;
-        let done = self.writer.write_metadata(&metadata(END, end)).and_then(|()| self.writer.finish().map(drop));
+        let revealed = self.sealed_seed.map(|seed| self.writer.write_metadata(&metadata(SEED, &SeedFile { seed })));
+        let ended = revealed.unwrap_or(Ok(())).and_then(|()| self.writer.write_metadata(&metadata(END, end)));
+        let done = ended.and_then(|()| self.writer.finish().map(drop));
         done.map_err(|e| self.failed(&e))
     }
 }
@@ -174,7 +186,13 @@ impl Observer for Recorder {
     }
 
     fn command(&mut self, tick: Tick, command: &Command) -> Result<(), RecorderError> {
-        self.write_event(tick, EventKindFile::Command(CommandFile::from(command)))
+        let what = match command {
+            Command::SetMaterial { .. } | Command::SetCoefficient { .. } if self.sealed_seed.is_some() => {
+                EventKindFile::SealedCommand {}
+            }
+            _ => EventKindFile::Command(CommandFile::from(command)),
+        };
+        self.write_event(tick, what)
     }
 
     fn effect(&mut self, tick: Tick, effect: &Effect, session: &Session) -> Result<(), RecorderError> {

@@ -137,6 +137,7 @@ impl Workpiece {
             original: Some(whole.into()),
             teeth: Vec::new(),
             lesions: Vec::new(),
+            drawn: Vec::new(),
             surroundings: Vec::new(),
             periodontium: None,
             arch: Default::default(),

@@ -582,6 +582,9 @@ pub struct StageFile {
     /// combined with `stiffness_steps`.
     #[serde(default)]
     pub adjustable: bool,
+    /// Caries at a site that is drawn for each session, in one or several trials.
+    #[serde(default)]
+    pub draw: Option<DrawFile>,
     /// Stiffness of a tissue that decreases in steps until the trainee answers.
     #[serde(default)]
     pub stiffness_steps: Option<StiffnessStepsFile>,
@@ -601,6 +604,30 @@ pub struct StageFile {
     #[serde(default)]
     #[schemars(length(max = 10))]
     pub ends_when: Vec<EndConditionFile>,
+}
+
+/// A draw: in each trial of the stage one of several possible sites is carious, and the others feel like sound enamel.
+/// The session's seed decides which, so that the answer cannot be read from the exercise.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DrawFile {
+    /// Name by which the stage's question refers to the caries that was drawn.
+    #[schemars(length(min = 1, max = 40), regex(pattern = r"^[a-z0-9_-]+$"))]
+    pub id: String,
+    /// Possible sites: ids of "decay" entries with a fixed position. Each is drawn with the same probability.
+    #[schemars(length(min = 2, max = 32))]
+    pub one_of: Vec<String>,
+    /// Number of trials: 1 to 50. The stage is repeated this often, each time with a new draw and a new answer;
+    /// `time_limit_s` applies to each trial.
+    #[serde(default = "DrawFile::once")]
+    #[schemars(range(min = 1, max = 50))]
+    pub trials: u32,
+}
+
+impl DrawFile {
+    fn once() -> u32 {
+        1
+    }
 }
 
 /// Stiffness that decreases in steps.
@@ -757,10 +784,10 @@ pub struct QuestionFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AnswerFile {
-    /// The tooth that has the decay with this id.
+    /// The tooth that has the decay with this id, or the caries of the stage's draw with this id.
     ToothWith(String),
-    /// The quadrant of the occlusal surface in which the decay with this id lies, as seen from above: 1 upper left, 2
-    /// upper right, 3 lower left, 4 lower right.
+    /// The quadrant of the occlusal surface in which the decay, or the caries of the stage's draw, with this id lies, as
+    /// seen from above: 1 upper left, 2 upper right, 3 lower left, 4 lower right.
     QuadrantOf(String),
     /// One of several texts.
     Choice(ChoiceFile),

@@ -2,7 +2,7 @@
 
 use super::file::SurfaceFile;
 use super::tooth_bounds::{PairHalf, ToothBounds, anatomy_tissues};
-use super::{Decay, DecayOrigin, DecayPlace, DecayShape, GrownDecay};
+use super::{Decay, DecayOrigin, DecayPlace, DecayShape, GrownDecay, Stage};
 use crate::catalog::{TissueRole, TissueTable};
 use typodont_anatomy::caries;
 use typodont_anatomy::caries::{Groove, LesionEntry, LesionSpec, SurfacePatch};
@@ -126,6 +126,13 @@ pub(super) fn locate_lesion(
     Lesion { id: decay.id.clone(), tooth, label: decay.label, centre, radii, quadrant }
 }
 
+/// Returns the lesion that the seed draws for a stage, as an index into `lesions`; `None` for a stage without a draw.
+pub(super) fn drawn_lesion(stage: &Stage, lesions: &[Lesion], seed: u64) -> Option<usize> {
+    let sites = &stage.draw.as_ref()?.sites;
+    let site = &sites[(seeded_random(seed, &format!("{}/draw", stage.id)) % sites.len() as u64) as usize];
+    lesions.iter().position(|lesion| lesion.id == *site)
+}
+
 /// Returns the tooth with a decay or a stain: sound tissue within it is relabelled.
 ///
 /// # Errors
@@ -210,7 +217,7 @@ fn first_surface_along(volume: &Volume, side: PairHalf, from: Vec3, along: Vec3)
 }
 
 /// Returns a number from a seed and a name (SplitMix64 over the name's bytes), the same on every machine.
-fn seeded_random(seed: u64, name: &str) -> u64 {
+pub fn seeded_random(seed: u64, name: &str) -> u64 {
     let mix = |mut z: u64| {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -73,6 +73,8 @@ pub enum RequiredFeature {
     /// A question with a correct answer.
     JudgedQuestion,
     StiffnessSteps,
+    /// A stage in which the site of the caries is drawn.
+    Draw,
     /// A stage in which probing depths are charted.
     DepthChart,
     /// A stage in which calculus is charted.
@@ -81,8 +83,8 @@ pub enum RequiredFeature {
     Calculus,
 }
 
-/// Features that measures require, in the order in which they are checked. [`OF_FILLINGS`] and [`CHARTING`] require
-/// one each, unless they are in this table.
+/// Features that measures require, in the order in which they are checked. [`OF_FILLINGS`], [`OF_DRAWS`] and
+/// [`CHARTING`] require one each, unless they are in this table.
 const REQUIRED_FEATURES: &[(&str, &[RequiredFeature])] = &[
     ("decay_cleared_pct", &[RequiredFeature::Decay]),
     ("accessible_decay_cleared_pct", &[RequiredFeature::Decay]),
@@ -93,6 +95,7 @@ const REQUIRED_FEATURES: &[(&str, &[RequiredFeature])] = &[
     ("detect_level_time_s", &[RequiredFeature::ToothQuestion]),
     ("detect_quadrant", &[RequiredFeature::QuadrantQuestion]),
     ("detect_quadrant_time_s", &[RequiredFeature::QuadrantQuestion]),
+    ("detect_level_corrected", &[RequiredFeature::Draw, RequiredFeature::StiffnessSteps]),
     ("questions_right_pct", &[RequiredFeature::JudgedQuestion]),
     ("calculus_found_pct", &[RequiredFeature::CalculusChart, RequiredFeature::Calculus]),
     ("calculus_false_alarms", &[RequiredFeature::CalculusChart]),
@@ -108,6 +111,7 @@ impl MetricInfo {
         let is_of = |table: &[MetricInfo]| table.iter().any(|about| about.name == self.name);
         match REQUIRED_FEATURES.iter().find(|(name, _)| *name == self.name) {
             Some((_, features)) => features,
+            None if is_of(OF_DRAWS) => &[RequiredFeature::Draw],
             None if is_of(CHARTING) => &[RequiredFeature::DepthChart],
             None if is_of(OF_FILLINGS) => &[RequiredFeature::Filling],
             None => &[],
@@ -385,6 +389,49 @@ pub const OF_FILLINGS: &[MetricInfo] = &[
     info("void_mm3", "Voids in the restoration", "mm³", Lower, "volume of air in C enclosed by material on all sides"),
 ];
 
+/// Measures of trials in which the site of the caries is drawn, computed if an exercise has such trials.
+pub const OF_DRAWS: &[MetricInfo] = &[
+    info(
+        "detect_corrected_pct",
+        "Caries located, corrected for chance",
+        "%",
+        Higher,
+        "100·(p − c) / (1 − c); p is the share of trials with a correct answer, c the share that guessing achieves on \
+         average; a trial without an answer counts as c in p; 0 for guessing, negative for fewer correct answers than \
+         guessing achieves",
+    ),
+    info(
+        "detect_corrected_low_pct",
+        "Caries located, corrected for chance: lower bound",
+        "%",
+        Higher,
+        "lower bound of the 95 % interval (Wilson) of p, corrected for chance as the result is",
+    ),
+    info(
+        "detect_corrected_high_pct",
+        "Caries located, corrected for chance: upper bound",
+        "%",
+        Higher,
+        "upper bound of the 95 % interval (Wilson) of p, corrected for chance as the result is",
+    ),
+    info("detect_trials_right", "Trials with a correct answer", "", Higher, "number of trials with a correct answer"),
+    info(
+        "detect_level_corrected",
+        "Stiffness at which the caries was located, corrected for chance",
+        "",
+        Higher,
+        "sum / number of trials; a correct answer adds the stiffness coefficient of the caries at its time, an \
+         incorrect one subtracts that coefficient times c / (1 − c), with c as above; no value without stiffness steps",
+    ),
+    info(
+        "detect_trial_time_s",
+        "Mean time to an answer",
+        "s",
+        Lower,
+        "mean time from the start of a trial to its answer, over all trials with an answer; no value if there is none",
+    ),
+];
+
 /// Measures of a periodontal chart, computed if a stage asks for one. The sites are the six sites of the tooth.
 pub const CHARTING: &[MetricInfo] = &[
     info("sites_read_pct", "Sites probed", "%", Higher, "100·sites with a reading / 6"),
@@ -533,7 +580,7 @@ impl fmt::Display for Metric {
 
 /// Returns every measure without an argument, in the order of reports.
 pub fn without_argument() -> impl Iterator<Item = &'static MetricInfo> + Clone {
-    PLAIN.iter().chain(OF_FILLINGS).chain(CHARTING)
+    PLAIN.iter().chain(OF_FILLINGS).chain(OF_DRAWS).chain(CHARTING)
 }
 
 /// Returns every measure.

@@ -20,7 +20,7 @@ mod tooth_words;
 mod workpiece;
 
 pub use cavity::{PreparedCavity, ProximalBox};
-pub use lesion::Lesion;
+pub use lesion::{Lesion, seeded_random};
 pub use metric::Metric;
 pub use questionnaire::{Questionnaire, QuestionnaireCategory, QuestionnaireItem};
 pub use resolve::{ResolveMode, hex, resolve};
@@ -323,12 +323,26 @@ pub struct Stage {
     pub show_decay: bool,
     /// True if the trainee may change the tissues' coefficients.
     pub is_adjustable: bool,
+    pub draw: Option<Draw>,
     pub steps: Option<StiffnessSteps>,
     /// Index into [`Scenario::guidances`].
     pub guidance: Option<usize>,
     pub chart: ChartScope,
     pub ask: Vec<Question>,
     pub ends: EndConditions,
+}
+
+/// One trial of a stage in which the site of the caries is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Draw {
+    /// Name by which the question refers to the caries that was drawn.
+    pub id: String,
+    /// Ids of the possible sites, in the order of the file; never fewer than two.
+    pub sites: Vec<String>,
+    /// Number of the trial, from 1. Trials of one stage follow one another as stages of the scenario.
+    pub trial: u32,
+    /// Number of trials of the stage.
+    pub trials: u32,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -476,6 +490,23 @@ impl Scenario {
     /// Returns the index of the last stage in which burs run.
     pub fn cutting_stage(&self) -> Option<usize> {
         self.stages.iter().rposition(|s| s.cutting)
+    }
+
+    /// Returns the index, in the scenario file, of the stage to which a stage belongs: trials are stages of their own.
+    pub fn written_stage(&self, stage: usize) -> usize {
+        let is_first = |s: &&Stage| s.draw.as_ref().is_none_or(|draw| draw.trial == 1);
+        self.stages.iter().take(stage + 1).filter(is_first).count().saturating_sub(1)
+    }
+
+    /// Returns true if the seed decides anything about the volume: a position, or one of several depths.
+    pub fn is_workpiece_drawn(&self) -> bool {
+        let is_drawn = |place: &DecayPlace| matches!(place, DecayPlace::Random | DecayPlace::RandomQuadrant);
+        let has_depths = |shape: &DecayShape| matches!(shape, DecayShape::Grown(grown) if grown.depths.len() > 1);
+        self.scene.teeth.iter().any(|tooth| {
+            let mut patches = tooth.decay.iter().chain(&tooth.stains);
+            let is_cavity_drawn = tooth.cavity.as_ref().is_some_and(|cavity| is_drawn(&cavity.place));
+            is_cavity_drawn || patches.any(|patch| is_drawn(&patch.place) || has_depths(&patch.shape))
+        })
     }
 
     /// Returns true if something is to be removed: decay, or tissue in a target zone.

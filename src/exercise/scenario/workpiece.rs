@@ -5,7 +5,7 @@
 
 use super::calculus_and_fillings::{apply_calculus, apply_old_filling};
 use super::cavity::CavityError;
-use super::lesion::{DecayPlacementError, Lesion, apply_decay, locate_lesion};
+use super::lesion::{DecayPlacementError, Lesion, apply_decay, drawn_lesion, locate_lesion};
 use super::tooth_bounds::{PairHalf, ToothBounds, anatomy_tissues};
 use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec};
 
@@ -26,6 +26,8 @@ pub struct Workpiece {
     pub original: Option<Arc<Volume>>,
     pub teeth: Vec<ToothBounds>,
     pub lesions: Vec<Lesion>,
+    /// For each stage of the scenario, the lesion that was drawn, as an index into `lesions`; `None` without a draw.
+    pub drawn: Vec<Option<usize>>,
     /// Gingiva and neighbouring teeth.
     pub surroundings: Vec<Collider>,
     /// Gingiva with a sulcus; `None` without pockets.
@@ -209,8 +211,25 @@ impl Workpiece {
         let world_from_tooth =
             world_from_tooth_above(Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z));
         let periodontium = gum.map(Arc::new);
+        let drawn = Workpiece::draw(scenario, &lesions, seed);
         let arch = scenario.scene.arch.clone();
-        Ok(Workpiece { volume, original, teeth, lesions, surroundings: around, periodontium, arch, world_from_tooth })
+        let surroundings = around;
+        Ok(Workpiece { volume, original, teeth, lesions, drawn, surroundings, periodontium, arch, world_from_tooth })
+    }
+
+    /// Returns, for each stage, the lesion that a seed draws, as an index into `lesions`; `None` without a draw.
+    pub fn draw(scenario: &Scenario, lesions: &[Lesion], seed: u64) -> Vec<Option<usize>> {
+        scenario.stages.iter().map(|stage| drawn_lesion(stage, lesions, seed)).collect()
+    }
+
+    /// Returns the lesion to which a question of a stage refers by an id: the lesion that was drawn, if the id is that of
+    /// the stage's draw.
+    pub fn lesion(&self, scenario: &Scenario, stage: usize, id: &str) -> Option<&Lesion> {
+        let is_draw = scenario.stages.get(stage)?.draw.as_ref().is_some_and(|draw| draw.id == id);
+        match is_draw {
+            true => self.lesions.get((*self.drawn.get(stage)?)?),
+            false => self.lesions.iter().find(|lesion| lesion.id == id),
+        }
     }
 
     /// Unit vector toward distal of the first tooth, tooth space.

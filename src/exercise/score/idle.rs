@@ -87,7 +87,7 @@ impl Trainee for IdleTrainee {
 struct SessionLog {
     ticks: Vec<TickRecord>,
     inputs: Vec<(Tick, Input)>,
-    commands: Vec<(Tick, Command)>,
+    commands: Vec<(Tick, Option<Command>)>,
 }
 
 impl Observer for SessionLog {
@@ -99,7 +99,7 @@ impl Observer for SessionLog {
     }
 
     fn command(&mut self, tick: Tick, command: &Command) -> Result<(), Infallible> {
-        self.commands.push((tick, *command));
+        self.commands.push((tick, Some(*command)));
         Ok(())
     }
 

@@ -5,9 +5,10 @@ use super::nearest_offset::{AnatomicalDirection, NearestOffsets};
 use super::process::{PeakValue, ProcessStats};
 use super::removal_comparison::{RemovalComparison, VoxelDistance, VoxelFlags};
 use super::restoration::Restoration;
+use super::trials::TrialSummary;
 use crate::record::{Recording, Replay};
 use crate::scenario::file::ZoneRole;
-use crate::scenario::metric::{CHARTING, MetricArgument, OF_FILLINGS, PLAIN};
+use crate::scenario::metric::{CHARTING, MetricArgument, OF_DRAWS, OF_FILLINGS, PLAIN};
 use crate::scenario::{Metric, QuestionKind, Rubric};
 use crate::session::{AnswerRecord, StageResult};
 use typodont_core::frame::Vec3;
@@ -112,12 +113,15 @@ pub fn all(
         comparison,
         restoration,
         chart,
+        trials: TrialSummary::of(scenario, &replay.workpiece, &replay.outcome),
         outlines: comparison.outline_distances(),
     };
     // Sessions without a cavity have no filling to measure, and those without a chart no readings to compare.
     let of_fillings = if restoration.is_some() { OF_FILLINGS } else { &[] };
     let charting = if chart.is_some() { CHARTING } else { &[] };
-    let mut metrics: Vec<Metric> = PLAIN.iter().chain(of_fillings).chain(charting).map(Metric::plain).collect();
+    let of_draws = if source.trials.is_some() { OF_DRAWS } else { &[] };
+    let mut metrics: Vec<Metric> =
+        PLAIN.iter().chain(of_fillings).chain(of_draws).chain(charting).map(Metric::plain).collect();
     let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
     let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
     metrics.extend(zones.chain([tolerance]).flatten());
@@ -141,6 +145,8 @@ struct MeasureSource<'a> {
     comparison: &'a RemovalComparison,
     restoration: Option<&'a Restoration>,
     chart: Option<&'a [SiteResult]>,
+    /// Answers of the trials; `None` without a draw.
+    trials: Option<TrialSummary>,
     /// Distances between the borders of R and T, mm, ascending.
     outlines: Option<Vec<f32>>,
 }
@@ -158,7 +164,7 @@ impl MeasureSource<'_> {
                 .or_else(|| self.of_removed_volume(name))
                 .or_else(|| self.of_removal_depth(name))
                 .or_else(|| self.of_process(name))
-                .unwrap_or_else(|| self.of_filling_or_chart(name)),
+                .unwrap_or_else(|| self.of_filling_trials_or_chart(name)),
         }
     }
 
@@ -259,10 +265,15 @@ impl MeasureSource<'_> {
         })
     }
 
-    /// Computes a measure of a filling or of a periodontal chart; other measures have no value.
-    fn of_filling_or_chart(&self, name: &str) -> ComputedValue {
+    /// Computes a measure of a filling, of trials or of a periodontal chart; other measures have no value.
+    fn of_filling_trials_or_chart(&self, name: &str) -> ComputedValue {
         if OF_FILLINGS.iter().any(|about| about.name == name) {
             return self.restoration.map_or(ComputedValue::default(), |r| of_filling(r, name));
+        }
+        if let Some(trials) = self.trials.as_ref().filter(|_| OF_DRAWS.iter().any(|about| about.name == name)) {
+            let first_error = trials.first_error.filter(|_| name == "detect_corrected_pct");
+            let evidence = first_error.map(|(at, place)| Evidence { at: Some(at), ..Evidence::at_place(place) });
+            return ComputedValue { value: trials.measure(name), evidence };
         }
         self.chart.and_then(|chart| charting::measure(name, chart)).into()
     }
@@ -293,16 +304,29 @@ impl MeasureSource<'_> {
         })
     }
 
+    /// Returns the questions of a kind outside of draws, whose answers have measures of their own.
+    fn asked_once(
+        &self,
+        is_meant: fn(&QuestionKind) -> bool,
+    ) -> impl Iterator<Item = (&StageResult, Option<&AnswerRecord>)> {
+        let stages = self.recording.scenario.stages.iter().zip(&self.replay.outcome.stages);
+        stages.filter(|(stage, _)| stage.draw.is_none()).flat_map(move |(stage, result)| {
+            let questions = stage.ask.iter().zip(&result.answers);
+            let meant = questions.filter(move |(question, _)| is_meant(&question.kind));
+            meant.map(move |(_, given)| (result, given.as_ref()))
+        })
+    }
+
     /// Returns 1 if the last answer to questions of a kind is correct, 0 if it is incorrect or missing; `None` if no
     /// such question was asked.
     fn answered_correctly(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<f64> {
-        let is_asked = self.asked().any(|(_, kind, _)| is_meant(kind));
+        let is_asked = self.asked_once(is_meant).next().is_some();
         is_asked.then(|| self.last_answer(is_meant).map_or(0.0, |(_, given)| flag(given.correct)))
     }
 
     /// Returns the last answer to questions of a kind, with the result of its stage.
     fn last_answer(&self, is_meant: fn(&QuestionKind) -> bool) -> Option<(&StageResult, &AnswerRecord)> {
-        self.asked().filter(|(_, kind, _)| is_meant(kind)).filter_map(|(stage, _, given)| Some((stage, given?))).last()
+        self.asked_once(is_meant).filter_map(|(stage, given)| Some((stage, given?))).last()
     }
 
     fn questions_right_pct(&self) -> Option<f64> {

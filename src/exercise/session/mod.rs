@@ -13,7 +13,9 @@ pub use operator::{ActionFile, Operator, OperatorFile};
 pub use run::{Observer, RunEnd, Trainee, run};
 
 use crate::catalog::{TissueRole, WorkingEndEntry};
-use crate::scenario::{Periodontium, ProbingSite, QuestionKind, Scenario, Stage, Workpiece};
+use crate::scenario::{
+    Periodontium, ProbingSite, QuestionKind, Scenario, Stage, StiffnessSteps, Workpiece, anatomy_tissues,
+};
 use std::sync::Arc;
 use typodont_core::device::DeviceSpec;
 use typodont_core::frame::Pose;
@@ -211,6 +213,10 @@ pub struct Session {
     scenario: Arc<Scenario>,
     /// Tooth and quadrant of each lesion: the correct answers to questions about it.
     ground_truths: Vec<GroundTruth>,
+    /// For each stage, the lesion that was drawn, as an index into `ground_truths`.
+    drawn: Vec<Option<usize>>,
+    /// For each lesion, true if an instrument touched it in the current stage.
+    touched: Vec<bool>,
     is_decay: [bool; 256],
     now: Tick,
     phase: SessionPhase,
@@ -238,6 +244,7 @@ pub struct Session {
 #[derive(Clone, Debug, PartialEq)]
 struct GroundTruth {
     decay: String,
+    label: Label,
     tooth: String,
     quadrant: u8,
 }
@@ -254,6 +261,7 @@ impl Session {
     pub fn new(scenario: Arc<Scenario>, workpiece: &Workpiece) -> Session {
         let truth = |l: &crate::scenario::Lesion| GroundTruth {
             decay: l.id.clone(),
+            label: l.label,
             tooth: workpiece.teeth[l.tooth].id.clone(),
             quadrant: l.quadrant,
         };
@@ -262,6 +270,8 @@ impl Session {
         let ratings = scenario.questionnaire.as_ref().map_or(0, |q| q.items().count());
         Session {
             ground_truths: workpiece.lesions.iter().map(truth).collect(),
+            drawn: workpiece.drawn.clone(),
+            touched: vec![false; workpiece.lesions.len()],
             scenario,
             is_decay,
             now: Tick::ZERO,
@@ -372,10 +382,34 @@ impl Session {
         if stage.guidance.is_some() {
             effects.push(Effect::Command(Command::SetGuidance { guidance: stage.guidance }));
         }
+        self.touched.fill(false);
+        self.place_drawn(index, &mut effects);
         if stage.steps.is_some() {
             self.start_step(0, stage, &mut effects);
         }
         effects
+    }
+
+    /// Gives the site that was drawn for a stage the properties of its decay, and all other possible sites those of
+    /// sound enamel.
+    fn place_drawn(&self, index: usize, effects: &mut Vec<Effect>) {
+        let enamel = anatomy_tissues(&self.scenario.tissues).enamel;
+        let drawn = self.drawn[index].map(|lesion| self.ground_truths[lesion].label);
+        for site in self.scenario.tissues.entries() {
+            if let Some(decay) = site.site_of {
+                let like = if drawn == Some(site.label()) { decay } else { enamel };
+                effects.push(Effect::Command(Command::SetMaterial { label: site.label(), like }));
+            }
+        }
+    }
+
+    /// Returns the label whose stiffness the steps of a stage change: the site that was drawn, if it has their decay.
+    fn stepped_label(&self, index: usize, steps: &StiffnessSteps) -> Label {
+        let site = self.drawn[index].map(|lesion| self.ground_truths[lesion].label);
+        let is_stepped = |label: &Label| {
+            self.scenario.tissues.by_label(*label).is_some_and(|entry| entry.site_of == Some(steps.label))
+        };
+        site.filter(is_stepped).unwrap_or(steps.label)
     }
 
     fn start_step(&mut self, step: usize, stage: &Stage, effects: &mut Vec<Effect>) {
@@ -384,7 +418,7 @@ impl Session {
         self.step_started = self.now;
         effects.push(Effect::StepStarted { stage: index, step });
         let stiffness = steps.coefficients[step];
-        let (label, coefficient) = (steps.label, Coefficient::Stiffness);
+        let (label, coefficient) = (self.stepped_label(index, steps), Coefficient::Stiffness);
         effects.push(Effect::Command(Command::SetCoefficient { label, coefficient, value: stiffness }));
     }
 
@@ -418,6 +452,12 @@ impl Session {
         self.last_step = Some(*step);
         self.instrument = step.instrument;
         let decay_gone = |e: &&Edit| e.removes() && self.is_decay[usize::from(e.before.label.0)];
+        if let Some(touch) = step.touch {
+            // No lesion other than a possible site of a draw needs this: the labels of sites are their own.
+            for (lesion, touched) in self.ground_truths.iter().zip(&mut self.touched) {
+                *touched |= lesion.label == touch.label;
+            }
+        }
         self.decay_gone += edits.iter().filter(decay_gone).count();
         let SessionPhase::In(index) = self.phase else { return Vec::new() };
         let scenario = self.scenario.clone();
@@ -552,9 +592,12 @@ impl Session {
         let Some(place) = stage.ask.iter().position(|q| q.id == question) else {
             return vec![Effect::Refused { why: InputError::NotAsked }];
         };
-        let Ok(correct) = self.check_answer(&stage.ask[place].kind, value) else {
+        let Ok(correct) = self.check_answer(index, &stage.ask[place].kind, value) else {
             return vec![Effect::Refused { why: InputError::NoAnswer }];
         };
+        if !self.is_examined(stage, &stage.ask[place].kind, value) {
+            return vec![Effect::Refused { why: InputError::NotExamined }];
+        }
         let step = stage.steps.as_ref().map(|s| (s.coefficients[self.step], self.step_started));
         self.answers[place] = Some(AnswerRecord { value: value.clone(), at: self.now, correct, step });
         let mut effects = vec![Effect::Answered { stage: index, question: place }];
@@ -564,10 +607,27 @@ impl Session {
         effects
     }
 
+    /// Returns true unless the answer names a place of a draw at which no possible site was touched in this trial.
+    fn is_examined(&self, stage: &Stage, kind: &QuestionKind, value: &AnswerValue) -> bool {
+        let (QuestionKind::ToothWith { decay } | QuestionKind::QuadrantOf { decay }) = kind else { return true };
+        let Some(draw) = stage.draw.as_ref().filter(|draw| draw.id == *decay) else { return true };
+        let is_named = |truth: &GroundTruth| match value {
+            AnswerValue::Word(tooth) => truth.tooth == *tooth,
+            AnswerValue::Quadrant(quadrant) => truth.quadrant == *quadrant,
+            _ => false,
+        };
+        let sites = self.ground_truths.iter().zip(&self.touched).filter(|(truth, _)| draw.sites.contains(&truth.decay));
+        sites.into_iter().any(|(truth, touched)| *touched && is_named(truth))
+    }
+
     /// Checks an answer: `None` for a question without a correct answer, `Err` for an answer that does not fit the
     /// question.
-    fn check_answer(&self, kind: &QuestionKind, value: &AnswerValue) -> Result<Option<bool>, ()> {
-        let truth = |decay: &str| self.ground_truths.iter().find(|t| t.decay == decay);
+    fn check_answer(&self, stage: usize, kind: &QuestionKind, value: &AnswerValue) -> Result<Option<bool>, ()> {
+        let draw = self.scenario.stages[stage].draw.as_ref();
+        let truth = |decay: &str| match draw.filter(|draw| draw.id == decay) {
+            Some(_) => self.drawn[stage].map(|lesion| &self.ground_truths[lesion]),
+            None => self.ground_truths.iter().find(|t| t.decay == decay),
+        };
         match (kind, value) {
             (QuestionKind::ToothWith { decay }, AnswerValue::Word(tooth)) => {
                 let is_tooth = self.scenario.scene.teeth.iter().any(|t| t.id == *tooth);

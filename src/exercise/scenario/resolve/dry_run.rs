@@ -140,7 +140,7 @@ fn find_paths_away(scenario: &Scenario, workpiece: &Workpiece, source_map: &Sour
         {
             let message = format!("the whole path is more than {PATH_AWAY} mm away from the tooth");
             let help = format!("the tooth extends from {low:.1} to {high:.1} mm along x (buccal), y, z (occlusal)");
-            let path = format!("/stages/{index}/guidance/path/file");
+            let path = format!("/stages/{}/guidance/path/file", scenario.written_stage(index));
             found.push(source_map.complain(&path, "wrong-place", message, Some(help)));
         }
     }

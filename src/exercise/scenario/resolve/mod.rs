@@ -29,6 +29,8 @@ use typodont_formats::{Library, json, pointer};
 pub enum ResolveMode {
     /// Scans are read, and the workpiece is made once to find errors that only the volume itself shows.
     MakeWorkpiece,
+    /// As `MakeWorkpiece`, and exercises that can be performed but whose result would mean little are reported, too.
+    Check,
     /// Scans are read, but no workpiece is made: errors that only the volume itself shows appear when a session begins.
     ReadScans,
     /// Scans are not read, since the volume is taken from a recording.
@@ -44,7 +46,9 @@ pub enum ResolveMode {
 pub fn resolve(source: Arc<SourceText>, library: &Library, mode: ResolveMode) -> Result<Scenario, Vec<Diagnostic>> {
     let read = match mode {
         ResolveMode::FromRecording => json::read_recorded::<ScenarioFile>(source.clone())?,
-        ResolveMode::MakeWorkpiece | ResolveMode::ReadScans => json::read::<ScenarioFile>(source.clone())?,
+        ResolveMode::MakeWorkpiece | ResolveMode::Check | ResolveMode::ReadScans => {
+            json::read::<ScenarioFile>(source.clone())?
+        }
     };
     let mut found = Vec::new();
     let tissues = TissueTable::read(library).map_err(|mut complaints| found.append(&mut complaints));
@@ -81,6 +85,7 @@ pub fn resolve(source: Arc<SourceText>, library: &Library, mode: ResolveMode) ->
         instruments,
         files,
         guidances,
+        sites: read.value.stages.iter().flat_map(|s| &s.draw).flat_map(|d| d.one_of.iter().cloned()).collect(),
         found,
     };
     let scenario = resolver.scenario(&read.value, &source.text);
@@ -88,7 +93,7 @@ pub fn resolve(source: Arc<SourceText>, library: &Library, mode: ResolveMode) ->
     if found.is_empty()
         && let Some(scenario) = scenario
     {
-        if mode == ResolveMode::MakeWorkpiece {
+        if matches!(mode, ResolveMode::MakeWorkpiece | ResolveMode::Check) {
             dry_run::check_workpiece(&scenario, &read.value, &read.source_map, &mut found);
         }
         if found.is_empty() {
@@ -127,6 +132,8 @@ struct Resolver<'a> {
     files: BTreeMap<String, Arc<[u8]>>,
     /// Haptic guidances, in the order of the stages.
     guidances: Vec<Guidance>,
+    /// Ids of all possible sites of the stages' draws.
+    sites: Vec<String>,
     found: Vec<Diagnostic>,
 }
 
@@ -146,6 +153,9 @@ impl Resolver<'_> {
         let lesions: Vec<String> =
             scene.iter().flat_map(|s| &s.teeth).flat_map(|t| &t.decay).map(|d| d.id.clone()).collect();
         let stages = self.stages(written, &lesions);
+        if self.mode == ResolveMode::Check {
+            self.find_fixed_answers(written);
+        }
         let capabilities = Capabilities::of(written, &stages);
         let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, capabilities));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
@@ -279,7 +289,9 @@ impl Resolver<'_> {
             .map(|instrument| {
                 let grit = MaterialScale { hardness: 1.0 / instrument.grit.unwrap_or(1.0), ..MaterialScale::ONE };
                 let all = self.tissues.entries().iter().map(|tissue| {
-                    (tissue.label(), touch_factors.factor(&tissue.name, instrument.kind, band).combined_with(grit))
+                    // The decay of a possible site has the factors of that decay.
+                    let own = tissue.site_of.and_then(|decay| self.tissues.by_label(decay)).unwrap_or(tissue);
+                    (tissue.label(), touch_factors.factor(&own.name, instrument.kind, band).combined_with(grit))
                 });
                 all.filter(|(_, factor)| *factor != MaterialScale::ONE)
                     .fold(MaterialScales::default(), |known, (label, factor)| known.with(label, factor))

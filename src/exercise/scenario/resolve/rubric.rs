@@ -15,6 +15,7 @@ pub(super) struct Capabilities {
     quadrant_question: bool,
     judged_question: bool,
     stiffness_steps: bool,
+    draw: bool,
     depth_chart: bool,
     calculus_chart: bool,
     calculus: bool,
@@ -24,13 +25,18 @@ impl Capabilities {
     pub fn of(written: &file::ScenarioFile, stages: &[Stage]) -> Capabilities {
         let teeth = written_teeth(&written.scene);
         let asks = |is_meant: fn(&QuestionKind) -> bool| stages.iter().flat_map(|s| &s.ask).any(|q| is_meant(&q.kind));
+        // Questions about a draw have measures of their own.
+        let asks_once = |is_meant: fn(&QuestionKind) -> bool| {
+            stages.iter().filter(|s| s.draw.is_none()).flat_map(|s| &s.ask).any(|q| is_meant(&q.kind))
+        };
         Capabilities {
             decay: teeth.iter().any(|t| !t.decay.is_empty()),
             filling: teeth.iter().any(|t| t.cavity.is_some()) && written.stages.iter().any(|s| s.filling.is_some()),
-            tooth_question: asks(|kind| matches!(kind, QuestionKind::ToothWith { .. })),
-            quadrant_question: asks(|kind| matches!(kind, QuestionKind::QuadrantOf { .. })),
+            tooth_question: asks_once(|kind| matches!(kind, QuestionKind::ToothWith { .. })),
+            quadrant_question: asks_once(|kind| matches!(kind, QuestionKind::QuadrantOf { .. })),
             judged_question: asks(QuestionKind::is_judged),
             stiffness_steps: stages.iter().any(|s| s.steps.is_some()),
+            draw: stages.iter().any(|s| s.draw.is_some()),
             depth_chart: stages.iter().any(|s| s.chart.depths),
             calculus_chart: stages.iter().any(|s| s.chart.calculus),
             calculus: teeth.iter().any(|t| !t.calculus.is_empty()),
@@ -45,6 +51,7 @@ impl Capabilities {
             RequiredFeature::QuadrantQuestion => self.quadrant_question,
             RequiredFeature::JudgedQuestion => self.judged_question,
             RequiredFeature::StiffnessSteps => self.stiffness_steps,
+            RequiredFeature::Draw => self.draw,
             RequiredFeature::DepthChart => self.depth_chart,
             RequiredFeature::CalculusChart => self.calculus_chart,
             RequiredFeature::Calculus => self.calculus,
@@ -68,7 +75,7 @@ fn missing_feature_diagnostic(feature: RequiredFeature) -> (&'static str, &'stat
         RequiredFeature::ToothQuestion => (
             "no-question",
             "requires a question about which tooth has the caries, but no stage asks it",
-            "add the question to a stage, or use another measure",
+            "add the question to a stage, or use another measure; stages with a draw have detect_corrected_pct",
         ),
         RequiredFeature::StiffnessSteps => (
             "no-steps",
@@ -78,7 +85,12 @@ fn missing_feature_diagnostic(feature: RequiredFeature) -> (&'static str, &'stat
         RequiredFeature::QuadrantQuestion => (
             "no-question",
             "requires a question about the quadrant of the caries, but no stage asks it",
-            "add the question to a stage, or use another measure",
+            "add the question to a stage, or use another measure; stages with a draw have detect_corrected_pct",
+        ),
+        RequiredFeature::Draw => (
+            "no-draw",
+            "requires a stage in which the site of the caries is drawn, but no stage has a draw",
+            "add \"draw\" to the stage with the question, or use another measure",
         ),
         RequiredFeature::JudgedQuestion => (
             "no-question",

@@ -257,8 +257,11 @@ impl Resolver<'_> {
         let patch =
             WrittenPatch { shape: &written.shape, surface: written.surface, at: written.at, depth: written.depth_mm };
         let place = self.patch_place(&patch, path);
-        let label = self.tissue_with(&written.tissue, crate::catalog::TissueRole::Decay, &format!("{path}/tissue"));
+        let mut label = self.tissue_with(&written.tissue, crate::catalog::TissueRole::Decay, &format!("{path}/tissue"));
         let mut shape = self.patch_shape(&patch, path);
+        if self.sites.contains(&written.id) {
+            label = self.site(written, label, place, &shape, path);
+        }
         match (&mut shape, &written.rim) {
             (_, None) => {}
             (DecayShape::Grown(grown), Some(rim)) => {
@@ -273,6 +276,34 @@ impl Resolver<'_> {
             }
         }
         Decay { id: written.id.clone(), label, shape, surface: written.surface, place }
+    }
+
+    /// Returns the label of a possible site of a draw, and reports a site that would give away the draw or that cannot
+    /// feel like sound enamel.
+    fn site(
+        &mut self,
+        written: &file::DecayFile,
+        decay: Label,
+        place: DecayPlace,
+        shape: &DecayShape,
+        path: &str,
+    ) -> Label {
+        let is_fixed = !matches!(place, DecayPlace::Random | DecayPlace::RandomQuadrant);
+        let has_one_depth = !matches!(shape, DecayShape::Grown(grown) if grown.depths.len() > 1);
+        if !is_fixed || !has_one_depth {
+            let message = "a possible site of a draw must have a fixed position and depth";
+            let help = "give each site its own position, such as { \"quadrant\": 1 }; the draw chooses among the sites";
+            self.complain(&format!("{path}/at"), "wrong-place", message, help);
+        }
+        if written.rim.is_some() {
+            let message = "a possible site of a draw cannot have a rim";
+            self.complain(&format!("{path}/rim"), "no-rim", message, "remove the rim");
+        }
+        self.tissues.add_site(decay, &written.id).unwrap_or_else(|| {
+            let message = "there are too many possible sites: every number of a tissue is in use";
+            self.complain(path, "too-many-sites", message, "remove some of the sites");
+            decay
+        })
     }
 
     fn stain(&mut self, written: &file::StainFile, path: &str) -> Decay {

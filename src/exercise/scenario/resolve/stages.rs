@@ -4,7 +4,7 @@ use super::{Resolver, written_teeth};
 use crate::catalog::{InstrumentEntry, WorkingEndEntry};
 use crate::scenario::file;
 use crate::scenario::file::ScenarioFile;
-use crate::scenario::{ChartScope, EndConditions, Question, QuestionKind, Stage, StiffnessSteps};
+use crate::scenario::{ChartScope, Draw, EndConditions, Question, QuestionKind, Stage, StiffnessSteps};
 use typodont_formats::diagnostic::did_you_mean;
 
 impl Resolver<'_> {
@@ -18,7 +18,7 @@ impl Resolver<'_> {
             .stages
             .iter()
             .enumerate()
-            .map(|(i, s)| self.stage(s, written, lesions, &format!("/stages/{i}")))
+            .flat_map(|(i, s)| trials(self.stage(s, written, lesions, &format!("/stages/{i}"))))
             .collect()
     }
 
@@ -32,10 +32,14 @@ impl Resolver<'_> {
         self.check_cutting(written, &instruments, tray, path);
         let filling = written.filling.as_ref().and_then(|name| self.filling(name, &instruments, scenario, path));
         let steps = self.stiffness_steps(written, path);
+        let draw = written.draw.as_ref().map(|draw| self.draw(draw, written, lesions, path));
+        // Questions may refer to the caries that was drawn, and not to a possible site.
+        let lesions: Vec<String> = lesions.iter().filter(|id| !self.sites.contains(id)).cloned().collect();
+        let lesions: Vec<String> = lesions.into_iter().chain(draw.iter().map(|draw| draw.id.clone())).collect();
         let guidance = written.guidance.as_ref().and_then(|g| self.guidance(g, &format!("{path}/guidance")));
         let chart = self.chart_scope(written, &instruments, scenario, path);
         let questions = written.ask.iter().enumerate();
-        let ask = questions.map(|(i, q)| self.question(q, scenario, lesions, &format!("{path}/ask/{i}"))).collect();
+        let ask = questions.map(|(i, q)| self.question(q, scenario, &lesions, &format!("{path}/ask/{i}"))).collect();
         Stage {
             id: written.id.clone(),
             title: written.title.clone(),
@@ -46,12 +50,50 @@ impl Resolver<'_> {
             filling,
             show_decay: written.show_decay,
             is_adjustable: written.adjustable,
+            draw,
             steps,
             guidance,
             chart,
             ask,
             ends,
         }
+    }
+
+    /// Returns the draw of a stage's first trial, and reports a draw whose answer is not asked for or is always the same.
+    fn draw(&mut self, written: &file::DrawFile, stage: &file::StageFile, lesions: &[String], path: &str) -> Draw {
+        let at = format!("{path}/draw");
+        for (index, site) in written.one_of.iter().enumerate() {
+            self.lesion(site, lesions, &format!("{at}/one_of/{index}"));
+        }
+        self.unique(written.one_of.iter().enumerate().map(|(i, id)| (id.as_str(), format!("{at}/one_of/{i}"))));
+        if lesions.contains(&written.id) {
+            let message = format!("\"{}\" is the id of a decay already", written.id);
+            self.complain(&format!("{at}/id"), "duplicate-id", message, "give the draw a name of its own");
+        }
+        let is_about = |question: &&file::QuestionFile| match &question.answer {
+            file::AnswerFile::ToothWith(id) | file::AnswerFile::QuadrantOf(id) => *id == written.id,
+            _ => false,
+        };
+        if stage.ask.iter().filter(is_about).count() != 1 {
+            let message = "exactly one question of the stage must ask for the tooth or the quadrant that was drawn";
+            let help =
+                format!("add \"answer\": {{ \"tooth_with\": \"{}\" }} to one question under \"ask\"", written.id);
+            self.complain(&at, "no-question", message, help);
+        }
+        let is_idle = !stage.ends_when.iter().any(|end| matches!(end, file::EndConditionFile::Answered));
+        if is_idle {
+            let message = "each trial must end with its answer";
+            self.complain(&at, "endless-stage", message, "add \"answered\" to \"ends_when\"");
+        }
+        for (is_given, key) in
+            [(stage.cutting, "cutting"), (stage.adjustable, "adjustable"), (stage.show_decay, "show_decay")]
+        {
+            if is_given {
+                let message = format!("a stage with a draw cannot have \"{key}\", which would show the sites");
+                self.complain(&format!("{path}/{key}"), "shown-draw", message, format!("remove \"{key}\""));
+            }
+        }
+        Draw { id: written.id.clone(), sites: written.one_of.clone(), trial: 1, trials: written.trials }
     }
 
     /// Returns the conditions that end a stage, and reports conditions that cannot be met or are missing.
@@ -257,6 +299,31 @@ impl Resolver<'_> {
         Question { id: written.id.clone(), text: written.text.clone(), kind }
     }
 
+    /// Reports questions whose answer stands in the file: the same for every trainee and in every session.
+    pub(super) fn find_fixed_answers(&mut self, scenario: &ScenarioFile) {
+        let decay = |id: &str| written_teeth(&scenario.scene).into_iter().flat_map(|t| &t.decay).find(|d| d.id == id);
+        for (stage, number) in scenario.stages.iter().zip(0..) {
+            for (question, place) in stage.ask.iter().zip(0..) {
+                let (id, key, is_fixed) = match &question.answer {
+                    file::AnswerFile::ToothWith(id) => (id, "tooth_with", true),
+                    file::AnswerFile::QuadrantOf(id) => {
+                        let at = decay(id).map(|d| d.at);
+                        let is_drawn =
+                            matches!(at, Some(file::DecayPlaceFile::RandomQuadrant | file::DecayPlaceFile::Random));
+                        (id, "quadrant_of", !is_drawn)
+                    }
+                    _ => continue,
+                };
+                if is_fixed && decay(id).is_some() {
+                    let message = "the answer is the same in every session, so trainees need not find it";
+                    let help = "add \"draw\" with several possible sites to the stage, and refer to the draw here";
+                    let path = format!("/stages/{number}/ask/{place}/answer/{key}");
+                    self.complain(&path, "fixed-answer", message, help);
+                }
+            }
+        }
+    }
+
     fn lesion(&mut self, name: &str, lesions: &[String], path: &str) {
         if !lesions.iter().any(|l| l == name) {
             let help = match lesions {
@@ -275,4 +342,16 @@ impl Resolver<'_> {
             d.id == decay && (d.surface != file::SurfaceFile::O || matches!(d.at, file::DecayPlaceFile::Centre))
         })
     }
+}
+
+/// Returns the trials of a stage, one stage each: the stage itself unless it has a draw with several trials.
+fn trials(stage: Stage) -> Vec<Stage> {
+    let Some(draw) = stage.draw.clone().filter(|draw| draw.trials > 1) else { return vec![stage] };
+    let trial = |number: u32| Stage {
+        id: format!("{}-{number}", stage.id),
+        title: format!("{} ({number}/{})", stage.title, draw.trials),
+        draw: Some(Draw { trial: number, ..draw.clone() }),
+        ..stage.clone()
+    };
+    (1..=draw.trials).map(trial).collect()
 }

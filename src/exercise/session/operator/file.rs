@@ -117,6 +117,9 @@ pub enum PlaceFile {
     Tooth(String),
     /// Surface above a decay, by its id.
     Decay(String),
+    /// One of the possible sites of the stage's draw, chosen at random and without regard to the draw. In a stage
+    /// without a draw, the centre of the occlusal surface of the first tooth.
+    Site,
     /// Quadrant of the first tooth, 1 to 4 as seen from above.
     Quadrant(#[schemars(range(min = 1, max = 4))] u8),
 }

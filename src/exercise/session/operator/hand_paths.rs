@@ -1,5 +1,6 @@
 //! Positions on the visible surface, and hand paths through the air to them.
 
+use crate::scenario::{Lesion, seeded_random};
 use crate::session::operator::file::{CarveFile, CutFile, PlaceFile};
 use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT, TOUCH_SPEED, TRAVEL_HEIGHT};
 use typodont_core::device::Move;
@@ -51,12 +52,14 @@ impl Operator {
         let tooth = match place {
             PlaceFile::Tooth(id) => teeth.iter().position(|t| t.id == *id).unwrap_or(0),
             PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(0, |l| l.tooth),
+            PlaceFile::Site => self.random_site().map_or(0, |lesion| lesion.tooth),
             PlaceFile::Crown | PlaceFile::Quadrant(_) => 0,
         };
         let (low, high) = (teeth[tooth].crown_low, teeth[tooth].crown_high);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let over = match place {
             PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(middle, |l| l.centre),
+            PlaceFile::Site => self.random_site().map_or(middle, |lesion| lesion.centre),
             PlaceFile::Quadrant(quadrant) => {
                 let buccal = if *quadrant <= 2 { 0.42 } else { -0.42 };
                 let distal = if quadrant % 2 == 1 { 0.42 } else { -0.42 };
@@ -66,6 +69,16 @@ impl Operator {
         };
         let (surface, normal) = self.surface_at(over.x, over.y, high.z).unwrap_or((over, Vec3::Z));
         (tooth, surface, normal)
+    }
+
+    /// Returns one of the possible sites of the current stage's draw. The choice depends on the seed and on the time,
+    /// but not on the draw.
+    fn random_site(&self) -> Option<&Lesion> {
+        let stage = &self.scenario.stages[self.stage?];
+        let sites = &stage.draw.as_ref()?.sites;
+        let chosen = seeded_random(self.seed, &format!("{}/site/{}", stage.id, self.stage_ticks));
+        let site = &sites[(chosen % sites.len() as u64) as usize];
+        self.workpiece.lesions.iter().find(|lesion| lesion.id == *site)
     }
 
     /// Returns the uppermost surface point at (x, y) and its unit normal; tooth space, mm.

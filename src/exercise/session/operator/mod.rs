@@ -48,6 +48,7 @@ pub struct Operator {
     file: OperatorFile,
     scenario: Arc<Scenario>,
     workpiece: Arc<Workpiece>,
+    seed: u64,
     device: ScriptedDevice,
     /// Index of the stage that the plan is for.
     stage: Option<usize>,
@@ -105,7 +106,8 @@ enum OperatorTask {
 const PATIENCE_TICKS: u64 = 20 * 60 * 1000;
 
 impl Operator {
-    /// Creates an operator that holds a device above the workpiece. The seed determines its tremor.
+    /// Creates an operator that holds a device above the workpiece. The seed determines its tremor and its random
+    /// choices.
     pub fn new(
         file: OperatorFile,
         scenario: Arc<Scenario>,
@@ -123,6 +125,7 @@ impl Operator {
             file,
             scenario,
             workpiece,
+            seed,
             stage: None,
             stage_ticks: 0,
             plan: VecDeque::new(),

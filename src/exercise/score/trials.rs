@@ -1,0 +1,168 @@
+//! Trials in which the site of the caries was drawn: the share of correct answers, corrected for chance.
+//!
+//! Takes a scenario, its workpiece and the outcome of a session. Gives counts, and the measures of
+//! [`OF_DRAWS`](crate::scenario::metric::OF_DRAWS). A person who guesses has an expected corrected result of 0, however
+//! often and however fast the guesses are made.
+
+use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
+use crate::session::{SessionOutcome, StageResult};
+use typodont_core::frame::Vec3;
+use typodont_core::statistics;
+use typodont_core::tick::Tick;
+
+/// Answers of all trials of a session.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrialSummary {
+    pub correct: usize,
+    pub incorrect: usize,
+    /// Trials without an answer, including those that were not reached.
+    pub unanswered: usize,
+    /// Sum over all trials of the share of correct answers that a person who guesses expects.
+    chance_sum: f64,
+    /// Sum over the answered trials of their value: 1 for a correct answer, −c/(1−c) for an incorrect one, times the
+    /// stiffness at the time of the answer; `None` without stiffness steps.
+    level_sum: Option<f64>,
+    /// Sum of the times from the start of a trial to its answer, s.
+    time_sum: f64,
+    /// Tick of the first incorrect answer, with the position of the caries, tooth space, mm.
+    pub first_error: Option<(Tick, Vec3)>,
+}
+
+impl TrialSummary {
+    /// Returns the summary of a session; `None` if the exercise has no draw.
+    pub fn of(scenario: &Scenario, workpiece: &Workpiece, outcome: &SessionOutcome) -> Option<TrialSummary> {
+        let mut summary = TrialSummary::default();
+        for (index, stage) in scenario.stages.iter().enumerate().filter(|(_, stage)| stage.draw.is_some()) {
+            let drawn = workpiece.drawn.get(index).copied().flatten();
+            let place = drawn.map(|lesion| workpiece.lesions[lesion].centre);
+            summary.add(stage, outcome.stages.get(index), chance(stage, workpiece), place);
+        }
+        (summary.trials() > 0).then_some(summary)
+    }
+
+    /// Adds a trial: its result, if it was reached, and the position of the caries.
+    fn add(&mut self, stage: &Stage, result: Option<&StageResult>, chance: f64, place: Option<Vec3>) {
+        self.chance_sum += chance;
+        if stage.steps.is_some() {
+            self.level_sum.get_or_insert(0.0);
+        }
+        let question = stage.ask.iter().position(|question| is_about_draw(stage, &question.kind));
+        let answer = result.zip(question).and_then(|(result, question)| result.answers.get(question)?.as_ref());
+        let (Some(answer), Some(result)) = (answer, result) else {
+            self.unanswered += 1;
+            return;
+        };
+        self.time_sum += answer.at.seconds_since(result.started);
+        let value = match answer.correct {
+            Some(true) => 1.0,
+            _ => -chance / (1.0 - chance),
+        };
+        match answer.correct {
+            Some(true) => self.correct += 1,
+            _ => self.incorrect += 1,
+        }
+        if let (Some(sum), Some((level, _))) = (&mut self.level_sum, answer.step) {
+            // The written coefficient: 0.7, not 0.699999988079071.
+            *sum += value * (f64::from(level) * 1e6).round() / 1e6;
+        }
+        if answer.correct != Some(true) && self.first_error.is_none() {
+            self.first_error = place.map(|place| (answer.at, place));
+        }
+    }
+
+    /// Returns the number of trials of the exercise.
+    pub fn trials(&self) -> usize {
+        self.correct + self.incorrect + self.unanswered
+    }
+
+    /// Returns the share of correct answers, 0 to 1, in which a trial without an answer counts as one that is guessed.
+    fn share(&self) -> f64 {
+        let n = self.trials() as f64;
+        (self.correct as f64 + self.unanswered as f64 * self.chance()) / n
+    }
+
+    /// Returns the mean share of correct answers that a person who guesses expects.
+    fn chance(&self) -> f64 {
+        self.chance_sum / self.trials() as f64
+    }
+
+    fn corrected_pct(&self, share: f64) -> f64 {
+        100.0 * (share - self.chance()) / (1.0 - self.chance())
+    }
+
+    /// Computes one of the measures of the trials; `None` if it has no value.
+    pub fn measure(&self, name: &str) -> Option<f64> {
+        let interval = || statistics::wilson_interval(self.share(), self.trials());
+        let answered = self.correct + self.incorrect;
+        match name {
+            "detect_corrected_pct" => Some(self.corrected_pct(self.share())),
+            "detect_corrected_low_pct" => Some(self.corrected_pct(interval()[0])),
+            "detect_corrected_high_pct" => Some(self.corrected_pct(interval()[1])),
+            "detect_trials_right" => Some(self.correct as f64),
+            "detect_level_corrected" => self.level_sum.map(|sum| sum / self.trials() as f64),
+            "detect_trial_time_s" => (answered > 0).then(|| self.time_sum / answered as f64),
+            _ => None,
+        }
+    }
+}
+
+fn is_about_draw(stage: &Stage, kind: &QuestionKind) -> bool {
+    let (QuestionKind::ToothWith { decay } | QuestionKind::QuadrantOf { decay }) = kind else { return false };
+    stage.draw.as_ref().is_some_and(|draw| draw.id == *decay)
+}
+
+/// Returns the share of correct answers that a person expects who gives the most frequent correct answer to a stage's
+/// question without examining anything; 0 without a draw.
+fn chance(stage: &Stage, workpiece: &Workpiece) -> f64 {
+    let Some(draw) = &stage.draw else { return 0.0 };
+    let Some(question) = stage.ask.iter().find(|question| is_about_draw(stage, &question.kind)) else { return 0.0 };
+    let sites = workpiece.lesions.iter().filter(|lesion| draw.sites.contains(&lesion.id));
+    let answers: Vec<usize> = match question.kind {
+        QuestionKind::ToothWith { .. } => sites.map(|lesion| lesion.tooth).collect(),
+        _ => sites.map(|lesion| usize::from(lesion.quadrant)).collect(),
+    };
+    let most = answers.iter().map(|answer| answers.iter().filter(|other| *other == answer).count()).max();
+    most.unwrap_or(0) as f64 / answers.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn summary(correct: usize, incorrect: usize, unanswered: usize, chance: f64) -> TrialSummary {
+        let chance_sum = chance * (correct + incorrect + unanswered) as f64;
+        TrialSummary { correct, incorrect, unanswered, chance_sum, ..TrialSummary::default() }
+    }
+
+    /// Numbers of Wilson's interval from R: `binom::binom.wilson(6, 8)` and `(2, 8)`.
+    #[test]
+    fn the_share_of_correct_answers_is_corrected_for_chance() {
+        let check = |summary: TrialSummary, name: &str, expected: f64| {
+            let found = summary.measure(name).unwrap();
+            assert!((found - expected).abs() < 1e-4, "{name}: {found} instead of {expected}");
+        };
+        check(summary(8, 0, 0, 0.5), "detect_corrected_pct", 100.0);
+        check(summary(4, 4, 0, 0.5), "detect_corrected_pct", 0.0);
+        check(summary(2, 6, 0, 0.25), "detect_corrected_pct", 0.0);
+        check(summary(0, 0, 8, 0.25), "detect_corrected_pct", 0.0);
+        check(summary(0, 8, 0, 0.5), "detect_corrected_pct", -100.0);
+        check(summary(3, 1, 4, 0.5), "detect_corrected_pct", 25.0);
+        check(summary(6, 2, 0, 0.5), "detect_corrected_low_pct", 100.0 * (2.0 * 0.409_275 - 1.0));
+        check(summary(6, 2, 0, 0.5), "detect_corrected_high_pct", 100.0 * (2.0 * 0.928_521 - 1.0));
+    }
+
+    /// Sums the result of every possible session of six guesses, each weighted by its probability.
+    #[test]
+    fn a_guess_has_an_expected_result_of_zero() {
+        for chance in [0.5f64, 0.25, 0.125] {
+            let mut expected = 0.0f64;
+            for outcome in 0..1u32 << 6 {
+                let correct = outcome.count_ones() as usize;
+                let probability = chance.powi(correct as i32) * (1.0 - chance).powi(6 - correct as i32);
+                let result = summary(correct, 6 - correct, 0, chance).measure("detect_corrected_pct").unwrap();
+                expected += probability * result;
+            }
+            assert!(expected.abs() < 1e-9, "{chance}: {expected}");
+        }
+    }
+}
