@@ -38,7 +38,7 @@ pub fn section_ui(
     }
     let rect = Rect::from_min_size(view.right_bottom() - vec2(SIDE + MARGIN, SIDE + MARGIN + 36.0), vec2(SIDE, SIDE));
     let right = Quat::from_rotation_y(orbit.azimuth) * Vec3::X;
-    let plane = SectionPlane { middle: snapshot.tip, right, up: Vec3::Y };
+    let plane = TipPlane { middle: snapshot.tip, right, up: Vec3::Y };
     let image = section_image(scene, &plane);
     let id = ui.scope_id().with("section");
     let texture = ui.data(|data| data.get_temp::<egui::TextureHandle>(id));
@@ -86,14 +86,14 @@ fn scale_ui(painter: &egui::Painter, rect: Rect, points_per_mm: f32) {
 }
 
 /// A plane in world space, mm, with its directions to the right and up.
-struct SectionPlane {
+struct TipPlane {
     middle: Vec3,
     right: Vec3,
     up: Vec3,
 }
 
 /// Colours of the tissues in a plane.
-fn section_image(scene: &LessonScene, plane: &SectionPlane) -> egui::ColorImage {
+fn section_image(scene: &LessonScene, plane: &TipPlane) -> egui::ColorImage {
     let LessonScene { volume, workpiece, palette, .. } = scene;
     let tooth_from_world = workpiece.world_from_tooth.inverse();
     let step = SIDE_MM / SAMPLES as f32;

@@ -391,7 +391,8 @@ mod tests {
         assert_eq!(head_differences(&head, &current), Vec::<String>::new());
         let other = SessionFile { participant: "other".into(), ..current.clone() };
         assert_eq!(head_differences(&head, &other), ["session.json: participant: differs from the recording"]);
-        let changes: [(&str, fn(&mut SessionFile)); 9] = [
+        type Change = fn(&mut SessionFile);
+        let changes: [(&str, Change); 9] = [
             ("seed", |s| s.seed += 1),
             ("started", |s| s.started = "2020-01-01T00:00:00Z".into()),
             ("operator", |s| s.operator = None),
@@ -420,7 +421,8 @@ mod tests {
         let (_, session, _) = example();
         let grade = session.grade.unwrap();
         assert_eq!(sum_differences(&grade), Vec::<String>::new());
-        let changes: [(&str, fn(&mut GradeFile)); 4] = [
+        type Change = fn(&mut GradeFile);
+        let changes: [(&str, Change); 4] = [
             ("the items add up to", |g| g.points += 1.0),
             ("the items allow", |g| g.max_points += 1.0),
             ("critical errors", |g| g.hard_fails.push("invented".into())),

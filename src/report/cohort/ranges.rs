@@ -14,7 +14,14 @@ const SHARES: [&str; 5] = ["dice", "jaccard", "precision", "recall", "detect_lev
 const RATIOS: [&str; 1] = ["healthy_per_decay_pct"];
 
 /// Measures that may be negative.
-const SIGNED: [&str; 2] = ["probing_bias_mm", "jerk"];
+const SIGNED: [&str; 6] = [
+    "probing_bias_mm",
+    "jerk",
+    "detect_corrected_pct",
+    "detect_corrected_low_pct",
+    "detect_corrected_high_pct",
+    "detect_level_corrected",
+];
 
 /// Range of a measure's values; unbounded for a measure that is not known.
 fn range_of_measure(name: &str) -> ValueRange {
