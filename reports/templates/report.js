@@ -332,6 +332,7 @@ class Page {
       choice.onchange = () => this.colourBy(view => {
         view.byVerdict = choice.value === 'verdict';
         view.byDeviation = choice.value === 'deviation';
+        document.querySelector('.scale').classList.toggle('unused', !view.byDeviation);
       });
     }
     byId('patterns').onchange = event => this.colourBy(view => { view.patterns = event.target.checked; });

@@ -124,8 +124,12 @@ fn draw_flags(svg: &mut String, flags: &[EventFlag], bottom: f64, x: &dyn Fn(f64
     in_time.sort_by(|a, b| a.at.total_cmp(&b.at));
     for EventFlag { number, at, span } in in_time {
         let middle = x(*at);
-        let row = (0..FLAG_ROWS).find(|&row| middle - taken[row] >= FLAG_WIDTH).unwrap_or(0);
-        taken[row] = middle;
+        let is_free = |row: &usize| middle - taken[*row] >= FLAG_WIDTH;
+        let most_room = || (0..FLAG_ROWS).min_by(|a, b| taken[*a].total_cmp(&taken[*b])).unwrap_or(0);
+        let row = (0..FLAG_ROWS).find(is_free).unwrap_or_else(most_room);
+        // Moved aside where every row is taken, so that each flag can be clicked.
+        let flag = middle.max(taken[row] + FLAG_WIDTH);
+        taken[row] = flag;
         let y = FLAGS_TOP + row as f64 * FLAG_WIDTH * 0.95;
         let _ = write!(
             svg,
@@ -143,9 +147,9 @@ fn draw_flags(svg: &mut String, flags: &[EventFlag], bottom: f64, x: &dyn Fn(f64
         }
         let _ = write!(
             svg,
-            "<line x1=\"{middle:.1}\" x2=\"{middle:.1}\" y1=\"{:.1}\" y2=\"{bottom:.1}\"/>\
-             <circle cx=\"{middle:.1}\" cy=\"{y:.1}\" r=\"9\"/>\
-             <text x=\"{middle:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{number}</text></g>",
+            "<line x1=\"{flag:.1}\" x2=\"{middle:.1}\" y1=\"{:.1}\" y2=\"{bottom:.1}\"/>\
+             <circle cx=\"{flag:.1}\" cy=\"{y:.1}\" r=\"9\"/>\
+             <text x=\"{flag:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{number}</text></g>",
             y + 9.0,
             y + 4.0
         );

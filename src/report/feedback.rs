@@ -473,9 +473,10 @@ fn wall(id: &str) -> Message {
     Message::text(format!("where.{id}"), &[])
 }
 
-/// Title of a tissue, in lower case within a sentence.
+/// Title of a tissue, in lower case within a sentence. `None` for a possible site of a draw, which feels like caries in
+/// some trials and like enamel in the others.
 fn tissue(name: Option<&str>, scenario: &Scenario) -> Option<Message> {
-    let entry = scenario.tissues.by_name(name?)?;
+    let entry = scenario.tissues.by_name(name?).filter(|entry| entry.site_of.is_none())?;
     Some(Message::text_or(format!("tissue.{}", entry.name), entry.title.to_lowercase()))
 }
 

@@ -257,7 +257,7 @@ fn names_that_lead_nowhere() {
         &[("unknown-tissue", "/zones/0/region/around/tissue")],
     );
     let text = edited("3-detection.json", "/stages/0/ask/0/answer/tooth_with", Some(json!("leison")));
-    let expected = [("no-question", "/stages/0/draw"), ("unknown-decay", "/stages/0/ask/0/answer/tooth_with")];
+    let expected = [("unknown-decay", "/stages/0/ask/0/answer/tooth_with"), ("no-question", "/stages/0/draw")];
     check_text("question about no decay", &text, &expected);
     let text = edited("3-detection.json", "/stages/0/stiffness_steps/tissue", Some(json!("decay")));
     check_text("steps of no tissue", &text, &[("unknown-tissue", "/stages/0/stiffness_steps/tissue")]);

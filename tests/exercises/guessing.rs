@@ -120,13 +120,15 @@ fn every_site_is_drawn_equally_often() {
         let scenario = scenario(coarse(id));
         let made = Workpiece::make(&scenario, 0).unwrap();
         let mut counts = BTreeMap::<usize, f64>::new();
-        let (mut sequences, mut repeated, mut pairs) = (BTreeSet::new(), 0.0, 0.0);
-        for seed in 0..400 {
+        let (mut sequences, mut repeated, mut pairs, mut trials) = (BTreeSet::new(), 0.0, 0.0, 0);
+        const SEEDS: u64 = 400;
+        for seed in 0..SEEDS {
             let drawn = Workpiece::draw(&scenario, &made.lesions, seed);
             let drawn: Vec<usize> = drawn.into_iter().map(Option::unwrap).collect();
             drawn.iter().for_each(|site| *counts.entry(*site).or_default() += 1.0);
             repeated += drawn.windows(2).filter(|pair| pair[0] == pair[1]).count() as f64;
             pairs += (drawn.len() - 1) as f64;
+            trials = drawn.len();
             sequences.insert(drawn);
         }
         let (sites, all) = (made.lesions.len() as f64, counts.values().sum::<f64>());
@@ -137,7 +139,10 @@ fn every_site_is_drawn_equally_often() {
         }
         let unexpected = (repeated - pairs / sites).abs();
         assert!(unexpected < 4.0 * deviation(pairs, 1.0 / sites), "{id}: {repeated} of {pairs} are repeated");
-        assert!(sequences.len() > 390, "{id}: {} sequences", sequences.len());
+        // Of so many possible sequences, so many different ones are expected.
+        let possible = sites.powi(trials as i32);
+        let expected = possible * (1.0 - (-(SEEDS as f64) / possible).exp());
+        assert!(sequences.len() as f64 > 0.9 * expected, "{id}: {} sequences of {expected:.0}", sequences.len());
     }
 }
 

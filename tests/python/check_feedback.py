@@ -65,7 +65,7 @@ class Session:
     def __init__(self, bundle):
         self.bundle = bundle
         self.result = json.loads((bundle / "session.json").read_text())
-        attached, self.stage_spans, messages = {}, [], []
+        attached, self.stage_spans, self.changes, messages = {}, [], [], []
         with open(bundle / "recording.mcap", "rb") as file:
             reader = mcap.reader.make_reader(file)
             attached = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
@@ -82,6 +82,7 @@ class Session:
         self.role = np.zeros(256, object)
         for tissue in table:
             self.role[tissue["id"]] = tissue["role"]
+        self.sites = self.sites_of_draws((bundle / "initial.seg.nrrd").read_bytes())
         entries = {entry["id"]: entry for entry in json.loads(attached["content/instruments.json"])["instruments"]}
         tray = [entries.get(name, {}) for name in self.scenario.get("instruments", [])]
         self.is_bur = np.array([bool(e.get("cuts")) and e.get("kind") not in BLADES for e in tray] + [False] * 256)
@@ -109,6 +110,25 @@ class Session:
             self.stage_spans.append([event["stage_started"]["stage"], event["tick"], None])
         if "stage_ended" in event and self.stage_spans:
             self.stage_spans[-1][2] = event["tick"]
+        if "set_material" in event.get("command", {}):
+            change = event["command"]["set_material"]
+            self.changes.append((event["tick"], change["label"], change["like"]))
+
+    def sites_of_draws(self, data):
+        """Tissues of the possible sites of draws, such as "caries:left-1", which no table has: number of each by name."""
+        header = data[:data.index(b"\n\n")].decode("latin1")
+        segments = re.findall(r"^Segment(\d+)_ID:=(.*)$", header, re.M)
+        sites = {name: int(re.search(rf"^Segment{n}_LabelValue:=(\d+)$", header, re.M)[1])
+                 for n, name in segments if ":" in name}
+        for name, number in sites.items():
+            self.number[name] = number
+            self.role[number] = self.role[self.number[name.partition(":")[0]]]
+        return sites
+
+    def felt(self, number, tick):
+        """Tissue that a touched one felt like: a possible site is caries in some trials, and enamel in the others."""
+        alike = [like for at, label, like in self.changes if label == number and at <= tick]
+        return alike[-1] if number in self.sites.values() and alike else number
 
     def removal_ticks(self):
         """Tick at which each voxel was removed; -1 where it was not."""
@@ -240,7 +260,9 @@ def of_voxels(s):
     yield from grouped(s, "vulnerable", None, s.exposed, exposing, wanted_tree)
     for name, mask in s.protected.items():
         yield from grouped(s, "zone", name, mask & s.removed, times, wanted_tree)
-    left = s.wanted & ~s.removed & ~s.exposed
+    # Where nothing is cut, and at the possible sites of draws, caries is to be found and not to be removed.
+    is_cut = any(stage.get("cutting") for stage in s.scenario["stages"])
+    left = s.wanted & ~s.removed & ~s.exposed & ~np.isin(s.before, list(s.sites.values())) & is_cut
     removed_tree = cKDTree(s.places(s.removed)) if s.removed.any() else None
     yield from grouped(s, "left", None, left, None, removed_tree)
 
@@ -356,10 +378,11 @@ def contact(s, kind, is_meant):
     if min(len(spells), EPISODES_MAX) != len(told):
         yield f"{kind}: {len(told)} episodes, the recording has {len(spells)} spells"
     for number, first, last, count, peak in spells:
-        episode = told.pop((names.get(number), first), None)
+        name = names.get(s.felt(number, peak))
+        episode = told.pop((name, first), None)
         if episode is None:
             if len(spells) <= EPISODES_MAX:
-                yield f"{kind}: contact with {names.get(number)} from {first / 1000} s is in no episode"
+                yield f"{kind}: contact with {name} from {first / 1000} s is in no episode"
             continue
         about = f"{kind} episode of {episode['tissue']} from {episode['from_s']} s"
         wanted = {"to_s": last / 1000, "contact_s": count / 1000, "at_s": peak / 1000, "force_n": s.force[peak],

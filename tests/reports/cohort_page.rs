@@ -46,7 +46,8 @@ fn sessions_of_other_teeth_voxel_sizes_and_scorers_are_kept_apart() {
         assert_eq!((&group["tooth_fdi"], &group["voxel_mm"][0]), (&json!(fdi), &json!(voxel)));
         let mean = 20.0 * (number as f64 + 1.0) + (2.0 + number as f64) / 2.0;
         assert!((group["points_mean"].as_f64().unwrap() - mean).abs() < 1e-9, "{group}");
-        assert!(group["cautions"][0].as_str().unwrap().contains("in 4 groups"), "{group}");
+        let cautions = group["cautions"].as_array().unwrap();
+        assert!(cautions.iter().any(|caution| caution.as_str().unwrap().contains("in 4 groups")), "{group}");
         assert!(group["progress"].as_object().unwrap().is_empty(), "attempts under other conditions are no progress");
     }
     let page = std::fs::read_to_string(&html).unwrap();

@@ -105,8 +105,8 @@ fn every_reader_says_which_results_follow_from_their_recordings() {
             && page.contains(">verified<")
     );
     let table = fs::read_to_string(table).unwrap();
-    assert!(table.lines().next().unwrap().ends_with("verification,verification_note"));
-    assert_eq!(table.lines().filter(|line| line.ends_with(",verified,")).count(), 1, "{table}");
+    assert!(table.lines().next().unwrap().contains(",verification,verification_note,"));
+    assert_eq!(table.lines().filter(|line| line.contains(",verified,,")).count(), 1, "{table}");
 
     let grades = out.join("grades.csv");
     let arguments = ["gradebook", text(&sessions), "--for", "moodle", "-o", text(&grades)];

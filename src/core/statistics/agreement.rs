@@ -47,6 +47,8 @@ pub fn weighted_kappa(pairs: &[(usize, usize)], categories: usize, weights: Kapp
     let cells = || all().flat_map(|i| all().map(move |j| (i, j)));
     let observed: f64 = cells().map(|(i, j)| weight(i, j) * shares[i][j]).sum();
     let by_chance: f64 = cells().map(|(i, j)| weight(i, j) * first[i] * second[j]).sum();
+    /// Differences below this are those of rounding; the terms are of order 1.
+    const ROUNDING: f64 = 1e-13;
     let spare = 1.0 - by_chance;
     // No differences beyond rounding: kappa is not defined.
     if spare < 1e-12 {
@@ -60,8 +62,9 @@ pub fn weighted_kappa(pairs: &[(usize, usize)], categories: usize, weights: Kapp
         shares[i][j] * deviation * deviation
     };
     let centre = observed * by_chance - 2.0 * by_chance + observed;
-    // Rounding may make the variance of a perfect agreement slightly negative.
-    let variance = ((cells().map(term).sum::<f64>() - centre * centre) / (n * spare.powi(4))).max(0.0);
+    let difference = cells().map(term).sum::<f64>() - centre * centre;
+    // The variance of a perfect agreement is zero but for rounding.
+    let variance = if difference < ROUNDING { 0.0 } else { difference / (n * spare.powi(4)) };
     let half = normal_quantile(0.5 + 0.5 * CONFIDENCE) * variance.sqrt();
     Some(WeightedKappa { works: pairs.len(), kappa, interval: [(kappa - half).max(-1.0), (kappa + half).min(1.0)] })
 }

@@ -8,8 +8,8 @@ use super::nearest_offset::{AnatomicalDirection, NearestOffsets};
 use super::voxel_removals::VoxelRemoval;
 use super::{Scored, Verdict};
 use crate::catalog::TissueRole;
-use crate::scenario::Scenario;
 use crate::scenario::file::ZoneRole;
+use crate::scenario::{Scenario, anatomy_tissues};
 use std::collections::BTreeMap;
 use typodont_core::frame::Vec3;
 use typodont_core::tick::{TICK_S, Tick};
@@ -71,7 +71,8 @@ pub struct ErrorEpisode {
     pub place: Vec3,
     /// Direction of every voxel of the episode; `None` for contact and force.
     pub direction: Option<AnatomicalDirection>,
-    /// Tissue of every voxel or of every tick of the episode.
+    /// Tissue of every voxel or of every tick of the episode. Of contact with a possible site of a draw, the tissue whose
+    /// properties the site had at the tick `worst`.
     pub tissue: Label,
     /// Distance of the place from the tissue to be removed; for remaining tissue, from the cavity; mm.
     pub depth: Option<f32>,
@@ -88,11 +89,15 @@ pub struct ErrorEpisode {
 /// Returns all error episodes of a session by kind, the greatest of each kind first.
 pub fn error_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode> {
     let mut found = removal_episodes(scenario, scored);
-    found.extend(remaining_episodes(scored));
-    found.extend(scored.hard_presses.iter().map(|spell| episode_of_contact(EpisodeKind::Force, spell)));
+    found.extend(remaining_episodes(scenario, scored));
+    let contact = |kind, spell: &ContactSpell| {
+        let tissue = tissue_felt(scenario, scored, spell.tissue, spell.peak);
+        episode_of_contact(kind, tissue, spell)
+    };
+    found.extend(scored.hard_presses.iter().map(|spell| contact(EpisodeKind::Force, spell)));
     found.extend(scored.forbidden_contacts.iter().map(|spell| {
         let is_soft = scenario.tissues.role(spell.tissue) == Some(TissueRole::Soft);
-        episode_of_contact(if is_soft { EpisodeKind::Soft } else { EpisodeKind::Neighbour }, spell)
+        contact(if is_soft { EpisodeKind::Soft } else { EpisodeKind::Neighbour }, spell)
     }));
     let severity = |episode: &ErrorEpisode| match episode.kind {
         EpisodeKind::Force => f64::from(episode.force),
@@ -167,11 +172,18 @@ fn removal_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode> {
     episodes.filter(|e| e.volume >= VOLUME_LEAST || e.kind != EpisodeKind::Overcut).collect()
 }
 
-/// Returns the episodes of tissue that should have been removed.
-fn remaining_episodes(scored: &Scored) -> Vec<ErrorEpisode> {
+/// Returns the episodes of tissue that should have been removed: none in an exercise in which nothing is cut. A possible
+/// site of a draw is to be found, and not to be removed.
+fn remaining_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode> {
+    if scenario.cutting_stage().is_none() {
+        return Vec::new();
+    }
+    let is_site: [bool; 256] = std::array::from_fn(|label| {
+        scenario.tissues.by_label(Label(label as u8)).is_some_and(|entry| entry.site_of.is_some())
+    });
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
     let is_removed = |v: usize| before.tissue(v) != Label::AIR && after.tissue(v) == Label::AIR;
-    let is_left = |v: usize| scored.verdicts[v] == Verdict::Left;
+    let is_left = |v: usize| scored.verdicts[v] == Verdict::Left && !is_site[usize::from(before.tissue(v).0)];
     let from_removed = NearestOffsets::new(before.grid(), scored.replay.workpiece.distal(), is_removed, is_left);
     let mut voxels: BTreeMap<(Option<AnatomicalDirection>, u8), Vec<EpisodeVoxel>> = BTreeMap::new();
     for voxel in (0..scored.verdicts.len()).filter(|&v| is_left(v)) {
@@ -214,7 +226,18 @@ fn episode_of_voxels(scored: &Scored, kind: EpisodeKind, zone: Option<usize>, vo
     }
 }
 
-fn episode_of_contact(kind: EpisodeKind, spell: &ContactSpell) -> ErrorEpisode {
+/// Returns the tissue that a touched tissue felt like at a tick. A possible site of a draw feels like its decay in the
+/// trials in which it is drawn, and like enamel in all others.
+fn tissue_felt(scenario: &Scenario, scored: &Scored, touched: Label, at: Tick) -> Label {
+    let Some(decay) = scenario.tissues.by_label(touched).and_then(|entry| entry.site_of) else { return touched };
+    let workpiece = &scored.replay.workpiece;
+    let stage = scored.replay.outcome.stages.iter().rposition(|stage| stage.started <= at);
+    let drawn = stage.and_then(|stage| *workpiece.drawn.get(stage)?);
+    let is_drawn = drawn.is_some_and(|lesion| workpiece.lesions[lesion].label == touched);
+    if is_drawn { decay } else { anatomy_tissues(&scenario.tissues).enamel }
+}
+
+fn episode_of_contact(kind: EpisodeKind, tissue: Label, spell: &ContactSpell) -> ErrorEpisode {
     ErrorEpisode {
         kind,
         zone: None,
@@ -222,7 +245,7 @@ fn episode_of_contact(kind: EpisodeKind, spell: &ContactSpell) -> ErrorEpisode {
         worst: Some(spell.peak),
         place: spell.place,
         direction: None,
-        tissue: spell.tissue,
+        tissue,
         depth: None,
         volume: 0.0,
         force: spell.force,
