@@ -1,6 +1,6 @@
 // Opens a bundle's report.html in Chromium as a reader would: from the disk, without a network, with mouse and keyboard.
 //
-//     node report_page.js PLAYWRIGHT-CORE CHROMIUM BUNDLE [PICTURES]
+//     node report_page.js PLAYWRIGHT-CORE CHROMIUM BUNDLE PICTURES [hostile]
 //
 // Prints what it measured as JSON. Exits with 1 and a line per claim that does not hold.
 
@@ -8,7 +8,7 @@ const fs = require('fs');
 const path = require('path');
 const zlib = require('zlib');
 
-const [playwright, executablePath, bundle, pictures] = process.argv.slice(2);
+const [playwright, executablePath, bundle, pictures, hostile] = process.argv.slice(2);
 const { chromium } = require(playwright);
 const { appearance } = require('./page_checks.js');
 
@@ -229,6 +229,9 @@ function fell(voxel) {
     }
     return { mm: within ? 0.5 * own - least : least - 0.5 * own, isNear: least < reach * own };
   };
+  // The whole tooth from the working side: the sections that clip it were moved by what was clicked.
+  for (const number of [0, 1]) await page.locator(`[data-clip="${number}"]`).uncheck();
+  await settled(() => page.locator('[data-side="work"]').click());
   await settled(() => page.locator('[name="colours"][value="deviation"]').check());
   await photograph('report-deviation.png');
   let compared = 0;
@@ -281,11 +284,12 @@ function fell(voxel) {
   await page.emulateMedia({ media: 'print' });
   await page.setViewportSize({ width: Math.floor(184 / 25.4 * 96), height: 900 });
   const first = await page.evaluate(() => document.getElementById('explore').getBoundingClientRect().top + window.scrollY);
-  claim(first <= 273 / 25.4 * 96, `the summary is ${Math.round(first)} pixels high on paper`);
+  // Titles of ninety letters without a space fill more than one sheet, and are broken.
+  claim(hostile || first <= 273 / 25.4 * 96, `the summary is ${Math.round(first)} pixels high on paper`);
   const unwanted = await page.evaluate(() => [...document.querySelectorAll('.screen, .formula, .time')].filter(e => e.offsetParent !== null).map(e => e.textContent.trim().slice(0, 40)));
   claim(unwanted.length === 0, `printed: ${unwanted.join(' | ')}`);
   await page.emulateMedia({ media: null });
-  wrong.push(...await appearance(page));
+  wrong.push(...(await appearance(page)).filter(line => !hostile || !line.startsWith('a word is broken')));
 
   // A narrow window has nothing beside it.
   await page.setViewportSize({ width: 400, height: 800 });

@@ -115,7 +115,7 @@ class Session:
             self.changes.append((event["tick"], change["label"], change["like"]))
 
     def sites_of_draws(self, data):
-        """Tissues of the possible sites of draws, such as "caries:left-1", which no table has: number of each by name."""
+        """Number of each possible site of a draw by its tissue's name, such as "caries:left-1"; no table has it."""
         header = data[:data.index(b"\n\n")].decode("latin1")
         segments = re.findall(r"^Segment(\d+)_ID:=(.*)$", header, re.M)
         sites = {name: int(re.search(rf"^Segment{n}_LabelValue:=(\d+)$", header, re.M)[1])

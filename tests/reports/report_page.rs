@@ -12,11 +12,11 @@ use folder::folder;
 use std::path::Path;
 use std::process::Command;
 
-fn opens(bundle: &Path, pictures: &Path) {
+fn opens(bundle: &Path, pictures: &Path, more: &[&str]) {
     let Some([playwright, chromium]) = browser() else { return };
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/report_page.js");
     let mut node = Command::new("node");
-    node.arg(script).args([playwright, chromium]).arg(bundle).arg(pictures);
+    node.arg(script).args([playwright, chromium]).arg(bundle).arg(pictures).args(more);
     let output = node.output().unwrap();
     assert!(output.status.success(), "{}{}", told(&output), complained(&output));
     println!("{}", told(&output));
@@ -38,7 +38,7 @@ fn a_report_is_explored_in_a_browser() {
     let scenario = out.join("fine.json");
     std::fs::write(&scenario, fine).unwrap();
     let bundle = run(scenario.to_str().unwrap(), "hasty", &out, &["--participant", "P07"]);
-    opens(&bundle, &out);
+    opens(&bundle, &out, &[]);
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn a_hostile_exercise_does_no_harm_in_a_browser() {
     let path = out.join("hostile.json");
     std::fs::write(&path, scenario.to_string()).unwrap();
     let bundle = run(path.to_str().unwrap(), "hasty", &out, &["--participant", "P07"]);
-    opens(&bundle, &out);
+    opens(&bundle, &out, &["hostile"]);
 }
 
 #[test]

@@ -333,7 +333,7 @@ fn grinder(folder: &Path) -> [PathBuf; 2] {
 fn recorded(folder: &Path, count: usize) -> Vec<PathBuf> {
     let [exercise, grinder] = grinder(folder);
     let mut library = Library::shipped();
-    library.insert(&OperatorFile::file_name("grinder"), fs::read(grinder).unwrap());
+    library.insert(OperatorFile::file_name("grinder"), fs::read(grinder).unwrap());
     let operator = OperatorFile::read(&library, "grinder").unwrap();
     let source = SourceText::new("grinding.json", fs::read_to_string(exercise).unwrap());
     let scenario = Arc::new(scenario::resolve(source, &library, ResolveMode::MakeWorkpiece).unwrap());
@@ -1019,8 +1019,11 @@ fn a_cohort_is_the_same_from_a_folder_and_from_the_database() {
     let database = cluster.address("examiner");
     let by_database = outputs(&["--database", &database, "--store", &address], "database");
     assert_eq!(by_folder.0, by_database.0);
+    // What cannot be replayed is not verified in either; the reason is seen in the folder, and by the worker.
+    let [damaged, waiting] =
+        ["recording.mcap: damaged-recording: not an MCAP file", "the recording has not been replayed yet"];
     for (a, b) in by_folder.1.iter().zip(&by_database.1) {
-        assert_eq!(a, b);
+        assert_eq!(&a.replace(damaged, waiting), b);
     }
     let nothing = cluster.typodont("examiner", &["cohort", "--database", &database, "--class", "B"]);
     assert!(complained(&nothing).contains("no-sessions"));

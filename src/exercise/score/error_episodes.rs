@@ -71,8 +71,8 @@ pub struct ErrorEpisode {
     pub place: Vec3,
     /// Direction of every voxel of the episode; `None` for contact and force.
     pub direction: Option<AnatomicalDirection>,
-    /// Tissue of every voxel or of every tick of the episode. Of contact with a possible site of a draw, the tissue whose
-    /// properties the site had at the tick `worst`.
+    /// Tissue of every voxel or of every tick of the episode. Of contact with a possible site of a draw, the tissue
+    /// whose properties the site had at the tick `worst`.
     pub tissue: Label,
     /// Distance of the place from the tissue to be removed; for remaining tissue, from the cavity; mm.
     pub depth: Option<f32>,
@@ -172,8 +172,8 @@ fn removal_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode> {
     episodes.filter(|e| e.volume >= VOLUME_LEAST || e.kind != EpisodeKind::Overcut).collect()
 }
 
-/// Returns the episodes of tissue that should have been removed: none in an exercise in which nothing is cut. A possible
-/// site of a draw is to be found, and not to be removed.
+/// Returns the episodes of tissue that should have been removed: none in an exercise in which nothing is cut. A
+/// possible site of a draw is to be found, and not to be removed.
 fn remaining_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode> {
     if scenario.cutting_stage().is_none() {
         return Vec::new();
