@@ -6,19 +6,19 @@
 //!
 //! # Examples
 //!
-//! A device that works without hardware is the mouse, which a window normally moves:
+//! A device that works without hardware is the mouse, whose hand a window normally aims:
 //!
 //! ```
 //! use typodont_core::device::{Device, Wrench};
-//! use typodont_core::frame::{Quat, Vec3};
+//! use typodont_core::frame::Vec3;
 //! use typodont_devices::driver_by_name;
-//! use typodont_devices::mouse::Mouse;
+//! use typodont_devices::mouse::{HandTarget, Mouse};
 //!
 //! assert!(driver_by_name("mouse").is_some());
 //!
-//! // The pointer moves 100 pixels to the right; the device's hand follows within a second.
+//! // The hand is aimed 10 mm to the right; it is there within a second.
 //! let (mouse, mut device) = Mouse::new();
-//! mouse.move_by_pixels(100.0, 0.0, Quat::IDENTITY);
+//! mouse.aim(HandTarget { place: Vec3::X * 10.0, max_force: 1.0, yaw: 0.0 });
 //! for _ in 0..1000 {
 //!     device.exchange(&Wrench::ZERO).unwrap();
 //! }
