@@ -323,7 +323,7 @@ pub fn verify(bundle: &Path, known: &[Templates]) -> Result<Verification, String
     };
     complaints.extend(compare_files(bundle, &bytes, &session));
     complaints.extend(compare_results(&recording, &scored, &session));
-    complaints.extend(unlisted_files(bundle, &session));
+    complaints.extend(unlisted_files(bundle, &session).iter().map(|name| unlisted_complaint(name)));
     if made_by != this {
         // The results are compared in any case; the drawings and texts of another version cannot be.
         let part = format!("its pages and images, which were made by typodont {made_by} (this is version {this})");
@@ -353,7 +353,7 @@ fn read_session_file(bundle: &Path) -> Result<(Vec<u8>, SessionFile), String> {
     Ok((written, session))
 }
 
-/// Complaints about files that `session.json` does not name.
+/// Names of files that `session.json` does not name.
 pub(super) fn unlisted_files(bundle: &Path, session: &SessionFile) -> Vec<String> {
     let in_folder = |folder: &str| -> Vec<String> {
         let entries = fs::read_dir(bundle.join(folder)).into_iter().flatten().flatten();
@@ -363,7 +363,11 @@ pub(super) fn unlisted_files(bundle: &Path, session: &SessionFile) -> Vec<String
     let mut found: Vec<String> = in_folder("").into_iter().chain(in_folder("views/")).collect();
     found.retain(|name| !is_ours(name));
     found.sort();
-    found.iter().map(|name| format!("{name}: this file is not part of a bundle")).collect()
+    found
+}
+
+pub(super) fn unlisted_complaint(name: &str) -> String {
+    format!("{name}: this file is not part of a bundle")
 }
 
 /// [`verify`] for a recording without a bundle: compares its replay with the states that it contains. Whatever followed
@@ -377,16 +381,9 @@ pub fn verify_recording(path: &Path) -> Result<Verification, String> {
     let workpiece = recording.workpiece().map_err(|e| format!("{}: {e}", path.display()))?;
     let replay = record::replay(&recording, workpiece, ReplayCheck::Full, |_, _, _, _| ());
     let complaints = replay.difference.iter().map(ToString::to_string).collect();
-    let (unverified, remarks) = match recording.describe_loss() {
-        Some(_) if recording.is_cut_off() => {
-            let kept = Tick(recording.len() as u64).seconds();
-            (
-                vec![format!("the end of the session, after {kept:.3} s")],
-                recording.describe_loss().into_iter().collect(),
-            )
-        }
-        loss => (Vec::new(), loss.into_iter().collect()),
-    };
+    let kept = Tick(recording.len() as u64).seconds();
+    let unjudged = recording.is_cut_off().then(|| format!("the end of the session, after {kept:.3} s"));
+    let (unverified, remarks) = (unjudged.into_iter().collect(), recording.describe_loss().into_iter().collect());
     Ok(Verification { complaints, unverified, remarks })
 }
 

@@ -7,7 +7,7 @@
 
 use super::bundle::{
     REPORT_FILE, SESSION_FILE, compare_facts, compare_files, compare_scores, derive_maps, read_plain_file, sha256,
-    unlisted_files,
+    unlisted_complaint, unlisted_files,
 };
 use super::session_file::{DeviceFile, GradeFile, POINTS_TOLERANCE, SessionFile};
 use super::templates::Templates;
@@ -98,7 +98,12 @@ struct ReplayCache {
 /// A bundle after everything that needs no replay was compared.
 enum FirstCheck {
     Decided(VerificationStatus),
-    NeedsReplay { written: Vec<u8>, recording: Vec<u8> },
+    /// `digest` is the SHA-256 of the recording.
+    NeedsReplay {
+        written: Vec<u8>,
+        recording: Vec<u8>,
+        digest: String,
+    },
 }
 
 impl Verifier {
@@ -117,9 +122,8 @@ impl Verifier {
     pub fn check(&self, bundle: &Path, session: &SessionFile) -> VerificationStatus {
         match self.first_check(bundle, session) {
             FirstCheck::Decided(status) => status,
-            FirstCheck::NeedsReplay { written, recording } => {
-                let key = self.cache.as_ref().map(|cache| cache.key(&recording));
-                let replayed = self.cache.as_ref().zip(key).and_then(|(cache, key)| cache.read(&key));
+            FirstCheck::NeedsReplay { written, digest, .. } => {
+                let replayed = self.cache.as_ref().and_then(|cache| cache.read(&digest));
                 replayed.map_or(VerificationStatus::Pending, |replayed| judge(&replayed, session, &written))
             }
         }
@@ -127,20 +131,20 @@ impl Verifier {
 
     /// Judges a bundle completely; replays its recording unless the cache has the replay.
     pub fn verify(&self, bundle: &Path, session: &SessionFile) -> VerificationStatus {
-        let (written, recording) = match self.first_check(bundle, session) {
+        let (written, recording, digest) = match self.first_check(bundle, session) {
             FirstCheck::Decided(status) => return status,
-            FirstCheck::NeedsReplay { written, recording } => (written, recording),
+            FirstCheck::NeedsReplay { written, recording, digest } => (written, recording, digest),
         };
-        let key = self.cache.as_ref().map(|cache| cache.key(&recording));
-        let cached = self.cache.as_ref().zip(key.as_ref()).and_then(|(cache, key)| cache.read(key));
-        let replayed = match cached.map_or_else(|| replay(&recording), Ok) {
-            Ok(replayed) => replayed,
-            Err(why) => return VerificationStatus::Unverified(why),
-        };
-        if let Some((cache, key)) = self.cache.as_ref().zip(key) {
-            cache.write(&key, &replayed);
+        if let Some(replayed) = self.cache.as_ref().and_then(|cache| cache.read(&digest)) {
+            return judge(&replayed, session, &written);
         }
-        judge(&replayed, session, &written)
+        match replay(&recording) {
+            Ok(replayed) => {
+                self.cache.iter().for_each(|cache| cache.write(&digest, &replayed));
+                judge(&replayed, session, &written)
+            }
+            Err(why) => VerificationStatus::Unverified(why),
+        }
     }
 
     /// Judges many bundles on all processors. `progress` is called after each one with the number of those done.
@@ -169,9 +173,9 @@ impl Verifier {
         if !is_as_read {
             return unverified(format!("{SESSION_FILE} was changed while it was read"));
         }
-        if !session.digests.contains_key(record::FILE_NAME) {
+        let Some(digest) = session.digests.get(record::FILE_NAME) else {
             return unverified("it has no recording".to_string());
-        }
+        };
         let recording = match read_plain_file(bundle, record::FILE_NAME) {
             Ok(recording) => recording,
             Err(why) => {
@@ -180,7 +184,8 @@ impl Verifier {
             }
         };
         let mut differences = compare_files(bundle, &recording, session);
-        differences.extend(unlisted_files(bundle, session).into_iter().filter(|file| is_of_a_bundle(file)));
+        let unlisted = unlisted_files(bundle, session);
+        differences.extend(unlisted.iter().filter(|name| is_of_a_bundle(name)).map(|name| unlisted_complaint(name)));
         differences.extend(session.grade.as_ref().map(sum_differences).unwrap_or_default());
         let head = Recording::parse_head(record::FILE_NAME, &recording);
         differences.extend(head.iter().flat_map(|head| head_differences(head, session)));
@@ -198,19 +203,21 @@ impl Verifier {
         if named.is_none() && session.template_sha256 != self.template_sha256 {
             return unverified(format!("{REPORT_FILE} was made from a different template, which it does not name"));
         }
-        FirstCheck::NeedsReplay { written, recording }
+        // The digest is that of the recording, or the files would have differed.
+        FirstCheck::NeedsReplay { written, recording, digest: digest.clone() }
     }
 }
 
 impl ReplayCache {
-    fn key(&self, recording: &[u8]) -> String {
-        let parts = [sha256(recording), SCORER_VERSION.to_string(), self.build.clone()];
-        sha256(parts.join("\n").as_bytes())
+    /// File of the entry for a recording with this SHA-256.
+    fn path(&self, digest: &str) -> PathBuf {
+        let parts = [digest, &SCORER_VERSION.to_string(), &self.build];
+        self.folder.join(sha256(parts.join("\n").as_bytes()))
     }
 
     /// An entry; `None` if there is none, or none that can be read.
-    fn read(&self, key: &str) -> Option<ReplayedFile> {
-        let path = self.folder.join(key);
+    fn read(&self, digest: &str) -> Option<ReplayedFile> {
+        let path = self.path(digest);
         let meta = fs::symlink_metadata(&path).ok()?;
         if !meta.is_file() || meta.len() > ENTRY_BYTES_MAX {
             return None;
@@ -219,14 +226,14 @@ impl ReplayCache {
     }
 
     /// Writes an entry. A cache that cannot be written is no error: the recording is replayed again next time.
-    fn write(&self, key: &str, replayed: &ReplayedFile) {
-        let path = self.folder.join(key);
+    fn write(&self, digest: &str, replayed: &ReplayedFile) {
+        let path = self.path(digest);
         if path.exists() || fs::create_dir_all(&self.folder).is_err() {
             return;
         }
         let Ok(text) = serde_json::to_vec(replayed) else { return };
         // Programs that write the same entry at the same time write the same bytes; a reader sees all of them or none.
-        let partial = self.folder.join(format!("{key}.{:p}.partial", std::ptr::from_ref(replayed)));
+        let partial = path.with_extension(format!("{:p}.partial", std::ptr::from_ref(replayed)));
         if fs::write(&partial, text).and_then(|()| fs::rename(&partial, &path)).is_err() {
             let _ = fs::remove_file(&partial);
         }
@@ -327,8 +334,7 @@ fn sum_differences(grade: &GradeFile) -> Vec<String> {
 
 /// True if a file that `session.json` does not name has a name that readers of bundles open. Others, such as those
 /// that file managers leave behind, are nobody's result.
-fn is_of_a_bundle(complaint: &str) -> bool {
-    let name = complaint.split(": ").next().unwrap_or_default();
+fn is_of_a_bundle(name: &str) -> bool {
     name == REPORT_FILE
         || [".nrrd", ".glb", ".mcap"].iter().any(|end| name.ends_with(end))
         || name.starts_with("views/") && name.ends_with(".png")
