@@ -34,6 +34,7 @@ mod parquet;
 mod missing_part;
 mod path;
 mod preview;
+mod progress;
 #[cfg(feature = "review")]
 mod review;
 mod run;

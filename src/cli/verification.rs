@@ -1,8 +1,8 @@
 //! Verification of the sessions that a command reads, with the cache of replays and the option `--verified`.
 
+use super::progress::progress_bar;
 use super::{CliError, cohort, load_templates};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::UNIX_EPOCH;
@@ -59,7 +59,7 @@ fn build_identity() -> Option<String> {
 pub fn settle(cohort: &mut Cohort, arguments: &VerificationArguments) -> Result<(), CliError> {
     let reported_count = cohort.skipped.len();
     if cohort.verification.is_empty() {
-        let bar = progress_bar(cohort.sessions.len() as u64);
+        let bar = progress_bar(cohort.sessions.len() as u64, "verified");
         cohort.verify(&verifier()?, |done| bar.set_position(done as u64));
         bar.finish_and_clear();
     } else {
@@ -113,10 +113,4 @@ fn report_unverified(cohort: &Cohort) {
         let sessions = if count == 1 { "1 session".to_string() } else { format!("{count} sessions") };
         eprintln!("{sessions}: not verified: {}", shown(&why));
     }
-}
-
-/// A progress bar on a terminal; hidden elsewhere.
-fn progress_bar(length: u64) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} verified, {eta} left");
-    ProgressBar::new(length).with_style(style.expect("the template is valid"))
 }

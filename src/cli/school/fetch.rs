@@ -5,7 +5,7 @@ use super::database::DatabaseArguments;
 use super::source::{SessionSource, audit_read};
 use super::store::StoreArguments;
 use super::store_marker;
-use super::sync::progress_bar;
+use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, print_line};
 use clap::Args;
 use sha2::{Digest, Sha256};

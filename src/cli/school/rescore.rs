@@ -1,6 +1,6 @@
 //! `typodont rescore`: scores many bundles again without a database, divided among computers.
 
-use super::sync::progress_bar;
+use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, cohort, print_line};
 use clap::Args;
 use sha2::{Digest, Sha256};

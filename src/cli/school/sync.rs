@@ -5,9 +5,9 @@ use super::database::DatabaseArguments;
 use super::retry::Transient;
 use super::store::{ObjectStoreHandle, StoreArguments, StoreError};
 use super::store_marker;
+use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, print_line, verification};
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -346,10 +346,4 @@ fn upload_parts(store: &ObjectStoreHandle, archive: &BundleArchive) -> Result<Re
         }
     }
     Ok(Ok(()))
-}
-
-/// A progress bar on a terminal; hidden elsewhere.
-pub fn progress_bar(length: u64, what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{bar:40} {pos}/{len} {msg}, {eta} left").expect("the template is valid");
-    ProgressBar::new(length).with_style(style).with_message(what)
 }

@@ -6,7 +6,7 @@ use super::metrics::{self, Counters};
 use super::retry::Transient;
 use super::store::{ObjectStoreHandle, StoreArguments};
 use super::store_marker;
-use super::sync::progress_bar;
+use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, print_line};
 use clap::Args;
 use indicatif::ProgressBar;
