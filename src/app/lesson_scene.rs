@@ -1,5 +1,6 @@
 //! The scene of a lesson as it is drawn: tooth, mouth, instruments, particles and display modes.
 
+use super::section_view::SectionImage;
 use super::transfer_function_draft::{DensityHistogram, TransferFunctionDraft};
 use std::cell::OnceCell;
 use std::sync::Arc;
@@ -35,6 +36,10 @@ pub struct LessonScene {
     pub particles: Option<ParticleField>,
     /// Model of the saliva ejector, which removes dust and water.
     pub ejector: Option<MeshInstance>,
+    /// Number of edits of the volume so far.
+    pub edit_count: u64,
+    /// Last image of the section through the working end.
+    pub section: Option<SectionImage>,
     /// True until the renderer has received the volume.
     pub is_new: bool,
     histogram: OnceCell<DensityHistogram>,
@@ -81,6 +86,8 @@ impl LessonScene {
             instruments,
             contra_angles: scenario.instruments.iter().map(scene::contra_angle).collect(),
             workpiece,
+            edit_count: 0,
+            section: None,
             is_new: true,
         };
         (built, complaints.iter().flatten().map(Diagnostic::headline).collect())

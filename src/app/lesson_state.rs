@@ -172,6 +172,7 @@ impl LessonState {
                     particles.record_removal(&edit, scene.volume.grid());
                 }
                 scene.volume.apply_edit(&edit);
+                scene.edit_count += 1;
             }
         }
         self.snapshot = self.thread.snapshot().or(self.snapshot);

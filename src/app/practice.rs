@@ -204,9 +204,10 @@ fn view_ui(
             if settings.stereo().is_none() {
                 pointer_ring(ui, lesson, rect);
             }
-            if let (Some(scene), Some(snapshot)) = (&lesson.scene, &lesson.snapshot)
+            let is_section_allowed = is_section_allowed(lesson);
+            if let (Some(scene), Some(snapshot)) = (&mut lesson.scene, &lesson.snapshot)
                 && let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize)
-                && is_section_allowed(lesson)
+                && is_section_allowed
             {
                 section_view::section_ui(ui, rect, scene, &lesson.orbit, snapshot, instrument);
             }

@@ -4,31 +4,41 @@ use super::lesson_scene::LessonScene;
 use super::snapshot::LessonSnapshot;
 use eframe::egui::{self, Color32, Pos2, Rect, Stroke, vec2};
 use typodont_core::frame::{Quat, Vec3};
-use typodont_core::volume::{ISO, Label, Volume};
 use typodont_exercise::catalog::InstrumentEntry;
-use typodont_render::{LabelPalette, Orbit};
+use typodont_render::Orbit;
+use typodont_report::raycast::{self, ImagePlane, OrthographicCamera, PixelBuffer};
 use typodont_scene::pointing::ring_radius;
 
 /// Side of the section in the scene, mm: a crown with its surroundings.
 const SIDE_MM: f32 = 10.0;
 
-/// Number of samples along each side.
-const SAMPLES: usize = 96;
+/// Number of pixels along each side.
+const PIXELS: u32 = 96;
 
 /// Side of the section on the screen, points, and its distance from the view's edges.
 const SIDE: f32 = 190.0;
 const MARGIN: f32 = 12.0;
 
-const BACKGROUND: Color32 = Color32::from_rgb(0x1d, 0x24, 0x2a);
-const SOFT_TISSUE: Color32 = Color32::from_rgb(0xb0, 0x6c, 0x68);
+/// Colours of the empty space and of whatever surrounds the tooth.
+const BACKGROUND: [f32; 3] = [0.11, 0.14, 0.16];
+const SURROUNDINGS: [f32; 3] = [0.69, 0.42, 0.41];
+
 const LINE: Color32 = Color32::from_rgba_premultiplied(190, 190, 190, 190);
+
+/// Image of a section, and what it depends on.
+pub struct SectionImage {
+    tip: Vec3,
+    azimuth: f32,
+    edit_count: u64,
+    texture: egui::TextureHandle,
+}
 
 /// Draws the section in the lower right corner of the view. The section plane is upright, contains the tip, and is
 /// parallel to the picture's horizontal.
 pub fn section_ui(
     ui: &egui::Ui,
     view: Rect,
-    scene: &LessonScene,
+    scene: &mut LessonScene,
     orbit: &Orbit,
     snapshot: &LessonSnapshot,
     instrument: &InstrumentEntry,
@@ -37,25 +47,10 @@ pub fn section_ui(
         return;
     }
     let rect = Rect::from_min_size(view.right_bottom() - vec2(SIDE + MARGIN, SIDE + MARGIN + 36.0), vec2(SIDE, SIDE));
-    let right = Quat::from_rotation_y(orbit.azimuth) * Vec3::X;
-    let plane = TipPlane { middle: snapshot.tip, right, up: Vec3::Y };
-    let image = section_image(scene, &plane);
-    let id = ui.scope_id().with("section");
-    let texture = ui.data(|data| data.get_temp::<egui::TextureHandle>(id));
-    let texture = match texture {
-        Some(mut texture) => {
-            texture.set(image, egui::TextureOptions::LINEAR);
-            texture
-        }
-        None => {
-            let texture = ui.ctx().load_texture("section", image, egui::TextureOptions::LINEAR);
-            ui.data_mut(|data| data.insert_temp(id, texture.clone()));
-            texture
-        }
-    };
+    let texture = section_texture(ui, scene, orbit.azimuth, snapshot.tip);
     let painter = ui.painter().with_clip_rect(rect);
     let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-    painter.image(texture.id(), rect, whole, Color32::WHITE);
+    painter.image(texture, rect, whole, Color32::WHITE);
     let points_per_mm = SIDE / SIDE_MM;
     // The outline of the working end: a ball about the tip, or an upright cylinder on it.
     let radius = ring_radius(&instrument.end) * points_per_mm;
@@ -85,50 +80,47 @@ fn scale_ui(painter: &egui::Painter, rect: Rect, points_per_mm: f32) {
     painter.text(at + vec2(6.0, 0.0), egui::Align2::LEFT_CENTER, "1 mm", egui::FontId::proportional(11.0), LINE);
 }
 
-/// A plane in world space, mm, with its directions to the right and up.
-struct TipPlane {
-    middle: Vec3,
-    right: Vec3,
-    up: Vec3,
+/// Texture of the section, drawn again only if one of its inputs has changed.
+fn section_texture(ui: &egui::Ui, scene: &mut LessonScene, azimuth: f32, tip: Vec3) -> egui::TextureId {
+    let edit_count = scene.edit_count;
+    let is_same =
+        |image: &&SectionImage| image.tip == tip && image.azimuth == azimuth && image.edit_count == edit_count;
+    if let Some(image) = scene.section.as_ref().filter(is_same) {
+        return image.texture.id();
+    }
+    let size = [PIXELS as usize; 2];
+    let image = egui::ColorImage::from_rgb(size, &section_picture(scene, azimuth, tip).rgb8());
+    let texture = ui.ctx().load_texture("section", image, egui::TextureOptions::LINEAR);
+    let id = texture.id();
+    scene.section = Some(SectionImage { tip, azimuth, edit_count, texture });
+    id
 }
 
-/// Colours of the tissues in a plane.
-fn section_image(scene: &LessonScene, plane: &TipPlane) -> egui::ColorImage {
+/// The tooth in the section plane, in the colours of its tissues, and what surrounds it.
+fn section_picture(scene: &LessonScene, azimuth: f32, tip_in_world: Vec3) -> PixelBuffer {
+    /// Pixels along each side of a block that is within or outside the surroundings as a whole: distances to meshes are
+    /// slow.
+    const BLOCK: u32 = 4;
     let LessonScene { volume, workpiece, palette, .. } = scene;
     let tooth_from_world = workpiece.world_from_tooth.inverse();
-    let step = SIDE_MM / SAMPLES as f32;
-    let corner = plane.middle + (plane.up - plane.right) * (0.5 * (SIDE_MM - step));
-    let (right, down) = (tooth_from_world.rotate(plane.right) * step, tooth_from_world.rotate(-plane.up) * step);
-    let corner = tooth_from_world * corner;
-    let half_diagonal = SIDE_MM;
-    let middle = tooth_from_world * plane.middle;
-    let nearby: Vec<_> = workpiece.surroundings.iter().filter(|c| c.distance(middle) < half_diagonal).collect();
-    // Distances to meshes are slow: one per block of samples.
-    const BLOCK: usize = 4;
-    let blocks = SAMPLES / BLOCK;
-    let at = |x: f32, y: f32| corner + right * x + down * y;
-    let is_beside: Vec<bool> = (0..blocks * blocks)
-        .map(|i| at(((i % blocks) * BLOCK) as f32 + 1.5, ((i / blocks) * BLOCK) as f32 + 1.5))
-        .map(|place| nearby.iter().any(|c| c.distance(place) <= 0.0))
-        .collect();
-    let colour = |i: usize| {
-        let (x, y) = (i % SAMPLES, i / SAMPLES);
-        match tissue_at(volume, at(x as f32, y as f32)) {
-            Some(label) => tissue_colour(palette, label),
-            None if is_beside[(y / BLOCK) * blocks + x / BLOCK] => SOFT_TISSUE,
-            None => BACKGROUND,
-        }
+    let middle = tooth_from_world * tip_in_world;
+    let camera = OrthographicCamera {
+        middle,
+        right: tooth_from_world.rotate(Quat::from_rotation_y(azimuth) * Vec3::X),
+        up: tooth_from_world.rotate(Vec3::Y),
+        half_height: 0.5 * SIDE_MM,
     };
-    egui::ColorImage::new([SAMPLES; 2], (0..SAMPLES * SAMPLES).map(colour).collect())
-}
-
-fn tissue_at(volume: &Volume, place: Vec3) -> Option<Label> {
-    let grid = volume.grid();
-    let voxel = grid.nearest(place).filter(|_| volume.density_at(place) >= ISO)?;
-    Some(volume.labels()[grid.index(voxel)])
-}
-
-fn tissue_colour(palette: &LabelPalette, label: Label) -> Color32 {
-    let [r, g, b] = palette.appearance(label).colour.map(|share| (share.clamp(0.0, 1.0) * 255.0).round() as u8);
-    Color32::from_rgb(r, g, b)
+    let plane = ImagePlane { camera, width: PIXELS, height: PIXELS };
+    let mut picture = PixelBuffer::filled(PIXELS, PIXELS, BACKGROUND);
+    let nearby: Vec<_> = workpiece.surroundings.iter().filter(|c| c.distance(middle) < SIDE_MM).collect();
+    for (x, y) in (0..PIXELS / BLOCK).flat_map(|y| (0..PIXELS / BLOCK).map(move |x| (x * BLOCK, y * BLOCK))) {
+        let centre = plane.unproject((x + BLOCK / 2) as f32, (y + BLOCK / 2) as f32);
+        if nearby.iter().any(|collider| collider.distance(centre) <= 0.0) {
+            for (x, y) in (y..y + BLOCK).flat_map(|y| (x..x + BLOCK).map(move |x| (x, y))) {
+                picture.blend_pixel(i64::from(x), i64::from(y), SURROUNDINGS, 1.0);
+            }
+        }
+    }
+    picture.composite(&raycast::slice(volume, &plane, middle, |label, _| palette.appearance(label).colour));
+    picture
 }
