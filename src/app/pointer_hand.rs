@@ -5,7 +5,7 @@ use super::snapshot::LessonSnapshot;
 use typodont_core::device::UPRIGHT;
 use typodont_core::frame::{Quat, Vec3};
 use typodont_devices::mouse::{HandTarget, Mouse};
-use typodont_exercise::catalog::InstrumentEntry;
+use typodont_exercise::catalog::{InstrumentEntry, WorkingEndEntry};
 use typodont_render::{Eye, Orbit};
 use typodont_scene::particles::CollisionWorld;
 use typodont_scene::pointing::{HandAction, REST_FORCE, SurfaceSpot, hand_at_spot, spot_under_ray};
@@ -82,7 +82,8 @@ impl PointerHand {
             obstacles: &scene.workpiece.surroundings,
         };
         self.spot = spot_under_ray(&world, eye.position, along);
-        let yaw = handle_yaw(orbit);
+        // The handle turns with the view, so that a handpiece leads to the operator's side.
+        let yaw = orbit.azimuth;
         let (place, max_force) = match self.spot {
             Some(spot) => {
                 let action = match self.is_pressing {
@@ -100,19 +101,12 @@ impl PointerHand {
 }
 
 fn first_strength(instrument: &InstrumentEntry) -> f32 {
-    use typodont_exercise::catalog::WorkingEndEntry;
     match &instrument.end {
         _ if instrument.cuts => BUR_STRENGTH,
         WorkingEndEntry::Probe(_) => PROBE_STRENGTH,
         WorkingEndEntry::Point | WorkingEndEntry::Bent(_) => EXPLORER_STRENGTH,
         _ => BUR_STRENGTH,
     }
-}
-
-/// Rotation of the handle around the vertical axis, rad: it turns with the view, so that a handpiece leads to the
-/// operator's side.
-fn handle_yaw(orbit: &Orbit) -> f32 {
-    orbit.azimuth
 }
 
 /// Point on a ray beside everything, as far away as the working end.

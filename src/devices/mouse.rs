@@ -69,6 +69,8 @@ struct MouseState {
     max_force: AtomicU32,
     yaw: AtomicI32,
     buttons: AtomicU32,
+    /// Maximum force of a target, N: that of the device.
+    force_limit: f32,
     /// Hand position and force, three floats each. Written only by the device.
     feedback: SeqLock<6>,
 }
@@ -76,16 +78,18 @@ struct MouseState {
 impl Mouse {
     /// Creates a mouse and the device that it moves; the hand starts at the origin.
     pub fn new() -> (Mouse, MouseDevice) {
+        let spec = spec();
         let shared = Arc::new(MouseState {
             place: Default::default(),
             max_force: AtomicU32::new(0),
             yaw: AtomicI32::new(0),
             buttons: AtomicU32::new(0),
+            force_limit: spec.max_force,
             feedback: SeqLock::new(),
         });
         let device = MouseDevice {
             shared: shared.clone(),
-            spec: spec(),
+            spec,
             hand: Vec3::ZERO,
             orientation: UPRIGHT,
             felt_force: Vec3::ZERO,
@@ -102,7 +106,7 @@ impl Mouse {
         for ((at, mm), half) in self.0.place.iter().zip(place.to_array()).zip(WORKSPACE_HALF.to_array()) {
             at.store((mm.clamp(-half, half) * UM_PER_MM).round() as i32, Ordering::Relaxed);
         }
-        self.0.max_force.store((max_force.clamp(0.0, spec().max_force) * MN_PER_N).round() as u32, Ordering::Relaxed);
+        self.0.max_force.store((max_force.clamp(0.0, self.0.force_limit) * MN_PER_N).round() as u32, Ordering::Relaxed);
         self.0.yaw.store((yaw * ANGLE_UNITS).round() as i32, Ordering::Relaxed);
     }
 
@@ -122,8 +126,8 @@ impl Mouse {
         self.0.buttons.store(0, Ordering::Relaxed);
     }
 
-    /// Returns the hand's position (world space, mm) and the force that it does not feel (N), for a spring on the
-    /// screen. `None` before the first tick.
+    /// Returns the hand's position (world space, mm) and the force that it does not feel (N). `None` before the first
+    /// tick.
     pub fn hand_and_force(&self) -> Option<(Vec3, Vec3)> {
         let [a, b, c, d, e, f] = self.0.feedback.read()?.1.map(f32::from_bits);
         Some((Vec3::new(a, b, c), Vec3::new(d, e, f)))

@@ -1,4 +1,4 @@
-//! What the shipped rubrics pay for, and what `typodont check` says of rubrics that are not fair.
+//! Points that the shipped rubrics give for doing nothing, and the warnings of `typodont check` about unfair rubrics.
 
 use crate::support::bundle;
 use crate::support::folder;

@@ -28,7 +28,7 @@ fn work(number: usize) -> Value {
     one
 }
 
-/// What a rater of known severity gives: two raters agree in two works of three, and differ by one or two elsewhere.
+/// Rating by a rater of known severity: two raters agree in two works of three, and differ by one or two elsewhere.
 fn rating(rater: usize, number: usize) -> usize {
     let truth = 1 + number * 5 / WORKS;
     let away = if rater == 1 && number.is_multiple_of(3) { [1, -1, 2][number / 3 % 3] } else { 0 };

@@ -1,4 +1,4 @@
-//! What the workspace depends on: licences, sources, second versions of a crate, and the notices that a package needs.
+//! Dependencies of the workspace: licences, sources, second versions of a crate, and the notices that a package needs.
 
 use crate::tools;
 use serde_json::Value;

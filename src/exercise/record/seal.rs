@@ -6,8 +6,8 @@
 //!
 //! The seed depends on the session as well as on the code, so that the same code gives each participant, and each
 //! session of a participant, draws of its own. A recording reveals the seed and not the code, which may be used again.
-//! Whoever knows the code before the session ends can compute the draws; so can whoever guesses it, at [`ROUNDS`] digests
-//! a guess.
+//! Anybody who knows the code before the session ends can compute the draws, and so can anybody who guesses it, at
+//! [`ROUNDS`] digests a guess.
 
 use super::file::RecordingHeadFile;
 use crate::scenario::hex;
