@@ -45,6 +45,21 @@ impl Eye {
         ([(x - left) / (right - left), (y - top) / (bottom - top)], z)
     }
 
+    /// Returns false if a ball is out of sight for certain: in front of the near plane, beyond the far plane, or beside the
+    /// image. World space, mm.
+    pub fn may_see(&self, middle: Vec3, radius: f32) -> bool {
+        let FrustumWindow { left, right, bottom, top } = self.window;
+        let from_eye = middle - self.position;
+        let z = from_eye.dot(self.forward);
+        let is_beyond = |outward: Vec3| from_eye.dot(outward) > radius * outward.length();
+        z + radius >= self.near
+            && z - radius <= self.far
+            && !is_beyond(self.forward * left - self.right)
+            && !is_beyond(self.right - self.forward * right)
+            && !is_beyond(self.forward * bottom - self.up)
+            && !is_beyond(self.up - self.forward * top)
+    }
+
     /// Returns the value in the depth buffer for a depth in mm: 0 at `near`, 1 at `far`. Equation 1 of the thesis
     /// that this program is based on; it is that of every perspective depth buffer from 0 to 1.
     pub fn buffer_depth(&self, z: f32) -> f32 {

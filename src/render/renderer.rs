@@ -315,7 +315,7 @@ impl Renderer {
             pass.set_pipeline(&self.surface_pass.background);
             pass.draw(0..3, 0..1);
         }
-        self.surface_pass.draw_solids(&mut pass);
+        self.surface_pass.draw_solids(&mut pass, eye);
         self.particle_pass.draw_opaque(&mut pass);
         if let Some(reflected) = reflected {
             pass.set_pipeline(&self.mirror_pass.pipeline);

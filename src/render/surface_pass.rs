@@ -1,12 +1,14 @@
 //! Triangles with per-pixel lighting: the background, mesh instances, and the tooth's surface.
 
+use super::eye::Eye;
+use super::mesh_parts::MeshParts;
 use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
 use super::resources;
 use super::scene::{MeshInstance, Rgb};
 use super::surface_mesh;
 use super::vertex::Vertex;
 use std::sync::Arc;
-use typodont_core::frame::Vec3;
+use typodont_core::frame::{Pose, Vec3};
 use typodont_core::mesh::Mesh;
 
 /// Structs of `surface_pass.wgsl`; keep in step.
@@ -37,6 +39,7 @@ pub struct SurfacePass {
 struct CachedMesh {
     mesh: Arc<Mesh>,
     vertex_colours: Arc<Vec<Rgb>>,
+    parts: MeshParts,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
     is_used: bool,
@@ -47,6 +50,7 @@ struct MeshDraw {
     group: wgpu::BindGroup,
     /// Index of the cached mesh.
     mesh: usize,
+    world_from_solid: Pose,
 }
 
 impl SurfacePass {
@@ -119,9 +123,10 @@ impl SurfacePass {
             if i == self.draws.len() {
                 let uniform = resources::uniform_buffer(device, "solid", size_of::<gpu::SolidUniform>());
                 let group = resources::group(device, &self.layout, [uniform.as_entire_binding()]);
-                self.draws.push(MeshDraw { uniform, group, mesh });
+                self.draws.push(MeshDraw { uniform, group, mesh, world_from_solid: solid.world_from_solid });
             }
             self.draws[i].mesh = new_indices[mesh];
+            self.draws[i].world_from_solid = solid.world_from_solid;
             let [r, g, b] = solid.appearance.colour;
             let uniform = gpu::SolidUniform {
                 world_from_solid: resources::columns(solid.world_from_solid, Vec3::ONE, Vec3::ZERO),
@@ -145,28 +150,32 @@ impl SurfacePass {
             };
             let vertices = surface_mesh::instance_vertices(solid);
             let vertices = filled("corners", wgpu::BufferUsages::VERTEX, bytemuck::cast_slice(&vertices));
-            let indices = bytemuck::cast_slice(&solid.mesh.triangles);
+            let parts = MeshParts::new(&solid.mesh);
+            let indices = bytemuck::cast_slice(&parts.triangles);
             let indices = filled("triangles", wgpu::BufferUsages::INDEX, indices);
             let (mesh, vertex_colours) = (solid.mesh.clone(), solid.vertex_colours.clone());
-            self.cached_meshes.push(CachedMesh { mesh, vertex_colours, vertices, indices, is_used: true });
+            self.cached_meshes.push(CachedMesh { mesh, vertex_colours, parts, vertices, indices, is_used: true });
             self.cached_meshes.len() - 1
         });
         self.cached_meshes[found].is_used = true;
         CacheIndex(found)
     }
 
-    /// Draws all prepared mesh instances; the view's bind group must be set.
-    pub fn draw_solids(&self, pass: &mut wgpu::RenderPass) {
+    /// Draws all prepared mesh instances that an eye may see; the view's bind group must be set.
+    pub fn draw_solids(&self, pass: &mut wgpu::RenderPass, eye: &Eye) {
         pass.set_pipeline(&self.solid);
         for draw in &self.draws {
             let cached = &self.cached_meshes[draw.mesh];
-            if cached.mesh.is_empty() {
+            let visible = cached.parts.visible(eye, draw.world_from_solid);
+            if visible.is_empty() {
                 continue;
             }
             pass.set_bind_group(2, &draw.group, &[]);
             pass.set_vertex_buffer(0, cached.vertices.slice(..));
             pass.set_index_buffer(cached.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..3 * cached.mesh.triangles.len() as u32, 0, 0..1);
+            for run in visible {
+                pass.draw_indexed(3 * run.start..3 * run.end, 0, 0..1);
+            }
         }
     }
 }
