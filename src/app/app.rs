@@ -56,6 +56,8 @@ pub struct App {
     /// Created for the first lesson and kept for the next.
     viewport: Option<Viewport>,
     frame_count: u64,
+    /// Time of the last input, s.
+    last_input: f64,
 }
 
 /// State of a request to close the window.
@@ -71,8 +73,12 @@ enum CloseState {
 /// Frame interval of a running lesson.
 const LESSON_FRAME_INTERVAL: Duration = Duration::from_millis(16);
 
-/// Poll interval of a screen that waits for something.
-const IDLE_POLL_INTERVAL: Duration = Duration::from_millis(100);
+/// Frame interval of the other screens: soon after an input, and at rest.
+const BUSY_FRAME_INTERVAL: Duration = Duration::from_millis(100);
+const IDLE_FRAME_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Time after an input during which a screen is busy, s.
+const BUSY_TIME: f64 = 2.0;
 
 impl App {
     pub fn new(context: &eframe::CreationContext, options: AppOptions) -> App {
@@ -115,6 +121,7 @@ impl App {
             has_graphics: context.wgpu_render_state.as_ref().is_some_and(viewport::has_graphics),
             viewport: None,
             frame_count: 0,
+            last_input: 0.0,
         };
         if let (Some(mode), Some(path)) = (app.options.editor_mode, app.options.exercise.clone()) {
             app.open_editor(&path, mode, ctx);
@@ -122,6 +129,27 @@ impl App {
             app.begin_lesson(ctx);
         }
         app
+    }
+
+    /// Time until the next frame, if nothing requests one before.
+    fn frame_interval(&mut self, ctx: &egui::Context) -> Duration {
+        let now = ctx.input(|input| input.time);
+        if ctx.input(|input| !input.events.is_empty()) {
+            self.last_input = now;
+        }
+        match &self.screen {
+            // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
+            Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
+            Screen::Lesson(lesson) if !lesson.are_stages_over => {
+                match lesson.view_refresh.is_active(now) || lesson.pointer_hand.is_pressing {
+                    true => LESSON_FRAME_INTERVAL,
+                    // Only the clock moves. Movement of the hand requests a frame at once.
+                    false => lesson.time_to_next_second(),
+                }
+            }
+            _ if now - self.last_input < BUSY_TIME => BUSY_FRAME_INTERVAL,
+            _ => IDLE_FRAME_INTERVAL,
+        }
     }
 
     /// Takes over all events since the last frame.
@@ -383,7 +411,7 @@ impl App {
             input_device,
             second: self.options.second.clone(),
             digests,
-            wake: repaint_waker(ctx),
+            wake: Arc::from(repaint_waker(ctx)),
         };
         // A sealed seed is shown nowhere; the sound does not need it.
         let shown_seed = if seed.is_sealed() { 0 } else { seed.value };
@@ -546,7 +574,7 @@ fn log_editor(log: &mut StateLog, editor: &EditorState) {
 }
 
 /// A function that makes the window draw a new frame; callable from another thread.
-fn repaint_waker(ctx: &egui::Context) -> Box<dyn Fn() + Send> {
+fn repaint_waker(ctx: &egui::Context) -> Box<dyn Fn() + Send + Sync> {
     let ctx = ctx.clone();
     Box::new(move || ctx.request_repaint())
 }
@@ -604,7 +632,7 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SetDisplayMode(way) => lesson.display_mode = way,
         PracticeCommand::SetTransferFunction(curves) => {
             if let Some(scene) = &mut lesson.scene {
-                scene.transfer_function = *curves;
+                scene.set_transfer_function(*curves);
                 lesson.display_mode = DisplayMode::Drawn;
             }
         }
@@ -672,17 +700,12 @@ impl eframe::App for App {
         self.save_settings(&ctx);
         self.had_focus = ctx.memory(|memory| memory.focused().is_some());
         self.frame_count += 1;
-        self.state_log.record("pictures", self.frame_count / 10);
+        self.state_log.record("frames", self.frame_count);
         self.log_state();
         editor::log_anchors(&ctx, &mut self.state_log);
         if let Some(wait) = self.options.frame_delay {
             std::thread::sleep(wait);
         }
-        ctx.request_repaint_after(match &self.screen {
-            // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
-            Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
-            Screen::Lesson(lesson) if !lesson.are_stages_over => LESSON_FRAME_INTERVAL,
-            _ => IDLE_POLL_INTERVAL,
-        });
+        ctx.request_repaint_after(self.frame_interval(&ctx));
     }
 }

@@ -38,6 +38,8 @@ pub struct LessonScene {
     pub ejector: Option<MeshInstance>,
     /// Number of edits of the volume so far.
     pub edit_count: u64,
+    /// Number of changes of the tissues' colours, the jaws and the transfer function so far.
+    pub appearance_count: u64,
     /// Last image of the section through the working end.
     pub section: Option<SectionImage>,
     /// True until the renderer has received the volume.
@@ -87,6 +89,7 @@ impl LessonScene {
             contra_angles: scenario.instruments.iter().map(scene::contra_angle).collect(),
             workpiece,
             edit_count: 0,
+            appearance_count: 0,
             section: None,
             is_new: true,
         };
@@ -97,6 +100,13 @@ impl LessonScene {
     pub fn colour(&mut self, tissues: &TissueTable, is_decay_shown: bool) {
         self.palette = scene::tissue_palette(tissues, is_decay_shown);
         self.presets = TransferFunctionPresets::new(tissues, &self.palette);
+        self.appearance_count += 1;
+    }
+
+    /// Replaces the transfer function drawn by the user.
+    pub fn set_transfer_function(&mut self, curves: TransferFunctionDraft) {
+        self.transfer_function = curves;
+        self.appearance_count += 1;
     }
 
     /// Opens the mouth further by this angle, degrees, if there is a mouth.
@@ -104,6 +114,7 @@ impl LessonScene {
         let Some(mouth) = &self.mouth else { return };
         self.mouth_opening = (self.mouth_opening + by).clamp(0.0, MAX_MOUTH_OPENING);
         self.surroundings = mouth.solids(self.mouth_opening);
+        self.appearance_count += 1;
     }
 
     /// Density histogram of the volume at the first call. It is computed on demand: few users need it, and counting the

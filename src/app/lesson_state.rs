@@ -6,9 +6,11 @@ use super::lesson_thread::{LessonCommand, LessonConfig, LessonEvent, LessonThrea
 use super::messages::{self, PauseReason, SecondHandStatus};
 use super::pointer_hand::{PointedPlace, PointerHand};
 use super::snapshot::LessonSnapshot;
+use super::view_refresh::ViewRefresh;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Command as Tell;
@@ -58,6 +60,7 @@ pub struct LessonState {
     pub pointer_hand: PointerHand,
     pub is_confirming_abort: bool,
     pub orbit: Orbit,
+    pub view_refresh: ViewRefresh,
     /// Source of the instruments' models.
     library: Library,
     /// Entries of the running stage's periodontal chart.
@@ -119,6 +122,7 @@ impl LessonState {
             pointer_hand: PointerHand::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
+            view_refresh: ViewRefresh::default(),
             library,
             display_mode,
             materials,
@@ -186,11 +190,24 @@ impl LessonState {
         }
     }
 
+    /// Time until the clock of the stage shows the next second.
+    pub fn time_to_next_second(&self) -> Duration {
+        /// Added, so that the second has passed for certain.
+        const MARGIN: f32 = 0.02;
+        let seconds = self.snapshot.map_or(0.0, |snapshot| snapshot.stage_seconds);
+        Duration::from_secs_f32(1.0 - seconds.fract().clamp(0.0, 1.0) + MARGIN)
+    }
+
+    /// True while the lesson is suspended, by the trainee or by the system.
+    pub fn is_standing_still(&self) -> bool {
+        self.is_paused || self.pause_reason.is_some()
+    }
+
     /// Advances dust and water by `elapsed`, s, while the lesson runs.
     fn step_particles(&mut self, elapsed: f32) {
         let does_drill_run = self.stage().is_some_and(|stage| stage.cutting);
         let snapshot = self.snapshot.filter(|_| does_drill_run);
-        let is_still = self.is_paused || self.pause_reason.is_some();
+        let is_still = self.is_standing_still();
         let Some(LessonScene { particles: Some(field), volume, workpiece, palette, .. }) = &mut self.scene else {
             return;
         };

@@ -29,6 +29,9 @@ use typodont_report::Templates;
 /// Poll interval of the thread; a screen cannot show changes faster.
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
 
+/// Minimum time between two frames that movement of the hand requests.
+const WAKE_INTERVAL: Duration = Duration::from_millis(16);
+
 /// Interval between attempts to find a disconnected device.
 const RECONNECT_INTERVAL: Duration = Duration::from_millis(500);
 
@@ -79,7 +82,7 @@ pub struct LessonConfig {
     /// SHA-256 of files that the exercise does not name, by name.
     pub digests: BTreeMap<String, String>,
     /// Called when the window should draw a new frame.
-    pub wake: Box<dyn Fn() + Send>,
+    pub wake: Arc<dyn Fn() + Send + Sync>,
 }
 
 /// The trainee's input device.
@@ -118,6 +121,8 @@ impl LessonThread {
             snapshot: snapshot.clone(),
             sound: LessonSound::new(&config.scenario, sounds),
             is_paused: false,
+            shown: None,
+            wake: config.wake.clone(),
         };
         let LessonConfig { input_device, .. } = &config;
         let (mouse, device): (_, Option<Box<dyn Device + Send>>) = match input_device {
@@ -201,6 +206,9 @@ struct LessonWorker {
     snapshot: Arc<SeqLock<SNAPSHOT_WORDS>>,
     sound: LessonSound,
     is_paused: bool,
+    /// The newest tick for which a frame was requested, and the time of the request.
+    shown: Option<(LessonSnapshot, Instant)>,
+    wake: Arc<dyn Fn() + Send + Sync>,
 }
 
 fn run_worker(mut worker: LessonWorker, config: LessonConfig, mouse: Option<Box<dyn Device + Send>>) {
@@ -209,6 +217,7 @@ fn run_worker(mut worker: LessonWorker, config: LessonConfig, mouse: Option<Box<
         Err(failed) => LessonEvent::Failed(failed.to_string()),
     };
     worker.events.send(last);
+    (worker.wake)();
     while !worker.events.queue.is_empty() && !worker.inbox.is_abandoned() {
         std::thread::sleep(POLL_INTERVAL);
         worker.events.flush();
@@ -220,7 +229,7 @@ fn run_lesson(
     config: LessonConfig,
     mouse: Option<Box<dyn Device + Send>>,
 ) -> Result<PathBuf, LessonError> {
-    let LessonConfig { scenario, seed, participant, out, templates, started, input_device, second, digests, wake } =
+    let LessonConfig { scenario, seed, participant, out, templates, started, input_device, second, digests, wake: _ } =
         config;
     let open_device = match input_device {
         InputDevice::Mouse => None,
@@ -241,14 +250,16 @@ fn run_lesson(
     let workpiece = opening.make_workpiece()?;
     // It is drawn while its recording is opened.
     worker.events.send(LessonEvent::WorkpieceReady(workpiece.clone()));
-    wake();
+    (worker.wake)();
     let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
     let (mut lesson, events) = prepared.begin(device, second)?;
     worker.send_events(events);
     let mut last_attempt = Instant::now();
     while !lesson.session().is_complete() {
         std::thread::sleep(POLL_INTERVAL);
-        worker.publish(&mut lesson)?;
+        if worker.publish(&mut lesson)? {
+            (worker.wake)();
+        }
         if lesson.live().is_suspended()
             && last_attempt.elapsed() > RECONNECT_INTERVAL
             && let Some((driver, argument)) = &reconnect
@@ -268,16 +279,19 @@ fn run_lesson(
     worker.sound.silence();
     let recorded = lesson.end()?;
     worker.events.send(LessonEvent::Scoring);
+    (worker.wake)();
     recorded.complete()
 }
 
 impl LessonWorker {
-    /// Passes events, edits and the newest tick of the servo to the window.
-    fn publish(&mut self, lesson: &mut Lesson) -> Result<(), LessonError> {
+    /// Passes events, edits and the newest tick of the servo to the window. Returns true if the window should show them.
+    fn publish(&mut self, lesson: &mut Lesson) -> Result<bool, LessonError> {
         let events = lesson.poll()?;
+        let mut has_news = !events.is_empty();
         self.send_events(events);
         while let Some(event) = lesson.next_assist_event() {
             self.events.send(LessonEvent::SecondHand(event));
+            has_news = true;
         }
         for edit in lesson.edits() {
             self.edits.queue.push_back(*edit);
@@ -298,8 +312,21 @@ impl LessonWorker {
                 Some((_, stage)) if !self.is_paused && !live.is_suspended() => self.sound.update(step, stage.cutting),
                 _ => self.sound.silence(),
             }
+            has_news |= self.is_worth_a_frame(snapshot);
         }
-        Ok(())
+        Ok(has_news)
+    }
+
+    /// True if a tick looks different from the last for which a frame was requested, and that is not too recent.
+    fn is_worth_a_frame(&mut self, snapshot: LessonSnapshot) -> bool {
+        let is_news = match &self.shown {
+            None => true,
+            Some((shown, at)) => at.elapsed() >= WAKE_INTERVAL && snapshot.looks_different(shown),
+        };
+        if is_news {
+            self.shown = Some((snapshot, Instant::now()));
+        }
+        is_news
     }
 
     /// Carries out the window's commands; returns true when the lesson is to end.

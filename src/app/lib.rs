@@ -24,6 +24,7 @@ mod shortcuts;
 mod i18n;
 mod theme;
 mod tools_panel;
+mod view_refresh;
 mod viewport_input;
 mod practice;
 mod questionnaire;

@@ -4,13 +4,14 @@ use super::command::{AppCommand, PracticeCommand};
 use super::i18n::Translations;
 use super::lesson_state::LessonState;
 use super::settings::Settings;
-use super::snapshot::LessonSnapshot;
+use super::snapshot::{InstrumentPose, LessonSnapshot};
+use super::view_refresh::{Redraw, ViewInputs};
 use super::viewport::{EyeWindow, Viewport};
 use super::{periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_exercise::catalog::TissueRole;
-use typodont_render::{Changes, Eye, Lamp, Lights, MeshInstance, RenderScene, Viewpoint, VolumeInstance};
+use typodont_render::{Changes, Eye, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance};
 use typodont_scene as scene;
 use typodont_scene::particles::ParticleField;
 
@@ -35,7 +36,9 @@ pub fn practice_ui(
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
-    let side = egui::Frame::side_top_panel(ui.style()).inner_margin(16);
+    // The window is cleared in the panels' colour; filling them again would cost as much as drawing the tooth where there
+    // is no graphics processor.
+    let side = egui::Frame::side_top_panel(ui.style()).inner_margin(16).fill(Color32::TRANSPARENT);
     let width = ui.available_width();
     egui::Panel::left("task").exact_size(310.0f32.min(0.28 * width)).resizable(false).frame(side).show(ui, |ui| {
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| task_ui(ui, lesson, words, commands));
@@ -197,7 +200,8 @@ fn view_ui(
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
     let mut viewport = viewport;
-    match viewport.as_deref_mut().map(|viewport| draw_view(lesson, settings, viewport, size)) {
+    let now = ui.input(|input| input.time);
+    match viewport.as_deref_mut().map(|viewport| refresh_view(lesson, settings, viewport, size, now)) {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, Color32::WHITE);
@@ -245,13 +249,52 @@ fn is_section_allowed(lesson: &LessonState) -> bool {
     lesson.has_mouse() && lesson.is_pointer_captured && lesson.stage().is_some_and(|stage| stage.show_decay)
 }
 
+/// Draws the lesson's scene if the last image is not right any more; `None` before it is built. `now`: s.
+fn refresh_view(
+    lesson: &mut LessonState,
+    settings: &Settings,
+    viewport: &mut Viewport,
+    size: [u32; 2],
+    now: f64,
+) -> Result<Option<egui::TextureId>, RenderError> {
+    let Some(scene) = &lesson.scene else { return Ok(None) };
+    let particles = scene.particles.as_ref();
+    let particle_count = particles.map_or(0, |field| field.opaque().len() + field.translucent().len());
+    let stereo = [settings.stereo(), settings.second_eye()];
+    let inputs = ViewInputs {
+        size,
+        orbit: lesson.orbit,
+        mode: lesson.display_mode,
+        instrument: lesson.snapshot.as_ref().map(InstrumentPose::from),
+        edit_count: scene.edit_count,
+        appearance_count: scene.appearance_count,
+        stereo,
+        second_size: viewport.second_eye_size(),
+        is_smooth: settings.is_smooth(viewport.has_graphics()),
+        particle_count,
+    };
+    let is_moving = particle_count > 0 && !lesson.is_standing_still();
+    // In stereo each pixel may belong to one eye.
+    let may_be_coarse = stereo == [None, None];
+    let share = match lesson.view_refresh.plan(inputs, is_moving, may_be_coarse, now) {
+        Redraw::Keep if let Some(texture) = viewport.texture() => return Ok(Some(texture)),
+        Redraw::Keep => 1.0,
+        Redraw::At(share) => share,
+    };
+    let drawn = draw_view(lesson, settings, viewport, size.map(|pixels| (share * pixels as f32).ceil() as u32));
+    if drawn.is_err() {
+        lesson.view_refresh.invalidate();
+    }
+    drawn
+}
+
 /// Draws the lesson's scene; `None` before it is built.
 fn draw_view(
     lesson: &mut LessonState,
     settings: &Settings,
     viewport: &mut Viewport,
     size: [u32; 2],
-) -> Result<Option<egui::TextureId>, typodont_render::RenderError> {
+) -> Result<Option<egui::TextureId>, RenderError> {
     let (viewpoint, mode, snapshot) = (lesson.orbit.viewpoint(), lesson.display_mode, lesson.snapshot);
     let is_pointer = lesson.has_mouse();
     let Some(lesson_scene) = &mut lesson.scene else { return Ok(None) };

@@ -25,6 +25,28 @@ pub struct LessonSnapshot {
     pub timing: ServoTiming,
 }
 
+/// Pose of the instrument in use; equal to another if the eye cannot tell them apart.
+#[derive(Clone, Copy)]
+pub struct InstrumentPose {
+    pub index: u32,
+    pub tip: Vec3,
+    pub orientation: Quat,
+}
+
+impl From<&LessonSnapshot> for InstrumentPose {
+    fn from(snapshot: &LessonSnapshot) -> InstrumentPose {
+        InstrumentPose { index: snapshot.instrument, tip: snapshot.tip, orientation: snapshot.orientation }
+    }
+}
+
+impl PartialEq for InstrumentPose {
+    fn eq(&self, other: &InstrumentPose) -> bool {
+        self.index == other.index
+            && self.tip.distance(other.tip) < STILL_DISTANCE
+            && 1.0 - self.orientation.dot(other.orientation).abs() < STILL_ROTATION
+    }
+}
+
 /// Timing of the servo, µs and counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ServoTiming {
@@ -34,6 +56,10 @@ pub struct ServoTiming {
     pub missed: u32,
     pub dropped: u32,
 }
+
+/// Movement and rotation of an instrument that are too small to be seen: mm, and as 1 − cosine of half the angle.
+const STILL_DISTANCE: f32 = 0.01;
+const STILL_ROTATION: f32 = 1e-6;
 
 /// Number of words in the mailbox.
 pub const SNAPSHOT_WORDS: usize = 24;
@@ -62,6 +88,15 @@ impl LessonSnapshot {
             cleared_pct: cleared_pct.map(|pct| pct as f32),
             timing: timing.map(ServoTiming::from).unwrap_or_default(),
         }
+    }
+
+    /// True if a person would see the difference between two ticks on the screen.
+    pub fn looks_different(&self, other: &LessonSnapshot) -> bool {
+        /// Difference of forces that the force bar shows, N.
+        const VISIBLE_FORCE: f32 = 0.05;
+        InstrumentPose::from(self) != InstrumentPose::from(other)
+            || (self.touch, self.cutting, self.cleared_pct) != (other.touch, other.cutting, other.cleared_pct)
+            || (self.spring - other.spring).abs() > VISIBLE_FORCE
     }
 
     pub fn encode(&self) -> [u32; SNAPSHOT_WORDS] {

@@ -65,6 +65,11 @@ impl Viewport {
         self.second_eye_size
     }
 
+    /// The last image of the main window, if there is one.
+    pub fn texture(&self) -> Option<egui::TextureId> {
+        self.textures[EyeWindow::Main as usize].as_ref().map(|canvas| canvas.id)
+    }
+
     /// The last image of the second window, if there is one.
     pub fn second_eye_texture(&self) -> Option<egui::TextureId> {
         self.textures[EyeWindow::SecondEye as usize].as_ref().map(|canvas| canvas.id)

@@ -105,7 +105,7 @@ impl Desk {
             .spawn()
             .unwrap();
         let mut desk = Desk { program, state_log, complaints, display };
-        desk.until("pictures", |_| true);
+        desk.until("frames", |_| true);
         let begun = Instant::now();
         let focus = ["search", "--onlyvisible", "--name", "Typodont", "windowfocus", "--sync"];
         while let Err(said) = desk.display.tried(&focus) {
