@@ -46,11 +46,19 @@ pub struct OpenError {
     pub message: String,
     /// Remedy for the user, in one line.
     pub help: String,
+    /// True if the vendor's software is not installed or not running, which is an error only for whoever wants its
+    /// device.
+    pub is_absent: bool,
 }
 
 impl OpenError {
     pub fn new(message: impl Into<String>, help: impl Into<String>) -> OpenError {
-        OpenError { message: message.into(), help: help.into() }
+        OpenError { message: message.into(), help: help.into(), is_absent: false }
+    }
+
+    /// Error of a vendor's software that is not installed or not running.
+    pub fn absent(message: impl Into<String>, help: impl Into<String>) -> OpenError {
+        OpenError { is_absent: true, ..OpenError::new(message, help) }
     }
 }
 

@@ -62,8 +62,13 @@ const LIBRARY_NAMES: &[&str] = if cfg!(windows) {
     &["libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3"]
 };
 
-const INSTALL: &str = "install the Force Dimension SDK (forcedimension.com) and set FDSDK to its folder, or name the \
-                       library: --device forcedimension:/path/to/libdrd.so";
+const INSTALL: &str = if cfg!(windows) {
+    "install the Force Dimension SDK (forcedimension.com) and set FDSDK to its folder, or name the library: --device \
+     forcedimension:C:\\path\\to\\drd64.dll"
+} else {
+    "install the Force Dimension SDK (forcedimension.com) and set FDSDK to its folder, or name the library: --device \
+     forcedimension:/path/to/libdrd.so"
+};
 
 /// Returns the paths to try: those of the system's loader, then those of the vendor's instructions and installer.
 fn default_paths() -> Vec<PathBuf> {

@@ -151,10 +151,20 @@ pub fn open(info: &HidDeviceInfo) -> Result<HidTransport, OpenError> {
 pub fn open_error(info: &HidDeviceInfo, reason: &str) -> OpenError {
     let HidDeviceInfo { vendor, title, .. } = info;
     let what = format!("cannot open {title} ({vendor:04x}:{:04x}): {reason}", info.product);
-    let help = match reason.to_lowercase().contains("permission denied") {
+    let reason = reason.to_lowercase();
+    let is_denied = reason.contains("permission denied") || reason.contains("access is denied");
+    let help = match is_denied {
+        true if cfg!(windows) => {
+            "close other programs that use it, such as the vendor's control panel; if that does not \
+                                  help, uninstall the device in Windows' Device Manager and plug it in again"
+                .into()
+        }
+        true if cfg!(target_os = "macos") => {
+            "allow the program in System Settings, Privacy & Security, Input Monitoring; then plug it in again".into()
+        }
         true => format!(
-            "copy content/devices/70-typodont.rules to /etc/udev/rules.d/, or create a file there with the line {}; then \
-             run `sudo udevadm control --reload` and plug the device in again",
+            "install the package of Typodont, or copy content/devices/70-typodont.rules to /etc/udev/rules.d/, or create \
+             a file there with the line {}; then run `sudo udevadm control --reload` and plug the device in again",
             udev_rule(*vendor)
         ),
         false => {
@@ -162,6 +172,27 @@ pub fn open_error(info: &HidDeviceInfo, reason: &str) -> OpenError {
         }
     };
     OpenError::new(what, help)
+}
+
+/// Other programs that have the device open, as far as this user may see them: name and process number. Two programs
+/// that write forces to one device disturb each other, and the system does not prevent it. Only Linux tells.
+pub fn other_users(info: &HidDeviceInfo) -> Vec<String> {
+    let Ok(node) = info.path.to_str() else { return Vec::new() };
+    let own = std::process::id().to_string();
+    let processes = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let mut users: Vec<String> = processes
+        .filter(|process| process.file_name().to_str().is_some_and(|id| id != own && id.parse::<u32>().is_ok()))
+        .filter(|process| {
+            let files = std::fs::read_dir(process.path().join("fd")).into_iter().flatten().flatten();
+            files.filter_map(|file| std::fs::read_link(file.path()).ok()).any(|open| open.as_os_str() == node)
+        })
+        .map(|process| {
+            let name = std::fs::read_to_string(process.path().join("comm")).unwrap_or_default();
+            format!("{} (process {})", name.trim(), process.file_name().display())
+        })
+        .collect();
+    users.sort();
+    users
 }
 
 /// Returns the udev rule that gives the user at the machine access to the devices of a vendor.

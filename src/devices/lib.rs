@@ -26,6 +26,7 @@
 //! assert!(reading.pose.position.distance(Vec3::X * 10.0) < 0.01);
 //! ```
 
+pub mod access;
 mod coupling;
 mod driver;
 mod forcedimension;

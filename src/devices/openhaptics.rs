@@ -65,8 +65,13 @@ const LIBRARY_NAMES: &[&str] = if cfg!(windows) {
     &["libHD.so", "libHD.so.3.4", "libHD.so.3.0"]
 };
 
-const INSTALL: &str = "install the vendor's device driver and OpenHaptics (3D Systems support pages), or name the library: \
-                       --device openhaptics:/path/to/libHD.so";
+const INSTALL: &str = if cfg!(windows) {
+    "install the vendor's device driver and OpenHaptics (3D Systems support pages), or name the library: --device \
+     openhaptics:C:\\path\\to\\HD.dll"
+} else {
+    "install the vendor's device driver and OpenHaptics (3D Systems support pages), or name the library: --device \
+     openhaptics:/path/to/libHD.so"
+};
 
 type Callback = extern "system" fn(*mut c_void) -> u32;
 

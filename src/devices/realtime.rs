@@ -22,6 +22,12 @@ impl fmt::Display for Priority {
     }
 }
 
+/// Priority that the system grants to a servo: asked for by a thread of its own, which then ends.
+pub fn granted_priority() -> Priority {
+    let thread = std::thread::Builder::new().name("priority".into()).spawn(raise_thread_priority);
+    thread.ok().and_then(|thread| thread.join().ok()).unwrap_or(Priority::Ordinary)
+}
+
 /// Raises the priority of the calling thread as far as the system allows.
 pub fn raise_thread_priority() -> Priority {
     set_min_timer_slack();

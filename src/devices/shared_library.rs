@@ -6,7 +6,7 @@
 use crate::OpenError;
 use std::error::Error;
 use std::ffi::OsStr;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Loads the first library that can be loaded: only the path that the user named, or else the default paths in order.
 ///
@@ -31,13 +31,27 @@ pub fn load<L>(
         }
     }
     // A file that exists but cannot be loaded is more informative than any number of missing ones.
-    let is_absent = |(place, words): &(&PathBuf, String)| words.starts_with(&*place.to_string_lossy());
-    let most_telling = complaints.iter().find(|c| !is_absent(c)).or(complaints.first());
-    let what = match most_telling {
-        Some((place, words)) => format!("cannot load {}: {words}", place.display()),
-        None => "no location of the library is known".to_string(),
-    };
-    Err(OpenError::new(what, help))
+    let most_telling = complaints.iter().find(|(place, words)| !is_absent(place, words)).or(complaints.first());
+    Err(match most_telling {
+        Some((place, words)) if is_absent(place, words) => {
+            OpenError::absent(format!("cannot load {}: {words}", place.display()), help)
+        }
+        Some((place, words)) => OpenError::new(
+            format!("cannot load {}: {words}", place.display()),
+            format!("the installed library is too old, damaged or made for another processor; {help}"),
+        ),
+        None => OpenError::absent("no location of the library is known", help),
+    })
+}
+
+/// True if the loader's message means that there is no such file. The messages for a library without a function, and
+/// for one that needs another missing library, say so about an existing file.
+fn is_absent(place: &Path, words: &str) -> bool {
+    let is_about_place = words.starts_with(&*place.to_string_lossy());
+    match cfg!(target_os = "linux") {
+        true => is_about_place && words.contains("cannot open shared object file"),
+        false => !place.is_file(),
+    }
 }
 
 /// Returns the system loader's message; the text of `error` itself only says that something failed.

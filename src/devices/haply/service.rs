@@ -35,6 +35,15 @@ const REPLY_TIMEOUT: Duration = Duration::from_millis(20);
 /// Time within which the service must accept the connection, send its first frame and describe its devices.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);
 
+/// Remedy for a service that is not running, in the words of the system.
+const START: &str = if cfg!(windows) {
+    "start the Inverse Service in Haply's Device Manager, or \"Haply Inverse Service\" in Windows' Services (services.msc)"
+} else if cfg!(target_os = "macos") {
+    "start the Inverse Service in Haply's Device Manager"
+} else {
+    "start the Inverse Service in Haply's Device Manager, or by `systemctl start haply-inverse-service`"
+};
+
 impl InverseService {
     /// Connects, and reads the snapshot that the service sends first.
     ///
@@ -56,9 +65,7 @@ impl InverseService {
             return Err(OpenError::new(format!("the Inverse Service has version {major}.{minor}"), help));
         }
         let stream = connect_any(&candidates).map_err(|error| {
-            let help =
-                "start the Inverse Service (in Haply's Device Manager, or systemctl start haply-inverse-service)";
-            OpenError::new(format!("cannot reach the Inverse Service at {address} ({error})"), help)
+            OpenError::absent(format!("cannot reach the Inverse Service at {address} ({error})"), START)
         })?;
         let no_service = |what: &dyn std::fmt::Display| {
             let help = "give the port of its WebSocket, 10001 by default";
