@@ -46,6 +46,7 @@ mod transfer_function_editor;
 mod transfer_function_draft;
 mod viewport;
 mod camera_preset;
+pub mod readiness;
 
 pub use editor::OpenMode;
 
@@ -127,13 +128,16 @@ pub fn open_window(options: AppOptions) -> Result<(), String> {
         Ok(Box::new(App::new(context, options)))
     });
     eframe::run_native("typodont", native, made).map_err(|error| {
-        let message = error.to_string();
-        // winit's message begins with a line of its own source, which is of no use to the user.
-        let after_place = message.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
-        let why = after_place.map_or(message.as_str(), |(_, why)| why).trim_end_matches('.');
+        let why = without_source_line(&error.to_string());
         format!(
             "no-window: {why}; a window requires a display and a graphics driver (Debian: mesa-vulkan-drivers). \
              Without them, use `typodont run SCENARIO --headless` in a terminal"
         )
     })
+}
+
+/// The text of an error without the line of winit's own source with which it begins, which is of no use to the user.
+fn without_source_line(message: &str) -> String {
+    let after_place = message.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+    after_place.map_or(message, |(_, why)| why).trim_end_matches('.').to_string()
 }

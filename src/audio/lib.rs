@@ -41,6 +41,6 @@ pub use clip::{Clip, Replacements};
 pub use cries::CRIES;
 pub use load::{DrillLoad, Tool};
 pub use playback::{AudioError, PlaybackOptions};
-pub use player::{PlayerEvent, RETRY_INTERVAL, SoundPlayer};
+pub use player::{PlayerEvent, RETRY_INTERVAL, SoundPlayer, output_name};
 pub use sound_channel::{SoundReceiver, SoundSender, sound_channel};
 pub use synth::{Synth, SynthOptions};

@@ -31,6 +31,15 @@ pub enum PlayerEvent {
 /// Interval between attempts to find a server. Below 1 s, a server that refuses would receive too many requests.
 pub const RETRY_INTERVAL: Duration = Duration::from_secs(2);
 
+/// Opens the system's sound output and closes it again without a sound; gives its name.
+///
+/// # Errors
+///
+/// Returns an error if nothing can be played.
+pub fn output_name() -> Result<String, AudioError> {
+    OutputStream::open(&PlaybackOptions::default()).map(|stream| stream.place())
+}
+
 /// Capacity for events.
 const EVENT_CAPACITY: usize = 16;
 

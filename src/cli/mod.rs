@@ -14,6 +14,7 @@ mod cohort;
 mod demo;
 #[cfg(feature = "devices")]
 mod devices;
+mod doctor;
 mod finish;
 #[cfg(not(feature = "school"))]
 mod folder_source;
@@ -94,6 +95,8 @@ enum CliCommand {
     #[cfg(not(feature = "devices"))]
     #[command(hide = true, disable_help_flag = true)]
     Devices(IgnoredArguments),
+    /// Look at what a session needs of this machine, and say what is missing and what to do about it
+    Doctor(doctor::Arguments),
     /// Join a session on another computer as the instructor, with a second device
     #[cfg(feature = "devices")]
     Assist(assist::Arguments),
@@ -289,6 +292,7 @@ fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
         Some(CliCommand::Devices) => devices::run(),
         #[cfg(not(feature = "devices"))]
         Some(CliCommand::Devices(_)) => Err(missing_part::error("typodont devices", "devices")),
+        Some(CliCommand::Doctor(arguments)) => doctor::run(&arguments),
         #[cfg(feature = "devices")]
         Some(CliCommand::Assist(arguments)) => assist::run(&arguments),
         #[cfg(not(feature = "devices"))]
@@ -358,6 +362,12 @@ fn default_output_folder() -> PathBuf {
         }
         _ => PathBuf::from(SESSIONS),
     }
+}
+
+/// Default folder of finished bundles of a build without the window.
+#[cfg(not(feature = "desktop"))]
+fn default_output_folder() -> PathBuf {
+    PathBuf::from(SESSIONS)
 }
 
 /// Language of pages and tables that are written in one language, if none is asked for.

@@ -9,6 +9,8 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Name of the adapter, with its driver and back-end.
     pub name: String,
+    /// True if the processor draws, by a software driver.
+    pub is_software: bool,
     pub error_listener: DeviceErrorListener,
 }
 
@@ -27,6 +29,7 @@ impl Gpu {
         let adapter = found.map_err(|e| RenderError::NoAdapter { why: e.to_string() })?;
         let info = adapter.get_info();
         let name = format!("{} ({}, {:?})", info.name, info.driver_info, info.backend);
+        let is_software = info.device_type == wgpu::DeviceType::Cpu;
         let asked = wgpu::DeviceDescriptor {
             label: Some("typodont"),
             // All that the adapter offers: large volumes need large textures.
@@ -37,7 +40,7 @@ impl Gpu {
         let (device, queue) =
             opened.map_err(|e| RenderError::NoDevice { adapter: name.clone(), why: e.to_string() })?;
         let error_listener = DeviceErrorListener::attach(&device);
-        Ok(Gpu { device, queue, name, error_listener })
+        Ok(Gpu { device, queue, name, is_software, error_listener })
     }
 }
 

@@ -4,6 +4,8 @@
 mod support;
 mod counting;
 mod devices;
+#[cfg(target_os = "linux")]
+mod doctor;
 mod drivers;
 mod haply;
 mod link_key;

@@ -255,6 +255,7 @@ fn an_adapter_with_small_textures_shows_a_coarser_tooth_and_says_so() {
         error_listener: DeviceErrorListener::attach(&device),
         device,
         queue,
+        is_software: found.get_info().device_type == wgpu::DeviceType::Cpu,
         name: "small".into(),
     })
     .unwrap();
