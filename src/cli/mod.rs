@@ -21,6 +21,8 @@ mod folder_source;
 #[cfg(feature = "integrations")]
 mod gradebook;
 mod import;
+#[cfg(feature = "manuals")]
+mod manuals;
 #[cfg(feature = "devices")]
 mod live;
 #[cfg(feature = "integrations")]
@@ -171,6 +173,10 @@ enum CliCommand {
     Import(import::Arguments),
     /// Measure the program's own speed and memory
     Bench(bench::Arguments),
+    /// Write the manual pages and the completions of shells, for packages
+    #[cfg(feature = "manuals")]
+    #[command(hide = true)]
+    Manuals(manuals::Arguments),
 }
 
 /// Error of a command.
@@ -340,6 +346,8 @@ fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
         Some(CliCommand::Anatomy(arguments)) => anatomy::run(&arguments),
         Some(CliCommand::Import(arguments)) => import::run(&arguments),
         Some(CliCommand::Bench(arguments)) => bench::run(&arguments),
+        #[cfg(feature = "manuals")]
+        Some(CliCommand::Manuals(arguments)) => manuals::run(&arguments),
     }
 }
 
