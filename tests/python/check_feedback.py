@@ -59,6 +59,21 @@ def nrrd(data):
     return samples, np.array(numbers(field["space origin"])), np.array([directions[0], directions[4], directions[8]])
 
 
+def seeded_random(seed, name):
+    """SplitMix64 over the bytes of a name, as exercises draw their sites."""
+    bits = (1 << 64) - 1
+
+    def mix(z):
+        z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9 & bits
+        z = (z ^ (z >> 27)) * 0x94d049bb133111eb & bits
+        return z ^ (z >> 31)
+
+    state = mix(seed + 0x9e3779b97f4a7c15 & bits)
+    for byte in name.encode():
+        state = mix(state + byte + 0x9e3779b97f4a7c15 & bits)
+    return state
+
+
 class Session:
     """A bundle, as independent programs read it."""
 
@@ -86,6 +101,7 @@ class Session:
         entries = {entry["id"]: entry for entry in json.loads(attached["content/instruments.json"])["instruments"]}
         tray = [entries.get(name, {}) for name in self.scenario.get("instruments", [])]
         self.is_bur = np.array([bool(e.get("cuts")) and e.get("kind") not in BLADES for e in tray] + [False] * 256)
+        self.changes += self.sealed_changes()
         self.before, self.origin, self.spacing = nrrd((bundle / "initial.seg.nrrd").read_bytes())
         self.after, _, _ = nrrd((bundle / "final.seg.nrrd").read_bytes())
         self.fallen = self.removal_ticks()
@@ -124,6 +140,22 @@ class Session:
             self.number[name] = number
             self.role[number] = self.role[self.number[name.partition(":")[0]]]
         return sites
+
+    def sealed_changes(self):
+        """The tissues of possible sites in a sealed session, whose recording has them not: drawn by its seed."""
+        if self.result.get("seed_origin") != "sealed":
+            return []
+        changes = []
+        for stage, tick, _ in self.stage_spans:
+            written = [s for s in self.scenario["stages"] if stage == s["id"] or re.fullmatch(re.escape(s["id"]) + r"-\d+", stage)]
+            if not written or "draw" not in written[0]:
+                continue
+            sites = written[0]["draw"]["one_of"]
+            drawn = sites[seeded_random(self.result["seed"], f"{stage}/draw") % len(sites)]
+            for name, number in self.sites.items():
+                decay, _, site = name.partition(":")
+                changes.append((tick, number, self.number[decay if site == drawn else "enamel"]))
+        return changes
 
     def felt(self, number, tick):
         """Tissue that a touched one felt like: a possible site is caries in some trials, and enamel in the others."""
@@ -466,7 +498,7 @@ def of_evidence(s):
             continue
         if not is_equal(metrics[name], highest, NEWTON) or not is_equal(s.force[peak], highest, NEWTON):
             yield f"{name}: {metrics[name]} N at {told['at_s']} s, the recording has {highest} N"
-        if s.number.get(told.get("tissue")) != s.ticks["touched"][peak]:
+        if s.number.get(told.get("tissue")) != s.felt(s.ticks["touched"][peak], peak):
             yield f"{name}: on {told.get('tissue')}, the recording has tissue {s.ticks['touched'][peak]}"
         if np.abs(s.tips[peak] - told["place_mm"]).max() > 1e-3:
             yield f"{name}: the tip was at {s.tips[peak]}, not at {told['place_mm']}"

@@ -5,11 +5,12 @@
 
 use super::contact_spell::ContactSpell;
 use super::nearest_offset::{AnatomicalDirection, NearestOffsets};
+use super::trials::tissue_felt;
 use super::voxel_removals::VoxelRemoval;
 use super::{Scored, Verdict};
 use crate::catalog::TissueRole;
+use crate::scenario::Scenario;
 use crate::scenario::file::ZoneRole;
-use crate::scenario::{Scenario, anatomy_tissues};
 use std::collections::BTreeMap;
 use typodont_core::frame::Vec3;
 use typodont_core::tick::{TICK_S, Tick};
@@ -91,7 +92,7 @@ pub fn error_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode>
     let mut found = removal_episodes(scenario, scored);
     found.extend(remaining_episodes(scenario, scored));
     let contact = |kind, spell: &ContactSpell| {
-        let tissue = tissue_felt(scenario, scored, spell.tissue, spell.peak);
+        let tissue = tissue_felt(scenario, &scored.replay, spell.tissue, spell.peak);
         episode_of_contact(kind, tissue, spell)
     };
     found.extend(scored.hard_presses.iter().map(|spell| contact(EpisodeKind::Force, spell)));
@@ -224,17 +225,6 @@ fn episode_of_voxels(scored: &Scored, kind: EpisodeKind, zone: Option<usize>, vo
         worst_force: force(worst),
         seconds: span.map_or(0.0, |[from, to]| to.seconds_since(from)),
     }
-}
-
-/// Returns the tissue that a touched tissue felt like at a tick. A possible site of a draw feels like its decay in the
-/// trials in which it is drawn, and like enamel in all others.
-fn tissue_felt(scenario: &Scenario, scored: &Scored, touched: Label, at: Tick) -> Label {
-    let Some(decay) = scenario.tissues.by_label(touched).and_then(|entry| entry.site_of) else { return touched };
-    let workpiece = &scored.replay.workpiece;
-    let stage = scored.replay.outcome.stages.iter().rposition(|stage| stage.started <= at);
-    let drawn = stage.and_then(|stage| *workpiece.drawn.get(stage)?);
-    let is_drawn = drawn.is_some_and(|lesion| workpiece.lesions[lesion].label == touched);
-    if is_drawn { decay } else { anatomy_tissues(&scenario.tissues).enamel }
 }
 
 fn episode_of_contact(kind: EpisodeKind, tissue: Label, spell: &ContactSpell) -> ErrorEpisode {

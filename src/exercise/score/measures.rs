@@ -5,7 +5,7 @@ use super::nearest_offset::{AnatomicalDirection, NearestOffsets};
 use super::process::{PeakValue, ProcessStats};
 use super::removal_comparison::{RemovalComparison, VoxelDistance, VoxelFlags};
 use super::restoration::Restoration;
-use super::trials::TrialSummary;
+use super::trials::{TrialSummary, tissue_felt};
 use crate::record::{Recording, Replay};
 use crate::scenario::file::ZoneRole;
 use crate::scenario::metric::{CHARTING, MetricArgument, OF_DRAWS, OF_FILLINGS, PLAIN};
@@ -133,7 +133,12 @@ pub fn all(
     }
     let compute = |metric: Metric| {
         let ComputedValue { value, evidence } = source.compute(&metric);
-        Measure { metric, value, evidence }
+        // What was touched is named as it felt; a possible site of a draw has no name for readers.
+        let felt = |e: Evidence| Evidence {
+            tissue: e.tissue.zip(e.at).map(|(t, at)| tissue_felt(scenario, replay, t, at)).or(e.tissue),
+            ..e
+        };
+        Measure { metric, value, evidence: evidence.map(felt) }
     };
     Measures { all: metrics.into_iter().map(compute).collect() }
 }

@@ -1,14 +1,16 @@
 //! Trials in which the site of the caries was drawn: the share of correct answers, corrected for chance.
 //!
-//! Takes a scenario, its workpiece and the outcome of a session. Gives counts, and the measures of
-//! [`OF_DRAWS`](crate::scenario::metric::OF_DRAWS). A person who guesses has an expected corrected result of 0, however
+//! Takes a scenario, its workpiece and the outcome of a session. Gives counts, the measures of
+//! [`OF_DRAWS`](crate::scenario::metric::OF_DRAWS), and the tissue that a possible site felt like. A person who guesses has an expected corrected result of 0, however
 //! often and however fast the guesses are made.
 
-use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
+use crate::record::Replay;
+use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece, anatomy_tissues};
 use crate::session::{SessionOutcome, StageResult};
 use typodont_core::frame::Vec3;
 use typodont_core::statistics;
 use typodont_core::tick::Tick;
+use typodont_core::volume::Label;
 
 /// Answers of all trials of a session.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -104,6 +106,17 @@ impl TrialSummary {
             _ => None,
         }
     }
+}
+
+/// Returns the tissue that a touched tissue felt like at a tick. A possible site of a draw feels like its decay in the
+/// trials in which it is drawn, and like enamel in all others.
+pub fn tissue_felt(scenario: &Scenario, replay: &Replay, touched: Label, at: Tick) -> Label {
+    let Some(decay) = scenario.tissues.by_label(touched).and_then(|entry| entry.site_of) else { return touched };
+    let workpiece = &replay.workpiece;
+    let stage = replay.outcome.stages.iter().rposition(|stage| stage.started <= at);
+    let drawn = stage.and_then(|stage| *workpiece.drawn.get(stage)?);
+    let is_drawn = drawn.is_some_and(|lesion| workpiece.lesions[lesion].label == touched);
+    if is_drawn { decay } else { anatomy_tissues(&scenario.tissues).enamel }
 }
 
 fn is_about_draw(stage: &Stage, kind: &QuestionKind) -> bool {
