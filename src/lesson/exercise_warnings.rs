@@ -3,7 +3,7 @@
 //! Takes a resolved exercise. Gives warnings with their place in the exercise's file. Never changes anything.
 
 use std::sync::Arc;
-use typodont_exercise::scenario::{DecayPlace, DecayShape, Scenario, Workpiece};
+use typodont_exercise::scenario::{DecayPlace, DecayShape, QuestionKind, Scenario, Workpiece};
 use typodont_exercise::score::{decay_in_zones, decay_on_vulnerable_mm3, idle_grade};
 
 /// Points of 100 that a trainee who does nothing may earn before the rubric is reported.
@@ -23,8 +23,8 @@ pub struct ExerciseWarning {
     pub help: String,
 }
 
-/// Returns the warnings about an exercise: caries within protected zones or on the pulp, and points that are paid for
-/// doing nothing.
+/// Returns the warnings about an exercise: answers that can be guessed, caries within protected zones or on the pulp, and
+/// points that are paid for doing nothing.
 ///
 /// # Errors
 /// Returns a message if the workpiece cannot be made.
@@ -34,7 +34,7 @@ pub fn exercise_warnings(scenario: &Arc<Scenario>) -> Result<Vec<ExerciseWarning
         has_depths || matches!(decay.place, DecayPlace::Random | DecayPlace::RandomQuadrant)
     });
     let seeds = if is_drawn { DRAWN } else { 1..=1 };
-    let mut found: Vec<ExerciseWarning> = Vec::new();
+    let mut found = guessable_answers(scenario);
     for seed in seeds {
         let workpiece = Workpiece::make(scenario, seed).map_err(|e| e.to_string())?;
         let mut here = caries_warnings(scenario, &workpiece);
@@ -46,6 +46,33 @@ pub fn exercise_warnings(scenario: &Arc<Scenario>) -> Result<Vec<ExerciseWarning
         found.append(&mut here);
     }
     Ok(found)
+}
+
+/// Returns the warnings about questions that are asked once and whose answer is one of a few: a trainee who guesses is
+/// often right, and no measure corrects the result for chance, as those of a draw do.
+fn guessable_answers(scenario: &Scenario) -> Vec<ExerciseWarning> {
+    let mut found = Vec::new();
+    for (index, stage) in scenario.stages.iter().enumerate().filter(|(_, stage)| stage.draw.is_none()) {
+        for (number, question) in stage.ask.iter().enumerate() {
+            let (key, choices, of) = match question.kind {
+                QuestionKind::ToothWith { .. } => ("tooth_with", scenario.scene.teeth.len(), "teeth"),
+                QuestionKind::QuadrantOf { .. } => ("quadrant_of", 4, "quadrants"),
+                _ => continue,
+            };
+            found.push(ExerciseWarning {
+                code: "guessable-answer",
+                path: format!("/stages/{}/ask/{number}/answer/{key}", scenario.written_stage(index)),
+                message: format!(
+                    "the question is asked only once, about {choices} {of}, so a trainee who guesses is right \
+                     in 1 of {choices} sessions"
+                ),
+                help: "add \"draw\" with several possible sites and at least 8 trials to the stage; its results are \
+                       corrected for chance"
+                    .to_string(),
+            });
+        }
+    }
+    found
 }
 
 /// Returns the warnings about caries that lies within a zone that protects tissue, or on the pulp.

@@ -87,3 +87,27 @@ fn check_says_when_caries_lies_within_a_protected_zone() {
     let zone = warnings.iter().find(|w| w.code == "caries-in-zone").expect("a warning");
     assert!(zone.path == "/zones/1" && zone.message.contains("Dentine within 0.5 mm of the pulp"), "{zone:?}");
 }
+
+#[test]
+fn check_says_when_a_trainee_can_guess_the_answer() {
+    // Aim: an exercise from the time before draws, whose lesion lies in a random quadrant, is named. Method: exercise 5
+    // in coarse voxels, with a question for the quadrant; and exercise 9, whose answers are drawn in several trials.
+    let shipped = format!("{}/scenarios/5-grinding.json", env!("CARGO_MANIFEST_DIR"));
+    let mut old: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(shipped).unwrap()).unwrap();
+    old.as_object_mut().unwrap().remove("$schema");
+    old["scene"]["jaw"]["tooth"]["form"]["procedural"]["spacing_mm"] = serde_json::json!(0.3);
+    let question =
+        serde_json::json!({ "id": "where", "text": "Which quadrant?", "answer": { "quadrant_of": "lesion" } });
+    old["stages"][0]["ask"] = serde_json::json!([question]);
+    let file = folder("guessable").join("old.json");
+    std::fs::write(&file, old.to_string()).unwrap();
+    let warnings =
+        |file: &Path| exercise_warnings(&Arc::new(read_scenario(file, ResolveMode::ReadScans).unwrap())).unwrap();
+    let found = warnings(&file);
+    let guessable: Vec<_> = found.iter().filter(|w| w.code == "guessable-answer").collect();
+    assert_eq!(guessable.len(), 1, "{found:?}");
+    assert_eq!(guessable[0].path, "/stages/0/ask/0/answer/quadrant_of");
+    assert!(guessable[0].message.contains("1 of 4 sessions"), "{guessable:?}");
+    let drawn = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/9-stain.json");
+    assert!(warnings(&drawn).iter().all(|w| w.code != "guessable-answer"));
+}
