@@ -168,7 +168,7 @@ impl ReviewApp {
         let mut state = self.state();
         state.refresh(&self.folder)?;
         let lost = |e: rusqlite::Error| format!("{}: unusable-cache: {e}", super::index::FILE_NAME);
-        let (_, count) = state.index.query_sessions(&Query::parse(&[]), self.anonymous).map_err(lost)?;
+        let (_, count) = state.index.query_sessions(&Query::parse(&[]), self.anonymous, None).map_err(lost)?;
         let left_out = state.index.left_out().map_err(lost)?.len();
         let mut issues = std::mem::take(&mut state.unreported);
         issues.extend(state.index.fallback_reason.as_ref().map(|why| {

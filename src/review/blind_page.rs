@@ -77,7 +77,7 @@ pub(super) fn next_unrated(app: &ReviewApp, context: &RequestContext) -> Option<
     let state = app.state();
     let ratings = Arc::clone(&state.ratings);
     let all = Query { length: SEARCHED_MAX, ..Query::parse(&[]) };
-    let (rows, _) = state.index.query_sessions(&all, app.anonymous).ok()?;
+    let (rows, _) = state.index.query_sessions(&all, app.anonymous, None).ok()?;
     drop(state);
     let unrated = rows.into_iter().find(|listed| !ratings.has_overall(&context.login.display_name, &listed.id));
     unrated.map(|listed| listed.id)

@@ -287,7 +287,7 @@ fn query_all(
 ) -> Result<(Vec<IndexedSession>, OverrideSnapshot), Box<Response>> {
     let query = Query { page: 1, length: ALL_SESSIONS, ..app.list_query(context) };
     let (state, log) = app.refresh(context)?;
-    let found = state.index.query_sessions(&query, app.anonymous);
+    let found = app.query_sessions(&state.index, &query);
     drop(state);
     match found {
         Ok((rows, _)) => Ok((rows, log)),

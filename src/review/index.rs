@@ -265,13 +265,23 @@ impl SessionIndex {
     }
 
     /// Returns one page of the list, and the number of sessions on all pages. With `by_code` (anonymous mode),
-    /// participants are identified only by their codes.
+    /// participants are identified only by their codes. Given `paths`, the list is restricted to these bundles.
     ///
     /// # Errors
     ///
     /// Returns the SQLite error.
-    pub fn query_sessions(&self, query: &Query, by_code: bool) -> rusqlite::Result<(Vec<IndexedSession>, usize)> {
-        let (narrowed, mut bound) = where_clause(query, by_code);
+    pub fn query_sessions(
+        &self,
+        query: &Query,
+        by_code: bool,
+        paths: Option<&[PathBuf]>,
+    ) -> rusqlite::Result<(Vec<IndexedSession>, usize)> {
+        let (mut narrowed, mut bound) = where_clause(query, by_code);
+        if let Some(paths) = paths {
+            narrowed += " AND session.path IN (SELECT value FROM json_each(?))";
+            // Paths in the index are UTF-8.
+            bound.push(Value::Text(serde_json::to_string(paths).unwrap_or_default()));
+        }
         let sql = format!("SELECT count(*) {LISTED_SESSIONS} {narrowed}");
         let count: i64 = self.connection.prepare(&sql)?.query_row(params_from_iter(&bound), |row| row.get(0))?;
         let first = (query.page - 1).saturating_mul(query.length);

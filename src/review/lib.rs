@@ -39,15 +39,18 @@ mod override_form;
 mod rating_form;
 mod blind_page;
 mod history;
+mod agreement_page;
 
 pub use app::{ReviewApp, ReviewOptions};
 pub use auth::{AuthMode, PASSWORD_MIN};
-pub use chained_log::{AppendError, IntegrityIssue};
+pub use chained_log::{AppendError, ChainedLog, IntegrityIssue, LogEntry, LogSnapshot, LoggedDraft};
 pub use effective_grade::{EffectiveGrade, effective_grade, with_overrides};
 pub use http::{BODY_MAX, Request, Response};
 pub use overrides::{GivenPoints, OverrideDraft, OverrideEntry, OverrideLog, OverrideSnapshot};
 pub use page_renderer::PageRenderer;
-pub use ratings::{ItemRating, RatingDraft, RatingEntry, RatingLog, RatingSnapshot, SCALE_MAX, SCALE_MIN};
+pub use ratings::{
+    ItemRating, RatingDraft, RatingEntry, RatingLog, RatingSnapshot, SCALE_MAX, SCALE_MIN, examiner_key,
+};
 
 /// File names of the logs, in the folder of the bundles.
 pub const OVERRIDES: &str = <overrides::OverrideDraft as chained_log::LoggedDraft>::FILE_NAME;

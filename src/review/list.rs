@@ -4,7 +4,7 @@ use super::app::{RequestContext, ReviewApp, SHOWN_MAX};
 use super::effective_grade::FailureReason;
 use super::http::Response;
 use super::index::IndexedSession;
-use super::query::{PAGE_LENGTHS, Query, ResultFilter, SortColumn};
+use super::query::{PAGE_LENGTHS, Query, ResultFilter, SortColumn, VerificationFilter};
 use super::ratings::{RatingSnapshot, examiner_key};
 use super::verification::{ShownVerification, VerificationProgress};
 use serde::Serialize;
@@ -27,6 +27,7 @@ struct ListPage {
     folders: Vec<SelectOption>,
     results: Vec<SelectOption>,
     overridden: Vec<SelectOption>,
+    verifications: Vec<SelectOption>,
     lengths: Vec<SelectOption>,
     /// Addresses that export the same sessions.
     csv: String,
@@ -91,7 +92,7 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
         Ok(now) => now,
         Err(response) => return *response,
     };
-    let found = state.index.query_sessions(&query, app.anonymous);
+    let found = app.query_sessions(&state.index, &query);
     let choices = state.index.filter_options();
     let left_out = state.index.left_out();
     let listed_count = state.index.paths().map_or(0, |paths| paths.len());
@@ -119,6 +120,10 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
             select_option("yes", query.overridden == Some(true)),
             select_option("no", query.overridden == Some(false)),
         ],
+        verifications: VerificationFilter::ALL
+            .iter()
+            .map(|o| select_option(o.name(), query.verification == Some(*o)))
+            .collect(),
         lengths: PAGE_LENGTHS.iter().map(|l| select_option(&l.to_string(), query.length == *l)).collect(),
         csv: href("/sessions.csv", &everything),
         json: href("/sessions.json", &everything),

@@ -11,10 +11,11 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
+use typodont_report::cohort::{AgreementTables, Cohort};
 use typodont_report::{Languages, Message, Templates};
 
 /// Shipped templates, by their names in the folder `review` of the templates.
-const PAGES: [(&str, &str); 12] = [
+const PAGES: [(&str, &str); 13] = [
     ("layout.html", include_str!("../../reports/templates/review/layout.html")),
     ("list.html", include_str!("../../reports/templates/review/list.html")),
     ("session.html", include_str!("../../reports/templates/review/session.html")),
@@ -22,6 +23,7 @@ const PAGES: [(&str, &str); 12] = [
     ("rating.html", include_str!("../../reports/templates/review/rating.html")),
     ("name.html", include_str!("../../reports/templates/review/name.html")),
     ("compare.html", include_str!("../../reports/templates/review/compare.html")),
+    ("agreement.html", include_str!("../../reports/templates/review/agreement.html")),
     ("history.html", include_str!("../../reports/templates/review/history.html")),
     ("left_out.html", include_str!("../../reports/templates/review/left_out.html")),
     ("door.html", include_str!("../../reports/templates/review/door.html")),
@@ -106,6 +108,15 @@ impl PageRenderer {
     /// Returns code and name of every language.
     pub fn languages(&self) -> Vec<(&str, &str)> {
         self.languages.names()
+    }
+
+    /// Agreement of the examiners of a cohort, as text in a language.
+    ///
+    /// # Errors
+    ///
+    /// Returns a message when there is no such language.
+    pub fn agreement_tables(&self, language: &str, cohort: &Cohort) -> Result<Vec<AgreementTables>, String> {
+        Ok(cohort.agreement_tables(self.languages.translator(language)?))
     }
 
     /// Translates a message.

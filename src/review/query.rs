@@ -20,6 +20,8 @@ pub struct Query {
     pub result: Option<ResultFilter>,
     /// Restricts the list to sessions with or without overrides.
     pub overridden: Option<bool>,
+    /// Relation of the result to its recording.
+    pub verification: Option<VerificationFilter>,
     pub sort: SortColumn,
     pub is_descending: bool,
     /// Page number, from 1.
@@ -43,6 +45,34 @@ impl ResultFilter {
             ResultFilter::Passed => "passed",
             ResultFilter::Failed => "failed",
             ResultFilter::Ungraded => "ungraded",
+        }
+    }
+}
+
+/// Relation of the result to its recording to which the list is restricted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VerificationFilter {
+    Verified,
+    /// The recording is still to be replayed.
+    Pending,
+    Unverified,
+    Differs,
+}
+
+impl VerificationFilter {
+    pub const ALL: [VerificationFilter; 4] = [
+        VerificationFilter::Verified,
+        VerificationFilter::Pending,
+        VerificationFilter::Unverified,
+        VerificationFilter::Differs,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            VerificationFilter::Verified => "verified",
+            VerificationFilter::Pending => "pending",
+            VerificationFilter::Unverified => "unverified",
+            VerificationFilter::Differs => "differs",
         }
     }
 }
@@ -113,6 +143,9 @@ impl Query {
                 "no" => Some(false),
                 _ => None,
             },
+            verification: VerificationFilter::ALL
+                .into_iter()
+                .find(|status| status.name() == first_value(pairs, "verification")),
             sort: SortColumn::ALL
                 .into_iter()
                 .find(|s| s.name() == first_value(pairs, "sort"))
@@ -142,6 +175,7 @@ impl Query {
         append_unless_default("folder", self.folder.as_deref().unwrap_or("*"), "*");
         append_unless_default("result", self.result.map_or("", ResultFilter::name), "");
         append_unless_default("overridden", self.overridden.map_or("", |yes| if yes { "yes" } else { "no" }), "");
+        append_unless_default("verification", self.verification.map_or("", VerificationFilter::name), "");
         append_unless_default("sort", self.sort.name(), SortColumn::Exercise.name());
         append_unless_default("down", if self.is_descending { "yes" } else { "" }, "");
         append_unless_default("length", &self.length.to_string(), &PAGE_LENGTHS[0].to_string());
@@ -173,7 +207,7 @@ mod tests {
         let default = parse("");
         assert_eq!(default.to_query_string(), "");
         let full = parse(
-            "text=%27%3B+DROP+TABLE&exercise=5&folder=&result=failed&overridden=yes&sort=machine&down=yes&length=200&page=3",
+            "text=%27%3B+DROP+TABLE&exercise=5&folder=&result=failed&overridden=yes&verification=differs&sort=machine&down=yes&length=200&page=3",
         );
         assert_eq!((full.text.as_str(), full.folder.as_deref(), full.page), ("'; DROP TABLE", Some(""), 3));
         assert_eq!(parse(&full.to_query_string()), full);

@@ -6,7 +6,7 @@ use super::bundle;
 use super::http::{BODY_MAX, Request, Response, first_value};
 use super::origin::OriginError;
 use super::router::Route;
-use super::{compare, export, history, list, override_form, rating_form, session_page};
+use super::{agreement_page, compare, export, history, list, override_form, rating_form, session_page};
 use serde::Serialize;
 use std::sync::Arc;
 use typodont_report::Message;
@@ -105,6 +105,7 @@ impl ReviewApp {
             Route::Override(id) => override_form::override_points(self, context, id),
             Route::Withdraw(id) => override_form::withdraw(self, context, id),
             Route::Compare => compare::page(self, context),
+            Route::Agreement => agreement_page::page(self, context),
             Route::History => history::page(self, context),
             Route::LeftOut => list::left_out(self, context),
             Route::Csv => export::csv(self, context),

@@ -24,6 +24,7 @@ pub enum Route {
     /// Examiner's name for this login.
     Name,
     Compare,
+    Agreement,
     History,
     LeftOut,
     Csv,
@@ -43,6 +44,7 @@ impl Route {
             ["leave"] => Route::Logout,
             ["language"] => Route::Language,
             ["compare"] => Route::Compare,
+            ["agreement"] => Route::Agreement,
             ["history"] => Route::History,
             ["left-out"] => Route::LeftOut,
             ["sessions.csv"] => Route::Csv,
@@ -95,6 +97,7 @@ impl Route {
             Route::Rate(_) => "rate",
             Route::Name => "name",
             Route::Compare => "compare",
+            Route::Agreement => "agreement",
             Route::History => "history",
             Route::LeftOut => "left-out",
             Route::Csv => "csv",

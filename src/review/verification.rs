@@ -2,7 +2,8 @@
 
 use super::app::ReviewApp;
 use super::bundle;
-use super::index::IndexedSession;
+use super::index::{IndexedSession, SessionIndex};
+use super::query::{Query, VerificationFilter};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -35,18 +36,25 @@ pub(super) struct ShownVerification {
 
 impl ShownVerification {
     pub fn of(status: &VerificationStatus) -> ShownVerification {
-        let (word, note) = match status {
-            VerificationStatus::Verified => ("verified", String::new()),
-            VerificationStatus::Pending => ("pending", String::new()),
-            VerificationStatus::Unverified(_) => ("unverified", status.note()),
-            VerificationStatus::Differs(_) => ("differs", status.note()),
+        let note = match status {
+            VerificationStatus::Verified | VerificationStatus::Pending => String::new(),
+            VerificationStatus::Unverified(_) | VerificationStatus::Differs(_) => status.note(),
         };
-        ShownVerification { word, note: sanitize_display(&note, NOTE_MAX) }
+        ShownVerification { word: filter_of(status).name(), note: sanitize_display(&note, NOTE_MAX) }
     }
 
     /// Leaves out the note, which states points and measures, where the marks of the session are hidden.
     pub fn without_note_if(self, is_hidden: bool) -> ShownVerification {
         if is_hidden { ShownVerification { note: String::new(), ..self } } else { self }
+    }
+}
+
+fn filter_of(status: &VerificationStatus) -> VerificationFilter {
+    match status {
+        VerificationStatus::Verified => VerificationFilter::Verified,
+        VerificationStatus::Pending => VerificationFilter::Pending,
+        VerificationStatus::Unverified(_) => VerificationFilter::Unverified,
+        VerificationStatus::Differs(_) => VerificationFilter::Differs,
     }
 }
 
@@ -97,9 +105,29 @@ impl ReviewApp {
 
     /// Relation of a listed session's result to its recording; pending for a bundle that was changed since.
     pub(super) fn verification(&self, indexed: &IndexedSession) -> VerificationStatus {
-        let known = self.verification_queue().judged.get(&indexed.path).cloned();
-        let print = fingerprint(&self.folder.join(&indexed.path));
+        self.verification_at(&indexed.path)
+    }
+
+    fn verification_at(&self, path: &Path) -> VerificationStatus {
+        let known = self.verification_queue().judged.get(path).cloned();
+        let print = fingerprint(&self.folder.join(path));
         known.filter(|(judged, _)| *judged == print).map(|(_, status)| status).unwrap_or_default()
+    }
+
+    /// Returns the sessions of a query, and their number on all pages.
+    ///
+    /// # Errors
+    ///
+    /// Returns the SQLite error.
+    pub(super) fn query_sessions(
+        &self,
+        index: &SessionIndex,
+        query: &Query,
+    ) -> rusqlite::Result<(Vec<IndexedSession>, usize)> {
+        let Some(asked) = query.verification else { return index.query_sessions(query, self.anonymous, None) };
+        let is_asked = |path: &PathBuf| filter_of(&self.verification_at(path)) == asked;
+        let paths: Vec<PathBuf> = index.paths()?.into_iter().filter(is_asked).collect();
+        index.query_sessions(query, self.anonymous, Some(&paths))
     }
 
     pub(super) fn verification_progress(&self, count: usize) -> VerificationProgress {

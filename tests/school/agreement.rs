@@ -49,11 +49,17 @@ fn two_scripted_raters_agree_as_python_says() {
         enter(&bundles, &work(number));
     }
     let table = folder.join("ratings.csv");
+    let mut desk_page = String::new();
     for (rater, name) in ["Dr. Öz", "Prof. Lee"].into_iter().enumerate() {
         let desk = Desk::open(&bundles, &["--blind"]);
         let browser = desk.browser();
         let form = form_value(&browser);
         assert_eq!(browser.post("/name", &[("form", &form), ("name", name)]).status, 303);
+        if rater == 1 {
+            let page = browser.get("/agreement").text();
+            assert!(page.contains(&format!("left out: {WORKS}.")), "{page}");
+            assert!(!page.contains("automatic grade</bdi>"), "nothing is told before an own rating: {page}");
+        }
         let export: Value = serde_json::from_str(&browser.get("/sessions.json").text()).unwrap();
         let sessions = export["sessions"].as_array().unwrap();
         assert_eq!(sessions.len(), WORKS);
@@ -67,6 +73,7 @@ fn two_scripted_raters_agree_as_python_says() {
             assert_eq!(answer.status, 303, "{}", answer.text());
         }
         fs::write(&table, browser.get("/ratings.csv").body).unwrap();
+        desk_page = browser.get("/agreement").text();
     }
     let (summary, page) = (folder.join("cohort.json"), folder.join("cohort.html"));
     let paths = [&bundles, &table, &summary, &page].map(|path| path.to_str().unwrap().to_string());
@@ -74,6 +81,10 @@ fn two_scripted_raters_agree_as_python_says() {
     let told = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{told}{}", String::from_utf8_lossy(&output.stderr));
     assert!(told.contains("agreement, Dr. Öz – Prof. Lee: κ 0."), "{told}");
+    // The page of the desk states the figures of the cohort.
+    let kappa = after(&told, "agreement, Dr. Öz – Prof. Lee: κ ", ", quadratic");
+    assert!(desk_page.contains("Dr. Öz – Prof. Lee") && desk_page.contains(kappa), "{kappa}: {desk_page}");
+    assert!(desk_page.contains("Caries removed, scale 1 to 5") && desk_page.contains("Dr. Öz – automatic grade"));
     let figures: Value = serde_json::from_str(&fs::read_to_string(&summary).unwrap()).unwrap();
     let about = &figures["scenarios"][0]["agreement"];
     assert_eq!(about.as_array().unwrap().len(), 2, "the works as a whole, and one item: {about}");

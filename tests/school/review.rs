@@ -908,3 +908,35 @@ fn impossible_numbers_stop_nobody() {
     drop(desk);
     assert_eq!(Desk::open(&folder, &[]).browser().get("/").status, 200);
 }
+
+#[test]
+fn the_list_can_be_restricted_by_verification() {
+    // Aim: an examiner finds the sessions whose results are not confirmed, on the page and in the exports. Method: a
+    // bundle without a recording, and one whose recording is another than the one named.
+    let folder = folder("review_by_verification");
+    enter(&folder, &session("5-grinding", "anna", 80.0));
+    let mut wrong = session("5-grinding", "berk", 61.0);
+    wrong["digests"] = json!({ "recording.mcap": "0".repeat(64) });
+    let bundle = enter(&folder, &wrong);
+    fs::write(bundle.join("recording.mcap"), "another recording").unwrap();
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    let listed = |status: &str| {
+        let export = browser.get(&format!("/sessions.json?verification={status}")).text();
+        let export: Value = serde_json::from_str(&export).unwrap();
+        let names =
+            export["sessions"].as_array().unwrap().iter().map(|one| one["participant"].as_str().unwrap().to_string());
+        names.collect::<Vec<_>>()
+    };
+    for _ in 0..200 {
+        if listed("pending").is_empty() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    assert_eq!((listed("differs"), listed("unverified")), (vec!["berk".to_string()], vec!["anna".to_string()]));
+    assert_eq!((listed("verified").len(), listed("").len()), (0, 2));
+    let page = browser.get("/?verification=differs").text();
+    assert!(page.contains("<option value=\"differs\" selected>"), "{page}");
+    assert!(page.contains("berk") && !page.contains("anna"), "{page}");
+}

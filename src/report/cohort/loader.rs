@@ -20,10 +20,7 @@ pub fn read_cohort(folder: &Path) -> Cohort {
             Err(reason) => cohort.skipped.push((file, reason)),
         }
     }
-    cohort.sessions.sort_by(|(pa, a), (pb, b)| {
-        let key = |s: &SessionFile| (s.scenario.id.clone(), s.participant.clone(), s.started.clone());
-        (key(a), pa).cmp(&(key(b), pb))
-    });
+    cohort.sort();
     skip_duplicates(&mut cohort);
     cohort
 }

@@ -24,6 +24,7 @@ pub use agreement::{AgreementFile, AgreementPair, IccFile, KappaFile, MACHINE, R
 pub use groups::ComparableGroup;
 pub use loader::{FoundBundles, find_bundles, read_session};
 pub use measurement_error::{DoubtfulResult, MeasurementErrorFile};
+pub use page::AgreementTables;
 pub use pass_mark::{ExaminerRating, read_ratings};
 pub use progress::LearningCurves;
 pub use questionnaire::{QuestionnaireSummary, wording};
@@ -61,6 +62,19 @@ impl Cohort {
     /// Reads every `session.json` below a folder.
     pub fn read(folder: &Path) -> Cohort {
         loader::read_cohort(folder)
+    }
+
+    /// Puts the sessions in order, which all statistics require.
+    pub fn sort(&mut self) {
+        self.sessions.sort_by(|(pa, a), (pb, b)| {
+            let key = |s: &SessionFile| (s.scenario.id.clone(), s.participant.clone(), s.started.clone());
+            (key(a), pa).cmp(&(key(b), pb))
+        });
+    }
+
+    /// Agreement of the examiners as text in one language: an entry for each exercise and its conditions that was rated.
+    pub fn agreement_tables(&self, translator: Translator) -> Vec<AgreementTables> {
+        page::agreement_tables(translator, self)
     }
 
     /// HTML page of the cohort in the language of a code. `at` is the path of the page, from which sessions are linked.

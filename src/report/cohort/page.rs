@@ -164,6 +164,15 @@ struct StandardPart {
     regression: Option<String>,
 }
 
+/// Agreement about the sessions of one exercise under the same conditions, as text.
+#[derive(Serialize)]
+pub struct AgreementTables {
+    title: String,
+    /// Conditions in words, where sessions of the exercise differ in them.
+    conditions: Option<String>,
+    parts: Vec<AgreementPart>,
+}
+
 #[derive(Serialize)]
 struct AgreementPart {
     title: String,
@@ -527,6 +536,16 @@ fn coefficient(translator: Translator, value: Option<(f64, Option<Interval>)>) -
         Some((value, None)) => two(value),
         Some((value, Some(bounds))) => format!("{} ({})", two(value), interval(translator, &bounds, two)),
     }
+}
+
+/// Returns the agreement about every exercise that was rated.
+pub(super) fn agreement_tables(translator: Translator, cohort: &Cohort) -> Vec<AgreementTables> {
+    let tables = |summary: &ScenarioSummary| AgreementTables {
+        title: sanitize(&summary.title),
+        conditions: summary.conditions.as_ref().map(|said| translator.translate(said)),
+        parts: summary.agreement.iter().map(|about| agreement(translator, about)).collect(),
+    };
+    cohort.summary().scenarios.iter().filter(|summary| !summary.agreement.is_empty()).map(tables).collect()
 }
 
 fn agreement(translator: Translator, about: &AgreementFile) -> AgreementPart {
