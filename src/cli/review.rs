@@ -131,7 +131,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         .map_err(|e| CliError::wrong(format!("{at}: the server stopped: {e}")))
 }
 
-/// Downloads bundles and overrides, and then exchanges overrides periodically.
+/// Downloads bundles, and exchanges overrides and ratings, at once and then periodically.
 #[cfg(feature = "school")]
 fn start_override_exchange(arguments: &Arguments) -> Result<(), CliError> {
     let Arguments { folder, at, store, class, .. } = arguments;
@@ -139,13 +139,17 @@ fn start_override_exchange(arguments: &Arguments) -> Result<(), CliError> {
     eprintln!("{fetched} bundles downloaded, {failed} failed");
     let mut connection = at.connection()?;
     school::fetch::exchange_overrides(&mut connection, folder)?;
+    // Marking goes on where the owner of the records has not prepared them for ratings yet.
+    school::fetch::exchange_ratings(&mut connection, folder).err().iter().for_each(CliError::report);
     let folder = folder.clone();
     std::thread::spawn(move || {
         let mut before = String::new();
         loop {
             std::thread::sleep(EXCHANGE_EVERY);
-            // Overrides made while the database is unavailable are uploaded later; the error is printed only once.
-            let now = school::fetch::exchange_overrides(&mut connection, &folder)
+            // Lines written while the database is unavailable are uploaded later; the error is printed only once.
+            let overrides = school::fetch::exchange_overrides(&mut connection, &folder);
+            let now = overrides
+                .and_then(|_| school::fetch::exchange_ratings(&mut connection, &folder))
                 .err()
                 .map_or_else(String::new, |e| e.message());
             if !now.is_empty() && now != before {

@@ -6,11 +6,12 @@ use std::fmt;
 use typodont_exercise::scenario::hex;
 
 /// Name and SQL text of each migration. The number of a migration is its position, from 1.
-const MIGRATIONS: [(&str, &str); 4] = [
+const MIGRATIONS: [(&str, &str); 5] = [
     ("records", include_str!("migrations/0001_records.sql")),
     ("roles", include_str!("migrations/0002_roles.sql")),
     ("store", include_str!("migrations/0003_store.sql")),
     ("measures", include_str!("migrations/0004_measures.sql")),
+    ("examiner_ratings", include_str!("migrations/0005_examiner_ratings.sql")),
 ];
 
 /// Key of the advisory lock that keeps two programs from migrating at the same time. Any number that nothing else

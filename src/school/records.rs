@@ -1,4 +1,4 @@
-//! Queries that insert sessions and overrides into the database and read them back.
+//! Queries that insert sessions and examiners' logs into the database and read them back.
 
 use super::archive::Manifest;
 use postgres::error::SqlState;
@@ -9,7 +9,7 @@ use std::path::{Component, Path};
 use typodont_core::tick::TICK_S;
 use typodont_integrations::session_id;
 use typodont_report::{SessionFile, VerificationStatus};
-use typodont_review::{OverrideEntry, OverrideSnapshot};
+use typodont_review::{LogEntry, LogSnapshot, LoggedDraft, OverrideSnapshot};
 
 /// Status of a local session in the database.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -341,21 +341,46 @@ fn rescored_in_place(written: &SessionFile, rescored: SessionFile) -> SessionFil
     SessionFile { digests: written.digests.clone(), template_sha256: written.template_sha256.clone(), ..rescored }
 }
 
+/// Examiners' logs that the database holds, line by line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LogTable {
+    Overrides,
+    Ratings,
+}
+
+impl LogTable {
+    fn name(self) -> &'static str {
+        match self {
+            LogTable::Overrides => "typodont.override",
+            LogTable::Ratings => "typodont.examiner_rating",
+        }
+    }
+}
+
 /// Reads all overrides that the login may read, in chronological order.
 ///
 /// # Errors
 ///
 /// Returns the database error.
 pub fn read_overrides(client: &mut Client) -> Result<OverrideSnapshot, Error> {
-    let rows = client.query("SELECT session_id::text, line FROM typodont.override", &[])?;
+    read_log(client, LogTable::Overrides)
+}
+
+/// Reads all lines of examiners' logs that the login may read, in chronological order.
+///
+/// # Errors
+///
+/// Returns the database error.
+pub fn read_log<D: LoggedDraft>(client: &mut Client, table: LogTable) -> Result<LogSnapshot<D>, Error> {
+    let rows = client.query(&format!("SELECT session_id::text, line FROM {}", table.name()), &[])?;
     // Access was granted for the row's session, so a line about another session is ignored.
     let entry = |row: &postgres::Row| {
-        let entry = serde_json::from_str::<OverrideEntry>(row.get(1)).ok()?;
-        (entry.draft.session == row.get::<_, &str>(0)).then_some(entry)
+        let entry = serde_json::from_str::<LogEntry<D>>(row.get(1)).ok()?;
+        (entry.draft.session() == row.get::<_, &str>(0)).then_some(entry)
     };
-    let mut entries: Vec<OverrideEntry> = rows.iter().filter_map(entry).collect();
+    let mut entries: Vec<LogEntry<D>> = rows.iter().filter_map(entry).collect();
     entries.sort_by(|a, b| (&a.at, a.number).cmp(&(&b.at, b.number)));
-    Ok(OverrideSnapshot::from_entries(entries))
+    Ok(LogSnapshot::from_entries(entries))
 }
 
 /// Inserts lines of an examiner's log, each given as entry, text and SHA-256, and returns the number of new ones.
@@ -364,19 +389,28 @@ pub fn read_overrides(client: &mut Client) -> Result<OverrideSnapshot, Error> {
 /// # Errors
 ///
 /// Returns the database error.
-pub fn insert_overrides(
+pub fn insert_log_lines<D: LoggedDraft>(
     client: &mut Client,
+    table: LogTable,
     log: &str,
-    lines: &[(OverrideEntry, String, String)],
+    lines: &[(LogEntry<D>, String, String)],
 ) -> Result<u64, Error> {
     let mut inserted = 0;
     let mut transaction = client.transaction()?;
+    let sql = format!(
+        "INSERT INTO {} (log, number, session_id, line, sha256)
+         SELECT $1, $2, s.id, $4, $5 FROM typodont.session s WHERE s.id::text = $3 ON CONFLICT DO NOTHING",
+        table.name()
+    );
     for (entry, line, digest) in lines {
-        let sql = "INSERT INTO typodont.override (log, number, session_id, line, sha256)
-          SELECT $1, $2, s.id, $4, $5 FROM typodont.session s WHERE s.id::text = $3 ON CONFLICT DO NOTHING";
         let number = i64::try_from(entry.number).unwrap_or(i64::MAX);
-        inserted += transaction.execute(sql, &[&log, &number, &entry.draft.session, line, digest])?;
+        inserted += transaction.execute(&sql, &[&log, &number, &entry.draft.session(), line, digest])?;
     }
     transaction.commit()?;
     Ok(inserted)
+}
+
+/// Returns true for the error of a table that an earlier version of the schema does not have.
+pub fn is_missing_table(error: &Error) -> bool {
+    error.code() == Some(&SqlState::UNDEFINED_TABLE)
 }

@@ -751,7 +751,9 @@ fn nobody_reads_what_is_not_theirs() {
         seen("station-1", "SELECT count(*) FROM typodont.session WHERE station <> 'station-1' OR result LIKE '%berk%'"),
         Ok(0)
     );
-    for table in ["participant", "score", "override", "job", "export", "audit", "erased", "salt", "examines"] {
+    for table in
+        ["participant", "score", "override", "examiner_rating", "job", "export", "audit", "erased", "salt", "examines"]
+    {
         assert!(seen("station-1", &of(table)).unwrap_err().contains("permission denied"), "{table}");
     }
     let refused = |login: &str, sql: &str| {
@@ -1100,9 +1102,31 @@ fn what_examiners_judged_is_entered_and_counts() {
         &["gradebook", "--database", &database, "--for", "moodle", "--overrides", "-o", &text(&grades)],
     );
     assert!(fs::read_to_string(grades).unwrap().contains("anna,60,"));
+    // Ratings travel in the same way, and an earlier one does not follow a later one of the same examiner.
+    let rating = |at: &str, overall: u8, blind: bool| {
+        json!({ "version": 1, "number": 1, "previous": "0".repeat(64), "at": at, "session": id, "recording": "",
+            "scale": 5, "overall": overall, "items": [], "blind": blind, "note": "'; DROP TABLE x; --", "name": "Dr. Öz" })
+    };
+    fs::write(own.join("ratings.jsonl"), rating("2026-11-22T09:00:00Z", 2, false).to_string() + "\n").unwrap();
+    fs::write(late.join("ratings.jsonl"), rating("2026-11-22T10:00:00Z", 4, false).to_string() + "\n").unwrap();
+    let exchange = |folder: &Path| cluster.ask("examiner", &["school", "judgements", &text(folder)]);
+    assert!(exchange(&own).contains("1 ratings uploaded, 0 downloaded"));
+    assert!(exchange(&own).contains("0 ratings uploaded, 0 downloaded"));
+    assert!(exchange(&desk).contains("0 ratings uploaded, 1 downloaded"));
+    assert!(exchange(&late).contains("1 ratings uploaded, 0 downloaded"));
+    assert!(exchange(&desk).contains("0 ratings uploaded, 1 downloaded"));
+    let counting = |folder: &Path| {
+        let log = typodont_review::RatingLog::of(folder).read(None).unwrap();
+        assert!(log.issues.is_empty(), "{:?}", log.issues);
+        log.counting(&id).iter().map(|entry| entry.draft.overall).collect::<Vec<_>>()
+    };
+    assert_eq!((counting(&desk), counting(&late)), (vec![Some(4)], vec![Some(4)]));
+    let received = "SELECT count(*) FROM typodont.audit WHERE action = 'rating received' AND session_id IS NOT NULL";
+    assert_eq!(cluster.count(received), 2);
     // Of a class that is not theirs examiners enter nothing.
     cluster.ask("owner", &["school", "admit", "other", "--as", "examiner", "--class", "B"]);
-    assert!(cluster.ask("other", &["school", "judgements", &text(&own)]).contains("0 overrides uploaded"));
+    let other = cluster.ask("other", &["school", "judgements", &text(&own)]);
+    assert!(other.contains("0 overrides uploaded, 0 downloaded; 0 ratings uploaded, 0 downloaded"), "{other}");
 }
 
 #[test]

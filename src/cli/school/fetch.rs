@@ -1,6 +1,7 @@
-//! `typodont school fetch` and `judgements`: downloads bundles, and exchanges examiners' overrides with the records.
+//! `typodont school fetch` and `judgements`: downloads bundles, and exchanges examiners' overrides and ratings with the
+//! records.
 
-use super::connection::DbConnection;
+use super::connection::{DbConnection, DbError};
 use super::database::DatabaseArguments;
 use super::source::{SessionSource, audit_read};
 use super::store::StoreArguments;
@@ -13,9 +14,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use typodont_exercise::scenario::hex;
 use typodont_report::sanitize_display;
-use typodont_review::{AppendError, OVERRIDES, OverrideEntry, OverrideLog, OverrideSnapshot};
+use typodont_review::{
+    AppendError, ChainedLog, LogEntry, LogSnapshot, LoggedDraft, OverrideSnapshot, RatingEntry, RatingSnapshot,
+    examiner_key,
+};
 use typodont_school::records;
-use typodont_school::records::{StoredSession, is_plain_name};
+use typodont_school::records::{LogTable, StoredSession, is_plain_name};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -94,57 +98,100 @@ fn fetch_bundle(store: &super::ObjectStoreHandle, stored: &StoredSession, partia
 }
 
 pub fn run_judgements(arguments: &JudgementsArguments) -> Result<(), CliError> {
-    let ExchangeCounts { uploaded: entered, downloaded: taken } =
-        exchange_overrides(&mut arguments.at.connection()?, &arguments.folder)?;
-    print_line(format!("{}: {entered} overrides uploaded, {taken} downloaded", arguments.folder.display()))
+    let JudgementsArguments { folder, at } = arguments;
+    let mut connection = at.connection()?;
+    let overrides = exchange_overrides(&mut connection, folder)?;
+    let ratings = exchange_ratings(&mut connection, folder)?;
+    print_line(format!(
+        "{}: {} overrides uploaded, {} downloaded; {} ratings uploaded, {} downloaded",
+        folder.display(),
+        overrides.uploaded,
+        overrides.downloaded,
+        ratings.uploaded,
+        ratings.downloaded
+    ))
 }
 
-/// Number of overrides exchanged in each direction.
+/// Number of lines exchanged in each direction.
 pub struct ExchangeCounts {
     pub uploaded: u64,
     pub downloaded: usize,
 }
 
-/// Uploads, word for word, the valid lines of a folder's log that are not in the records yet, and appends to the log
-/// the overrides of other examiners.
+/// Exchanges the overrides of a folder with the records; see [`exchange_log`].
 ///
 /// # Errors
 /// A message if the log cannot be read or written, or the database does not answer.
 pub fn exchange_overrides(connection: &mut DbConnection, folder: &Path) -> Result<ExchangeCounts, CliError> {
-    let path = folder.join(OVERRIDES);
+    // A later override made here takes precedence: a downloaded line must not replace it.
+    exchange_log(connection, folder, LogTable::Overrides, |local_log: &OverrideSnapshot, entry| {
+        let item = entry.draft.item.as_ref().map(|item| item.index);
+        local_log.latest_for(&entry.draft.session, item).is_some_and(|last| last.at > entry.at)
+    })
+}
+
+/// Exchanges the ratings of a folder with the records; see [`exchange_log`].
+///
+/// # Errors
+/// A message if the log cannot be read or written, the records have no table for ratings yet, or the database does not
+/// answer.
+pub fn exchange_ratings(connection: &mut DbConnection, folder: &Path) -> Result<ExchangeCounts, CliError> {
+    // Of ratings that are not blind the latest counts: an earlier one of the same examiner must not follow it.
+    exchange_log(connection, folder, LogTable::Ratings, |local_log: &RatingSnapshot, entry| {
+        let is_later = |own: &&RatingEntry| {
+            own.at > entry.at
+                && own.draft.session == entry.draft.session
+                && examiner_key(&own.draft.name) == examiner_key(&entry.draft.name)
+        };
+        !entry.draft.blind && local_log.valid_entries().any(|own| is_later(&own))
+    })
+}
+
+/// Uploads, word for word, the valid lines of a folder's log that are not in the records yet, and appends to the log
+/// the lines of other examiners, except those that `is_overtaken` by a line of the log.
+fn exchange_log<D: LoggedDraft + PartialEq>(
+    connection: &mut DbConnection,
+    folder: &Path,
+    table: LogTable,
+    is_overtaken: impl Fn(&LogSnapshot<D>, &LogEntry<D>) -> bool,
+) -> Result<ExchangeCounts, CliError> {
+    let path = folder.join(D::FILE_NAME);
     let failed = |e| CliError::wrong(format!("{}: unreadable-file: {e}", path.display()));
-    let mut log = OverrideLog::of(folder);
+    let mut log = ChainedLog::<D>::of(folder);
     let local_log = log.read(None).map_err(failed)?;
-    let remote_log = connection.query_with_retry(records::read_overrides)?;
-    let is_in = |snapshot: &OverrideSnapshot, entry: &OverrideEntry| {
+    let remote_log = match connection.query_with_retry(|client| records::read_log::<D>(client, table)) {
+        Err(DbError::Rejected(error)) if records::is_missing_table(&error) => {
+            return Err(CliError::wrong(
+                "old-schema: the database has no table for examiners' ratings yet; its owner runs typodont school init",
+            ));
+        }
+        read => read?,
+    };
+    let is_in = |snapshot: &LogSnapshot<D>, entry: &LogEntry<D>| {
         snapshot.valid_entries().any(|e| e.at == entry.at && e.draft == entry.draft)
     };
     let text = if path.is_file() { typodont_formats::read_text(&path)?.text.clone() } else { String::new() };
     let mut lines = Vec::new();
     for entry in local_log.valid_entries().filter(|entry| !is_in(&remote_log, entry)) {
-        let line = text.lines().find(|line| serde_json::from_str::<OverrideEntry>(line).is_ok_and(|e| e == *entry));
+        let line = text.lines().find(|line| serde_json::from_str::<LogEntry<D>>(line).is_ok_and(|e| e == *entry));
         lines.extend(line.map(|line| (entry.clone(), line.to_string(), hex(&Sha256::digest(line)))));
     }
-    let mut entered = 0;
+    let mut uploaded = 0;
     if !lines.is_empty() {
         // A log is identified by its first line and its login.
         let first = hex(&Sha256::digest(text.lines().next().unwrap_or_default()));
         let name = format!("{}:{}", connection.query_with_retry(records::login_name)?, &first[..16]);
-        entered = connection.query_with_retry(|client| records::insert_overrides(client, &name, &lines))?;
+        uploaded = connection.query_with_retry(|client| records::insert_log_lines(client, table, &name, &lines))?;
     }
-    let mut taken = 0;
-    // A later override made here takes precedence: a downloaded line must not replace it.
-    let is_overtaken = |entry: &OverrideEntry| {
-        let item = entry.draft.item.as_ref().map(|item| item.index);
-        local_log.latest_for(&entry.draft.session, item).is_some_and(|last| last.at > entry.at)
-    };
-    for entry in remote_log.valid_entries().filter(|entry| !is_in(&local_log, entry) && !is_overtaken(entry)) {
+    let mut downloaded = 0;
+    let remote_lines = remote_log.valid_entries();
+    for entry in remote_lines.filter(|entry| !is_in(&local_log, entry) && !is_overtaken(&local_log, entry)) {
         let append = log.append(&entry.at, None, |_| Ok::<_, std::convert::Infallible>(entry.draft.clone()));
         append.map_err(|unwritten| match unwritten {
             AppendError::Io(error) => failed(error),
             AppendError::Rejected(never) => match never {},
         })?;
-        taken += 1;
+        downloaded += 1;
     }
-    Ok(ExchangeCounts { uploaded: entered, downloaded: taken })
+    Ok(ExchangeCounts { uploaded, downloaded })
 }
