@@ -1,7 +1,8 @@
-//! The grade of a session in which nothing was done.
+//! The grade of a session that is run in memory, and of one in which nothing was done.
 //!
-//! Takes an exercise and its workpiece. Gives the points that its rubric pays for absence: of contact, of force, of
-//! cuts. Never guesses: the session is run, recorded in memory and scored like any other.
+//! Takes an exercise, its workpiece and a trainee. Gives the trainee's grade; of an idle trainee, the points that the
+//! rubric pays for absence: of contact, of force, of cuts. Never guesses: the session is recorded in memory and scored
+//! like any other.
 
 use super::Grade;
 use crate::record::{Recording, RecordingEndFile, RecordingHeadFile, ReplayCheck, ServoStatsFile, TickRecord};
@@ -28,14 +29,27 @@ const STAGE_TICKS: u64 = 100;
 /// # Errors
 /// Returns a message if the workpiece does not fit the scenario.
 pub fn idle_grade(scenario: &Arc<Scenario>, workpiece: &Workpiece, seed: u64) -> Result<Option<Grade>, String> {
+    let trainee = IdleTrainee { spec: DeviceSpec::phantom_omni(), stage: None, ticks: 0 };
+    trainee_grade(scenario, workpiece, seed, trainee)
+}
+
+/// Runs a session in memory and returns the trainee's grade; `None` without a rubric.
+///
+/// # Errors
+/// Returns a message if the workpiece does not fit the scenario.
+pub fn trainee_grade(
+    scenario: &Arc<Scenario>,
+    workpiece: &Workpiece,
+    seed: u64,
+    mut trainee: impl Trainee,
+) -> Result<Option<Grade>, String> {
     if scenario.rubric.is_none() {
         return Ok(None);
     }
-    let spec = DeviceSpec::phantom_omni();
+    let spec = trainee.spec().clone();
     let head = RecordingHeadFile::of(scenario, &spec, seed);
-    let mut simulation = Simulation::new(session::setup(scenario, workpiece, spec.clone()));
+    let mut simulation = Simulation::new(session::setup(scenario, workpiece, spec));
     let mut session = Session::new(scenario.clone(), workpiece);
-    let mut trainee = IdleTrainee { spec, stage: None, ticks: 0 };
     let mut log = SessionLog::default();
     let Ok(_) = session::run(&mut session, &mut simulation, &mut trainee, &mut log);
     let end = RecordingEndFile { reason: "complete".into(), servo: ServoStatsFile::of(&simulation) };

@@ -25,7 +25,7 @@ pub use contact_spell::ContactSpell;
 pub use cropped_grid::CroppedGrid;
 pub use error_episodes::{EpisodeKind, ErrorEpisode, error_episodes};
 pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
-pub use idle::idle_grade;
+pub use idle::{idle_grade, trainee_grade};
 pub use measures::{Evidence, Measure, Measures};
 pub use nearest_offset::AnatomicalDirection;
 pub use process::{Trace, TraceSample};
