@@ -639,6 +639,7 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::CapturePointer(is_held) => capture_pointer(lesson, is_held),
         PracticeCommand::PointAt(place) => lesson.point_at(place),
         PracticeCommand::ChangeStrength(steps) => lesson.change_strength(steps),
+        PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
         PracticeCommand::AdjustMouthOpening(by) => {
             if let Some(scene) = &mut lesson.scene {

@@ -65,6 +65,8 @@ pub enum PracticeCommand {
     PointAt(Option<PointedPlace>),
     /// Changes the strength of a press, steps of the mouse wheel.
     ChangeStrength(f32),
+    /// Sets the share of the strength with which a pen presses, 0 to 1.
+    SetPressure(f32),
     SetDeviceButton {
         bit: u32,
         is_down: bool,

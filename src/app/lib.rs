@@ -25,6 +25,7 @@ mod i18n;
 mod theme;
 mod tools_panel;
 mod view_refresh;
+mod touches;
 mod viewport_input;
 mod practice;
 mod questionnaire;

@@ -34,13 +34,21 @@ pub struct PointedPlace {
 }
 
 /// State of the pointer's hand.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct PointerHand {
     pub is_pressing: bool,
+    /// Share of the strength with which it presses, 0 to 1; less than 1 for a pen that is pressed lightly.
+    pub pressure: f32,
     /// Surface under the pointer.
     pub spot: Option<SurfaceSpot>,
     /// Maximum force of a press, N, by instrument, where the trainee has changed it.
     strengths: Vec<Option<f32>>,
+}
+
+impl Default for PointerHand {
+    fn default() -> PointerHand {
+        PointerHand { is_pressing: false, pressure: 1.0, spot: None, strengths: Vec::new() }
+    }
 }
 
 impl PointerHand {
@@ -87,7 +95,9 @@ impl PointerHand {
         let (place, max_force) = match self.spot {
             Some(spot) => {
                 let action = match self.is_pressing {
-                    true => HandAction::Press { max_force: self.strength(snapshot.instrument as usize, instrument) },
+                    true => HandAction::Press {
+                        max_force: self.pressure * self.strength(snapshot.instrument as usize, instrument),
+                    },
                     false => HandAction::Rest,
                 };
                 let world_from_handle = Quat::from_rotation_y(yaw) * UPRIGHT;

@@ -3,10 +3,11 @@
 //! While it is free, its buttons move the camera as in the thesis: left rotates, right zooms, middle shifts. While it
 //! acts as the device, the hand follows the surface under the pointer, the left button presses, the wheel sets the
 //! strength, and the right button rotates the view; with the Ctrl key the buttons and the wheel move the camera as
-//! before.
+//! before. A pen presses as hard as it is pressed; one finger points, and a second one presses.
 
 use super::command::{AppCommand, CameraCommand, PracticeCommand};
 use super::pointer_hand::PointedPlace;
+use super::touches::Touches;
 use eframe::egui::{self, Event, MouseWheelUnit, PointerButton};
 
 /// Rotation by a drag across one point of the screen, rad: half a turn in 300 points.
@@ -82,6 +83,10 @@ fn free_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppComm
     if view.hovered() && steps != 0.0 {
         commands.push(AppCommand::Camera(CameraCommand::Zoom((-steps * ZOOM_PER_WHEEL_STEP).exp())));
     }
+    // Two fingers that part zoom in.
+    if let Some(fingers) = ui.input(|input| input.multi_touch()).filter(|fingers| fingers.zoom_delta != 1.0) {
+        commands.push(AppCommand::Camera(CameraCommand::Zoom(1.0 / fingers.zoom_delta)));
+    }
 }
 
 /// Share of the pointer's movement that the hand follows while Shift is held.
@@ -113,13 +118,26 @@ fn captured_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<App
         });
     }
     let is_working = is_on_view && drag.is_none();
-    let is_down = is_working && is_pressed && view.is_pointer_button_down_on();
+    // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
+    let pressure = touch_pressure(ui, view.id).unwrap_or(1.0);
+    let is_down = is_working && is_pressed && pressure > 0.0 && view.is_pointer_button_down_on();
+    commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
     commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
     let place = at.filter(|_| is_working).map(|at| {
         let share = (fine_position(ui, view.id, at, modifiers.shift) - rect.min) / rect.size();
         PointedPlace { share: [share.x, share.y], aspect: rect.width() / rect.height().max(1.0) }
     });
     commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
+}
+
+/// Share of the strength with which pens and fingers press; `None` for a mouse.
+fn touch_pressure(ui: &egui::Ui, view: egui::Id) -> Option<f32> {
+    let events = ui.input(|input| input.events.clone());
+    ui.data_mut(|data| {
+        let touches = data.get_temp_mut_or_default::<Touches>(view.with("touches"));
+        touches.update(&events);
+        touches.pressure()
+    })
 }
 
 /// Position at which the hand points: that of the pointer, or, while Shift is held, one that follows it more finely
@@ -144,4 +162,89 @@ fn wheel(ui: &egui::Ui) -> f32 {
         };
         input.events.iter().map(steps).sum()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::{Modifiers, Pos2, RawInput, Rect, Sense, TouchDeviceId, TouchId, TouchPhase, Vec2};
+
+    /// A view that fills a window, and the commands of each frame.
+    #[derive(Default)]
+    struct Screen(egui::Context);
+
+    impl Screen {
+        /// Shows a frame in which these events come in; returns the share of the strength with which the hand presses, and
+        /// the place at which it points.
+        fn frame(&self, events: Vec<Event>) -> (f32, Option<[f32; 2]>) {
+            let mut commands = Vec::new();
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 600.0)));
+            let input = RawInput { screen_rect, events, ..RawInput::default() };
+            let mut output = self.0.run_ui(input, |ui| {
+                let view = ui.interact(ui.max_rect(), ui.id().with("view"), Sense::click_and_drag());
+                commands.clear();
+                collect_commands(ui, &view, true, &mut commands);
+            });
+            output.textures_delta.clear();
+            let (mut pressure, mut is_pressed, mut place) = (1.0, false, None);
+            for command in commands {
+                match command {
+                    AppCommand::Practice(PracticeCommand::SetPressure(share)) => pressure = share,
+                    AppCommand::Practice(PracticeCommand::SetDeviceButton { is_down, .. }) => is_pressed = is_down,
+                    AppCommand::Practice(PracticeCommand::PointAt(pointed)) => place = pointed.map(|p| p.share),
+                    _ => {}
+                }
+            }
+            (if is_pressed { pressure } else { 0.0 }, place)
+        }
+    }
+
+    /// Events of a touch as winit's egui integration sends them: the first touch moves the pointer, too.
+    fn touch(id: u64, phase: TouchPhase, pos: Pos2, force: Option<f32>) -> Vec<Event> {
+        let touch = Event::Touch { device_id: TouchDeviceId(1), id: TouchId(id), phase, pos, force };
+        let button =
+            |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE };
+        let pointer = match (id, phase) {
+            (0, TouchPhase::Start) => vec![Event::PointerMoved(pos), button(true)],
+            (0, TouchPhase::Move) => vec![Event::PointerMoved(pos)],
+            (0, TouchPhase::End | TouchPhase::Cancel) => vec![button(false), Event::PointerGone],
+            _ => Vec::new(),
+        };
+        [vec![touch], pointer].concat()
+    }
+
+    #[test]
+    fn one_finger_points_and_a_second_one_presses() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let (first, second) = (Pos2::new(400.0, 300.0), Pos2::new(200.0, 150.0));
+        assert_eq!(screen.frame(touch(0, TouchPhase::Start, first, None)), (0.0, Some([0.5, 0.5])));
+        assert_eq!(screen.frame(touch(1, TouchPhase::Start, second, None)), (1.0, Some([0.5, 0.5])));
+        let moved = touch(0, TouchPhase::Move, Pos2::new(200.0, 300.0), None);
+        assert_eq!(screen.frame(moved), (1.0, Some([0.25, 0.5])), "the first finger points while the second presses");
+        assert_eq!(screen.frame(touch(1, TouchPhase::End, second, None)).0, 0.0);
+        assert_eq!(screen.frame(touch(0, TouchPhase::End, first, None)), (0.0, None), "a lifted hand is put down");
+    }
+
+    #[test]
+    fn a_pen_presses_as_hard_as_it_is_pressed() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let at = Pos2::new(400.0, 300.0);
+        assert_eq!(screen.frame(touch(0, TouchPhase::Start, at, Some(0.02))).0, 0.0, "it rests on the screen");
+        assert_eq!(screen.frame(touch(0, TouchPhase::Move, at, Some(0.4))).0, 0.4);
+        assert_eq!(screen.frame(touch(0, TouchPhase::Move, at, Some(1.0))).0, 1.0);
+        assert_eq!(screen.frame(touch(0, TouchPhase::End, at, Some(0.0))).0, 0.0);
+    }
+
+    #[test]
+    fn a_mouse_presses_with_its_full_strength() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let pos = Pos2::new(400.0, 300.0);
+        let button =
+            Event::PointerButton { pos, button: PointerButton::Primary, pressed: true, modifiers: Modifiers::NONE };
+        assert_eq!(screen.frame(vec![Event::PointerMoved(pos)]), (0.0, Some([0.5, 0.5])));
+        assert_eq!(screen.frame(vec![button]).0, 1.0);
+    }
 }
