@@ -233,14 +233,41 @@ fn view_ui(
         second_eye_window(ui.ctx(), viewport, words);
     }
     if lesson.has_mouse() && lesson.scene.is_some() {
-        let key = if lesson.is_pointer_captured { "practice.held" } else { "practice.free" };
-        let at = rect.center_bottom() - egui::vec2(0.0, 26.0);
-        let place = Rect::from_center_size(at, egui::vec2((rect.width() - 24.0).clamp(40.0, 620.0), 32.0));
-        ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
-        ui.put(
-            place,
-            egui::Label::new(egui::RichText::new(words.get(key)).size(13.0).color(Color32::WHITE)).selectable(false),
-        );
+        pointer_hint_ui(ui, rect, lesson.is_pointer_captured, words, commands);
+    }
+}
+
+/// What the pointer does, along the lower edge of the view, and a button that puts the instrument down for those who have
+/// no keyboard.
+fn pointer_hint_ui(
+    ui: &mut egui::Ui,
+    view: Rect,
+    is_captured: bool,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    /// Width of the button, points.
+    const BUTTON: f32 = 136.0;
+    let at = view.center_bottom() - egui::vec2(0.0, 26.0);
+    let width = (view.width() - 24.0).clamp(40.0, if is_captured { 680.0 } else { 620.0 });
+    let place = Rect::from_center_size(at, egui::vec2(width, 36.0));
+    ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
+    let text = |key| egui::RichText::new(words.get(key)).size(13.0);
+    let hint = |key| egui::Label::new(text(key).color(Color32::WHITE)).selectable(false);
+    if !is_captured {
+        ui.put(place, hint("practice.free"));
+        return;
+    }
+    let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));
+    ui.put(left.shrink2(egui::vec2(8.0, 0.0)), hint("practice.held"));
+    if ui
+        .put(
+            right.shrink(4.0),
+            egui::Button::new(text("practice.put_down")).small().wrap_mode(egui::TextWrapMode::Extend),
+        )
+        .clicked()
+    {
+        commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));
     }
 }
 
