@@ -237,8 +237,8 @@ fn view_ui(
     }
 }
 
-/// What the pointer does, along the lower edge of the view, and a button that puts the instrument down for those who have
-/// no keyboard.
+/// Hint at the lower edge of the view about the pointer, and a button that puts the instrument down for those who have no
+/// keyboard.
 fn pointer_hint_ui(
     ui: &mut egui::Ui,
     view: Rect,

@@ -181,7 +181,7 @@ mod tests {
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 600.0)));
             let input = RawInput { screen_rect, events, ..RawInput::default() };
             let mut output = self.0.run_ui(input, |ui| {
-                let view = ui.interact(ui.max_rect(), ui.id().with("view"), Sense::click_and_drag());
+                let view = ui.interact(ui.max_rect(), ui.scope_id().with("view"), Sense::click_and_drag());
                 commands.clear();
                 collect_commands(ui, &view, true, &mut commands);
             });
