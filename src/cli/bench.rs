@@ -18,12 +18,15 @@ use typodont_formats::nrrd;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// CT volume (NRRD) to measure with, instead of the program's own tooth in three sizes
+    /// CT volume (NRRD) to measure with, instead of the program's own tooth in several sizes; may be repeated
     #[arg(long, value_name = "FILE")]
-    volume: Option<PathBuf>,
-    /// Voxel spacing of that volume, if its header does not state it
+    volume: Vec<PathBuf>,
+    /// Voxel spacing of these volumes, if their headers do not state it
     #[arg(long, value_name = "MM", requires = "volume", value_parser = super::run::spacing)]
     tooth_spacing_mm: Option<f32>,
+    /// Measure only the ticks of the servo
+    #[arg(long)]
+    ticks: bool,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -35,6 +38,10 @@ pub struct Arguments {
 /// Volume sizes, voxels, for which every figure is measured.
 const DIMS: [[u32; 3]; 3] = [[128, 128, 80], [256, 256, 161], [512, 512, 322]];
 
+/// Voxel sizes, mm, for which the ticks of the servo are measured as well: those of micro-CT scans of single teeth, 22 mm
+/// over 128, 256 and 512 voxels. Dimensions alone say little, because a grid may be much wider than its tooth.
+const VOXEL_SIZES: [f32; 3] = [22.0 / 128.0, 22.0 / 256.0, 22.0 / 512.0];
+
 /// Volume size, voxels, on which the replay and scoring of a whole session are measured.
 const SESSION_DIMS: [u32; 3] = DIMS[1];
 
@@ -44,6 +51,8 @@ struct BenchResults {
     version: &'static str,
     threads: usize,
     cpu: String,
+    /// Size of a voxel of each measured volume, mm.
+    voxel_mm: BTreeMap<String, f64>,
     tick_us: BTreeMap<String, BTreeMap<&'static str, Percentiles>>,
     mesh_ms: BTreeMap<String, Percentiles>,
     remesh_ms: BTreeMap<String, Percentiles>,
@@ -82,38 +91,59 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 }
 
 fn measure(arguments: &Arguments, results: &mut BenchResults) -> Result<(), String> {
-    match &arguments.volume {
-        Some(path) => {
-            let image = nrrd::read(path).map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
-            let spacing = arguments.tooth_spacing_mm.map(|mm| [mm; 3]);
-            let tooth = tooth_import::segmented(&image, spacing, &volumes::tissues()?)
-                .map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
-            measure_tooth(tooth, results)?;
+    let measure_tooth = if arguments.ticks { measure_ticks } else { measure_all };
+    for path in &arguments.volume {
+        let image = nrrd::read(path).map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
+        let spacing = arguments.tooth_spacing_mm.map(|mm| [mm; 3]);
+        let tooth = tooth_import::segmented(&image, spacing, &volumes::tissues()?)
+            .map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
+        measure_tooth(tooth, results)?;
+    }
+    if arguments.volume.is_empty() {
+        for dims in DIMS {
+            measure_tooth(grow_tooth(dims)?, results)?;
         }
-        None => {
-            for dims in DIMS {
-                measure_tooth(grow_tooth(dims)?, results)?;
-                let name = name_of(dims);
-                results.peak_mib.insert(name.clone(), session::peak_mib(&name)?);
-            }
-            let five_minutes = session::five_minutes(grow_tooth(SESSION_DIMS)?)?;
-            results.replay_s = Some(five_minutes.replay_s);
-            results.score_s = Some(five_minutes.score_s);
+        for spacing in VOXEL_SIZES {
+            measure_ticks(grow_tooth_of_spacing(spacing)?, results)?;
+        }
+        if !arguments.ticks {
+            measure_sessions(results)?;
         }
     }
-    results.startup_ms = Some(volumes::startup_ms()?);
+    if !arguments.ticks {
+        results.startup_ms = Some(volumes::startup_ms()?);
+    }
+    Ok(())
+}
+
+/// Measures whole sessions on the program's own tooth.
+fn measure_sessions(results: &mut BenchResults) -> Result<(), String> {
+    for name in DIMS.map(name_of) {
+        let peak = session::peak_mib(&name)?;
+        results.peak_mib.insert(name, peak);
+    }
+    let five_minutes = session::five_minutes(grow_tooth(SESSION_DIMS)?)?;
+    results.replay_s = Some(five_minutes.replay_s);
+    results.score_s = Some(five_minutes.score_s);
     Ok(())
 }
 
 /// Takes all measurements on one tooth.
-fn measure_tooth(tooth: Volume, results: &mut BenchResults) -> Result<(), String> {
+fn measure_all(tooth: Volume, results: &mut BenchResults) -> Result<(), String> {
     let name = name_of(tooth.grid().dims);
     let work = volumes::measure(&tooth)?;
     results.mesh_ms.insert(name.clone(), work.mesh_ms);
     results.remesh_ms.insert(name.clone(), work.remesh_ms);
     results.frame_ms.insert(name.clone(), work.frames);
     results.edt_ms.insert(name.clone(), work.edt_ms);
-    results.load_ms.insert(name.clone(), work.load_ms);
+    results.load_ms.insert(name, work.load_ms);
+    measure_ticks(tooth, results)
+}
+
+/// Measures the ticks of the servo on one tooth.
+fn measure_ticks(tooth: Volume, results: &mut BenchResults) -> Result<(), String> {
+    let name = name_of(tooth.grid().dims);
+    results.voxel_mm.insert(name.clone(), f64::from(tooth.grid().spacing.max_element()));
     let ticks = ticks::measure(tooth)?;
     results.tick_us.insert(name.clone(), ticks.us);
     results.removed_mm3.insert(name, ticks.removed_mm3);
@@ -124,6 +154,12 @@ fn measure_tooth(tooth: Volume, results: &mut BenchResults) -> Result<(), String
 fn grow_tooth(dims: [u32; 3]) -> Result<Volume, String> {
     let form = &typodont_anatomy::lower_first_molar::LOWER_FIRST;
     Ok(typodont_anatomy::grow(form, typodont_anatomy::grid_fitting(form, dims), &volumes::tissues()?))
+}
+
+/// Generates the program's own molar in the smallest grid with this voxel size, mm.
+fn grow_tooth_of_spacing(spacing: f32) -> Result<Volume, String> {
+    let form = &typodont_anatomy::lower_first_molar::LOWER_FIRST;
+    Ok(typodont_anatomy::grow(form, typodont_anatomy::grid_of_spacing(form, spacing), &volumes::tissues()?))
 }
 
 fn name_of(dims: [u32; 3]) -> String {
@@ -172,8 +208,9 @@ impl BenchResults {
             figures.iter().for_each(|f| line(name.to_string(), f));
         }
         let plain = |name: &str, table: &BTreeMap<String, f64>| -> Vec<String> {
-            table.iter().map(|(dims, value)| format!("{:<34}{value:>10.2}", format!("{name}.{dims}"))).collect()
+            table.iter().map(|(dims, value)| format!("{:<34}{value:>10.3}", format!("{name}.{dims}"))).collect()
         };
+        lines.extend(plain("voxel_mm", &self.voxel_mm));
         lines.extend(plain("removed_mm3", &self.removed_mm3));
         lines.extend(plain("peak_mib", &self.peak_mib));
         lines.join("\n") + "\n"
