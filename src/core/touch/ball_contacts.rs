@@ -4,6 +4,7 @@
 
 use super::active_set::{Constraint, ConstraintSource};
 use super::body::BodyRegion;
+use super::collider_bounds::ColliderBounds;
 use super::collision_scene::CollisionScene;
 use super::instrument::{Instrument, SAMPLE_SAG};
 use crate::frame::Vec3;
@@ -30,6 +31,7 @@ pub(super) struct ContactQuery {
 /// Collects a constraint for every sample direction in which matter is in reach, and for every collider in reach.
 pub(super) fn collect_constraints(
     constraints: &mut Vec<Constraint>,
+    bounds: &mut ColliderBounds,
     scene: &CollisionScene,
     instrument: &Instrument,
     query: ContactQuery,
@@ -71,7 +73,7 @@ pub(super) fn collect_constraints(
             region: BodyRegion::Head,
         });
     }
-    collect_collider_constraints(constraints, scene, radius, query);
+    collect_collider_constraints(constraints, bounds, scene, radius, query);
 }
 
 /// Clearance by which the ball may enter the volume, mm.
@@ -89,13 +91,17 @@ fn slack(volume: &Volume, instrument: &Instrument) -> f32 {
 /// Adds a constraint for every contact with a collider in reach.
 fn collect_collider_constraints(
     constraints: &mut Vec<Constraint>,
+    bounds: &mut ColliderBounds,
     scene: &CollisionScene,
     radius: f32,
     query: ContactQuery,
 ) {
     let ContactQuery { tip, reach, .. } = query;
     for (index, collider) in scene.colliders.iter().enumerate() {
-        collider.for_each_contact(tip, radius + reach, |distance, normal| {
+        if bounds.is_far((index, collider), tip, radius + reach) {
+            continue;
+        }
+        let distance = collider.for_each_contact(tip, radius + reach, |distance, normal| {
             let clearance = distance - radius;
             if clearance < reach {
                 constraints.push(Constraint {
@@ -107,6 +113,7 @@ fn collect_collider_constraints(
                 });
             }
         });
+        bounds.keep(index, tip, distance);
     }
 }
 

@@ -7,6 +7,7 @@ use super::profile::{Profile, ProfilePoint, ProfileSample};
 use crate::frame::Vec3;
 use crate::volume::{Grid, ISO, Volume, distance, surface};
 use std::f32::consts::{PI, TAU};
+use std::ops::Range;
 
 /// Working end with its shank.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +16,7 @@ pub struct Body {
     /// Makes contact, never cuts.
     shank: Option<Profile>,
     surface_points: Vec<BodySurfacePoint>,
+    chunks: Vec<PointChunk>,
     /// Centre of a sphere around all surface points, handle space.
     centre: Vec3,
     bounding_radius: f32,
@@ -70,6 +72,19 @@ pub struct BodySurfacePoint {
     /// Half the extent of the surface patch around the point, along the profile and across it, mm.
     pub half_extent: [f32; 2],
     pub region: BodyRegion,
+}
+
+/// Consecutive surface points per [`PointChunk`]. They lie near each other, so that one comparison skips the whole chunk
+/// while none of them can be in contact.
+pub(super) const CHUNK: usize = 16;
+
+/// Consecutive surface points and a sphere around them; handle space, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PointChunk {
+    /// Indices of the points.
+    pub points: Range<usize>,
+    pub centre: Vec3,
+    pub radius: f32,
 }
 
 /// Target number of surface points: enough that whatever slips between two of them stays below what a hand can
@@ -151,16 +166,22 @@ impl Body {
     }
 
     fn enclosed(head: HeadGeometry, shank: Option<Profile>, surface_points: Vec<BodySurfacePoint>) -> Body {
-        let low = surface_points.iter().map(|n| n.position).fold(Vec3::splat(f32::INFINITY), Vec3::min);
-        let high = surface_points.iter().map(|n| n.position).fold(Vec3::splat(f32::NEG_INFINITY), Vec3::max);
-        let centre = if surface_points.is_empty() { Vec3::ZERO } else { 0.5 * (low + high) };
-        let bounding_radius = surface_points.iter().map(|n| n.position.distance(centre)).fold(0.0, f32::max);
-        Body { head, shank, surface_points, centre, bounding_radius }
+        let (centre, bounding_radius) = enclosing_sphere(&surface_points);
+        let chunks = surface_points.chunks(CHUNK).enumerate().map(|(index, points)| {
+            let (centre, radius) = enclosing_sphere(points);
+            PointChunk { points: index * CHUNK..index * CHUNK + points.len(), centre, radius }
+        });
+        Body { head, shank, chunks: chunks.collect(), surface_points, centre, bounding_radius }
     }
 
     /// Sample points of the surface, for contact queries.
     pub fn surface_points(&self) -> &[BodySurfacePoint] {
         &self.surface_points
+    }
+
+    /// Surface points in chunks of [`CHUNK`].
+    pub(super) fn chunks(&self) -> &[PointChunk] {
+        &self.chunks
     }
 
     /// Centre (handle space) and radius of a sphere that contains all surface points, mm.
@@ -227,6 +248,14 @@ impl Body {
             (_, HeadGeometry::Voxels(field), _) => field.project_to_surface(point_in_handle),
         }
     }
+}
+
+/// Centre and radius of a sphere around surface points, mm.
+fn enclosing_sphere(points: &[BodySurfacePoint]) -> (Vec3, f32) {
+    let low = points.iter().map(|n| n.position).fold(Vec3::splat(f32::INFINITY), Vec3::min);
+    let high = points.iter().map(|n| n.position).fold(Vec3::splat(f32::NEG_INFINITY), Vec3::max);
+    let centre = if points.is_empty() { Vec3::ZERO } else { 0.5 * (low + high) };
+    (centre, points.iter().map(|n| n.position.distance(centre)).fold(0.0, f32::max))
 }
 
 /// Area of a body of revolution, mm², summed over the samples of its profile.

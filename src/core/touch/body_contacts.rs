@@ -6,9 +6,10 @@
 
 use super::active_set::{Constraint, ConstraintSource};
 use super::ball_contacts::ContactQuery;
-use super::body::{Body, BodySurfacePoint};
+use super::body::{Body, BodySurfacePoint, CHUNK};
+use super::collider_bounds::{ColliderBounds, ColliderProximity};
 use super::collision_scene::CollisionScene;
-use crate::frame::{Quat, Vec3};
+use crate::frame::{Pose, Quat, Vec3};
 use crate::volume::{ISO, Volume};
 
 /// Distance below which a surface point may become an active contact and is refined, mm.
@@ -28,10 +29,6 @@ const REFINE_STEPS: usize = 3;
 /// Search directions tried in turn: where the body is curved in one direction and matter in the other, the deepest
 /// point lies off the first.
 const DIRECTIONS_MAX: usize = 2;
-
-/// Consecutive surface points per chunk. They lie near each other, so that one comparison skips the whole chunk while
-/// none of them is due for a check.
-const CHUNK: usize = 16;
 
 /// Surface points that need no check yet, because they are farther from matter than the instrument can have moved
 /// since.
@@ -86,6 +83,13 @@ impl ProximityCache {
     }
 }
 
+/// Everything known about the distances of a body from matter.
+pub(super) struct ProximityState<'a> {
+    pub volume: &'a mut ProximityCache,
+    pub colliders: &'a mut ColliderProximity,
+    pub bounds: &'a mut ColliderBounds,
+}
+
 /// Body, its orientation and whether it cuts.
 #[derive(Clone, Copy)]
 pub(super) struct PosedBody<'a> {
@@ -97,7 +101,7 @@ pub(super) struct PosedBody<'a> {
 /// Collects a constraint for every surface point with matter in reach, and for every collider in reach of a point.
 pub(super) fn collect_constraints(
     constraints: &mut Vec<Constraint>,
-    cache: &mut ProximityCache,
+    ProximityState { volume: cache, colliders, bounds }: ProximityState,
     scene: &CollisionScene,
     posed: PosedBody,
     query: ContactQuery,
@@ -152,7 +156,7 @@ pub(super) fn collect_constraints(
         }
         *chunk_next = next_checks.iter().copied().fold(f64::INFINITY, f64::min);
     }
-    collect_collider_constraints(constraints, scene, posed, query);
+    collect_collider_constraints(constraints, (bounds, colliders), scene, posed, query);
 }
 
 /// Between voxel centres a concave surface reads narrower than it is; see `ball_contacts`.
@@ -164,19 +168,27 @@ fn slack(volume: &Volume, posed: PosedBody) -> f32 {
 
 fn collect_collider_constraints(
     constraints: &mut Vec<Constraint>,
+    (bounds, proximity): (&mut ColliderBounds, &mut ColliderProximity),
     scene: &CollisionScene,
     posed: PosedBody,
     query: ContactQuery,
 ) {
     let ContactQuery { tip, reach, .. } = query;
+    let tooth_from_handle = Pose { position: tip, orientation: posed.tooth_from_handle };
     let (middle, radius) = posed.body.bounding_sphere();
+    let mut has_moved = false;
     for (index, collider) in scene.colliders.iter().enumerate() {
-        if collider.distance(tip + posed.tooth_from_handle * middle) > radius + reach {
+        if bounds.is_beyond((index, collider), tooth_from_handle * middle, radius + reach) {
             continue;
         }
-        for node in posed.body.surface_points() {
-            let place = tip + posed.tooth_from_handle * node.position;
-            if collider.distance(place) < reach && constraints.len() < constraints.capacity() {
+        if !has_moved {
+            proximity.move_to(scene, posed.body, tooth_from_handle);
+            has_moved = true;
+        }
+        proximity.for_each_near((index, collider), posed.body, reach, |point| {
+            let node = &posed.body.surface_points()[point];
+            let place = tooth_from_handle * node.position;
+            if constraints.len() < constraints.capacity() {
                 let (distance, normal) = collider.distance_and_normal(place);
                 constraints.push(Constraint {
                     normal,
@@ -186,7 +198,7 @@ fn collect_collider_constraints(
                     region: node.region,
                 });
             }
-        }
+        });
     }
 }
 

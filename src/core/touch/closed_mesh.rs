@@ -100,7 +100,9 @@ impl ClosedMesh {
 
     /// Visits every local minimum of the distance to the surface within a distance, at most the nearest
     /// [`MESH_CONTACTS_MAX`]: the points at which a growing ball around `point` would touch the surface.
-    pub(super) fn for_each_contact(&self, point: Vec3, within: f32, mut visit: impl FnMut(MeshContact)) {
+    ///
+    /// Returns the signed distance of the point, or a lower bound of it.
+    pub(super) fn for_each_contact(&self, point: Vec3, within: f32, mut visit: impl FnMut(MeshContact)) -> f32 {
         let (way_out, triangle, location) = self.nearest_place(point);
         let nearest = self.contact_at(point, way_out, triangle, location);
         let is_inside = nearest.distance < -SKIN;
@@ -139,6 +141,7 @@ impl ClosedMesh {
             (found[0], count) = (nearest, 1);
         }
         found[..count].iter().for_each(|m| visit(*m));
+        nearest.distance
     }
 
     /// Returns true if no direction along the surface leads from the nearest point of a triangle closer to `point`.

@@ -16,7 +16,7 @@ pub struct CollisionScene {
 
 /// Margin for rounding errors of distances of some metres, mm: whatever is farther than a search distance by this
 /// much is out of reach.
-const ROUNDING: f32 = 1e-2;
+pub(super) const ROUNDING: f32 = 1e-2;
 
 /// Distance of the tip's centre from a compliant collider below which the tip rests on it, mm: more than a probe's
 /// radius.
@@ -70,6 +70,11 @@ impl Collider {
         }
     }
 
+    /// Greatest change of the distance per millimetre of motion: 1, unless samples describe a steeper shape.
+    pub(super) fn steepness(&self) -> f32 {
+        if let ColliderGeometry::Sdf(field) = &self.geometry { field.steepness() } else { 1.0 }
+    }
+
     /// Returns the distance, as [`Collider::distance`] does, and the outward unit normal.
     pub fn distance_and_normal(&self, point_in_tooth: Vec3) -> (f32, Vec3) {
         if let ColliderGeometry::Mesh(obstacle) = &self.geometry {
@@ -89,23 +94,26 @@ impl Collider {
 
     /// Visits the signed distance and outward normal of every contact of a ball around a point: at most one for a
     /// formula or a distance grid, all local minima for a mesh. Contacts farther than `within` mm may be left out.
-    pub(super) fn for_each_contact(&self, point_in_tooth: Vec3, within: f32, mut visit: impl FnMut(f32, Vec3)) {
+    ///
+    /// Returns the signed distance of the point, or a lower bound of it.
+    pub(super) fn for_each_contact(&self, point_in_tooth: Vec3, within: f32, mut visit: impl FnMut(f32, Vec3)) -> f32 {
         match &self.geometry {
             // The normal costs six more distances, so it is computed only within reach.
             ColliderGeometry::Ball { .. }
             | ColliderGeometry::RoundBox { .. }
             | ColliderGeometry::Capsule { .. }
             | ColliderGeometry::Sdf(_) => {
-                if self.distance(point_in_tooth) > within + ROUNDING {
-                    return;
+                let distance = self.distance(point_in_tooth);
+                if distance <= within + ROUNDING {
+                    let (distance, normal) = self.distance_and_normal(point_in_tooth);
+                    visit(distance, normal);
                 }
-                let (distance, normal) = self.distance_and_normal(point_in_tooth);
-                visit(distance, normal);
+                distance
             }
             ColliderGeometry::Mesh(obstacle) => {
                 let point = self.tooth_from_collider.inverse() * point_in_tooth;
                 obstacle
-                    .for_each_contact(point, within, |m| visit(m.distance, self.tooth_from_collider.rotate(m.normal)));
+                    .for_each_contact(point, within, |m| visit(m.distance, self.tooth_from_collider.rotate(m.normal)))
             }
         }
     }

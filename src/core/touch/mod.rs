@@ -8,6 +8,7 @@ mod sdf_grid;
 mod closed_mesh;
 mod profile;
 mod body;
+mod collider_bounds;
 mod instrument;
 mod material;
 mod active_set;

@@ -7,10 +7,11 @@
 
 use super::active_set::{ActiveSet, Constraint, ConstraintSource, project_to_feasible};
 use super::ball_contacts;
-use super::body::{Body, BodyRegion};
+use super::body::{Body, BodyRegion, BodySurfacePoint};
 use super::body_contacts::{self, ProximityCache};
 use super::closed_mesh::MESH_CONTACTS_MAX;
-use super::collision_scene::CollisionScene;
+use super::collider_bounds::{ColliderBounds, ColliderProximity};
+use super::collision_scene::{Collider, CollisionScene, ROUNDING};
 use super::instrument::Instrument;
 use super::material::{Material, MaterialMean, Materials};
 use crate::frame::{Pose, Quat, Vec3};
@@ -84,6 +85,10 @@ pub struct Proxy {
     constraints: Vec<Constraint>,
     /// Scratch: surface points of a body that are far from matter.
     proximity: ProximityCache,
+    /// Scratch: the same for colliders.
+    collider_proximity: ColliderProximity,
+    /// Scratch: distances of colliders.
+    bounds: ColliderBounds,
 }
 
 impl Proxy {
@@ -101,6 +106,8 @@ impl Proxy {
             stick: 1.0,
             constraints: Vec::with_capacity((directions + 1 + collider_contacts).max(points * (1 + collider_contacts))),
             proximity: ProximityCache::with_capacity(points),
+            collider_proximity: ColliderProximity::with_capacity(scene.colliders.len(), points),
+            bounds: ColliderBounds::new(scene),
         }
     }
 
@@ -115,6 +122,11 @@ impl Proxy {
 
     /// Moves the tip to the hand and ends contact.
     pub fn reset_to(&mut self, hand_in_tooth: Vec3) {
+        self.end_contact_at(hand_in_tooth);
+        self.collider_proximity.forget();
+    }
+
+    fn end_contact_at(&mut self, hand_in_tooth: Vec3) {
         self.tip = hand_in_tooth;
         self.last_hand = hand_in_tooth;
         self.contact = None;
@@ -150,8 +162,8 @@ impl Proxy {
         tooth_from_handle: &Pose,
     ) {
         let hand = tooth_from_handle.position;
-        if self.contact.is_none() && is_path_clear(scene, instrument, self.tip, tooth_from_handle) {
-            self.reset_to(hand);
+        if self.contact.is_none() && self.is_path_clear(scene, instrument, tooth_from_handle) {
+            self.end_contact_at(hand);
             self.last_orientation = tooth_from_handle.orientation;
             return;
         }
@@ -173,10 +185,22 @@ impl Proxy {
         if let Some(contact) = self.read_contact(scene, materials, &active, friction) {
             self.contact = Some(contact);
         } else if self.tip.distance(hand) < ARRIVED {
-            self.reset_to(hand);
+            self.end_contact_at(hand);
         }
         // Otherwise nothing constrains the tip, but it has not caught up with the hand yet: the last contact stays
         // until it has.
+    }
+
+    /// Returns true if the straight way from tip to hand is certain to be clear of matter.
+    fn is_path_clear(&mut self, scene: &CollisionScene, instrument: &Instrument, tooth_from_handle: &Pose) -> bool {
+        let hand = tooth_from_handle.position;
+        if let Some(body) = instrument.body() {
+            let (middle, radius) = body.bounding_sphere();
+            return self.bounds.is_clear(scene, *tooth_from_handle * middle, self.tip.distance(hand) + radius);
+        }
+        // A clear ball around one end that contains the other end contains the whole way.
+        let needed = self.tip.distance(hand) + instrument.radius();
+        self.bounds.is_clear(scene, hand, needed) || self.bounds.is_clear(scene, self.tip, needed)
     }
 
     /// Moves the ball toward the goal; returns the constraints active at the end (indices into `self.constraints`).
@@ -193,6 +217,7 @@ impl Proxy {
         for _ in 0..MOVES_MAX {
             ball_contacts::collect_constraints(
                 &mut self.constraints,
+                &mut self.bounds,
                 scene,
                 instrument,
                 ball_contacts::ContactQuery { tip: self.tip, goal, reach },
@@ -240,7 +265,12 @@ impl Proxy {
         self.proximity.add_rotation(swing);
         for _ in 0..MOVES_MAX {
             let query = ball_contacts::ContactQuery { tip: self.tip, goal, reach };
-            body_contacts::collect_constraints(&mut self.constraints, &mut self.proximity, scene, posed, query);
+            let proximity = body_contacts::ProximityState {
+                volume: &mut self.proximity,
+                colliders: &mut self.collider_proximity,
+                bounds: &mut self.bounds,
+            };
+            body_contacts::collect_constraints(&mut self.constraints, proximity, scene, posed, query);
             let allowed;
             (allowed, active) = project_to_feasible(&self.constraints, goal);
             let displacement = allowed - self.tip;
@@ -417,24 +447,22 @@ impl StepCapsule {
     }
 }
 
-/// Returns true if the straight way from tip to hand is certain to be clear of matter.
-fn is_path_clear(scene: &CollisionScene, instrument: &Instrument, tip: Vec3, tooth_from_handle: &Pose) -> bool {
-    let hand = tooth_from_handle.position;
-    if let Some(body) = instrument.body() {
-        let (middle, radius) = body.bounding_sphere();
-        return tip.distance(hand) + radius < scene.clear_radius(*tooth_from_handle * middle);
-    }
-    // A clear ball around one end that contains the other end contains the whole way.
-    let needed = tip.distance(hand) + instrument.radius();
-    needed < scene.clear_radius(hand) || needed < scene.clear_radius(tip)
-}
-
 fn is_body_free(scene: &CollisionScene, body: &Body, hand: &Pose) -> bool {
     let (middle, radius) = body.bounding_sphere();
     scene.clear_radius(*hand * middle) > radius
-        || body.surface_points().iter().all(|node| {
-            let place = *hand * node.position;
-            scene.volume.density_at(place) < ISO && scene.colliders.iter().all(|s| s.distance(place) > 0.0)
+        || body.surface_points().iter().all(|node| scene.volume.density_at(*hand * node.position) < ISO)
+            && scene.colliders.iter().all(|collider| is_body_outside(collider, body, hand))
+}
+
+/// Returns true if all surface points of a body are outside a collider.
+fn is_body_outside(collider: &Collider, body: &Body, hand: &Pose) -> bool {
+    let is_ball_outside =
+        |centre: Vec3, radius: f32| collider.distance(*hand * centre) > collider.steepness() * radius + ROUNDING;
+    let (middle, radius) = body.bounding_sphere();
+    let are_outside = |points: &[BodySurfacePoint]| points.iter().all(|p| collider.distance(*hand * p.position) > 0.0);
+    is_ball_outside(middle, radius)
+        || body.chunks().iter().all(|chunk| {
+            is_ball_outside(chunk.centre, chunk.radius) || are_outside(&body.surface_points()[chunk.points.clone()])
         })
 }
 

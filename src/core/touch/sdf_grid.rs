@@ -9,6 +9,8 @@ pub struct SdfGrid {
     grid: Grid,
     /// Signed distances, mm; negative inside.
     distances: Vec<f32>,
+    /// Upper bound of the change of the distance per millimetre of motion; at least 1.
+    steepness: f32,
     pub compliance: Compliance,
 }
 
@@ -40,7 +42,13 @@ impl SdfGrid {
             let beyond = (low - point).max(point - high).max_element() + grid.spacing.max_element();
             at(point).max(beyond)
         });
-        SdfGrid { distances: distances.collect(), grid, compliance }
+        let distances: Vec<f32> = distances.collect();
+        SdfGrid { steepness: steepness(&grid, &distances), distances, grid, compliance }
+    }
+
+    /// Upper bound of the change of the distance per millimetre of motion; at least 1.
+    pub(super) fn steepness(&self) -> f32 {
+        self.steepness
     }
 
     pub fn extent(&self) -> [Vec3; 2] {
@@ -62,6 +70,19 @@ impl SdfGrid {
         // box and the distance from there to the shape.
         if outside > 0.0 { (outside * outside + inside.max(0.0) * inside.max(0.0)).sqrt() } else { inside }
     }
+}
+
+/// Upper bound of the slope of samples interpolated trilinearly: along each axis it is between the slopes of the
+/// surrounding edges of the grid. Outside the grid, where the distance to the grid is added, the slope is at most 1.
+fn steepness(grid: &Grid, distances: &[f32]) -> f32 {
+    let [nx, ny, _] = grid.dims.map(|n| n as usize);
+    let squared_slopes = [1, nx, nx * ny].into_iter().enumerate().map(|(axis, stride)| {
+        let is_edge = |index: &usize| index / stride % grid.dims[axis] as usize + 1 < grid.dims[axis] as usize;
+        let rise = |index: usize| (distances[index + stride] - distances[index]).abs();
+        let slope = (0..distances.len()).filter(is_edge).map(rise).fold(0.0, f32::max) / grid.spacing[axis];
+        slope * slope
+    });
+    squared_slopes.sum::<f32>().sqrt().max(1.0)
 }
 
 #[cfg(test)]
