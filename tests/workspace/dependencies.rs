@@ -205,3 +205,39 @@ fn a_package_can_name_all_it_contains() {
         assert!(!line.is_empty());
     }
 }
+
+#[test]
+fn a_bill_of_materials_names_every_crate_with_its_digest() {
+    // Aim: IT can compare the program with a list of known weaknesses. Method: `scripts/sbom` names the crates of the lock
+    // file with their digests, each reference leads to one of them, and the same sources give the same bytes.
+    let bill = || {
+        let mut command = Command::new("python3");
+        command.arg("scripts/sbom").current_dir(root()).env("SOURCE_DATE_EPOCH", "1800000000").output()
+    };
+    let (Ok(output), Ok(again)) = (bill(), bill()) else {
+        return tools::skip("there is no python3: the bill of materials is not written");
+    };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.stdout, again.stdout);
+    let bill: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&bill["specVersion"], &bill["metadata"]["timestamp"]), (&"1.5".into(), &"2027-01-15T08:00:00Z".into()));
+    let components = bill["components"].as_array().unwrap();
+    let mut references: BTreeSet<&str> =
+        components.iter().map(|component| component["bom-ref"].as_str().unwrap()).collect();
+    for component in components {
+        assert_eq!(component["hashes"][0]["content"].as_str().unwrap().len(), 64, "{component}");
+        assert!(!component["licenses"][0]["expression"].as_str().unwrap().is_empty(), "{component}");
+    }
+    for package in PACKAGES.iter().filter(|package| ["serde", "wgpu", "postgres"].contains(&name(package))) {
+        let reference = format!("pkg:cargo/{}@{}", name(package), package["version"].as_str().unwrap());
+        assert!(references.contains(reference.as_str()), "{reference}");
+    }
+    assert!(!references.iter().any(|reference| reference.starts_with("pkg:cargo/proptest@")), "a test's dependency");
+    references.insert(bill["metadata"]["component"]["bom-ref"].as_str().unwrap());
+    for dependency in bill["dependencies"].as_array().unwrap() {
+        assert!(references.contains(dependency["ref"].as_str().unwrap()), "{dependency}");
+        for used in dependency["dependsOn"].as_array().unwrap() {
+            assert!(references.contains(used.as_str().unwrap()), "{dependency}");
+        }
+    }
+}
