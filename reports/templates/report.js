@@ -150,7 +150,7 @@ class Page {
       tissue: this.named(palette.tissues.get(tissue)), verdict: this.named(palette.verdicts.get(verdict)),
       voxel: voxels.inBundle(cell).join(', '), ...this.wayTo(voxels.pointOf(cell)),
     };
-    if (fall) Object.assign(values, { time: duration(fall.tick / 1000), seconds: (fall.tick / 1000).toFixed(3), force: fall.force.toFixed(2), tool: this.session.tools[fall.tool] || '–' });
+    if (fall) Object.assign(values, { time: duration(fall.tick / 1000), seconds: (fall.tick / 1000).toFixed(3), force: fall.force.toFixed(2), tool: this.named(this.session.tools[fall.tool]) });
     const parts = [tissue === 0 ? this.say('script.air') : this.say(fall ? 'script.fell' : 'script.kept', values)];
     if (fall && fall.tick > voxels.moment) parts.push(this.say('script.falls_later'));
     if (this.mark !== null) parts.unshift(this.say('script.mark', { number: this.mark }));

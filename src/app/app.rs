@@ -1,15 +1,17 @@
 //! The application: chooses the screen that is shown, and carries out the commands of every screen.
 
 use super::command::{AppCommand, CameraCommand, PracticeCommand};
+use super::completion::{Completion, CompletionProgress};
 use super::editor::{self, EditorCommand, EditorState, OpenMode};
-use super::exercise_list::{self, ExerciseList, exercise_list_ui};
+use super::exercise_list::{self, ExerciseList, ListContext, exercise_list_ui};
 use super::i18n::{self, Translations};
 use super::lesson_scene::DisplayMode;
 use super::lesson_state::LessonState;
 use super::lesson_thread::{InputDevice, LessonConfig};
 use super::messages::SecondHandStatus;
-use super::results::{LessonResults, results_ui};
+use super::results::{BundleState, LessonResults, ResultTexts, results_ui};
 use super::screen::Screen;
+use super::session_history::SessionHistory;
 use super::settings::{self, Settings};
 use super::settings_screen::settings_ui;
 use super::state_log::StateLog;
@@ -23,12 +25,13 @@ use std::time::Duration;
 use typodont_audio::wav_files;
 use typodont_audio::{PlaybackOptions, Replacements};
 use typodont_author::new_exercise;
-use typodont_exercise::scenario::Scenario;
+use typodont_exercise::scenario::{QuestionnaireTime, Scenario};
 use typodont_exercise::session::Input;
 use typodont_formats::Library;
 use typodont_formats::diagnostic::headlines;
 use typodont_lesson as lesson;
 use typodont_lesson::SessionSeed;
+use typodont_report::FirstResult;
 
 pub struct App {
     options: AppOptions,
@@ -36,6 +39,9 @@ pub struct App {
     languages: Vec<Translations>,
     words: Translations,
     exercise_list: ExerciseList,
+    history: SessionHistory,
+    /// Bundles that are still being made after their results were left.
+    completions: Vec<Completion>,
     participant: String,
     screen: Screen,
     /// The editor to return to after the test run of an exercise.
@@ -102,7 +108,10 @@ impl App {
             }
         }
         let begins = options.begins_at_once;
+        let history = SessionHistory::read(&options.out, options.templates.clone(), repaint_waker(ctx));
         let mut app = App {
+            history,
+            completions: Vec::new(),
             words: i18n::select_language(&languages, &settings.language),
             participant: options.participant.clone(),
             options,
@@ -157,15 +166,109 @@ impl App {
         if let Screen::Editor(editor) = &mut self.screen {
             editor.poll(ctx.input(|input| input.time));
         }
+        self.history.poll();
+        for completion in &mut self.completions {
+            completion.poll();
+            if let Some(Err(why)) = &completion.state().outcome {
+                self.complaints.push(why.clone());
+            }
+        }
+        self.completions.retain(|completion| completion.state().outcome.is_none());
+        match &mut self.screen {
+            Screen::Lesson(lesson) => {
+                lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
+                self.skip_questionnaire();
+                self.poll_lesson();
+            }
+            Screen::Completion(completion) => {
+                completion.poll();
+                self.poll_interrupted();
+            }
+            Screen::Results(results) => results.poll(ctx),
+            _ => {}
+        }
+    }
+
+    /// Shows the result of the lesson once it is scored, or the reason why there is none.
+    fn poll_lesson(&mut self) {
         let Screen::Lesson(lesson) = &mut self.screen else { return };
-        lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
-        match lesson.outcome.take() {
-            Some(Ok(bundle)) => match LessonResults::load(bundle, ctx) {
-                Ok(results) => self.screen = Screen::Results(Box::new(results)),
-                Err(why) => self.screen = Screen::Failed(why),
-            },
-            Some(Err(why)) => self.screen = Screen::Failed(why),
-            None => {}
+        if let Some(first) = lesson.completion.first_result.take() {
+            if let Some(ended) = lesson.ended {
+                self.state_log.record("result_after_ms", ended.elapsed().as_millis());
+            }
+            if let Screen::Lesson(lesson) = std::mem::replace(&mut self.screen, Screen::ExerciseList) {
+                let is_test_run = self.test_run_origin.is_some();
+                self.show_results(*first, Completion::of_lesson(lesson), !is_test_run);
+            }
+        } else if let Some(Err(why)) = lesson.completion.outcome.take() {
+            self.screen = Screen::Failed(why);
+        }
+    }
+
+    /// Shows the result of an interrupted session once it is scored, or the reason why there is none.
+    fn poll_interrupted(&mut self) {
+        let Screen::Completion(completion) = &mut self.screen else { return };
+        if let Some(first) = completion.take_first_result() {
+            let has_retry = self.exercise_list.select_id(&first.session.scenario.id);
+            if let Screen::Completion(completion) = std::mem::replace(&mut self.screen, Screen::ExerciseList) {
+                self.show_results(*first, *completion, has_retry);
+            }
+        } else if let Some(Err(why)) = completion.state().outcome.clone() {
+            self.screen = Screen::Failed(why);
+        }
+    }
+
+    fn show_results(&mut self, first: FirstResult, completion: Completion, has_retry: bool) {
+        if self.test_run_origin.is_none() {
+            self.history.add(&first.session);
+        }
+        self.screen = Screen::Results(Box::new(LessonResults::new(first, completion, has_retry)));
+    }
+
+    /// Ends a lesson without its questionnaire if the exercise asks it at the end of the course, and that is not yet.
+    fn skip_questionnaire(&mut self) {
+        let Screen::Lesson(lesson) = &mut self.screen else { return };
+        if !lesson.are_stages_over || lesson.is_submitted || lesson.is_questionnaire_due {
+            return;
+        }
+        let course = self.exercise_list.course();
+        let scenario = &lesson.scenario;
+        lesson.is_questionnaire_due = self.test_run_origin.is_some()
+            || scenario.questionnaire_time == QuestionnaireTime::EachTime
+            || self.history.is_course_over(scenario, &course, &self.participant);
+        if !lesson.is_questionnaire_due {
+            lesson.submit_questionnaire();
+        }
+    }
+
+    /// Leaves the results; a bundle that is still being made is completed in the background.
+    fn leave_results(&mut self) {
+        if let Screen::Results(results) = std::mem::replace(&mut self.screen, Screen::ExerciseList)
+            && let BundleState::Pending(completion) = results.state
+        {
+            self.completions.push(completion);
+        }
+    }
+
+    /// Progress of a bundle that is being made in the background.
+    fn background_progress(&self) -> Option<CompletionProgress> {
+        self.completions.first().map(|completion| completion.state().progress)
+    }
+
+    /// Scores the interrupted session that the list offers.
+    fn finish_interrupted(&mut self, ctx: &egui::Context) {
+        let Some(session) = self.history.take_interrupted() else { return };
+        let templates = self.options.templates.clone();
+        self.screen = match Completion::of_interrupted(session, templates, repaint_waker(ctx)) {
+            Ok(completion) => Screen::Completion(Box::new(completion)),
+            Err(e) => Screen::Failed(format!("no-thread: the session cannot be scored: {e}")),
+        };
+    }
+
+    fn set_interrupted_aside(&mut self) {
+        let moved = self.history.take_interrupted().map(|session| session.set_aside());
+        if let Some(Err(why)) = moved {
+            self.complaints.push(why);
         }
     }
 
@@ -190,6 +293,12 @@ impl App {
                 }
             }
             AppCommand::OpenReport => self.open_report(ctx),
+            AppCommand::TryAgain => {
+                self.leave_results();
+                self.screen = Screen::Briefing;
+            }
+            AppCommand::FinishInterrupted => self.finish_interrupted(ctx),
+            AppCommand::SetAsideInterrupted => self.set_interrupted_aside(),
             AppCommand::ShowShortcuts(is_open) => {
                 self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false })
             }
@@ -216,21 +325,20 @@ impl App {
 
     /// Shows the instructions of the selected exercise, if it is valid.
     fn open_briefing(&mut self) {
-        if self.exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
+        let App { exercise_list: list, history, participant, settings, .. } = self;
+        let is_open = list.required_before(list.selected, history, participant, settings).is_none();
+        if is_open && list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
             self.screen = Screen::Briefing;
         }
     }
 
     /// Returns to the author's screen after a test run, otherwise to the list of exercises.
     fn go_back(&mut self) {
+        self.leave_results();
         if let Some(mut editor) = self.test_run_origin.take() {
             editor.invalidate_preview();
             self.screen = Screen::Editor(editor);
             return;
-        }
-        if !matches!(self.screen, Screen::Briefing) {
-            // The next person at this station is a different trainee.
-            self.participant = self.options.participant.clone();
         }
         self.screen = Screen::ExerciseList;
     }
@@ -249,7 +357,7 @@ impl App {
         let orbit = match &mut self.screen {
             Screen::Lesson(lesson) => &mut lesson.orbit,
             Screen::Editor(editor) => &mut editor.preview.orbit,
-            Screen::ExerciseList | Screen::Briefing | Screen::Results(_) | Screen::Failed(_) => return,
+            _ => return,
         };
         *orbit = match command {
             CameraCommand::Orbit { right, up } => orbit.rotated(right, up),
@@ -326,6 +434,11 @@ impl App {
     fn test_run(&mut self, ctx: &egui::Context) {
         let Screen::Editor(editor) = &mut self.screen else { return };
         editor.autosave();
+        if !self.completions.is_empty() {
+            // Both would write into the same folder.
+            editor.notice = Some(("briefing.report_first", String::new()));
+            return;
+        }
         let scenario = match editor.scenario() {
             Ok(scenario) => scenario,
             Err(_) => return editor.execute(EditorCommand::Check),
@@ -343,24 +456,36 @@ impl App {
     /// Delays a request to close the window while a lesson runs and until its bundle is written.
     fn handle_close_request(&mut self, ctx: &egui::Context) {
         let is_in_lesson = matches!(self.screen, Screen::Lesson(_));
+        let is_completing = !self.completions.is_empty()
+            || match &self.screen {
+                Screen::Lesson(lesson) => lesson.is_scoring,
+                Screen::Completion(_) => true,
+                Screen::Results(results) => results.is_pending(),
+                _ => false,
+            };
         if ctx.input(|input| input.viewport().close_requested())
             && let Screen::Editor(editor) = &mut self.screen
         {
             editor.autosave();
         }
-        if ctx.input(|input| input.viewport().close_requested()) && is_in_lesson {
+        if ctx.input(|input| input.viewport().close_requested()) && (is_in_lesson || is_completing) {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            if self.closing == CloseState::No {
+            if is_completing {
+                self.closing = CloseState::AfterLesson;
+            } else if self.closing == CloseState::No {
                 self.open_overlay(shortcuts::OverlayState::default());
                 self.closing = CloseState::Asked;
             }
         }
-        if self.closing == CloseState::AfterLesson && !is_in_lesson {
+        if self.closing == CloseState::AfterLesson && !is_in_lesson && !is_completing {
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
 
     fn begin_lesson(&mut self, ctx: &egui::Context) {
+        if !self.completions.is_empty() {
+            return;
+        }
         let Some(exercise) = self.exercise_list.selected_exercise() else { return };
         let (Ok(scenario), library) = (&exercise.scenario, exercise.library.clone()) else { return };
         if !lesson::is_valid_participant_code(&self.participant) {
@@ -446,9 +571,13 @@ impl App {
 
     fn screen_ui(&mut self, ui: &mut egui::Ui, frame: &eframe::Frame, commands: &mut Vec<AppCommand>) {
         let is_test_run = self.test_run_origin.is_some();
-        let App { screen, exercise_list, words, settings, participant, viewport, .. } = self;
+        let completion = self.background_progress();
+        let App { screen, exercise_list, history, options, words, settings, participant, viewport, .. } = self;
         match screen {
-            Screen::ExerciseList => exercise_list_ui(ui, exercise_list, words, commands),
+            Screen::ExerciseList => {
+                let context = ListContext { history, settings, words };
+                exercise_list_ui(ui, exercise_list, participant, &context, commands);
+            }
             Screen::Editor(editor) => {
                 if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
                     *viewport = Some(Viewport::new(state));
@@ -457,24 +586,29 @@ impl App {
             }
             Screen::Briefing => {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
-                    briefing::briefing_ui(ui, scenario, participant, words, commands);
+                    briefing::briefing_ui(ui, scenario, participant, completion, words, commands);
                 }
             }
             Screen::Lesson(lesson) if lesson.are_stages_over && !lesson.is_submitted => {
                 questionnaire::questionnaire_ui(ui, lesson, words, commands);
                 lesson.scroll_to_statement = false;
             }
-            Screen::Lesson(lesson) if lesson.are_stages_over || lesson.is_scoring => theme::centered_column(ui, |ui| {
-                ui.heading(words.get("practice.scoring"));
-                theme::progress_dots(ui);
-            }),
+            Screen::Lesson(lesson) if lesson.are_stages_over || lesson.is_scoring => {
+                let texts = &lesson.scenario.texts;
+                let timed_out = lesson.timed_out_stage.as_deref().map(|stage| words.own(texts, stage));
+                scoring_ui(ui, lesson.completion.progress, timed_out, words);
+            }
+            Screen::Completion(completion) => scoring_ui(ui, completion.state().progress, None, words),
             Screen::Lesson(lesson) => {
                 if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
                     *viewport = Some(Viewport::new(state));
                 }
                 practice::practice_ui(ui, lesson, settings, viewport.as_mut(), words, commands);
             }
-            Screen::Results(results) => results_ui(ui, results, is_test_run, words, commands),
+            Screen::Results(results) => {
+                let texts = ResultTexts { words, languages: options.templates.languages() };
+                results_ui(ui, results, is_test_run, &texts, commands);
+            }
             Screen::Failed(why) => theme::centered_column(ui, |ui| {
                 ui.heading(words.get("desk.failed"));
                 ui.label(why.as_str());
@@ -515,6 +649,7 @@ impl App {
     /// Writes the state of the screen to the state log, a line per change.
     fn log_state(&mut self) {
         let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, .. } = self;
+        let (history, participant, settings) = (&self.history, &self.participant, &self.settings);
         state_log.record(
             "over",
             if open.shortcuts {
@@ -529,6 +664,12 @@ impl App {
         );
         match screen {
             Screen::ExerciseList => {
+                state_log.record("unfinished", u8::from(history.interrupted().is_some()));
+                let chosen = exercise_list.selected_exercise().map_or("", |e| e.id());
+                let summary = history.summary(chosen, participant);
+                state_log.record("done", format!("{} {}", summary.count, summary.is_passed));
+                let required = exercise_list.required_before(exercise_list.selected, history, participant, settings);
+                state_log.record("required", required.map_or("nothing", |first| first.id()));
                 state_log.record("screen", "shelf");
                 state_log.record("chosen", exercise_list.selected_exercise().map_or("", |e| e.id()));
             }
@@ -538,13 +679,46 @@ impl App {
             }
             Screen::Briefing => state_log.record("screen", "briefing"),
             Screen::Lesson(lesson) => log_lesson(state_log, lesson),
+            Screen::Completion(_) => state_log.record("screen", "scoring"),
             Screen::Results(results) => {
-                state_log.record("bundle", results.bundle.display());
+                if let BundleState::Finished(bundle) = &results.state {
+                    state_log.record("bundle", bundle.display());
+                }
                 state_log.record("screen", "results");
             }
             Screen::Failed(why) => state_log.record("screen", format!("failed {why}")),
         }
     }
+}
+
+/// The bar above every screen, with the buttons for help and settings.
+fn top_bar_ui(ui: &mut egui::Ui, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let frame = egui::Frame::NONE.inner_margin(egui::Margin::symmetric(12, 4));
+    egui::Panel::top("top").resizable(false).frame(frame).show_separator_line(false).show(ui, |ui| {
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            for (key, command) in
+                [("menu.settings", AppCommand::ShowSettings(true)), ("menu.keys", AppCommand::ShowShortcuts(true))]
+            {
+                let button = ui.add(egui::Button::new(words.get(key)).small());
+                editor::anchor(ui, key, button.rect);
+                if button.clicked() {
+                    commands.push(command);
+                }
+            }
+        });
+    });
+}
+
+/// The page that is shown until the result is known.
+fn scoring_ui(ui: &mut egui::Ui, progress: CompletionProgress, timed_out: Option<&str>, words: &Translations) {
+    theme::centered_column(ui, |ui| {
+        if let Some(stage) = timed_out {
+            ui.label(egui::RichText::new(words.format("results.time_up", stage)).size(20.0).color(theme::WARNING));
+        }
+        ui.heading(words.get("practice.scoring"));
+        theme::progress_bar(ui, words.get(progress.key), progress.share);
+        theme::progress_dots(ui);
+    });
 }
 
 /// A modal page over the screen; it takes all keyboard and pointer input.
@@ -591,6 +765,8 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState) {
     }
     log.record("pointer", if lesson.is_pointer_captured { "held" } else { "free" });
     log.record("paused", lesson.is_paused);
+    log.record("clock", if lesson.is_awaiting_movement { "stopped" } else { "running" });
+    log.record("asked", if lesson.is_confirming_finish { "finish" } else { "nothing" });
     if let Some(SecondHandStatus::AwaitingConnection(address)) = lesson.second_hand {
         log.record("may_join", address);
     }
@@ -624,7 +800,8 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SelectInstrument(instrument) => lesson.submit(Input::Take { instrument }),
         PracticeCommand::AnswerQuestion(question, value) => lesson.answer_question(question, value),
         PracticeCommand::AddToChart(sign) => lesson.add_to_chart(sign),
-        PracticeCommand::ConfirmStage => lesson.confirm_stage(),
+        PracticeCommand::FinishStage => lesson.finish_stage(),
+        PracticeCommand::ContinueStage => lesson.is_confirming_finish = false,
         PracticeCommand::Pause(is_paused) => lesson.pause(is_paused),
         PracticeCommand::AskToAbort(is_giving_up) => lesson.is_confirming_abort = is_giving_up,
         PracticeCommand::Abort => lesson.abort(),
@@ -690,6 +867,7 @@ impl eframe::App for App {
         self.poll(&ctx);
         self.handle_close_request(&ctx);
         shortcuts::collect_commands(&ctx, &self.screen, self.overlay, self.had_focus, &mut commands);
+        top_bar_ui(ui, &self.words, &mut commands);
         for complaint in &self.complaints {
             ui.colored_label(theme::ERROR, complaint);
         }

@@ -35,6 +35,12 @@ pub enum AppCommand {
     /// A movement of the camera, in a lesson or at the author's screen.
     Camera(CameraCommand),
     OpenReport,
+    /// Shows the instructions of the exercise whose results are shown again.
+    TryAgain,
+    /// Scores the interrupted session that the list offers, and makes its bundle.
+    FinishInterrupted,
+    /// Moves the interrupted session that the list offers aside.
+    SetAsideInterrupted,
     ShowShortcuts(bool),
     ShowSettings(bool),
     ApplySettings(Box<Settings>),
@@ -49,7 +55,10 @@ pub enum PracticeCommand {
     AnswerQuestion(String, AnswerValue),
     /// Records an entry in the periodontal chart, at the site of the instrument.
     AddToChart(ChartInput),
-    ConfirmStage,
+    /// Asks whether the stage is finished; a second time, finishes it.
+    FinishStage,
+    /// Withdraws the question whether the stage is finished.
+    ContinueStage,
     Pause(bool),
     /// Opens or closes the question before aborting the lesson.
     AskToAbort(bool),

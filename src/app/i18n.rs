@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
+use typodont_exercise::local_text::LocalTexts;
 
 const SHIPPED: [(&str, &str); 2] =
     [("en", include_str!("../../content/languages/en.json")), ("tr", include_str!("../../content/languages/tr.json"))];
@@ -31,6 +32,11 @@ impl Translations {
     /// A text with its `{}` replaced.
     pub fn format(&self, key: &str, value: impl ToString) -> String {
         self.get(key).replacen("{}", &value.to_string(), 1)
+    }
+
+    /// A text of an exercise in this language; the base text if its author wrote no other.
+    pub fn own<'a>(&self, texts: &'a LocalTexts, text: &'a str) -> &'a str {
+        texts.get(text, &self.code)
     }
 
     pub fn name(&self) -> &str {

@@ -1,6 +1,8 @@
 //! A lesson as the window knows it: its events so far, its scene, and answers not yet submitted.
 
 use super::answer_draft::parse_draft;
+use super::completion::CompletionState;
+use super::controls_guide::{ControlsProgress, LessonProgress};
 use super::lesson_scene::{DisplayMode, LessonScene};
 use super::lesson_thread::{LessonCommand, LessonConfig, LessonEvent, LessonThread};
 use super::messages::{self, PauseReason, SecondHandStatus};
@@ -8,16 +10,15 @@ use super::pointer_hand::{PointedPlace, PointerHand};
 use super::snapshot::LessonSnapshot;
 use super::view_refresh::ViewRefresh;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Command as Tell;
 use typodont_core::touch::{Coefficient, Materials};
 use typodont_core::volume::Label;
 use typodont_exercise::scenario::{Scenario, Stage};
-use typodont_exercise::session::{AnswerValue, ChartInput, ChartRecord, Effect, Input};
+use typodont_exercise::session::{AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input};
 use typodont_formats::Library;
 use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
@@ -58,6 +59,8 @@ pub struct LessonState {
     /// True while the pointer acts as the device.
     pub is_pointer_captured: bool,
     pub pointer_hand: PointerHand,
+    /// Actions done in the running stage, for a stage that teaches the controls.
+    pub controls: ControlsProgress,
     pub is_confirming_abort: bool,
     pub orbit: Orbit,
     pub view_refresh: ViewRefresh,
@@ -78,9 +81,19 @@ pub struct LessonState {
     /// True while the user is asked to confirm submission with statements not rated.
     pub is_confirming_submit: bool,
     pub is_submitted: bool,
+    /// True if the questionnaire is to be answered now.
+    pub is_questionnaire_due: bool,
     pub is_scoring: bool,
-    /// Folder of the bundle, or the reason why there is none.
-    pub outcome: Option<Result<PathBuf, String>>,
+    /// True while the clock is stopped until the trainee picks the instrument up.
+    pub is_awaiting_movement: bool,
+    /// True while the user is asked to confirm that the stage is finished.
+    pub is_confirming_finish: bool,
+    /// Title of the stage that has just ended because its time was up.
+    pub timed_out_stage: Option<String>,
+    /// The making of the bundle.
+    pub completion: CompletionState,
+    /// Time at which the last input of the trainee ended the session.
+    pub ended: Option<Instant>,
 }
 
 /// Radius of the view until the workpiece is built, mm.
@@ -120,6 +133,7 @@ impl LessonState {
             is_paused: false,
             is_pointer_captured: false,
             pointer_hand: PointerHand::default(),
+            controls: ControlsProgress::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
             view_refresh: ViewRefresh::default(),
@@ -131,9 +145,14 @@ impl LessonState {
             scroll_to_statement: false,
             is_confirming_submit: false,
             is_submitted: false,
+            is_questionnaire_due: false,
             is_scoring: false,
+            is_awaiting_movement: false,
+            is_confirming_finish: false,
+            timed_out_stage: None,
             complaints: Vec::new(),
-            outcome: None,
+            completion: CompletionState::default(),
+            ended: None,
         })
     }
 
@@ -166,9 +185,7 @@ impl LessonState {
                 PlayerEvent::Silent(silence) => Some(silence.to_string()),
             };
         }
-        while let Some(event) = self.thread.next_event() {
-            self.apply_event(event);
-        }
+        self.poll_events();
         if let Some(scene) = &mut self.scene {
             for _ in 0..MAX_EDITS_PER_FRAME {
                 let Some(edit) = self.thread.next_edit() else { break };
@@ -180,11 +197,36 @@ impl LessonState {
             }
         }
         self.snapshot = self.thread.snapshot().or(self.snapshot);
+        if let Some(seen) = &self.snapshot {
+            self.controls.update(&LessonProgress {
+                hand: seen.hand,
+                is_touching: seen.touch.is_some(),
+                force: seen.spring,
+                is_cutting: seen.cutting,
+                orbit: &self.orbit,
+            });
+        }
         self.step_particles(elapsed);
-        if self.outcome.is_none() && self.thread.is_finished() {
-            self.outcome = Some(Err(
+        self.check_thread();
+    }
+
+    /// Takes over the steps in which the bundle is made.
+    pub fn poll_completion(&mut self) {
+        self.poll_events();
+        self.check_thread();
+    }
+
+    fn poll_events(&mut self) {
+        while let Some(event) = self.thread.next_event() {
+            self.apply_event(event);
+        }
+    }
+
+    fn check_thread(&mut self) {
+        if self.completion.outcome.is_none() && self.thread.is_finished() {
+            self.completion.outcome = Some(Err(
                 "broken-off: the session ended unexpectedly; its recording is in the folder of finished sessions, and \
-                 `typodont finish` makes a bundle from it"
+                 the list of exercises offers to finish it when the program is started again"
                     .into(),
             ));
         }
@@ -240,9 +282,13 @@ impl LessonState {
             }
             LessonEvent::SecondHand(news) => self.second_hand = Some(SecondHandStatus::from_event(news)),
             LessonEvent::DifferentDevice => self.pause_reason = Some(PauseReason::different_device()),
-            LessonEvent::Scoring => self.is_scoring = true,
-            LessonEvent::Finished(path) => self.outcome = Some(Ok(path)),
-            LessonEvent::Failed(why) => self.outcome = Some(Err(why)),
+            LessonEvent::Live(LiveEvent::AwaitingMovement(is_awaiting)) => self.is_awaiting_movement = is_awaiting,
+            LessonEvent::Completing(step) => {
+                self.is_scoring = true;
+                self.completion.apply(step);
+            }
+            LessonEvent::Finished(path) => self.completion.outcome = Some(Ok(path)),
+            LessonEvent::Failed(why) => self.completion.outcome = Some(Err(why)),
         }
     }
 
@@ -255,6 +301,8 @@ impl LessonState {
                 self.answers.clear();
                 self.chart.clear();
                 self.refusal_key = None;
+                self.controls = ControlsProgress::default();
+                self.is_confirming_finish = false;
                 self.materials = self.scenario.tissues.materials();
                 self.update_palette();
                 if !DisplayMode::available(self.stage()).any(|(way, _)| way == self.display_mode) {
@@ -275,13 +323,22 @@ impl LessonState {
             }
             Effect::StagesOver => {
                 (self.stage, self.are_stages_over) = (None, true);
+                self.is_confirming_finish = false;
+                self.ended = Some(Instant::now());
                 self.release_pointer();
             }
             Effect::Refused { why } => self.refusal_key = Some(messages::refusal_key(*why)),
             Effect::Command(Tell::SetCoefficient { label, coefficient, value }) => {
                 self.materials.set(*label, self.materials.get(*label).with(*coefficient, *value));
             }
-            Effect::Command(_) | Effect::StepStarted { .. } | Effect::StageEnded { .. } => {}
+            Effect::StageEnded { stage, by } => {
+                let is_timed_out = *by == EndedBy::Time && self.scenario.stages[*stage].draw.is_none();
+                self.timed_out_stage = is_timed_out.then(|| self.scenario.stages[*stage].title.clone());
+                if is_timed_out && self.is_pointer_captured {
+                    self.release_pointer();
+                }
+            }
+            Effect::Command(_) | Effect::StepStarted { .. } => {}
         }
     }
 
@@ -339,8 +396,21 @@ impl LessonState {
         }
     }
 
+    /// Asks whether the running stage is finished. A trial of several ends at once.
+    pub fn finish_stage(&mut self) {
+        let is_trial = self.stage().is_some_and(|stage| stage.draw.is_some());
+        match self.is_confirming_finish || is_trial {
+            true => self.confirm_stage(),
+            false => self.is_confirming_finish = true,
+        }
+        if self.is_confirming_finish {
+            self.release_pointer();
+        }
+    }
+
     /// Ends the running stage, after submitting typed answers. Does nothing while a typed number is not a number.
-    pub fn confirm_stage(&mut self) {
+    fn confirm_stage(&mut self) {
+        self.is_confirming_finish = false;
         let Some((stage, questions)) = self.stage.zip(self.stage().map(|stage| stage.ask.clone())) else { return };
         for question in questions {
             let draft = self.drafts.get(&question.id).map_or("", String::as_str);
@@ -439,6 +509,7 @@ impl LessonState {
         for (item, value) in self.ratings.clone() {
             self.submit(Input::Rate { item, value });
         }
+        self.ended = Some(Instant::now());
         self.is_submitted = self.thread.send(LessonCommand::FinishQuestionnaire);
     }
 

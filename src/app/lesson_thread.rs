@@ -25,6 +25,7 @@ use typodont_lesson::{
     Lesson, LessonError, OpenDevice, PendingSecondHand, PreparedSession, SessionConfig, SessionSeed, second_hand,
 };
 use typodont_report::Templates;
+use typodont_report::bundle::CompletionStep;
 
 /// Poll interval of the thread; a screen cannot show changes faster.
 const POLL_INTERVAL: Duration = Duration::from_millis(4);
@@ -62,8 +63,8 @@ pub enum LessonEvent {
     SecondHand(SecondHandEvent),
     /// The device that was connected again is a different one.
     DifferentDevice,
-    /// The session is over; its bundle is being written.
-    Scoring,
+    /// A step in the making of the bundle, after the session.
+    Completing(CompletionStep),
     Finished(PathBuf),
     Failed(String),
 }
@@ -254,6 +255,7 @@ fn run_lesson(
     let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
     let (mut lesson, events) = prepared.begin(device, second)?;
     worker.send_events(events);
+    lesson.await_movement();
     let mut last_attempt = Instant::now();
     while !lesson.session().is_complete() {
         std::thread::sleep(POLL_INTERVAL);
@@ -278,9 +280,10 @@ fn run_lesson(
     worker.publish(&mut lesson)?;
     worker.sound.silence();
     let recorded = lesson.end()?;
-    worker.events.send(LessonEvent::Scoring);
-    (worker.wake)();
-    recorded.complete()
+    recorded.complete(&mut |step| {
+        worker.events.send(LessonEvent::Completing(step));
+        (worker.wake)();
+    })
 }
 
 impl LessonWorker {

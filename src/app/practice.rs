@@ -7,7 +7,7 @@ use super::settings::Settings;
 use super::snapshot::{InstrumentPose, LessonSnapshot};
 use super::view_refresh::{Redraw, ViewInputs};
 use super::viewport::{EyeWindow, Viewport};
-use super::{periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
+use super::{controls_guide, periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_exercise::catalog::TissueRole;
@@ -66,10 +66,16 @@ fn task_ui(ui: &mut egui::Ui, lesson: &mut LessonState, words: &Translations, co
     };
     let number = lesson.stage.unwrap_or_default() + 1;
     ui.weak(format!("{} {number} / {}", words.get("practice.stage"), scenario.stages.len()));
-    ui.heading(&stage.title);
-    ui.label(&stage.instruction);
+    ui.heading(words.own(&scenario.texts, &stage.title));
+    ui.label(words.own(&scenario.texts, &stage.instruction));
     ui.add_space(8.0);
     time_ui(ui, stage.time_limit, lesson.snapshot.as_ref(), words);
+    if lesson.is_awaiting_movement {
+        ui.colored_label(theme::ACCENT, words.get("practice.clock_stopped"));
+    }
+    if let Some(before) = &lesson.timed_out_stage {
+        ui.colored_label(theme::WARNING, words.format("practice.time_up", words.own(&scenario.texts, before)));
+    }
     if stage.show_decay
         && stage.cutting
         && let Some(cleared) = lesson.snapshot.and_then(|seen| seen.cleared_pct)
@@ -95,14 +101,39 @@ fn task_ui(ui: &mut egui::Ui, lesson: &mut LessonState, words: &Translations, co
         // A row, so that the text stands in the button's middle.
         let done = ui.horizontal(|ui| ui.add(theme::primary_button(words.get("practice.done")))).inner;
         if done.clicked() {
-            commands.push(AppCommand::Practice(PracticeCommand::ConfirmStage));
+            commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
         }
+    }
+    if lesson.is_confirming_finish {
+        confirm_finish_ui(ui.ctx(), words, commands);
     }
     if let Some(why) = &lesson.refusal_key {
         ui.colored_label(theme::ERROR, words.format("practice.refused", words.get(why)));
     }
     ui.add_space(16.0);
     abort_ui(ui, lesson, words, commands);
+}
+
+/// The question before a stage ends, over the screen, so that no click that was meant for another button ends it.
+fn confirm_finish_ui(ctx: &egui::Context, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let frame = egui::Frame::popup(&ctx.global_style()).inner_margin(24);
+    let shown = egui::Modal::new(egui::Id::unique("finish")).frame(frame).show(ctx, |ui| {
+        ui.set_max_width(440.0);
+        ui.heading(words.get("practice.finish_sure"));
+        ui.label(words.get("practice.finish_about"));
+        ui.add_space(8.0);
+        ui.horizontal_wrapped(|ui| {
+            if ui.add(theme::primary_button(words.get("practice.finish_yes"))).clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
+            }
+            if ui.button(words.get("practice.finish_no")).clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::ContinueStage));
+            }
+        });
+    });
+    if shown.should_close() {
+        commands.push(AppCommand::Practice(PracticeCommand::ContinueStage));
+    }
 }
 
 fn time_ui(ui: &mut egui::Ui, limit: Option<f64>, snapshot: Option<&LessonSnapshot>, words: &Translations) {
@@ -215,6 +246,7 @@ fn view_ui(
             {
                 section_view::section_ui(ui, rect, scene, &lesson.orbit, snapshot, instrument);
             }
+            controls_guide::controls_guide_ui(ui, lesson, rect, words);
         }
         Some(Ok(None)) => {
             ui.painter().rect_filled(rect, 0, Color32::from_rgb(0xd5, 0xdc, 0xe0));

@@ -16,23 +16,27 @@ pub fn questionnaire_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Transla
         return;
     };
     theme::centered_column(ui, |ui| {
-        ui.heading(&questionnaire.title);
-        ui.label(&questionnaire.instruction);
-        ui.weak(format!("1 = {}, {} = {}", questionnaire.lowest, questionnaire.steps, questionnaire.highest));
+        let texts = &lesson.scenario.texts;
+        ui.heading(words.own(texts, &questionnaire.title));
+        ui.label(words.own(texts, &questionnaire.instruction));
+        let [lowest, highest] = [&questionnaire.lowest, &questionnaire.highest].map(|label| words.own(texts, label));
+        ui.weak(format!("1 = {lowest}, {} = {highest}", questionnaire.steps));
         ui.add_space(10.0);
         let room = (ui.available_height() - 100.0).max(200.0);
         egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
             let mut place = 0;
             for category in &questionnaire.categories {
                 ui.add_space(8.0);
-                ui.label(egui::RichText::new(&category.title).strong().size(18.0).color(theme::ACCENT));
+                ui.label(
+                    egui::RichText::new(words.own(texts, &category.title)).strong().size(18.0).color(theme::ACCENT),
+                );
                 for item in &category.items {
                     let is_current = place == lesson.statement;
                     let rating = lesson.ratings.get(&item.id).copied();
                     statement_ui(
                         ui,
                         &item.id,
-                        &item.text,
+                        words.own(texts, &item.text),
                         RatingScale {
                             steps: questionnaire.steps,
                             rating,

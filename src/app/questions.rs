@@ -6,6 +6,7 @@ use super::i18n::Translations;
 use super::lesson_state::LessonState;
 use super::theme;
 use eframe::egui;
+use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::scenario::{Question, QuestionKind, Stage};
 use typodont_exercise::session::AnswerValue;
 
@@ -17,15 +18,18 @@ pub fn questions_ui(
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
+    let scenario = lesson.scenario.clone();
     let teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
     for (place, question) in stage.ask.iter().enumerate() {
         let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
         ui.add_space(10.0);
-        ui.strong(&question.text);
+        ui.strong(words.own(&scenario.texts, &question.text));
         let draft = lesson.drafts.entry(question.id.clone()).or_default();
         let current = lesson.answers.get(&question.id);
         ui.push_id(place, |ui| {
-            if let Some(answer) = (QuestionUi { question, current, words }).answer_ui(ui, &teeth, draft) {
+            if let Some(answer) =
+                (QuestionUi { question, current, texts: &scenario.texts, words }).answer_ui(ui, &teeth, draft)
+            {
                 commands.push(AppCommand::Practice(PracticeCommand::AnswerQuestion(question.id.clone(), answer)));
             }
         });
@@ -46,6 +50,7 @@ pub fn questions_ui(
 struct QuestionUi<'a> {
     question: &'a Question,
     current: Option<&'a AnswerValue>,
+    texts: &'a LocalTexts,
     words: &'a Translations,
 }
 
@@ -65,9 +70,12 @@ impl QuestionUi<'_> {
                 self.buttons(ui, options)
             }
             QuestionKind::QuadrantOf { .. } => self.quadrants(ui),
-            QuestionKind::Choice { options, .. } => {
-                self.buttons(ui, options.iter().map(|(id, title)| (AnswerValue::Word(id.clone()), title.clone())))
-            }
+            QuestionKind::Choice { options, .. } => self.buttons(
+                ui,
+                options
+                    .iter()
+                    .map(|(id, title)| (AnswerValue::Word(id.clone()), words.own(self.texts, title).to_string())),
+            ),
             QuestionKind::YesNo { .. } => {
                 let options = [(true, "questions.yes"), (false, "questions.no")];
                 self.buttons(
@@ -115,7 +123,7 @@ impl QuestionUi<'_> {
         let is_current = self.current == Some(answer);
         let button = ui.add(egui::Button::selectable(is_current, title).frame_when_inactive(true).min_size(min_size));
         button.widget_info(|| {
-            let name = format!("{}: {title}", self.question.text);
+            let name = format!("{}: {title}", self.words.own(self.texts, &self.question.text));
             egui::WidgetInfo::selected(egui::Role::RadioButton, true, is_current, name)
         });
         button.clicked()
@@ -126,7 +134,9 @@ impl QuestionUi<'_> {
         let mut is_submitted = false;
         ui.horizontal(|ui| {
             let line = ui.add(egui::TextEdit::singleline(draft).desired_width(150.0));
-            line.widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, &self.question.text));
+            line.widget_info(|| {
+                egui::WidgetInfo::labeled(egui::Role::TextInput, true, self.words.own(self.texts, &self.question.text))
+            });
             ui.label(unit);
             let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
             is_submitted = ui.button(self.words.get("questions.say")).clicked() || is_entered;

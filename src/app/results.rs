@@ -1,42 +1,67 @@
 //! Results of a lesson: the grade, its reasons, and maps of tissue wrongly removed or left.
+//!
+//! The grade and its reasons are shown as soon as the session is scored; maps and report follow when they are made.
 
 use super::command::AppCommand;
+use super::completion::Completion;
 use super::i18n::Translations;
 use super::theme;
 use eframe::egui;
 use std::fs;
 use std::path::{Path, PathBuf};
-use typodont_exercise::scenario::Metric;
-use typodont_report::bundle::{REPORT_FILE, SESSION_FILE};
-use typodont_report::{GradeFile, SessionFile, measure_in_words};
+use typodont_lesson::Attempt;
+use typodont_report::bundle::REPORT_FILE;
+use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, SessionFile, phrases};
 
-/// The parts of a bundle that the window shows.
+/// The result of a session, and its bundle as far as it is made.
 pub struct LessonResults {
-    pub bundle: PathBuf,
-    pub session: SessionFile,
+    pub first: FirstResult,
+    pub state: BundleState,
     /// The maps listed in `MAPS`, as far as the bundle contains them.
     pub maps: Vec<egui::TextureHandle>,
+    /// True if the exercise can be tried again from here.
+    pub has_retry: bool,
+}
+
+/// State of the bundle of a result.
+pub enum BundleState {
+    Pending(Completion),
+    Finished(PathBuf),
+    /// The reason why there is none.
+    Failed(String),
 }
 
 /// Names of the maps shown in the window; the report page shows all.
 const MAPS: [&str; 2] = ["map-occlusal", "after-occlusal"];
 
 impl LessonResults {
-    /// Reads a bundle that was just written.
-    ///
-    /// # Errors
-    /// A message with the reason if the bundle cannot be read.
-    pub fn load(bundle: PathBuf, ctx: &egui::Context) -> Result<LessonResults, String> {
-        let wrong = |what: &dyn std::fmt::Display| format!("{}: unreadable-bundle: {what}", bundle.display());
-        let text = fs::read(bundle.join(SESSION_FILE)).map_err(|e| wrong(&e))?;
-        let session = serde_json::from_slice(&text).map_err(|e| wrong(&e))?;
-        let maps = MAPS.iter().filter_map(|name| load_map(&bundle, name, ctx)).collect();
-        Ok(LessonResults { bundle, session, maps })
+    /// The result of a session whose bundle is still being made.
+    pub fn new(first: FirstResult, completion: Completion, has_retry: bool) -> LessonResults {
+        LessonResults { first, state: BundleState::Pending(completion), maps: Vec::new(), has_retry }
     }
 
-    /// URL of the report page; `None` if its path cannot be written as a URL.
+    /// Takes over the steps of the completion, and loads the maps at its end.
+    pub fn poll(&mut self, ctx: &egui::Context) {
+        let BundleState::Pending(completion) = &mut self.state else { return };
+        completion.poll();
+        match completion.state().outcome.clone() {
+            Some(Ok(bundle)) => {
+                self.maps = MAPS.iter().filter_map(|name| load_map(&bundle, name, ctx)).collect();
+                self.state = BundleState::Finished(bundle);
+            }
+            Some(Err(why)) => self.state = BundleState::Failed(why),
+            None => {}
+        }
+    }
+
+    pub fn is_pending(&self) -> bool {
+        matches!(self.state, BundleState::Pending(_))
+    }
+
+    /// URL of the report page; `None` before the page exists, and if its path cannot be written as a URL.
     pub fn report_url(&self) -> Option<String> {
-        let path = std::path::absolute(self.bundle.join(REPORT_FILE)).ok()?;
+        let BundleState::Finished(bundle) = &self.state else { return None };
+        let path = std::path::absolute(bundle.join(REPORT_FILE)).ok()?;
         url::Url::from_file_path(path).ok().map(String::from)
     }
 }
@@ -49,73 +74,129 @@ fn load_map(bundle: &Path, name: &str, ctx: &egui::Context) -> Option<egui::Text
     Some(ctx.load_texture(name, pixels, egui::TextureOptions::LINEAR))
 }
 
+/// Texts of the results: those of the window, and those of the report in the window's language.
+pub struct ResultTexts<'a> {
+    pub words: &'a Translations,
+    pub languages: &'a Languages,
+}
+
+impl ResultTexts<'_> {
+    /// A text of the exercise in the window's language.
+    fn own<'a>(&self, first: &'a FirstResult, text: &'a str) -> &'a str {
+        self.words.own(&first.texts, text)
+    }
+
+    fn text(&self, message: &Message) -> String {
+        self.languages.text_in(&self.words.code, message)
+    }
+}
+
 /// Draws the results. `is_test_run`: the lesson was a test run of an author, who returns to the exercise.
 pub fn results_ui(
     ui: &mut egui::Ui,
     results: &LessonResults,
     is_test_run: bool,
-    words: &Translations,
+    texts: &ResultTexts,
     commands: &mut Vec<AppCommand>,
 ) {
-    let side = egui::Frame::NONE.inner_margin(24);
-    egui::Panel::right("maps").exact_size(380.0).resizable(false).frame(side).show(ui, |ui| {
-        egui::ScrollArea::vertical().show(ui, |ui| maps_ui(ui, results, words));
+    let words = texts.words;
+    let side = egui::Frame::NONE.inner_margin(16);
+    let width = 360.0f32.min(0.34 * ui.available_width());
+    egui::Panel::right("maps").exact_size(width).resizable(false).frame(side).show(ui, |ui| {
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| maps_ui(ui, results, texts));
     });
-    egui::CentralPanel::default().frame(egui::Frame::NONE.inner_margin(32)).show(ui, |ui| {
-        let session = &results.session;
-        ui.heading(&session.scenario.title);
+    let below = egui::Frame::NONE.inner_margin(egui::Margin { left: 32, right: 16, top: 8, bottom: 16 });
+    egui::Panel::bottom("next").resizable(false).frame(below).show(ui, |ui| {
+        bundle_ui(ui, results, words);
+        buttons_ui(ui, results, is_test_run, words, commands);
+    });
+    let middle = egui::Frame::NONE.inner_margin(egui::Margin { left: 32, right: 16, top: 24, bottom: 8 });
+    egui::CentralPanel::default().frame(middle).show(ui, |ui| {
+        let session = &results.first.session;
+        ui.heading(texts.own(&results.first, &session.scenario.title));
         match &session.grade {
-            Some(grade) => verdict_ui(ui, grade, words),
+            Some(grade) => verdict_ui(ui, grade, &results.first, texts),
             None => {
                 ui.label(words.get("results.no_grade"));
+                let is_done = Attempt::of(session).is_some_and(|attempt| attempt.is_passed());
+                let (key, colour) = match is_done {
+                    true => ("results.performed", theme::SUCCESS),
+                    false => ("results.not_performed", theme::WARNING),
+                };
+                ui.label(egui::RichText::new(words.get(key)).size(18.0).strong().color(colour));
             }
         }
-        ui.add_space(10.0);
-        let room = (ui.available_height() - 110.0).max(160.0);
-        egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
+        for stage in session.stages.iter().filter(|stage| stage.ended_by == "time") {
+            ui.colored_label(theme::WARNING, words.format("results.time_up", texts.own(&results.first, &stage.title)));
+        }
+        ui.add_space(6.0);
+        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+            feedback_ui(ui, &results.first, texts);
             if let Some(grade) = &session.grade {
-                items_ui(ui, grade, words);
+                items_ui(ui, grade, &results.first, texts);
             }
-            egui::CollapsingHeader::new(words.get("results.measures")).show(ui, |ui| measures_ui(ui, session));
+            egui::CollapsingHeader::new(words.get("results.measures")).show(ui, |ui| measures_ui(ui, session, texts));
         });
-        ui.add_space(10.0);
-        ui.horizontal(|ui| {
-            if ui.add(theme::primary_button(words.get("results.report"))).clicked() {
-                commands.push(AppCommand::OpenReport);
-            }
-            if ui.button(words.get(if is_test_run { "author.back" } else { "results.again" })).clicked() {
-                commands.push(AppCommand::BackToList);
-            }
-        });
-        ui.weak(words.format("results.bundle", results.bundle.display()));
     });
 }
 
-fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, words: &Translations) {
+fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ResultTexts) {
+    let words = texts.words;
     let (key, colour) = match (grade.finished, grade.passed) {
         (false, _) => ("results.unfinished", theme::WARNING),
         (true, true) => ("results.passed", theme::SUCCESS),
         (true, false) => ("results.failed", theme::ERROR),
     };
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.label(egui::RichText::new(words.get(key)).size(24.0).strong().color(colour));
         ui.label(egui::RichText::new(format!("{:.1} / {:.0}", grade.points, grade.max_points)).size(24.0));
     });
     ui.weak(words.format("results.pass_at", format!("{:.0}", grade.pass_points)));
     for fail in &grade.hard_fails {
-        ui.colored_label(theme::ERROR, format!("× {fail}"));
+        ui.colored_label(theme::ERROR, format!("× {}", texts.own(first, fail)));
     }
 }
 
-fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, words: &Translations) {
+/// The causes of lost points, the most costly first.
+fn feedback_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ResultTexts) {
+    if first.feedback.findings.is_empty() {
+        return;
+    }
+    ui.label(egui::RichText::new(texts.words.get("results.next")).strong().size(18.0));
+    for finding in &first.feedback.findings {
+        finding_ui(ui, finding, texts);
+    }
+    ui.add_space(10.0);
+}
+
+fn finding_ui(ui: &mut egui::Ui, finding: &FeedbackFinding, texts: &ResultTexts) {
+    egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(6).inner_margin(10).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.horizontal_wrapped(|ui| {
+            ui.strong(texts.text(&finding.title));
+            if let Some(lost) = finding.lost {
+                ui.colored_label(theme::ERROR, format!("−{lost:.1}"));
+            }
+        });
+        for sentence in &finding.sentences {
+            ui.label(texts.text(&sentence.message));
+        }
+        if let Some(advice) = &finding.advice {
+            ui.colored_label(theme::ACCENT, texts.text(advice));
+        }
+    });
+    ui.add_space(4.0);
+}
+
+fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ResultTexts) {
     egui::Grid::new("items").num_columns(3).spacing([24.0, 8.0]).striped(true).show(ui, |ui| {
         for key in ["results.item", "results.value", "results.points"] {
-            ui.strong(words.get(key));
+            ui.strong(texts.words.get(key));
         }
         ui.end_row();
         for item in &grade.items {
-            ui.label(&item.title);
-            ui.label(measure_in_words(&item.metric, item.value));
+            ui.label(texts.own(first, &item.title));
+            ui.label(texts.text(&phrases::value(&item.metric, item.value)));
             ui.label(format!("{:.1} / {:.0}", item.points, item.max_points));
             ui.end_row();
         }
@@ -123,22 +204,89 @@ fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, words: &Translations) {
     ui.add_space(10.0);
 }
 
-fn measures_ui(ui: &mut egui::Ui, session: &SessionFile) {
+fn measures_ui(ui: &mut egui::Ui, session: &SessionFile, texts: &ResultTexts) {
     egui::Grid::new("measures").num_columns(2).spacing([24.0, 6.0]).striped(true).show(ui, |ui| {
         for (name, value) in &session.metrics {
-            let title = Metric::parse(name).map_or(name.clone(), |metric| metric.info.title.to_string());
-            ui.label(title).on_hover_text(name);
-            ui.label(measure_in_words(name, *value));
+            ui.label(texts.text(&phrases::measure_title(name))).on_hover_text(name);
+            ui.label(texts.text(&phrases::value(name, *value)));
             ui.end_row();
         }
     });
 }
 
-fn maps_ui(ui: &mut egui::Ui, results: &LessonResults, words: &Translations) {
+/// The maps and the meaning of their colours.
+fn maps_ui(ui: &mut egui::Ui, results: &LessonResults, texts: &ResultTexts) {
+    let words = texts.words;
     ui.strong(words.get("results.map"));
-    for map in &results.maps {
-        ui.add(egui::Image::new(map).max_width(330.0).alt_text(words.get("results.map")).corner_radius(8));
+    let width = ui.available_width();
+    for (number, map) in results.maps.iter().enumerate() {
+        ui.add(egui::Image::new(map).max_width(width).alt_text(words.get("results.map")).corner_radius(8));
+        if number == 0 {
+            legend_ui(ui, &results.first.legend, texts);
+        }
         ui.add_space(8.0);
     }
+    if results.maps.is_empty() {
+        legend_ui(ui, &results.first.legend, texts);
+        if results.is_pending() {
+            ui.weak(words.get("results.map_pending"));
+        }
+    }
     ui.weak(words.get("results.map_about"));
+}
+
+fn legend_ui(ui: &mut egui::Ui, legend: &[LegendEntry], texts: &ResultTexts) {
+    const SIDE: f32 = 22.0;
+    for entry in legend {
+        ui.horizontal(|ui| {
+            let (rect, _) = ui.allocate_exact_size(egui::vec2(SIDE, SIDE), egui::Sense::hover());
+            let [r, g, b] = entry.color;
+            let ink = if entry.is_dark { egui::Color32::WHITE } else { egui::Color32::BLACK };
+            ui.painter().rect_filled(rect, 4, egui::Color32::from_rgb(r, g, b));
+            let font = egui::FontId::proportional(14.0);
+            ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, entry.sign, font, ink);
+            let text = format!("{} · {:.2} mm³", texts.text(&entry.title), entry.volume);
+            ui.add(egui::Label::new(text).wrap());
+        });
+    }
+}
+
+/// Progress of the bundle, and its folder in the end.
+fn bundle_ui(ui: &mut egui::Ui, results: &LessonResults, words: &Translations) {
+    match &results.state {
+        BundleState::Pending(completion) => {
+            let progress = completion.state().progress;
+            theme::progress_bar(ui, words.get(progress.key), progress.share);
+        }
+        BundleState::Finished(bundle) => {
+            ui.add(
+                egui::Label::new(egui::RichText::new(words.format("results.bundle", bundle.display())).weak()).wrap(),
+            );
+        }
+        BundleState::Failed(why) => {
+            ui.colored_label(theme::ERROR, why);
+        }
+    }
+}
+
+fn buttons_ui(
+    ui: &mut egui::Ui,
+    results: &LessonResults,
+    is_test_run: bool,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    ui.add_space(6.0);
+    ui.horizontal_wrapped(|ui| {
+        if results.has_retry && ui.add(theme::primary_button(words.get("results.retry"))).clicked() {
+            commands.push(AppCommand::TryAgain);
+        }
+        let is_finished = matches!(results.state, BundleState::Finished(_));
+        if ui.add_enabled(is_finished, egui::Button::new(words.get("results.report"))).clicked() {
+            commands.push(AppCommand::OpenReport);
+        }
+        if ui.button(words.get(if is_test_run { "author.back" } else { "results.again" })).clicked() {
+            commands.push(AppCommand::BackToList);
+        }
+    });
 }

@@ -1,5 +1,6 @@
 //! Screens of the window.
 
+use super::completion::Completion;
 use super::editor::EditorState;
 use super::lesson_state::LessonState;
 use super::results::LessonResults;
@@ -10,6 +11,8 @@ pub enum Screen {
     Briefing,
     Editor(Box<EditorState>),
     Lesson(Box<LessonState>),
+    /// An interrupted session is being scored.
+    Completion(Box<Completion>),
     Results(Box<LessonResults>),
     /// The lesson or its bundle failed; holds the reason.
     Failed(String),

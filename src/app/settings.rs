@@ -31,6 +31,8 @@ pub struct Settings {
     pub volume: f32,
     pub high_contrast: bool,
     pub font_size: f32,
+    /// True if the first shipped exercise must be passed before the others open. It is set in the file only.
+    pub introduction_first: bool,
     /// A further folder with exercises; empty for none.
     pub exercises: PathBuf,
 }
@@ -60,6 +62,7 @@ impl Default for Settings {
             volume: VOLUME,
             high_contrast: false,
             font_size: 1.0,
+            introduction_first: true,
             exercises: PathBuf::new(),
         }
     }

@@ -133,7 +133,7 @@ pub fn collect_commands(
             commands.push(AppCommand::BackToList);
         }
         Screen::Results(_) if pressed(Key::R) => commands.push(AppCommand::OpenReport),
-        Screen::Editor(_) | Screen::Briefing | Screen::Results(_) | Screen::Failed(_) => {}
+        Screen::Editor(_) | Screen::Briefing | Screen::Completion(_) | Screen::Results(_) | Screen::Failed(_) => {}
     }
 }
 
@@ -177,7 +177,16 @@ fn is_down(ctx: &egui::Context, key: Key) -> bool {
 fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, commands: &mut Vec<AppCommand>) {
     let pressed = |key| is_pressed(ctx, Modifiers::NONE, key);
     if is_done && lesson.stage().is_some_and(|stage| stage.ends.confirmed) {
-        commands.push(AppCommand::Practice(PracticeCommand::ConfirmStage));
+        commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
+    }
+    if lesson.is_confirming_finish {
+        if pressed(Key::Enter) {
+            commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
+        }
+        if pressed(Key::Escape) {
+            commands.push(AppCommand::Practice(PracticeCommand::ContinueStage));
+        }
+        return;
     }
     if pressed(Key::O) && lesson.has_mouse() {
         commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(!lesson.is_pointer_captured)));

@@ -67,6 +67,13 @@ pub fn centered_column(ui: &mut egui::Ui, contents: impl FnOnce(&mut egui::Ui)) 
     });
 }
 
+/// A bar that shows which share of a work is done, with the name of its present step.
+pub fn progress_bar(ui: &mut egui::Ui, step: &str, share: f32) {
+    ui.label(step);
+    let bar = ui.add(egui::ProgressBar::new(share).fill(ACCENT).desired_height(12.0).desired_width(420.0));
+    bar.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ProgressIndicator, true, step));
+}
+
 /// Interval at which [`progress_dots`] changes.
 pub const PROGRESS_DOT_INTERVAL: Duration = Duration::from_millis(333);
 

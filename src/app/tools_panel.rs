@@ -1,4 +1,5 @@
-//! The menu beside the practice, as the thesis has it: instrument, rendering, haptics, materials, and how the beat is kept.
+//! The menu beside the practice, as the thesis has it: instrument, rendering, haptics, materials,
+//! and the timing of the system.
 
 use super::camera_preset::CameraPreset;
 use super::command::{AppCommand, PracticeCommand};
@@ -54,22 +55,17 @@ pub fn tools_panel_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translati
     }
     section_heading(ui, words.get("menu.materials"));
     materials_ui(ui, lesson, words, commands);
-    section_heading(ui, words.get("menu.beat"));
-    performance_ui(ui, lesson, words);
     for complaint in &lesson.complaints {
         ui.colored_label(theme::WARNING, complaint);
     }
-    if let Some(why) = &lesson.audio_error {
-        section_heading(ui, words.get("menu.sound"));
-        ui.small(why);
-    }
-    ui.add_space(16.0);
-    if ui.button(words.get("menu.keys")).clicked() {
-        commands.push(AppCommand::ShowShortcuts(true));
-    }
-    if ui.button(words.get("menu.settings")).clicked() {
-        commands.push(AppCommand::ShowSettings(true));
-    }
+    ui.add_space(14.0);
+    egui::CollapsingHeader::new(words.get("menu.beat")).show(ui, |ui| {
+        performance_ui(ui, lesson, words);
+        if let Some(why) = &lesson.audio_error {
+            ui.small(words.get("menu.sound"));
+            ui.small(why);
+        }
+    });
 }
 
 fn section_heading(ui: &mut egui::Ui, title: &str) {
@@ -83,7 +79,7 @@ fn instruments_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations,
     let current = lesson.snapshot.map(|seen| seen.instrument as usize);
     let tray = lesson.stage().map(|stage| stage.instruments.as_slice()).unwrap_or_default();
     for &instrument in tray {
-        let title = &lesson.scenario.instruments[instrument].title;
+        let title = words.own(&lesson.scenario.texts, &lesson.scenario.instruments[instrument].title);
         if ui.radio(current == Some(instrument), title).clicked() {
             commands.push(AppCommand::Practice(PracticeCommand::SelectInstrument(instrument)));
         }
@@ -99,7 +95,7 @@ fn materials_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, c
     coefficients.show(ui, |ui| {
         // Possible sites of a draw have the properties of their decay, which is listed once.
         for entry in lesson.scenario.tissues.entries().iter().filter(|entry| entry.site_of.is_none()) {
-            ui.label(egui::RichText::new(&entry.title).size(14.0).strong());
+            ui.label(egui::RichText::new(words.own(&lesson.scenario.texts, &entry.title)).size(14.0).strong());
             // A stage that changes a stiffness in steps tests whether the trainee feels it: only the exercise's own
             // value is shown there.
             let shown = if is_adjustable { *lesson.materials.get(entry.label()) } else { entry.material() };

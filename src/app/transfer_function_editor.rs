@@ -36,7 +36,9 @@ pub fn transfer_function_ui(
 ) {
     let mut new = draft.clone();
     presets_ui(ui, &mut new, palette, words);
-    let title = |label: Label| tissues.by_label(label).map_or(words.get("transfer.all"), |entry| entry.title.as_str());
+    let title = |label: Label| {
+        tissues.by_label(label).map_or(words.get("transfer.all"), |entry| entry.title.in_language(&words.code))
+    };
     let label = ui.small(words.get("transfer.tissue")).id;
     egui::ComboBox::from_id_salt("tissue")
         .selected_text(title(new.tissue))

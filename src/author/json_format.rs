@@ -51,6 +51,7 @@ const KEY_ORDER: &[&str] = &[
     "time_limit_s",
     "cutting",
     "show_decay",
+    "shows_controls",
     "adjustable",
     "draw",
     "one_of",
@@ -76,6 +77,7 @@ const KEY_ORDER: &[&str] = &[
     "measures",
     "rubric",
     "questionnaire",
+    "questionnaire_time",
 ];
 
 /// Returns the position of a key among the others of its object.

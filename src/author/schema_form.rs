@@ -22,6 +22,8 @@ pub struct SchemaField<'f> {
     pub default: Option<&'f Value>,
     /// True if the value may be null.
     pub is_nullable: bool,
+    /// True for a text that may also be written as texts by language.
+    pub is_by_language: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -81,7 +83,9 @@ impl SchemaForm {
         let (inner, may_be_null) = self.dereference(schema);
         let description = description_of(schema).or(description_of(inner)).unwrap_or_default();
         let is_nullable = may_be_null || has_type(inner, "null");
-        SchemaField { kind: self.kind_of(inner), description, default: usual.or(inner.get("default")), is_nullable }
+        let is_by_language = has_type(inner, "string") && has_type(inner, "object");
+        let default = usual.or(inner.get("default"));
+        SchemaField { kind: self.kind_of(inner), description, default, is_nullable, is_by_language }
     }
 
     /// Returns the schema at a pointer of a scenario; `None` if no value is permitted there. It is called for every

@@ -21,7 +21,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     if let Some(code) = read_code(arguments.seed_sealed.as_deref())? {
         unfinished.reveal_seed(&code).map_err(CliError::wrong)?;
     }
-    let completed = unfinished.complete_interrupted(&templates).map_err(CliError::wrong)?;
+    let completed = unfinished.complete_interrupted(&templates, &mut |_| ()).map_err(CliError::wrong)?;
     for remark in completed.remarks {
         eprintln!("{}: {remark}", completed.path.display());
     }

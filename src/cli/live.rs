@@ -141,6 +141,7 @@ fn print_events(events: &[LiveEvent], session: &Session) {
                 print_best_effort(format!("instrument: {}", session.scenario().instruments[*instrument].title));
             }
             LiveEvent::Effect(Effect::Command(_) | Effect::StepStarted { .. }) => {}
+            LiveEvent::AwaitingMovement(_) => {}
             LiveEvent::ServoStarted(priority) => print_best_effort(format!("the servo thread runs at {priority}")),
             LiveEvent::DeviceState(state) if state.is_ready() => print_best_effort("the device is ready"),
             LiveEvent::DeviceState(state) => print_best_effort(format!("the session is suspended: {state}")),

@@ -324,7 +324,7 @@ pub fn run_session(run: RunRequest) -> Result<PathBuf, CliError> {
         }
     };
     let bar = spinner("scoring and writing the report");
-    let bundle = recorded.complete();
+    let bundle = recorded.complete(&mut |_| ());
     bar.finish_and_clear();
     Ok(bundle?)
 }

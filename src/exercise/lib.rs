@@ -17,6 +17,7 @@
 //! assert_eq!((points, rubric.pass_points), (100.0, 70.0));
 //! ```
 
+pub mod local_text;
 pub mod catalog;
 pub mod tooth_import;
 pub mod scenario;

@@ -74,8 +74,28 @@ fn is_forbidden(letter: char) -> bool {
 
 /// Returns the schema of a type, as printed for editors and as used by [`read`].
 pub fn schema_of<T: JsonSchema>() -> Schema {
-    let settings = SchemaSettings::draft2020_12().with_transform(RecursiveTransform(require_plain_text));
+    let settings = SchemaSettings::draft2020_12()
+        .with_transform(RecursiveTransform(bound_texts_by_language))
+        .with_transform(RecursiveTransform(require_plain_text));
     SchemaGenerator::new(settings).into_root_schema_for::<T>()
+}
+
+/// Gives the texts of a text by language (a string, or an object of strings) the bounds of the string.
+fn bound_texts_by_language(schema: &mut Schema) {
+    let is_by_language = schema
+        .get("type")
+        .and_then(Json::as_array)
+        .is_some_and(|names| ["string", "object"].iter().all(|name| names.iter().any(|own| own == name)));
+    if !is_by_language {
+        return;
+    }
+    let bounds = ["minLength", "maxLength"].map(|key| (key, schema.get(key).cloned()));
+    let Some(Json::Object(texts)) = schema.get_mut("additionalProperties") else { return };
+    for (key, bound) in bounds {
+        if let Some(bound) = bound {
+            texts.insert(key.into(), bound);
+        }
+    }
 }
 
 /// Adds [`TEXT_PATTERN`] to the schema of a text that has no form of its own.
@@ -316,12 +336,32 @@ impl<'s> Check<'s> {
             }
             path.truncate(length);
         }
+        self.property_names(object, schema, path);
         let required = schema.get("required").and_then(Json::as_array);
         for name in required.into_iter().flatten().filter_map(Json::as_str) {
             if !seen.contains(name) {
                 let help =
                     known.and_then(|k| k.get(name)).and_then(|s| description(s).or(description(self.resolve(s))));
                 self.complain(object, path, "missing-key", format!("the key \"{name}\" is missing"), help);
+            }
+        }
+    }
+
+    /// Complains about keys without the form that the schema requires of them, and about too few keys.
+    fn property_names(&mut self, object: &jsonc_parser::ast::Object, schema: &Json, path: &str) {
+        let least = schema.get("minProperties").and_then(Json::as_u64).unwrap_or(0);
+        let names = schema.get("propertyNames");
+        if (object.properties.len() as u64) < least {
+            let help = names.and_then(description).or(description(schema));
+            self.complain(object, path, "wrong-count", "the object is empty".to_string(), help);
+        }
+        let Some(names) = names else { return };
+        let Some(form) = names.get("pattern").and_then(Json::as_str).and_then(|p| Regex::new(p).ok()) else { return };
+        for property in &object.properties {
+            let name = name_of(&property.name);
+            if !form.is_match(&name) {
+                let message = format!("the key \"{}\" does not have the required form", abridged(&name));
+                self.complain(&property.name, path, "wrong-form", message, description(names));
             }
         }
     }

@@ -3,6 +3,7 @@
 //! Takes a resolved exercise. Gives warnings with their place in the exercise's file. Never changes anything.
 
 use std::sync::Arc;
+use typodont_exercise::local_text::LanguageGap;
 use typodont_exercise::scenario::{DecayPlace, DecayShape, QuestionKind, Scenario, Workpiece};
 use typodont_exercise::score::{decay_in_zones, decay_on_vulnerable_mm3, idle_grade};
 
@@ -35,6 +36,7 @@ pub fn exercise_warnings(scenario: &Arc<Scenario>) -> Result<Vec<ExerciseWarning
     });
     let seeds = if is_drawn { DRAWN } else { 1..=1 };
     let mut found = guessable_answers(scenario);
+    found.extend(language_warning(scenario));
     for seed in seeds {
         let workpiece = Workpiece::make(scenario, seed).map_err(|e| e.to_string())?;
         let mut here = caries_warnings(scenario, &workpiece);
@@ -73,6 +75,17 @@ fn guessable_answers(scenario: &Scenario) -> Vec<ExerciseWarning> {
         }
     }
     found
+}
+
+/// Returns a warning if a text lacks a language in which others are written.
+fn language_warning(scenario: &Scenario) -> Option<ExerciseWarning> {
+    let LanguageGap { path, code } = scenario.texts.gap.clone()?;
+    Some(ExerciseWarning {
+        code: "missing-translation",
+        path,
+        message: format!("this text lacks the language \"{code}\", in which others of the exercise are written"),
+        help: format!("write it as {{ \"{code}\": \"…\" }} with the other languages, as every text of the exercise"),
+    })
 }
 
 /// Returns the warnings about caries that lies within a zone that protects tissue, or on the pulp.

@@ -22,7 +22,7 @@ pub fn library_for(scenario: &Path) -> Library {
     Library::shipped().with_folder(folder)
 }
 
-/// All scenario files of a folder, sorted by name; for the path of a file, that file.
+/// All scenario files of a folder, sorted by name, with numbers by their value; for the path of a file, that file.
 ///
 /// # Errors
 ///
@@ -38,14 +38,45 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
         name.ends_with(".json") && !name.ends_with(".schema.json")
     };
     let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(is_scenario).collect();
-    files.sort();
+    files.sort_by_cached_key(|path| natural_key(path));
     match files.is_empty() {
         true => Err(wrong("no-scenarios: the folder contains no scenario (*.json)".to_string())),
         false => Ok(files),
     }
 }
 
+/// Key by which names sort as people expect: "2-decay" before "10-class-one".
+fn natural_key(path: &Path) -> Vec<(u64, String)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut key: Vec<(u64, String)> = vec![(0, String::new())];
+    for c in name.chars() {
+        match (c.to_digit(10), key.last_mut()) {
+            (Some(digit), Some((number, text))) if text.is_empty() => {
+                *number = number.saturating_mul(10).saturating_add(u64::from(digit));
+            }
+            (Some(digit), _) => key.push((u64::from(digit), String::new())),
+            (None, Some((_, text))) => text.push(c),
+            (None, None) => {}
+        }
+    }
+    key
+}
+
 /// True for a valid participant code: at most 64 ASCII letters, digits, "-", "_" and ".". The empty code is valid, too.
 pub fn is_valid_participant_code(text: &str) -> bool {
     text.len() <= 64 && text.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exercises_sort_by_the_value_of_their_numbers() {
+        let sorted =
+            ["1-introduction.json", "2-decay.json", "9-stain.json", "10-class-one.json", "a1.json", "a12.json"];
+        let mut names: Vec<PathBuf> = sorted.iter().rev().map(PathBuf::from).collect();
+        names.sort_by_cached_key(|path| natural_key(path));
+        assert_eq!(names, sorted.map(PathBuf::from));
+    }
 }

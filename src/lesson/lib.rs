@@ -26,7 +26,7 @@
 //! while !lesson.session().is_complete() {
 //!     let _events = lesson.poll()?; // Each frame of a window.
 //! }
-//! let bundle = lesson.end()?.complete()?;
+//! let bundle = lesson.end()?.complete(&mut |_step| ())?;
 //! assert!(bundle.join("session.json").is_file());
 //! # Ok::<(), typodont_lesson::LessonError>(())
 //! ```
@@ -37,6 +37,7 @@ mod exercise_warnings;
 mod inputs;
 mod preparation;
 mod seed;
+mod session_folder;
 mod tooth_scan;
 #[cfg(feature = "devices")]
 mod device_selection;
@@ -52,6 +53,7 @@ pub use exercise_warnings::{ExerciseWarning, IDLE_POINTS_MAX, caries_warnings, e
 pub use inputs::{is_valid_participant_code, library_for, read_scenario, scenario_files};
 pub use preparation::{PreparedSession, RecordedSession, SessionConfig};
 pub use seed::SessionSeed;
+pub use session_folder::{Attempt, InterruptedSession, SessionFolder};
 pub use tooth_scan::ToothScan;
 
 #[cfg(feature = "devices")]

@@ -17,6 +17,7 @@ use typodont_devices::servo::{
     SecondHandLink, Servo, ServoCommand, ServoEvent, ServoExit, TickReport, TimingStats, TimingSummary,
 };
 use typodont_exercise::record::ServoStatsFile;
+use typodont_exercise::scenario::Stage;
 use typodont_exercise::session::{Effect, Input, Observer, Session, SessionEvent};
 
 /// Event to show to the person.
@@ -29,6 +30,8 @@ pub enum LiveEvent {
     DeviceState(DeviceState),
     /// The device was disconnected; the simulation is paused until [`LiveSession::resume_with`].
     DeviceLost(DeviceError),
+    /// The clock is stopped until the device moves, or (false) it runs.
+    AwaitingMovement(bool),
 }
 
 /// The servo of a live session, and its connection to the [`Session`].
@@ -47,6 +50,10 @@ pub struct LiveSession {
     /// Specification of the device in the recording's head.
     spec: DeviceSpec,
     is_paused: bool,
+    /// True if each stage begins with the first movement of the device.
+    awaits_movement: bool,
+    /// True while the servo waits for it.
+    is_awaiting: bool,
     was_ready: bool,
     /// Timing statistics of the servo, after it has ended.
     final_timing: Option<TimingSummary>,
@@ -161,6 +168,8 @@ impl LiveSession {
             pauses: 0,
             spec: device.spec().clone(),
             is_paused: false,
+            awaits_movement: false,
+            is_awaiting: false,
             was_ready: false,
             final_timing: None,
         };
@@ -188,6 +197,9 @@ impl LiveSession {
         let mut servo = Servo::start(simulation, device, second, timing).map_err(LiveError::Servo)?;
         if self.is_paused {
             servo.send(ServoCommand::Pause);
+        }
+        if self.is_awaiting {
+            servo.send(ServoCommand::AwaitMovement);
         }
         for command in &self.pending_commands {
             servo.send(ServoCommand::Command(*command));
@@ -241,6 +253,10 @@ impl LiveSession {
                     observer.command(self.tick, &command)?;
                 }
                 ServoEvent::Ticked(turn) => self.record_tick(&turn, session, observer, &mut events)?,
+                ServoEvent::AwaitingMovement(is_awaiting) => {
+                    self.is_awaiting = is_awaiting;
+                    events.push(LiveEvent::AwaitingMovement(is_awaiting));
+                }
                 ServoEvent::DeviceState(state) => {
                     self.set_ready(state.is_ready());
                     events.push(LiveEvent::DeviceState(state));
@@ -301,6 +317,11 @@ impl LiveSession {
         observer: &mut O,
     ) -> Result<Vec<LiveEvent>, LiveError<O::Error>> {
         let mut events = Vec::new();
+        if self.awaits_movement
+            && let Some(servo) = self.servo_mut()
+        {
+            servo.send(ServoCommand::StopAwaiting);
+        }
         observer.input(self.tick, input)?;
         let effects = session.advance(SessionEvent::Input(input));
         self.apply_effects(effects, session, observer, &mut events)?;
@@ -327,9 +348,32 @@ impl LiveSession {
                 }
             }
             observer.effect(self.tick, &effect, session)?;
+            if let Effect::StageStarted { stage } = effect
+                && self.awaits_movement
+                && has_own_instruction(&session.scenario().stages, stage)
+            {
+                self.stop_clock();
+            }
             events.push(LiveEvent::Effect(effect));
         }
         Ok(())
+    }
+
+    /// Stops the clock at the beginning of each stage with an instruction of its own, until the device moves, one of its
+    /// buttons changes or the person makes an input. No tick is recorded while the person reads, and this counts as no
+    /// pause. An instrument that presses on something is not released for it.
+    pub fn await_movement(&mut self) {
+        self.awaits_movement = true;
+        self.stop_clock();
+    }
+
+    fn stop_clock(&mut self) {
+        /// Force above which an instrument counts as being in use, N.
+        const IN_USE: f32 = 0.05;
+        let is_in_use = self.latest_step.and_then(|step| step.touch).is_some_and(|touch| touch.spring > IN_USE);
+        if let Some(servo) = self.servo_mut().filter(|_| !is_in_use) {
+            servo.send(ServoCommand::AwaitMovement);
+        }
     }
 
     /// Pauses or resumes the servo. During a pause, the simulation stops and the force is switched off.
@@ -401,4 +445,9 @@ impl LiveSession {
     fn servo_mut(&mut self) -> Option<&mut Servo> {
         if let LiveState::Running(servo) = &mut self.state { Some(servo) } else { None }
     }
+}
+
+/// True if a stage has another instruction than the one before: the trials of a draw follow one another at once.
+fn has_own_instruction(stages: &[Stage], stage: usize) -> bool {
+    stage.checked_sub(1).is_none_or(|before| stages[before].instruction != stages[stage].instruction)
 }

@@ -78,6 +78,12 @@ impl Lesson {
         self.live.set_paused(is_paused);
     }
 
+    /// Stops the clock at the beginning of each stage until the trainee moves the device or makes an input; see
+    /// [`LiveSession::await_movement`].
+    pub fn await_movement(&mut self) {
+        self.live.await_movement();
+    }
+
     /// Continues after the device was disconnected. Returns false if `device` is not the device with which the lesson
     /// began.
     ///

@@ -18,7 +18,7 @@ use typodont_exercise::record::{Recorder, RecordingEndFile, RecordingHeadFile, S
 use typodont_exercise::scenario::{Scenario, Workpiece, hex};
 use typodont_exercise::session::{Operator, OperatorFile, RunEnd, Session};
 use typodont_report::Templates;
-use typodont_report::bundle::PartialBundle;
+use typodont_report::bundle::{CompletionObserver, PartialBundle};
 
 /// Configuration of a session.
 pub struct SessionConfig<'a> {
@@ -172,12 +172,13 @@ impl RecordedSession {
         Ok(RecordedSession { partial_bundle, templates })
     }
 
-    /// Scores the recording and writes all files of the bundle; returns its folder.
+    /// Scores the recording and writes all files of the bundle; returns its folder. The result is known long before the
+    /// files are made: the observer is told of every step.
     ///
     /// # Errors
     ///
     /// [`LessonError::Bundle`] if the recording cannot be scored or a file cannot be written.
-    pub fn complete(self) -> Result<PathBuf, LessonError> {
-        Ok(self.partial_bundle.complete(&self.templates)?)
+    pub fn complete(self, observer: CompletionObserver) -> Result<PathBuf, LessonError> {
+        Ok(self.partial_bundle.complete(&self.templates, observer)?)
     }
 }

@@ -4,6 +4,7 @@
 //! renamed. All other files follow from the recording: [`verify`] derives them again and compares. Every file is synced
 //! to the disk before the folder is renamed, so that a bundle is whole even after a power cut.
 
+use super::first_result::FirstResult;
 use super::session_file::SessionFile;
 use super::templates::Templates;
 use super::verification::with_template_name;
@@ -12,7 +13,7 @@ use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
-use std::fs::File;
+use std::fs::{File, TryLockError};
 use std::io;
 use std::io::Write;
 use std::path::{Component, Path, PathBuf};
@@ -28,6 +29,9 @@ pub const SESSION_FILE: &str = "session.json";
 
 /// Name of the page within a bundle.
 pub const REPORT_FILE: &str = "report.html";
+
+/// Name of the file that a running session keeps locked in its folder.
+const LOCK_FILE: &str = "session.lock";
 
 /// Error while a bundle is made or read.
 #[derive(Debug)]
@@ -69,6 +73,59 @@ impl std::error::Error for BundleError {}
 pub struct PartialBundle {
     partial: PathBuf,
     path: PathBuf,
+    /// The locked file, by which other programs see that the session is not interrupted; `None` where the file system
+    /// has no locks.
+    lock: Option<File>,
+}
+
+/// A step in the completion of a bundle, in order.
+#[derive(Clone, Debug)]
+pub enum CompletionStep {
+    /// The recording is being replayed and scored.
+    Scoring,
+    /// The result is known; the files are still to be made.
+    Scored(Box<FirstResult>),
+    /// The label maps are being written.
+    Maps,
+    /// The coloured surfaces are being made.
+    Surfaces,
+    /// Images are being drawn; `done` of `all` are finished.
+    Pictures { done: usize, all: usize },
+    /// The report page is being written.
+    Page,
+    /// All files are being saved.
+    Saving,
+}
+
+/// Observer of the steps of a completion.
+pub type CompletionObserver<'a> = &'a mut dyn FnMut(CompletionStep);
+
+/// Lock of a session's folder.
+enum SessionLock {
+    Held(File),
+    Unsupported,
+    /// Another program holds it.
+    Taken,
+}
+
+impl SessionLock {
+    fn acquire(partial: &Path) -> SessionLock {
+        match File::create(partial.join(LOCK_FILE)).map(|file| (file.try_lock(), file)) {
+            Ok((Ok(()), file)) => SessionLock::Held(file),
+            Ok((Err(TryLockError::WouldBlock), _)) => SessionLock::Taken,
+            Ok((Err(TryLockError::Error(_)), _)) | Err(_) => SessionLock::Unsupported,
+        }
+    }
+
+    fn into_file(self) -> Option<File> {
+        if let SessionLock::Held(file) = self { Some(file) } else { None }
+    }
+}
+
+/// True if a program is still recording or completing the session of this folder.
+pub fn is_in_use(partial: &Path) -> bool {
+    let lock = File::open(partial.join(LOCK_FILE)).map(|file| file.try_lock_shared());
+    matches!(lock, Ok(Err(TryLockError::WouldBlock)))
 }
 
 impl PartialBundle {
@@ -88,14 +145,15 @@ impl PartialBundle {
             return Err(BundleError::new(&path, "a bundle with this name exists already"));
         }
         fs::create_dir(&partial).map_err(unmade)?;
-        Ok(PartialBundle { partial, path })
+        let lock = SessionLock::acquire(&partial).into_file();
+        Ok(PartialBundle { partial, path, lock })
     }
 
     /// Reopens the folder of a session that was interrupted.
     ///
     /// # Errors
     ///
-    /// When the folder's name does not end in `.partial`, or the finished bundle exists.
+    /// When the folder's name does not end in `.partial`, the finished bundle exists, or the session is still running.
     pub fn resume(partial: &Path) -> Result<PartialBundle, BundleError> {
         let path = match partial.extension().is_some_and(|e| e == "partial") {
             true => partial.with_extension(""),
@@ -106,10 +164,18 @@ impl PartialBundle {
                 ));
             }
         };
-        match path.exists() {
-            true => Err(BundleError::new(&path, "a bundle with this name exists already")),
-            false if !partial.is_dir() => Err(BundleError::new(partial, "there is no folder of this name")),
-            false => Ok(PartialBundle { partial: partial.to_path_buf(), path }),
+        if path.exists() {
+            return Err(BundleError::new(&path, "a bundle with this name exists already"));
+        }
+        if !partial.is_dir() {
+            return Err(BundleError::new(partial, "there is no folder of this name"));
+        }
+        match SessionLock::acquire(partial) {
+            SessionLock::Taken => {
+                let why = "another program is still recording or completing this session; finish the session there";
+                Err(BundleError::new(partial, why))
+            }
+            lock => Ok(PartialBundle { partial: partial.to_path_buf(), path, lock: lock.into_file() }),
         }
     }
 
@@ -144,8 +210,8 @@ impl PartialBundle {
     /// # Errors
     ///
     /// When the recording cannot be scored or a file cannot be written; the folder then stays `….partial`.
-    pub fn complete(self, templates: &Templates) -> Result<PathBuf, BundleError> {
-        self.complete_checked(templates, ReplayCheck::Skip).map(|completed| completed.path)
+    pub fn complete(self, templates: &Templates, observer: CompletionObserver) -> Result<PathBuf, BundleError> {
+        self.complete_checked(templates, ReplayCheck::Skip, observer).map(|completed| completed.path)
     }
 
     /// [`PartialBundle::complete`] for a session that was interrupted: reads its recording as far as it is intact.
@@ -153,12 +219,21 @@ impl PartialBundle {
     /// # Errors
     ///
     /// As [`PartialBundle::complete`]; when nothing was recorded, the error says so.
-    pub fn complete_interrupted(self, templates: &Templates) -> Result<CompletedBundle, BundleError> {
-        self.complete_checked(templates, ReplayCheck::Full)
+    pub fn complete_interrupted(
+        self,
+        templates: &Templates,
+        observer: CompletionObserver,
+    ) -> Result<CompletedBundle, BundleError> {
+        self.complete_checked(templates, ReplayCheck::Full, observer)
     }
 
-    fn complete_checked(self, templates: &Templates, check: ReplayCheck) -> Result<CompletedBundle, BundleError> {
-        let PartialBundle { partial, path } = self;
+    fn complete_checked(
+        self,
+        templates: &Templates,
+        check: ReplayCheck,
+        observer: CompletionObserver,
+    ) -> Result<CompletedBundle, BundleError> {
+        let PartialBundle { partial, path, lock } = self;
         let unmade = |why: String| BundleError::new(&partial, why);
         let unwritten = |name: &str, e: &io::Error| {
             let why = format!("{name}: {}", typodont_formats::write_failure(e));
@@ -175,8 +250,11 @@ impl PartialBundle {
             }
             parsed => parsed.map_err(|e| unmade(e.to_string()))?,
         };
+        observer(CompletionStep::Scoring);
         let scored = score::score(&recording, check).map_err(unmade)?;
-        let files = derive_files(&recording, &bytes, &scored, templates).map_err(unmade)?;
+        observer(CompletionStep::Scored(Box::new(FirstResult::of(&recording, &scored, templates))));
+        let files = derive_files(&recording, &bytes, &scored, templates, observer).map_err(unmade)?;
+        observer(CompletionStep::Saving);
         fs::create_dir_all(partial.join("views")).map_err(|e| unwritten("views", &e))?;
         for (name, bytes) in files {
             write_synced(&partial.join(&name), &bytes).map_err(|e| unwritten(&name, &e))?;
@@ -184,6 +262,9 @@ impl PartialBundle {
         for folder in [&partial.join("views"), &partial] {
             sync_folder(folder);
         }
+        // Some systems do not rename a folder with an open file.
+        drop(lock);
+        let _ = fs::remove_file(partial.join(LOCK_FILE));
         fs::rename(&partial, &path).map_err(|e| unwritten("the folder cannot be renamed", &e))?;
         sync_folder(path.parent().unwrap_or(Path::new(".")));
         let difference = scored
@@ -229,10 +310,16 @@ fn derive_files(
     bytes: &[u8],
     scored: &Scored,
     templates: &Templates,
+    observer: CompletionObserver,
 ) -> Result<BTreeMap<String, Vec<u8>>, String> {
+    observer(CompletionStep::Maps);
     let mut files = derive_maps(recording, scored)?;
+    observer(CompletionStep::Surfaces);
     files.insert("performance.glb".to_string(), glb::encode(&pictures::surface_parts(scored))?);
-    let views = pictures::all_pictures(recording, scored);
+    let views = pictures::all_pictures(recording, scored, &mut |done, all| {
+        observer(CompletionStep::Pictures { done, all });
+    });
+    observer(CompletionStep::Page);
     files.extend(views.iter().map(|view| (format!("views/{}.png", view.name), view.png.clone())));
     let mut session = SessionFile::of(recording, scored);
     session.digests = files.iter().map(|(name, bytes)| (name.clone(), sha256(bytes))).collect();
@@ -331,7 +418,7 @@ pub fn verify(bundle: &Path, known: &[Templates]) -> Result<Verification, String
     } else if complaints.is_empty() {
         let own = known.iter().find(|t| session.template_sha256 == sha256(t.session_source_text().as_bytes()));
         let templates = own.or(known.first()).ok_or("no templates are known")?;
-        let derived = derive_files(&recording, &bytes, &scored, templates)?;
+        let derived = derive_files(&recording, &bytes, &scored, templates, &mut |_| ())?;
         complaints.extend(compare_derived(bundle, &session, &derived, &written, own.is_some()));
         if own.is_none() {
             let part = format!("{REPORT_FILE}, which was made from templates that are not available here");

@@ -223,7 +223,7 @@ pub struct FeedbackSentence {
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeedbackFinding {
     pub metric: String,
-    pub title: String,
+    pub title: Message,
     /// Points lost; `None` for a critical error.
     pub lost: Option<f64>,
     pub sentences: Vec<FeedbackSentence>,
@@ -238,7 +238,7 @@ pub struct Feedback {
     /// Moments in the order in which sentences mention them, numbered from 1.
     pub moments: Vec<FeedbackMoment>,
     /// Titles of the items with full marks.
-    pub full_marks: Vec<String>,
+    pub full_marks: Vec<Message>,
 }
 
 /// Feedback on a graded session; empty for a session without a grade. `scenario` gives the titles of tissues and zones.
@@ -266,7 +266,8 @@ pub fn build(session: &SessionFile, scenario: &Scenario, rules: &FeedbackRules) 
         }
     }
     let has_full_marks = |i: &&super::ItemResultFile| i.max_points - i.points < LOST_POINTS_MIN;
-    feedback.full_marks = grade.items.iter().filter(has_full_marks).map(|i| i.title.clone()).collect();
+    feedback.full_marks =
+        grade.items.iter().filter(has_full_marks).map(|i| Message::authored(&scenario.texts, &i.title)).collect();
     feedback.moments = builder.moments;
     feedback
 }
@@ -293,17 +294,17 @@ impl SentenceBuilder<'_> {
         is_lower_better: bool,
     ) -> FeedbackFinding {
         let rules = self.rules;
-        let mut finding =
-            FeedbackFinding { metric: metric.into(), title: title.into(), lost, sentences: Vec::new(), advice: None };
+        let title = Message::authored(&self.scenario.texts, title);
+        let (metric_name, sentences) = (metric.into(), Vec::new());
+        let mut finding = FeedbackFinding { metric: metric_name, title: title.clone(), lost, sentences, advice: None };
         let Some(rule) = rules.rule_for(metric, is_lower_better) else { return finding };
         let formatted = |value: Option<f64>| {
             let text = display_format::measure(metric, value);
             Message::text_or(format!("value.{text}"), non_breaking(text))
         };
-        let args: MessageArgs =
-            [("value", formatted(value)), ("goal", formatted(goal)), ("title", Message::plain(title))]
-                .map(|(name, said)| (name.to_string(), said))
-                .into();
+        let args: MessageArgs = [("value", formatted(value)), ("goal", formatted(goal)), ("title", title)]
+            .map(|(name, said)| (name.to_string(), said))
+            .into();
         if let (Some(mistake), Some(texts)) = (rule.lapse.map(EpisodeKind::from), &rule.say) {
             for index in self.worst_lapses(mistake, metric, goal, rule.worst_by) {
                 finding.sentences.extend(self.sentence(index, texts, &args));
@@ -426,7 +427,7 @@ fn lapse_args(lapse: &EpisodeFile, scenario: &Scenario) -> MessageArgs {
         ("force", lapse.force_n.map(force)),
         ("force_at", lapse.force_at_n.map(force)),
         ("seconds", lapse.contact_s.map(|s| Message::plain(non_breaking(display_format::duration(s))))),
-        ("zone", zone.map(|zone| Message::plain(zone.title.as_str()))),
+        ("zone", zone.map(|zone| Message::authored(&scenario.texts, &zone.title))),
     ];
     with_values(known)
 }

@@ -17,7 +17,7 @@ pub fn tissues(volume: &Volume, table: &TissueTable) -> Result<Vec<u8>, String> 
     let labels: Vec<u8> = volume.tissues().map(|l| l.0).collect();
     let segments = table.entries().iter().map(|e| NamedSegment {
         id: e.name.clone(),
-        name: e.title.clone(),
+        name: e.title.to_string(),
         label_value: e.id,
         color: e.rgb(),
     });

@@ -7,6 +7,7 @@
 use super::display_format::sanitize_display;
 use minijinja::value::Value;
 use std::collections::BTreeMap;
+use typodont_exercise::local_text::LocalTexts;
 
 /// A language's texts by key.
 pub type Texts = BTreeMap<String, String>;
@@ -52,6 +53,14 @@ pub enum Message {
 impl Message {
     pub fn plain(text: impl Into<String>) -> Message {
         Message::Plain(text.into())
+    }
+
+    /// A text of an exercise, in the languages in which its author wrote it.
+    pub fn authored(texts: &LocalTexts, text: &str) -> Message {
+        match texts.translations(text) {
+            Some(texts) => Message::PerLanguage { texts, args: Vec::new() },
+            None => Message::plain(text),
+        }
     }
 
     pub fn text(key: impl Into<String>, args: &[(&str, Message)]) -> Message {

@@ -20,6 +20,7 @@ pub mod cohort;
 pub mod csv;
 mod curves;
 mod feedback;
+mod first_result;
 mod glb;
 mod templates;
 mod labelmap;
@@ -34,6 +35,8 @@ mod voxels;
 pub mod display_format;
 
 pub use display_format::{measure as measure_in_words, sanitize_display};
+pub use feedback::{Feedback, FeedbackFinding, FeedbackMoment, FeedbackSentence};
+pub use first_result::{FirstResult, LegendEntry};
 pub use glb::{SurfacePart, encode as surfaces_glb};
 pub use labelmap::tissues as tissue_map;
 pub use language::{Languages, Message, Translator};

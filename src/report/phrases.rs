@@ -4,6 +4,7 @@ use super::display_format;
 use super::language::Message;
 use super::session_file::{AnswerResultFile, CriticalErrorFile, EvidenceFile, GradeFile, ItemResultFile};
 use serde_json::Value as Json;
+use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::scenario::metric::MetricArgument;
 use typodont_exercise::scenario::{Metric, distal};
 
@@ -38,10 +39,10 @@ pub fn formula(metric: &str) -> Message {
 }
 
 /// Dependence of an item's points on another item of the same grade; empty for an item that counts by itself.
-pub fn counts_with(item: &ItemResultFile, grade: Option<&GradeFile>) -> Message {
+pub fn counts_with(item: &ItemResultFile, grade: Option<&GradeFile>, texts: &LocalTexts) -> Message {
     let (Some(metric), Some(share)) = (&item.counts_with, item.counts_with_share) else { return Message::plain("") };
     let other = grade.and_then(|g| g.items.iter().find(|i| i.metric == *metric && i.counts_with.is_none()));
-    let title = other.map_or_else(|| measure_title(metric), |other| Message::plain(&other.title));
+    let title = other.map_or_else(|| measure_title(metric), |other| Message::authored(texts, &other.title));
     let percent = Message::plain(display_format::plain_number((1000.0 * share).round() / 10.0));
     Message::text("points.counts_with", &[("title", title), ("percent", percent)])
 }

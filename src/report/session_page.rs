@@ -7,9 +7,10 @@ use super::SessionFile;
 use super::curves::{self, EventFlag};
 use super::display_format;
 use super::feedback::{self, Feedback, FeedbackFinding, FeedbackMoment};
+use super::first_result::{self, LegendEntry, shown_verdicts};
 use super::language::{Languages, Message};
 use super::phrases;
-use super::pictures::{EncodedPicture, ViewKind, srgb_to_linear};
+use super::pictures::{EncodedPicture, ViewKind};
 use super::templates::Templates;
 use super::voxels::{self, VoxelHeader};
 use base64::Engine;
@@ -17,6 +18,7 @@ use minijinja::value::Value;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
+use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::record::Recording;
 use typodont_exercise::scenario::{Metric, Rubric, Scenario};
 use typodont_exercise::score;
@@ -26,7 +28,10 @@ use typodont_exercise::score::{Scored, Verdict};
 #[derive(Serialize)]
 struct SessionPage<'a> {
     session: &'a SessionFile,
-    summary: &'a str,
+    title: Value,
+    summary: Value,
+    /// Titles of the critical errors that failed the exercise.
+    failed: Vec<Value>,
     started: String,
     length: String,
     points: Option<String>,
@@ -71,12 +76,12 @@ struct ReportLanguage {
 #[derive(Serialize)]
 struct ReportFeedback {
     findings: Vec<ReportFinding>,
-    kept: Vec<String>,
+    kept: Vec<Value>,
 }
 
 #[derive(Serialize)]
 struct ReportFinding {
-    title: String,
+    title: Value,
     metric: String,
     /// Points lost; `None` for a critical error.
     lost: Option<String>,
@@ -102,7 +107,7 @@ struct ReportPlace {
 
 #[derive(Serialize)]
 struct ReportItem {
-    title: String,
+    title: Value,
     formula: Value,
     /// Dependence on another item, in words; empty for an item that counts by itself.
     counts_with: Value,
@@ -118,7 +123,7 @@ struct ReportItem {
 
 #[derive(Serialize)]
 struct ReportCriticalError {
-    title: String,
+    title: Value,
     formula: Value,
     limit: Value,
     value: Value,
@@ -157,7 +162,7 @@ struct ReportFigure {
 
 #[derive(Serialize)]
 struct ReportStage {
-    title: String,
+    title: Value,
     began: String,
     took: String,
     ended_by: Value,
@@ -207,7 +212,7 @@ pub fn render(
     session: &SessionFile,
     pictures: &[EncodedPicture],
 ) -> Result<String, String> {
-    let localizer = ReportLocalizer { languages: templates.languages(), session };
+    let localizer = ReportLocalizer { languages: templates.languages(), session, texts: &recording.scenario.texts };
     let grade = session.grade.as_ref();
     let figures_of = |shows: fn(&ViewKind) -> bool| {
         pictures.iter().filter(|p| shows(&p.kind)).map(|p| localizer.figure(p)).collect()
@@ -218,7 +223,9 @@ pub fn render(
     let data = script_data(templates, recording, scored, session, &feedback, packed_voxels.as_ref().map(|v| &v.header));
     let page = SessionPage {
         session,
-        summary: &recording.scenario.summary,
+        title: localizer.own(&session.scenario.title),
+        summary: localizer.own(&recording.scenario.summary),
+        failed: grade.map(|g| g.hard_fails.iter().map(|title| localizer.own(title)).collect()).unwrap_or_default(),
         started: session.started.replace('T', " ").replace('Z', " UTC"),
         length: display_format::duration(session.servo.ticks as f64 * typodont_core::tick::TICK_S),
         points: grade.map(|g| display_format::points(g.points, g.pass_points)),
@@ -243,7 +250,7 @@ pub fn render(
         stages: localizer.stages(recording),
         chart: session.chart.iter().map(|site| localizer.site(site)).collect(),
         measures: localizer.measures(&recording.scenario, scored),
-        questionnaire: questionnaire(recording, session),
+        questionnaire: questionnaire(recording, &localizer),
         feedback: localizer.feedback(&feedback),
         languages: languages(templates),
         style: Value::from_safe_string(templates.session_file("report.css").into()),
@@ -291,10 +298,17 @@ struct ScriptData<'a> {
     voxels: Option<&'a VoxelHeader>,
     tissues: Vec<LabelRow>,
     verdicts: Vec<LabelRow>,
-    tools: Vec<&'a str>,
+    tools: Vec<InstrumentName>,
     moments: Vec<ScriptMoment>,
     /// Texts of the script by language and key.
     words: BTreeMap<&'a str, BTreeMap<&'a str, &'a str>>,
+}
+
+/// An instrument of the tray.
+#[derive(Serialize)]
+struct InstrumentName {
+    /// By language.
+    title: BTreeMap<String, String>,
 }
 
 /// A tissue or a verdict by its number in label maps.
@@ -329,7 +343,7 @@ fn script_data(
     let languages = templates.languages();
     let tissue = |t: &typodont_exercise::catalog::TissueEntry| LabelRow {
         id: t.id,
-        title: languages.in_each_language(&Message::text_or(format!("tissues.{}", t.name), &t.title)),
+        title: languages.in_each_language(&Message::text_or(format!("tissues.{}", t.name), t.title.to_string())),
         color: t.rgb(),
         sign: "",
         decay: t.role == typodont_exercise::catalog::TissueRole::Decay,
@@ -347,7 +361,13 @@ fn script_data(
         voxels,
         tissues: recording.scenario.tissues.entries().iter().map(tissue).collect(),
         verdicts: shown_verdicts(scored).map(verdict).collect(),
-        tools: recording.scenario.instruments.iter().map(|i| i.title.as_str()).collect(),
+        tools: recording
+            .scenario
+            .instruments
+            .iter()
+            .map(|i| Message::authored(&recording.scenario.texts, &i.title))
+            .map(|title| InstrumentName { title: languages.in_each_language(&title) })
+            .collect(),
         moments: feedback.moments.iter().map(moment).collect(),
         words: languages.with_prefix("script."),
     };
@@ -355,16 +375,11 @@ fn script_data(
     serde_json::to_string(&data).unwrap_or_default().replace('<', "\\u003c")
 }
 
-/// The verdicts that a session's maps may show.
-fn shown_verdicts(scored: &Scored) -> impl Iterator<Item = &'static Verdict> + use<> {
-    let of_fillings: &[Verdict] = if scored.restoration.is_some() { &Verdict::OF_FILLINGS } else { &[] };
-    Verdict::VISIBLE.iter().chain(of_fillings)
-}
-
 /// Turns a session's results into texts in all languages.
 struct ReportLocalizer<'a> {
     languages: &'a Languages,
     session: &'a SessionFile,
+    texts: &'a LocalTexts,
 }
 
 impl ReportLocalizer<'_> {
@@ -372,8 +387,9 @@ impl ReportLocalizer<'_> {
         self.languages.html(message)
     }
 
-    fn word(&self, key: impl Into<String>, fallback: &str) -> Value {
-        self.html(&Message::text_or(key, fallback))
+    /// A text of the exercise, in its author's languages.
+    fn own(&self, text: &str) -> Value {
+        self.html(&Message::authored(self.texts, text))
     }
 
     fn figure(&self, picture: &EncodedPicture) -> ReportFigure {
@@ -411,9 +427,9 @@ impl ReportLocalizer<'_> {
     fn item(&self, item: &super::ItemResultFile) -> ReportItem {
         let written = |v: f64| self.html(&phrases::value_text(display_format::written(&item.metric, v)));
         ReportItem {
-            title: item.title.clone(),
+            title: self.own(&item.title),
             formula: self.formula(&item.metric),
-            counts_with: self.html(&phrases::counts_with(item, self.session.grade.as_ref())),
+            counts_with: self.html(&phrases::counts_with(item, self.session.grade.as_ref(), self.texts)),
             value: self.value(&item.metric, item.value),
             r#where: self.place(&item.metric),
             spot: self.evidence_place(&item.metric),
@@ -427,7 +443,7 @@ impl ReportLocalizer<'_> {
 
     fn critical_error(&self, fail: &super::CriticalErrorFile) -> ReportCriticalError {
         ReportCriticalError {
-            title: fail.title.clone(),
+            title: self.own(&fail.title),
             formula: self.formula(&fail.metric),
             limit: self.html(&phrases::limit(fail)),
             value: self.value(&fail.metric, fail.value),
@@ -458,29 +474,23 @@ impl ReportLocalizer<'_> {
 
     /// The signs are a second cue beside the colours.
     fn legend(&self, scored: &Scored) -> Vec<ReportLegendEntry> {
-        let voxel = scored.replay.workpiece.volume.grid().voxel_mm3();
-        let entry = |verdict: &Verdict| {
-            let count = scored.verdicts.iter().filter(|v| *v == verdict).count();
-            let [r, g, b] = verdict.color();
-            // Black is read better from this luminance on (WCAG 2): (0.179 + 0.05)² ≈ 1.05·0.05.
-            let [red, green, blue] = srgb_to_linear([r, g, b]);
-            let is_dark = 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.179;
-            let [r, g, b] = [r, g, b].map(|c| (c * 255.0).round() as u8);
+        let entry = |entry: LegendEntry| {
+            let [r, g, b] = entry.color;
             ReportLegendEntry {
-                title: self.word(format!("verdict.{}", verdict.id()), verdict.title()),
+                title: self.html(&entry.title),
                 color: format!("#{r:02x}{g:02x}{b:02x}"),
-                ink: if is_dark { "#fff" } else { "#000" },
-                sign: verdict.sign(),
-                amount: format!("{} mm³", display_format::significant(count as f64 * voxel, 2)),
+                ink: if entry.is_dark { "#fff" } else { "#000" },
+                sign: entry.sign,
+                amount: format!("{} mm³", display_format::significant(entry.volume, 2)),
             }
         };
-        shown_verdicts(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
+        first_result::legend(scored).into_iter().map(entry).collect()
     }
 
     fn stages(&self, recording: &Recording) -> Vec<ReportStage> {
         let stages = self.session.stages.iter().zip(&recording.scenario.stages);
         let line = |(result, stage): (&super::StageResultFile, &typodont_exercise::scenario::Stage)| ReportStage {
-            title: result.title.clone(),
+            title: self.own(&result.title),
             began: display_format::duration(result.started_s),
             took: display_format::duration(result.ended_s - result.started_s),
             ended_by: self.html(&phrases::ended_by(&result.ended_by)),
@@ -531,28 +541,31 @@ impl ReportLocalizer<'_> {
     fn feedback(&self, feedback: &Feedback) -> ReportFeedback {
         let sentence = |s: &feedback::FeedbackSentence| ReportSentence { text: self.html(&s.message), mark: s.moment };
         let line = |finding: &FeedbackFinding| ReportFinding {
-            title: finding.title.clone(),
+            title: self.html(&finding.title),
             metric: finding.metric.clone(),
             lost: finding.lost.map(|points| format!("{points:.1}")),
             sentences: finding.sentences.iter().map(sentence).collect(),
             advice: finding.advice.as_ref().map(|said| self.html(said)),
         };
-        ReportFeedback { findings: feedback.findings.iter().map(line).collect(), kept: feedback.full_marks.clone() }
+        ReportFeedback {
+            findings: feedback.findings.iter().map(line).collect(),
+            kept: feedback.full_marks.iter().map(|title| self.html(title)).collect(),
+        }
     }
 }
 
 #[derive(Serialize)]
 struct ReportQuestionnaire {
-    title: String,
-    lowest: String,
-    highest: String,
+    title: Value,
+    lowest: Value,
+    highest: Value,
     steps: u8,
     categories: Vec<ReportCategory>,
 }
 
 #[derive(Serialize)]
 struct ReportCategory {
-    title: String,
+    title: Value,
     mean: String,
     /// Not "items": in a template that is a mapping's own method.
     entries: Vec<ReportRating>,
@@ -560,30 +573,33 @@ struct ReportCategory {
 
 #[derive(Serialize)]
 struct ReportRating {
-    text: String,
+    text: Value,
     value: String,
     counted: String,
 }
 
-fn questionnaire(recording: &Recording, session: &SessionFile) -> Option<ReportQuestionnaire> {
-    let (definition, answers) = (recording.scenario.questionnaire.as_ref()?, session.questionnaire.as_ref()?);
+/// The questionnaire with its answers; `None` if nothing was answered.
+fn questionnaire(recording: &Recording, localizer: &ReportLocalizer) -> Option<ReportQuestionnaire> {
+    let (definition, answers) = (recording.scenario.questionnaire.as_ref()?, localizer.session.questionnaire.as_ref()?);
+    answers.items.iter().find(|rating| rating.value.is_some())?;
     let shown = |v: Option<f64>| v.map_or("–".to_string(), display_format::plain_number);
     let categories = definition.categories.iter().map(|category| {
         let items = category.items.iter().filter_map(|item| {
             let rating = answers.items.iter().find(|r| r.id == item.id)?;
-            Some(ReportRating { text: item.text.clone(), value: shown(rating.value), counted: shown(rating.counted) })
+            let (value, counted) = (shown(rating.value), shown(rating.counted));
+            Some(ReportRating { text: localizer.own(&item.text), value, counted })
         });
         let mean = answers.categories.get(&category.id).copied().flatten();
         ReportCategory {
-            title: category.title.clone(),
+            title: localizer.own(&category.title),
             mean: mean.map_or("–".to_string(), |m| format!("{m:.2}")),
             entries: items.collect(),
         }
     });
     Some(ReportQuestionnaire {
-        title: definition.title.clone(),
-        lowest: definition.lowest.clone(),
-        highest: definition.highest.clone(),
+        title: localizer.own(&definition.title),
+        lowest: localizer.own(&definition.lowest),
+        highest: localizer.own(&definition.highest),
         steps: definition.steps,
         categories: categories.collect(),
     })

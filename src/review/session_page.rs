@@ -10,6 +10,7 @@ use super::overrides::OverrideEntry;
 use super::rating_form::{self, RatingFields, RatingRow};
 use super::verification::ShownVerification;
 use serde::Serialize;
+use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::scenario::Metric;
 use typodont_exercise::score::Verdict;
 use typodont_report::display_format;
@@ -327,7 +328,11 @@ impl ReviewLocalizer<'_> {
             index,
             title: sanitize_display(&item.title, 200),
             formula: self.translate(&phrases::formula(&item.metric)),
-            counts_with: self.translate(&phrases::counts_with(item, self.session.grade.as_ref())),
+            counts_with: self.translate(&phrases::counts_with(
+                item,
+                self.session.grade.as_ref(),
+                &LocalTexts::default(),
+            )),
             value: self.value(&item.metric, item.value),
             place: self.place(&item.metric),
             full_at: self.value(&item.metric, Some(item.full_at)),

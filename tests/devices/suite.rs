@@ -304,7 +304,7 @@ impl Heard {
                     self.states += 1;
                     self.last = Some(state);
                 }
-                ServoEvent::Started(_) | ServoEvent::Commanded(..) => {}
+                ServoEvent::Started(_) | ServoEvent::Commanded(..) | ServoEvent::AwaitingMovement(_) => {}
             }
         }
     }

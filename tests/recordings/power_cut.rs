@@ -78,7 +78,7 @@ fn losses_of_power_cuts(count: usize, mount: &Path, disk: &VolatileDisk) -> Vec<
         }
         if lesson.session().are_stages_over() {
             // A finished bundle is whole on the disk at once.
-            let bundle = lesson.end().unwrap().complete().unwrap();
+            let bundle = lesson.end().unwrap().complete(&mut |_| ()).unwrap();
             let left = disk.after_power_cut(|_| Vec::new());
             let kept = folder("power_cut_bundle");
             for (path, bytes) in left.iter().filter(|(path, _)| path.starts_with(bundle.file_name().unwrap())) {

@@ -15,6 +15,9 @@ const SCREEN_SIZE: [i32; 2] = [1280, 800];
 /// Maximum time to wait for a state on a busy computer; a test that exceeds it fails.
 pub const PATIENCE: Duration = Duration::from_secs(180);
 
+/// Number of exercises that the list shows before those of a school.
+pub const SHIPPED_EXERCISES: usize = 15;
+
 /// Poll interval of the state log.
 pub const LOOK_EVERY: Duration = Duration::from_millis(20);
 

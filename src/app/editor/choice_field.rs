@@ -50,7 +50,7 @@ pub fn named_choices(form: &FormContext, pointer: &str) -> Option<Vec<NamedChoic
             editor
                 .instruments
                 .iter()
-                .map(|e| NamedChoice { name: e.id.clone(), title: e.title.clone(), description: e.id.clone() })
+                .map(|e| NamedChoice { name: e.id.clone(), title: e.title.to_string(), description: e.id.clone() })
                 .collect(),
         ),
         _ => None,

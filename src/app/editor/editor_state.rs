@@ -433,9 +433,10 @@ impl EditorState {
         let own = self.draft.value_at("/new_tissues").and_then(Value::as_array).into_iter().flatten();
         let own = own.filter_map(|entry| {
             let name = entry.get("name")?.as_str()?;
-            Some((name.to_string(), entry.get("title").and_then(Value::as_str).unwrap_or(name).to_string()))
+            let title = entry.get("title").and_then(base_text).unwrap_or(name);
+            Some((name.to_string(), title.to_string()))
         });
-        self.tissues.iter().map(|entry| (entry.name.clone(), entry.title.clone())).chain(own).collect()
+        self.tissues.iter().map(|entry| (entry.name.clone(), entry.title.to_string())).chain(own).collect()
     }
 
     /// The `id` of every entry in the lists at the given JSON pointers.
@@ -461,6 +462,12 @@ fn exercises_folder() -> PathBuf {
     let dirs = directories::UserDirs::new();
     let home = dirs.as_ref().map(|dirs| dirs.document_dir().unwrap_or(dirs.home_dir()).to_path_buf());
     home.unwrap_or_default().join("Typodont").join("exercises")
+}
+
+/// The text of a value that is a text, or texts by language; English if it is among them.
+fn base_text(value: &Value) -> Option<&str> {
+    let by_language = || value.as_object().and_then(|texts| texts.get("en").or(texts.values().next()));
+    value.as_str().or_else(|| by_language()?.as_str())
 }
 
 /// Names of the shipped questionnaires and of those in the folder in which the program runs.

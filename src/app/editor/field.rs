@@ -65,6 +65,12 @@ pub fn named_field_ui(ui: &mut egui::Ui, form: &mut FormContext, pointer: &str, 
     });
 }
 
+/// True for a text of several lines, and for one of its languages.
+fn is_multiline(pointer: &str) -> bool {
+    let above = pointer.rsplit_once('/').map_or("", |(above, _)| last_segment(above));
+    [last_segment(pointer), above].iter().any(|key| MULTILINE_KEYS.contains(key))
+}
+
 fn text_ui(
     ui: &mut egui::Ui,
     form: &mut FormContext,
@@ -73,11 +79,15 @@ fn text_ui(
     field: &SchemaField,
     value: Option<&Value>,
 ) {
+    if let Some(Value::Object(texts)) = value {
+        let codes: Vec<String> = texts.keys().cloned().collect();
+        return texts_by_language_ui(ui, form, pointer, name, field, &codes);
+    }
     let named = name_ui(ui, name, &field.description);
     let mut text = value.and_then(Value::as_str).unwrap_or_default().to_string();
     ui.horizontal(|ui| {
         let room = ui.available_width() - if is_removable(field, value) { 44.0 } else { 0.0 };
-        let edit = match MULTILINE_KEYS.contains(&last_segment(pointer)) {
+        let edit = match is_multiline(pointer) {
             true => egui::TextEdit::multiline(&mut text).desired_rows(3),
             false => egui::TextEdit::singleline(&mut text),
         };
@@ -88,6 +98,39 @@ fn text_ui(
         }
         clear_button_ui(ui, form, pointer, name, field, value);
     });
+    if field.is_by_language && value.is_some() {
+        let own = form.words.code.clone();
+        let another = if own == BASE_LANGUAGE { SECOND_LANGUAGE } else { &own };
+        let add = ui.small_button(form.words.get("author.translate"));
+        anchor(ui, format!("translate:{pointer}"), add.rect);
+        if add.clicked() {
+            let texts = json!({ BASE_LANGUAGE: value, another: value });
+            form.send(EditorCommand::SetValue(pointer.into(), texts));
+        }
+    }
+}
+
+/// Languages of a text that gets its first translation, if the window itself is in English.
+const BASE_LANGUAGE: &str = "en";
+const SECOND_LANGUAGE: &str = "tr";
+
+/// A text in several languages: a field for each.
+fn texts_by_language_ui(
+    ui: &mut egui::Ui,
+    form: &mut FormContext,
+    pointer: &str,
+    name: &str,
+    field: &SchemaField,
+    codes: &[String],
+) {
+    for code in codes {
+        let own = child(pointer, code);
+        let value = form.value(&own).cloned();
+        // Of several languages one may be removed; the last one is the text itself.
+        let inner = SchemaField { is_nullable: codes.len() > 1, is_by_language: false, ..field.clone() };
+        ui.push_id(code, |ui| text_ui(ui, form, &own, &format!("{name} ({code})"), &inner, value.as_ref()));
+        diagnostics_ui(ui, form, &own);
+    }
 }
 
 fn number_ui(

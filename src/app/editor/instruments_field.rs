@@ -27,7 +27,7 @@ pub fn instruments_ui(ui: &mut egui::Ui, form: &mut FormContext, pointer: &str) 
     };
     let title = |id: &str| {
         let entry = form.editor.instruments.iter().find(|entry| entry.id == id);
-        entry.map_or(id.to_string(), |entry| entry.title.clone())
+        entry.map_or(id.to_string(), |entry| entry.title.in_language(&form.words.code).to_string())
     };
     let Some(own) = own else {
         ui.horizontal_wrapped(|ui| {

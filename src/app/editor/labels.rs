@@ -111,6 +111,7 @@ const LABELS: &[(&str, &str)] = &[
     ("time_limit_s", "label.time_limit"),
     ("cutting", "label.cutting"),
     ("show_decay", "label.show_decay"),
+    ("shows_controls", "label.shows_controls"),
     ("adjustable", "label.adjustable"),
     ("draw", "label.draw"),
     ("one_of", "label.one_of"),
@@ -154,6 +155,9 @@ const LABELS: &[(&str, &str)] = &[
     ("above", "label.above"),
     ("below", "label.below"),
     ("questionnaire", "label.questionnaire"),
+    ("questionnaire_time", "label.questionnaire_time"),
+    ("each_time", "label.each_time"),
+    ("end_of_course", "label.end_of_course"),
     ("color", "label.color"),
     ("name", "label.name"),
 ];

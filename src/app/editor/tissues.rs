@@ -39,9 +39,10 @@ fn tissue_ui(ui: &mut egui::Ui, form: &mut FormContext, entry: &TissueEntry) {
     let at = child("/tissues", &entry.name);
     let changed = form.value(&at).and_then(Value::as_object).map_or(0, |map| map.len());
     let is_wrong = count_below(form, &at) > 0;
+    let own = entry.title.in_language(&form.words.code);
     let title = match changed {
-        0 => entry.title.clone(),
-        count => format!("{} · {}", entry.title, form.words.format("author.changed", count)),
+        0 => own.to_string(),
+        count => format!("{own} · {}", form.words.format("author.changed", count)),
     };
     let header = egui::CollapsingHeader::new(title).id_salt(&at).default_open(changed > 0 || is_wrong);
     header.show(ui, |ui| {

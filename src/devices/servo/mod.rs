@@ -25,6 +25,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 use tick_timer::TickTimer;
 use typodont_core::device::{Device, DeviceError, DeviceState, Reading, Wrench};
+use typodont_core::frame::Vec3;
 use typodont_core::mailbox;
 use typodont_core::mailbox::{Receiver, Sender, SeqLock};
 use typodont_core::sim::{Command, Simulation, Step};
@@ -39,6 +40,10 @@ pub enum ServoCommand {
     /// Pauses the simulation and releases the hand.
     Pause,
     Resume,
+    /// Pauses the simulation, after its first tick at the earliest, until the device moves or one of its buttons
+    /// changes, or until [`ServoCommand::StopAwaiting`].
+    AwaitMovement,
+    StopAwaiting,
 }
 
 /// Events of the servo, in the order in which they happened.
@@ -52,6 +57,8 @@ pub enum ServoEvent {
     Ticked(TickReport),
     /// The state of the device has changed. The simulation is paused unless the device is ready.
     DeviceState(DeviceState),
+    /// The simulation waits for the first movement of the device, or (false) waits no longer.
+    AwaitingMovement(bool),
 }
 
 /// Result of one tick.
@@ -100,6 +107,10 @@ const COMMAND_CAPACITY: usize = 256;
 /// force, and equal to the time for which [`crate::FORCE_LIFE`] lets a force be rendered.
 const RELEASE_AFTER: Duration = Duration::from_millis(10);
 
+/// Movement of the device with which a waiting simulation goes on, mm: more than a hand trembles, less than a deliberate
+/// movement.
+const FIRST_MOVEMENT: f32 = 3.0;
+
 /// Ticks between two updates of the timing summary.
 const SUMMARY_TICKS: u64 = 500;
 
@@ -135,6 +146,7 @@ impl Servo {
             output: Wrench::ZERO,
             state: None,
             is_paused: false,
+            awaited: None,
             is_hand_trusted: false,
         };
         let stop = Arc::new(AtomicBool::new(false));
@@ -225,6 +237,21 @@ impl EventSink {
     }
 }
 
+/// Position and buttons of a device that has not moved yet; `None` before its first valid reading.
+#[derive(Clone, Copy, Debug, Default)]
+struct FirstReading(Option<(Vec3, u32)>);
+
+impl FirstReading {
+    /// Returns true if a reading differs from the first one by a movement or a button.
+    fn is_left_by(&mut self, reading: &Reading) -> bool {
+        if !reading.pose.is_valid() {
+            return false;
+        }
+        let (position, buttons) = *self.0.get_or_insert((reading.pose.position, reading.buttons));
+        buttons != reading.buttons || position.distance(reading.pose.position) > FIRST_MOVEMENT
+    }
+}
+
 /// State of a servo on its thread.
 struct ServoLoop {
     simulation: Simulation,
@@ -237,6 +264,8 @@ struct ServoLoop {
     /// State of the device, once it has been reported.
     state: Option<DeviceState>,
     is_paused: bool,
+    /// First reading since the simulation waits for a movement; `None` if it does not wait.
+    awaited: Option<FirstReading>,
     /// True if the last tick was stepped with a reading of the device.
     is_hand_trusted: bool,
 }
@@ -271,7 +300,9 @@ impl ServoLoop {
             self.drain_commands();
             let is_ready = self.report_state().is_ready();
             match exchanged {
-                Ok(reading) if is_ready && !self.is_paused => self.run_tick(reading, late.unwrap_or_default()),
+                Ok(reading) if is_ready && !self.is_paused && !self.is_awaiting(&reading) => {
+                    self.run_tick(reading, late.unwrap_or_default())
+                }
                 Ok(_) => self.release_if_held(),
                 Err(gone) => {
                     self.release_if_held();
@@ -294,7 +325,29 @@ impl ServoLoop {
                 }
                 ServoCommand::Pause => self.is_paused = true,
                 ServoCommand::Resume => self.is_paused = false,
+                ServoCommand::AwaitMovement => {
+                    self.awaited = Some(FirstReading::default());
+                    self.sink.send(ServoEvent::AwaitingMovement(true));
+                }
+                ServoCommand::StopAwaiting => self.stop_awaiting(),
             }
+        }
+    }
+
+    /// Returns true while the simulation waits for the first movement of the device. The first tick is always run, so
+    /// that the instrument is seen where it is.
+    fn is_awaiting(&mut self, reading: &Reading) -> bool {
+        let Some(first) = &mut self.awaited else { return false };
+        if self.simulation.tick() == Tick::ZERO || !first.is_left_by(reading) {
+            return self.simulation.tick() != Tick::ZERO;
+        }
+        self.stop_awaiting();
+        false
+    }
+
+    fn stop_awaiting(&mut self) {
+        if self.awaited.take().is_some() {
+            self.sink.send(ServoEvent::AwaitingMovement(false));
         }
     }
 

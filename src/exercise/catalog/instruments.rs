@@ -1,6 +1,7 @@
 //! The table of instruments.
 
 use crate::catalog::hand_instruments::{BladeEntry, CleoidEntry, PluggerEntry, SpoonEntry};
+use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::f32::consts::FRAC_PI_4;
@@ -20,7 +21,7 @@ pub struct InstrumentEntry {
     pub id: String,
     /// Name shown to users.
     #[schemars(length(min = 1, max = 80))]
-    pub title: String,
+    pub title: LocalText,
     /// Working end: the part that touches.
     pub end: WorkingEndEntry,
     /// True for an instrument that removes material: a bur, or a blade such as a carver.

@@ -1,5 +1,6 @@
 //! The table of tissues: names, colours and tactile properties.
 
+use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use typodont_core::touch::{FillingMaterial, Material, Materials};
@@ -41,7 +42,7 @@ pub struct TissueEntry {
     pub name: String,
     /// Name shown to users.
     #[schemars(length(min = 1, max = 80))]
-    pub title: String,
+    pub title: LocalText,
     /// Role of the tissue in scoring.
     pub role: TissueRole,
     /// Colour for display, as "#rrggbb", for example "#6b4226".
@@ -189,7 +190,7 @@ impl TissueTable {
         let id = (1..=255u8).rev().find(|id| self.by_label(Label(*id)).is_none())?;
         let own = self.by_label(decay)?;
         // A colon cannot occur in the name of another tissue.
-        let (name, title) = (format!("{}:{site}", own.name), format!("{} ({site})", own.title));
+        let (name, title) = (format!("{}:{site}", own.name), own.title.map(|title| format!("{title} ({site})")));
         let entry = TissueEntry { id, name, title, site_of: Some(decay), ..own.clone() };
         self.entries.push(entry);
         Some(Label(id))

@@ -9,6 +9,7 @@ pub use super::decay_file::*;
 pub use super::periodontium_file::*;
 
 use crate::catalog::TissueEntry;
+use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -26,11 +27,11 @@ pub struct ScenarioFile {
     pub id: String,
     /// Title shown to trainees.
     #[schemars(length(min = 1, max = 120))]
-    pub title: String,
+    pub title: LocalText,
     /// Purpose of the exercise, in one or two sentences.
     #[serde(default)]
     #[schemars(length(max = 2000))]
-    pub summary: String,
+    pub summary: LocalText,
     /// The tooth or teeth of the exercise and their surroundings.
     pub scene: SceneFile,
     /// File of the school's own instruments, in addition to those of `content/instruments.json`. It has the same keys;
@@ -82,6 +83,21 @@ pub struct ScenarioFile {
     #[serde(default)]
     #[schemars(regex(pattern = r"^[a-z0-9_-]+$"))]
     pub questionnaire: Option<String>,
+    /// Time at which the questionnaire is asked.
+    #[serde(default)]
+    pub questionnaire_time: Option<QuestionnaireTime>,
+}
+
+/// Time at which a questionnaire is asked.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum QuestionnaireTime {
+    /// Every time, after the last stage.
+    #[default]
+    EachTime,
+    /// Once, when the trainee has performed every exercise of the course that names the same questionnaire. The window
+    /// knows the course from its list of exercises; at a terminal the questionnaire is asked every time.
+    EndOfCourse,
 }
 
 /// The tooth or teeth of an exercise and their surroundings.
@@ -448,7 +464,7 @@ pub struct ZoneFile {
     pub id: String,
     /// Name shown to users.
     #[schemars(length(min = 1, max = 80))]
-    pub title: String,
+    pub title: LocalText,
     /// Role of the zone.
     pub role: ZoneRole,
     /// Voxels that belong to the zone.
@@ -555,10 +571,10 @@ pub struct StageFile {
     pub id: String,
     /// Title shown to trainees.
     #[schemars(length(min = 1, max = 120))]
-    pub title: String,
+    pub title: LocalText,
     /// Task for the trainee, in plain language.
     #[schemars(length(min = 1, max = 2000))]
-    pub instruction: String,
+    pub instruction: LocalText,
     /// Time limit after which the stage ends, s: 1 to 7200; null for no limit.
     #[serde(default)]
     #[schemars(range(min = 1.0, max = 7200.0))]
@@ -577,6 +593,10 @@ pub struct StageFile {
     /// True to show decay in its own colour.
     #[serde(default)]
     pub show_decay: bool,
+    /// True to show a card beside the tooth that teaches how the trainee's own device (mouse or haptic device) is used,
+    /// with a picture of each action and a mark for those done.
+    #[serde(default)]
+    pub shows_controls: bool,
     /// True to let the trainee change the tactile properties of tissues in the menu, in order to learn the effect of
     /// each coefficient. The report lists the changes; the next stage starts with the original values. Cannot be
     /// combined with `stiffness_steps`.
@@ -775,7 +795,7 @@ pub struct QuestionFile {
     pub id: String,
     /// Text of the question, as shown to the trainee.
     #[schemars(length(min = 1, max = 500))]
-    pub text: String,
+    pub text: LocalText,
     /// Kind of answer, and the correct answer.
     pub answer: AnswerFile,
 }
@@ -818,7 +838,7 @@ pub struct OptionFile {
     pub id: String,
     /// Text of the option, as shown to the trainee.
     #[schemars(length(min = 1, max = 200))]
-    pub text: String,
+    pub text: LocalText,
 }
 
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -899,7 +919,7 @@ pub struct RubricFile {
 pub struct RubricItemFile {
     /// Name shown in the report.
     #[schemars(length(min = 1, max = 120))]
-    pub title: String,
+    pub title: LocalText,
     /// The measure, such as "decay_cleared_pct".
     pub metric: String,
     /// Maximum points of the item: more than 0, up to 100.
@@ -922,7 +942,7 @@ pub struct RubricItemFile {
 pub struct HardFailFile {
     /// Name shown in the report.
     #[schemars(length(min = 1, max = 120))]
-    pub title: String,
+    pub title: LocalText,
     /// The measure, such as "pulp_exposed".
     pub metric: String,
     /// Condition under which the error has occurred.

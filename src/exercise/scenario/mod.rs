@@ -20,6 +20,7 @@ mod tooth_words;
 mod workpiece;
 
 pub use cavity::{PreparedCavity, ProximalBox};
+pub use file::QuestionnaireTime;
 pub use lesion::{Lesion, seeded_random};
 pub use metric::Metric;
 pub use questionnaire::{Questionnaire, QuestionnaireCategory, QuestionnaireItem};
@@ -30,6 +31,7 @@ pub use typodont_anatomy::periodontium::{Periodontium, Pockets, ProbingSite};
 pub use workpiece::{Workpiece, WorkpieceError};
 
 use crate::catalog::{InstrumentEntry, TissueTable};
+use crate::local_text::LocalTexts;
 use file::{AngleClassFile, SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -71,6 +73,9 @@ pub struct Scenario {
     pub measures: MeasureParams,
     pub rubric: Option<Rubric>,
     pub questionnaire: Option<Questionnaire>,
+    pub questionnaire_time: QuestionnaireTime,
+    /// Translations of the texts of the exercise and of its tables. All other fields hold the base texts.
+    pub texts: LocalTexts,
 }
 
 /// Visible effects of drilling. They are drawn only, and do not influence any measure.
@@ -321,6 +326,8 @@ pub struct Stage {
     /// Filling material that carriers place.
     pub filling: Option<Label>,
     pub show_decay: bool,
+    /// True if a card teaches how the trainee's device is used.
+    pub shows_controls: bool,
     /// True if the trainee may change the tissues' coefficients.
     pub is_adjustable: bool,
     pub draw: Option<Draw>,

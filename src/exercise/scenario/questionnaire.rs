@@ -1,5 +1,6 @@
 //! Statements that a trainee agrees or disagrees with after an exercise.
 
+use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use typodont_formats::diagnostic::Diagnostic;
@@ -14,19 +15,19 @@ pub struct Questionnaire {
     pub id: String,
     /// Title shown to users.
     #[schemars(length(min = 1, max = 120))]
-    pub title: String,
+    pub title: LocalText,
     /// Instruction to the trainee.
     #[schemars(length(min = 1, max = 1000))]
-    pub instruction: String,
+    pub instruction: LocalText,
     /// Number of steps of the rating scale: 2 to 11.
     #[schemars(range(min = 2, max = 11))]
     pub steps: u8,
     /// Label of the lowest step.
     #[schemars(length(min = 1, max = 60))]
-    pub lowest: String,
+    pub lowest: LocalText,
     /// Label of the highest step.
     #[schemars(length(min = 1, max = 60))]
-    pub highest: String,
+    pub highest: LocalText,
     /// Statements whose ratings are averaged together.
     #[schemars(length(min = 1, max = 20))]
     pub categories: Vec<QuestionnaireCategory>,
@@ -41,7 +42,7 @@ pub struct QuestionnaireCategory {
     pub id: String,
     /// Title shown to users.
     #[schemars(length(min = 1, max = 80))]
-    pub title: String,
+    pub title: LocalText,
     /// The statements.
     #[schemars(length(min = 1, max = 50))]
     pub items: Vec<QuestionnaireItem>,
@@ -56,7 +57,7 @@ pub struct QuestionnaireItem {
     pub id: String,
     /// Text of the statement.
     #[schemars(length(min = 1, max = 300))]
-    pub text: String,
+    pub text: LocalText,
     /// True for a statement to which agreement is unfavourable to the system. Such ratings are mirrored before they are
     /// averaged.
     #[serde(default)]

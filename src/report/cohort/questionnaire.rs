@@ -95,7 +95,7 @@ impl QuestionnaireSummary {
         let items = statements.iter().filter_map(|s| Some((s.id.clone(), s.answered.clone()?)));
         QuestionnaireSummary {
             id: id.into(),
-            title: wording.map_or_else(String::new, |w| w.title),
+            title: wording.map_or_else(String::new, |w| w.title.to_string()),
             n: filled.len(),
             categories: means
                 .into_iter()
@@ -166,7 +166,7 @@ fn statements(
         QuestionnaireStatement {
             id: id.into(),
             category: category.into(),
-            text: words.map_or_else(String::new, |w| w.text.clone()),
+            text: words.map_or_else(String::new, |w| w.text.to_string()),
             mirrored: words.map(|w| w.negative).or(is_answered_mirrored.then_some(true)),
             answered: SpreadFile::of(&answered, answers),
             counted: SpreadFile::of(&counted, answers),

@@ -59,15 +59,22 @@ const FORMER_CONTOUR: [f32; 3] = [0.62, 0.62, 0.62];
 const CONTOUR_WIDTH: f32 = 1.6;
 
 /// Every picture of a session: six sides and three cuts, each before, after and as a map.
-pub fn all_pictures(recording: &Recording, scored: &Scored) -> Vec<EncodedPicture> {
+pub fn all_pictures(
+    recording: &Recording,
+    scored: &Scored,
+    progress: &mut dyn FnMut(usize, usize),
+) -> Vec<EncodedPicture> {
+    let all = ViewSide::ALL.len() + SECTIONS.len();
     let palette = TissueColours::of(&recording.scenario.tissues);
     let colours = VerdictColours::of(scored);
     let mut raw = Vec::new();
-    for side in ViewSide::ALL {
+    for (done, side) in ViewSide::ALL.into_iter().enumerate() {
+        progress(done, all);
         raw.extend(side_pictures(scored, &palette, &colours, side));
     }
     let middle = centre_of_work(scored);
-    for cut in SECTIONS {
+    for (done, cut) in SECTIONS.into_iter().enumerate() {
+        progress(ViewSide::ALL.len() + done, all);
         raw.extend(section_pictures(scored, &palette, cut, middle));
     }
     encode_all(raw)

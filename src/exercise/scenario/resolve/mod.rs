@@ -6,12 +6,14 @@ mod guidance;
 mod rubric;
 mod scene;
 mod stages;
+mod texts;
 mod dry_run;
 mod zones;
 
 use super::file::{self, ScenarioFile};
 use super::{MeasureParams, OperatingField, Questionnaire, Scenario};
 use crate::catalog::{AgeBand, InstrumentEntry, InstrumentTable, TissueEntry, TissueTable, TouchFactorTable};
+use crate::local_text::LocalTexts;
 use rubric::Capabilities;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -159,13 +161,18 @@ impl Resolver<'_> {
         let capabilities = Capabilities::of(written, &stages);
         let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, capabilities));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
+        if written.questionnaire_time.is_some() && written.questionnaire.is_none() {
+            let message = "there is no questionnaire to be asked at that time".to_string();
+            let help = "name it with \"questionnaire\", or remove this key".to_string();
+            self.complain("/questionnaire_time", "missing-questionnaire", message, help);
+        }
         let factors = self.factors(written, &instruments);
         let carving = self.carving(&written.carving);
         let operating_field = self.operating_field(written);
         Some(Scenario {
             id: written.id.clone(),
-            title: written.title.clone(),
-            summary: written.summary.clone(),
+            title: written.title.to_string(),
+            summary: written.summary.to_string(),
             text: Arc::from(text),
             sha256: hex(&Sha256::digest(text.as_bytes())),
             files: std::mem::take(&mut self.files),
@@ -179,7 +186,6 @@ impl Resolver<'_> {
                 axis: typodont_core::frame::Vec3::Y,
             },
             operating_field,
-            instruments,
             factors,
             zones,
             guidances: std::mem::take(&mut self.guidances),
@@ -190,7 +196,10 @@ impl Resolver<'_> {
                 tolerance: written.measures.tolerance_mm,
             },
             rubric,
+            texts: self.texts(written, &instruments, questionnaire.as_ref()),
+            instruments,
             questionnaire,
+            questionnaire_time: written.questionnaire_time.unwrap_or_default(),
         })
     }
 
@@ -340,6 +349,22 @@ impl Resolver<'_> {
             );
         }
         field
+    }
+
+    /// Returns the texts by language, after complaints about those with two translations into the same language.
+    fn texts(
+        &mut self,
+        written: &ScenarioFile,
+        instruments: &[InstrumentEntry],
+        questionnaire: Option<&Questionnaire>,
+    ) -> LocalTexts {
+        let tables = texts::Tables { tissues: &self.tissues, instruments, questionnaire };
+        let (texts, conflicts) = texts::local_texts(written, &tables);
+        for (path, code) in conflicts {
+            let message = format!("the same text is translated differently elsewhere in the exercise, in \"{code}\"");
+            self.complain(&path, "two-translations", message, "write the same translation at both places");
+        }
+        texts
     }
 
     fn questionnaire(&mut self, name: &str) -> Option<Questionnaire> {

@@ -147,7 +147,7 @@ impl Resolver<'_> {
                 self.check_direction(&metric, item, &path);
                 self.check_needs(&metric, capabilities, &format!("{path}/metric"));
                 let &file::RubricItemFile { points, full_at, zero_at, .. } = item;
-                let title = item.title.clone();
+                let title = item.title.to_string();
                 items.push(RubricItem { title, metric, points, full_at, zero_at, counts_with: None });
                 written_items.push((index, item));
             }
@@ -169,7 +169,7 @@ impl Resolver<'_> {
                     file::FailFile::Above(value) => Limit::Above(value),
                     file::FailFile::Below(value) => Limit::Below(value),
                 };
-                hard_fails.push(HardFail { title: fail.title.clone(), metric, when });
+                hard_fails.push(HardFail { title: fail.title.to_string(), metric, when });
             }
         }
         Rubric { pass_points: written.pass_points, items, hard_fails }

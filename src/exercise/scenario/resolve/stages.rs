@@ -42,13 +42,14 @@ impl Resolver<'_> {
         let ask = questions.map(|(i, q)| self.question(q, scenario, &lesions, &format!("{path}/ask/{i}"))).collect();
         Stage {
             id: written.id.clone(),
-            title: written.title.clone(),
-            instruction: written.instruction.clone(),
+            title: written.title.to_string(),
+            instruction: written.instruction.to_string(),
             time_limit: written.time_limit_s,
             instruments,
             cutting: written.cutting,
             filling,
             show_decay: written.show_decay,
+            shows_controls: written.shows_controls,
             is_adjustable: written.adjustable,
             draw,
             steps,
@@ -287,7 +288,7 @@ impl Resolver<'_> {
                     let message = format!("\"{correct}\" is not one of the options");
                     self.complain(&format!("{path}/answer/choice/correct"), "unknown-option", message, help);
                 }
-                let options = choice.options.iter().map(|o| (o.id.clone(), o.text.clone())).collect();
+                let options = choice.options.iter().map(|o| (o.id.clone(), o.text.to_string())).collect();
                 QuestionKind::Choice { options, correct: choice.correct.clone() }
             }
             file::AnswerFile::YesNo(correct) => QuestionKind::YesNo { correct: *correct },
@@ -296,7 +297,7 @@ impl Resolver<'_> {
             }
             file::AnswerFile::Text => QuestionKind::Text,
         };
-        Question { id: written.id.clone(), text: written.text.clone(), kind }
+        Question { id: written.id.clone(), text: written.text.to_string(), kind }
     }
 
     /// Reports questions whose answer stands in the file: the same for every trainee and in every session.
@@ -344,12 +345,17 @@ impl Resolver<'_> {
     }
 }
 
+/// Returns the title of a trial of a stage.
+pub(super) fn trial_title(title: &str, number: u32, trials: u32) -> String {
+    format!("{title} ({number}/{trials})")
+}
+
 /// Returns the trials of a stage, one stage each: the stage itself unless it has a draw with several trials.
 fn trials(stage: Stage) -> Vec<Stage> {
     let Some(draw) = stage.draw.clone().filter(|draw| draw.trials > 1) else { return vec![stage] };
     let trial = |number: u32| Stage {
         id: format!("{}-{number}", stage.id),
-        title: format!("{} ({number}/{})", stage.title, draw.trials),
+        title: trial_title(&stage.title, number, draw.trials),
         draw: Some(Draw { trial: number, ..draw.clone() }),
         ..stage.clone()
     };

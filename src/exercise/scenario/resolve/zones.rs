@@ -11,7 +11,7 @@ impl Resolver<'_> {
         self.unique(written.iter().enumerate().map(|(i, z)| (z.id.as_str(), format!("/zones/{i}/id"))));
         let zone = |(i, z): (usize, &file::ZoneFile)| {
             let region = self.region(&z.region, &format!("/zones/{i}/region"))?;
-            Some(Zone { id: z.id.clone(), title: z.title.clone(), role: z.role, region })
+            Some(Zone { id: z.id.clone(), title: z.title.to_string(), role: z.role, region })
         };
         written.iter().enumerate().filter_map(zone).collect()
     }

@@ -1,0 +1,139 @@
+//! The making of a bundle after its session: of a lesson in this window, or of a session that was interrupted.
+
+use super::lesson_state::LessonState;
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver, TryRecvError};
+use typodont_lesson::InterruptedSession;
+use typodont_report::bundle::CompletionStep;
+use typodont_report::{FirstResult, Templates};
+
+/// State of a completion, as far as its steps have been reported.
+#[derive(Default)]
+pub struct CompletionState {
+    pub progress: CompletionProgress,
+    pub first_result: Option<Box<FirstResult>>,
+    /// Folder of the bundle, or the reason why there is none.
+    pub outcome: Option<Result<PathBuf, String>>,
+}
+
+/// Progress of a completion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompletionProgress {
+    /// Text key of the present step.
+    pub key: &'static str,
+    /// Share that is done, by the usual duration of the steps.
+    pub share: f32,
+}
+
+impl Default for CompletionProgress {
+    fn default() -> CompletionProgress {
+        CompletionProgress { key: "completion.scoring", share: 0.0 }
+    }
+}
+
+impl CompletionState {
+    pub fn apply(&mut self, step: CompletionStep) {
+        let (key, share) = match step {
+            CompletionStep::Scoring => ("completion.scoring", 0.0),
+            CompletionStep::Scored(first) => {
+                self.first_result = Some(first);
+                ("completion.maps", 0.15)
+            }
+            CompletionStep::Maps => ("completion.maps", 0.15),
+            CompletionStep::Surfaces => ("completion.surfaces", 0.25),
+            CompletionStep::Pictures { done, all } => {
+                ("completion.pictures", 0.3 + 0.5 * done as f32 / all.max(1) as f32)
+            }
+            CompletionStep::Page => ("completion.page", 0.8),
+            CompletionStep::Saving => ("completion.saving", 0.95),
+        };
+        self.progress = CompletionProgress { key, share };
+    }
+}
+
+/// A bundle that is being made.
+pub struct Completion(CompletionSource);
+
+enum CompletionSource {
+    Lesson(Box<LessonState>),
+    Interrupted(InterruptedCompletion),
+}
+
+/// The completion of an interrupted session, on a thread of its own.
+struct InterruptedCompletion {
+    messages: Receiver<CompletionMessage>,
+    state: CompletionState,
+}
+
+enum CompletionMessage {
+    Step(CompletionStep),
+    Ended(Result<PathBuf, String>),
+}
+
+impl Completion {
+    /// The completion of a lesson whose stages are over.
+    pub fn of_lesson(mut lesson: Box<LessonState>) -> Completion {
+        // The drawn scene is the largest part of a lesson, and no longer needed.
+        lesson.scene = None;
+        Completion(CompletionSource::Lesson(lesson))
+    }
+
+    /// Completes an interrupted session. `wake` is called after every step.
+    pub fn of_interrupted(
+        session: InterruptedSession,
+        templates: Templates,
+        wake: Box<dyn Fn() + Send>,
+    ) -> std::io::Result<Completion> {
+        let (sender, messages) = mpsc::channel();
+        std::thread::Builder::new().name("completion".into()).spawn(move || {
+            // The window may be closed meanwhile; the bundle is made in any case.
+            let send = |message| {
+                let _ = sender.send(message);
+                wake();
+            };
+            let ended = session.finish(&templates, &mut |step| send(CompletionMessage::Step(step)));
+            send(CompletionMessage::Ended(ended.map(|completed| completed.path)));
+        })?;
+        let state = CompletionState::default();
+        Ok(Completion(CompletionSource::Interrupted(InterruptedCompletion { messages, state })))
+    }
+
+    /// Takes over all steps since the last call.
+    pub fn poll(&mut self) {
+        match &mut self.0 {
+            CompletionSource::Lesson(lesson) => lesson.poll_completion(),
+            CompletionSource::Interrupted(completion) => completion.poll(),
+        }
+    }
+
+    pub fn state(&self) -> &CompletionState {
+        match &self.0 {
+            CompletionSource::Lesson(lesson) => &lesson.completion,
+            CompletionSource::Interrupted(completion) => &completion.state,
+        }
+    }
+
+    pub fn take_first_result(&mut self) -> Option<Box<FirstResult>> {
+        match &mut self.0 {
+            CompletionSource::Lesson(lesson) => lesson.completion.first_result.take(),
+            CompletionSource::Interrupted(completion) => completion.state.first_result.take(),
+        }
+    }
+}
+
+impl InterruptedCompletion {
+    fn poll(&mut self) {
+        loop {
+            match self.messages.try_recv() {
+                Ok(CompletionMessage::Step(step)) => self.state.apply(step),
+                Ok(CompletionMessage::Ended(ended)) => self.state.outcome = Some(ended),
+                Err(TryRecvError::Empty) => return,
+                Err(TryRecvError::Disconnected) => {
+                    let why = "unmade-bundle: the session could not be scored; please report this".to_string();
+                    self.state.outcome.get_or_insert(Err(why));
+                    return;
+                }
+            }
+        }
+    }
+}

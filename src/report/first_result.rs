@@ -1,0 +1,69 @@
+//! Result of a session as soon as it is scored, before its maps, pictures and pages are made.
+
+use super::feedback::{self, Feedback};
+use super::language::Message;
+use super::pictures::srgb_to_linear;
+use super::session_file::SessionFile;
+use super::templates::Templates;
+use typodont_exercise::local_text::LocalTexts;
+use typodont_exercise::record::Recording;
+use typodont_exercise::score::{Scored, Verdict};
+
+/// Result of a session before its files are made.
+#[derive(Clone, Debug)]
+pub struct FirstResult {
+    /// As in `session.json`, without the digests of the other files.
+    pub session: SessionFile,
+    pub feedback: Feedback,
+    /// Colours of the map, as far as they occur.
+    pub legend: Vec<LegendEntry>,
+    /// Translations of the exercise's texts.
+    pub texts: LocalTexts,
+}
+
+/// A colour of the map.
+#[derive(Clone, Debug)]
+pub struct LegendEntry {
+    pub title: Message,
+    /// Red, green and blue, sRGB.
+    pub color: [u8; 3],
+    /// Sign that distinguishes the entry without its colour.
+    pub sign: &'static str,
+    /// Volume of the tissue with this colour, mm³.
+    pub volume: f64,
+    /// True if black is not legible on the colour.
+    pub is_dark: bool,
+}
+
+impl FirstResult {
+    pub fn of(recording: &Recording, scored: &Scored, templates: &Templates) -> FirstResult {
+        let session = SessionFile::of(recording, scored);
+        let feedback = feedback::build(&session, &recording.scenario, templates.rules());
+        FirstResult { session, feedback, legend: legend(scored), texts: recording.scenario.texts.clone() }
+    }
+}
+
+/// Colours of the map of a session, as far as they occur.
+pub fn legend(scored: &Scored) -> Vec<LegendEntry> {
+    let voxel = scored.replay.workpiece.volume.grid().voxel_mm3();
+    let entry = |verdict: &Verdict| {
+        let count = scored.verdicts.iter().filter(|v| *v == verdict).count();
+        let [r, g, b] = verdict.color();
+        // Black is read better from this luminance on (WCAG 2): (0.179 + 0.05)² ≈ 1.05·0.05.
+        let [red, green, blue] = srgb_to_linear([r, g, b]);
+        LegendEntry {
+            title: Message::text_or(format!("verdict.{}", verdict.id()), verdict.title()),
+            color: [r, g, b].map(|c| (c * 255.0).round() as u8),
+            sign: verdict.sign(),
+            volume: count as f64 * voxel,
+            is_dark: 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.179,
+        }
+    };
+    shown_verdicts(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
+}
+
+/// The verdicts that a session's maps may show.
+pub fn shown_verdicts(scored: &Scored) -> impl Iterator<Item = &'static Verdict> + use<> {
+    let of_fillings: &[Verdict] = if scored.restoration.is_some() { &Verdict::OF_FILLINGS } else { &[] };
+    Verdict::VISIBLE.iter().chain(of_fillings)
+}
