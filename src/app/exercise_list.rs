@@ -192,7 +192,7 @@ fn from_file(path: &Path) -> Exercise {
     }
 }
 
-/// What the list is drawn with.
+/// Earlier sessions, settings and texts with which the list is drawn.
 pub struct ListContext<'a> {
     pub history: &'a SessionHistory,
     pub settings: &'a Settings,

@@ -79,7 +79,10 @@ pub fn select_language(all: &[Translations], code: &str) -> Translations {
 /// Language code of the system, from its environment variables.
 pub fn system_language() -> String {
     let locale = ["LC_ALL", "LC_MESSAGES", "LANG"].into_iter().find_map(|name| std::env::var(name).ok());
-    locale.and_then(|t| t.get(..2).map(str::to_string)).unwrap_or_else(|| BASE.to_string())
+    // "C.UTF-8" and "POSIX" name no language.
+    let is_code = |code: &&str| code.bytes().all(|letter| letter.is_ascii_lowercase());
+    let code = locale.as_deref().and_then(|locale| locale.get(..2)).filter(is_code);
+    code.unwrap_or(BASE).to_string()
 }
 
 fn texts(text: &str) -> Result<BTreeMap<String, String>, serde_json::Error> {

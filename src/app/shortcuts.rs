@@ -8,12 +8,13 @@ use super::screen::Screen;
 use eframe::egui::{self, Event, Key, Modifiers};
 use typodont_exercise::session::ChartInput;
 
-/// Keys with the text keys of their functions, in the order of the page.
+/// Keys with the text keys of their functions, in the order of the page. A key whose name differs between languages is
+/// itself a text key.
 const SHORTCUTS: [(&str, &str); 30] = [
     ("F1", "keys.help"),
     ("F2", "keys.settings"),
     ("Tab", "keys.tab"),
-    ("Up Down", "keys.choose"),
+    ("keyname.up_down", "keys.choose"),
     ("Enter", "keys.next"),
     ("Esc", "keys.back"),
     ("O", "keys.hold"),
@@ -24,17 +25,17 @@ const SHORTCUTS: [(&str, &str); 30] = [
     ("P", "keys.pause"),
     ("V", "keys.view"),
     ("J M", "keys.mouth"),
-    ("Arrows", "keys.turn_by_key"),
+    ("keyname.arrows", "keys.turn_by_key"),
     ("+ -", "keys.nearer_by_key"),
-    ("Shift Arrows", "keys.shift_by_key"),
-    ("1 to 9", "keys.rate"),
-    ("Mouse", "keys.mouse"),
-    ("Wheel", "keys.wheel"),
-    ("Left drag", "keys.turn"),
-    ("Right drag", "keys.nearer"),
-    ("Middle drag", "keys.shift"),
-    ("Ctrl drag", "keys.touchpad_nearer"),
-    ("Shift drag", "keys.touchpad_shift"),
+    ("keyname.shift_arrows", "keys.shift_by_key"),
+    ("keyname.digits", "keys.rate"),
+    ("keyname.mouse", "keys.mouse"),
+    ("keyname.wheel", "keys.wheel"),
+    ("keyname.left_drag", "keys.turn"),
+    ("keyname.right_drag", "keys.nearer"),
+    ("keyname.middle_drag", "keys.shift"),
+    ("keyname.ctrl_drag", "keys.touchpad_nearer"),
+    ("keyname.shift_drag", "keys.touchpad_shift"),
     ("R", "keys.report"),
     ("Ctrl S", "keys.save"),
     ("Ctrl Z, Ctrl Y", "keys.undo"),
@@ -52,7 +53,7 @@ pub fn shortcuts_ui(ui: &mut egui::Ui, words: &Translations, commands: &mut Vec<
     egui::Grid::new("keys").num_columns(4).spacing([20.0, 6.0]).striped(true).show(ui, |ui| {
         for place in 0..left.len() {
             for (key, about) in [left.get(place), right.get(place)].into_iter().flatten() {
-                ui.strong(*key);
+                ui.strong(words.get(key));
                 ui.label(words.get(about));
             }
             ui.end_row();

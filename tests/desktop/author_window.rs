@@ -182,7 +182,7 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     };
     edit(&mut desk);
     assert_eq!(desk.until("file", |file| !file.is_empty()), path, "the school's file, not the shipped one");
-    desk.write("/title", "Mine");
+    desk.write("/title/en", "Mine");
     desk.until("unsaved", |unsaved| unsaved == "true");
     fs::write(&file, text.replace("Caries removal", "Theirs")).unwrap();
     desk.place_of("answer:mine");

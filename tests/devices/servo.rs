@@ -107,6 +107,31 @@ fn wander(hand: &SharedHand, ms: u64) {
 }
 
 #[test]
+fn a_waiting_simulation_starts_with_the_first_movement_of_the_hand() {
+    // Aim: no time passes while the trainee reads. Method: the hand trembles by less than a movement, then moves; only
+    // the first tick, by which the instrument is seen, comes before. A second wait ends by request.
+    let rig = Simulated::new();
+    let hand = rig.hand();
+    hand.reach(Vec3::new(0.0, 10.0, 0.0));
+    for _ in 0..3000 {
+        hand.turn(Wrench::ZERO);
+    }
+    let (turns, _, _) = turn_for(InHand::new(&hand), Duration::from_millis(1500), |ms, servo| match ms {
+        0 => assert!(servo.send(ServoCommand::AwaitMovement)),
+        1..700 => hand.reach(Vec3::new(0.0, 10.0 + (ms % 2) as f32, 0.0)),
+        700 => hand.reach(Vec3::new(0.0, 16.0, 0.0)),
+        1000 => assert!(servo.send(ServoCommand::AwaitMovement)),
+        1200 => assert!(servo.send(ServoCommand::StopAwaiting)),
+        _ => {}
+    });
+    let still = turns.iter().filter(|turn| turn.reading.pose.position.y < 12.0).count();
+    let run = turns.len() - still;
+    assert!((1..=60).contains(&still), "{still} ticks before the hand moved");
+    assert!((300..=700).contains(&run), "{run} ticks in about 300 and 300 ms, with a wait of 200 ms between them");
+    assert!(turns.windows(2).all(|pair| pair[1].step.tick == pair[0].step.tick.next()), "ticks follow one another");
+}
+
+#[test]
 fn ten_thousand_ticks_with_everything_in_them_allocate_nothing() {
     crate::support::peace::in_real_time(|| {
         // Aim: the servo's thread travels light. Method: from its 300th beat on every allocation and release of that thread is
