@@ -116,8 +116,13 @@ fn row_ui(ui: &mut egui::Ui, picture: ActionPicture, text: &str, is_done: bool) 
             ActionPicture::Mouse(part) => mouse_picture(ui.painter(), rect, part),
             ActionPicture::Stylus(height) => stylus_picture(ui.painter(), rect, height),
         }
-        let (mark, colour) = if is_done { ("✓", theme::SUCCESS) } else { ("○", theme::WARNING) };
-        ui.label(egui::RichText::new(mark).strong().size(18.0).color(colour));
+        let (mark, _) = ui.allocate_exact_size(vec2(18.0, 18.0), egui::Sense::hover());
+        if is_done {
+            let font = egui::FontId::proportional(17.0);
+            ui.painter().text(mark.center(), egui::Align2::CENTER_CENTER, "✔", font, theme::SUCCESS);
+        } else {
+            ui.painter().circle_stroke(mark.center(), 6.0, Stroke::new(1.5, theme::WARNING));
+        }
         ui.add(egui::Label::new(egui::RichText::new(text).size(14.0)).wrap().selectable(false));
     });
 }

@@ -142,9 +142,9 @@ fn time_ui(ui: &mut egui::Ui, limit: Option<f64>, snapshot: Option<&LessonSnapsh
     let elapsed = snapshot.map_or(0.0, |seen| f64::from(seen.stage_seconds));
     let (text, colour) = match limit {
         Some(limit) if limit - elapsed < SHORT => {
-            (words.format("practice.time_left", format_time(limit - elapsed)), theme::WARNING)
+            (words.format("practice.time_left", format_time((limit - elapsed).ceil())), theme::WARNING)
         }
-        Some(limit) => (words.format("practice.time_left", format_time(limit - elapsed)), theme::ACCENT),
+        Some(limit) => (words.format("practice.time_left", format_time((limit - elapsed).ceil())), theme::ACCENT),
         None => (words.format("practice.time", format_time(elapsed)), theme::ACCENT),
     };
     ui.label(egui::RichText::new(text).size(20.0).strong().color(colour));

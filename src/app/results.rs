@@ -243,8 +243,14 @@ fn legend_ui(ui: &mut egui::Ui, legend: &[LegendEntry], texts: &ResultTexts) {
             let [r, g, b] = entry.color;
             let ink = if entry.is_dark { egui::Color32::WHITE } else { egui::Color32::BLACK };
             ui.painter().rect_filled(rect, 4, egui::Color32::from_rgb(r, g, b));
+            // The window's fonts have only the heavy forms of these signs.
+            let sign = match entry.sign {
+                "✓" => "✔",
+                "✗" => "✖",
+                sign => sign,
+            };
             let font = egui::FontId::proportional(14.0);
-            ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, entry.sign, font, ink);
+            ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, sign, font, ink);
             let text = format!("{} · {:.2} mm³", texts.text(&entry.title), entry.volume);
             ui.add(egui::Label::new(text).wrap());
         });
