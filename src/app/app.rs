@@ -340,6 +340,7 @@ impl App {
             self.screen = Screen::Editor(editor);
             return;
         }
+        self.exercise_list.scroll_to_selected = true;
         self.screen = Screen::ExerciseList;
     }
 
