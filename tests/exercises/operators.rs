@@ -342,9 +342,9 @@ fn operators_page(results: &OperatorResults) -> (String, Vec<String>) {
     spacings.sort();
     spacings.dedup();
     for spacing in spacings {
-        page += &format!("\n## Voxels of {spacing} mm\n\n| exercise | seeds |");
+        page += &format!("\n## Voxels of {spacing} mm\n\n| exercise |");
         COLUMNS.iter().for_each(|operator| page += &format!(" {operator} |"));
-        page += &format!("\n| --- | --- |{}\n", " --- |".repeat(COLUMNS.len()));
+        page += &format!("\n| --- |{}\n", " --- |".repeat(COLUMNS.len()));
         let mut names: Vec<&String> =
             results.keys().filter(|(_, own, ..)| own == spacing).map(|(name, ..)| name).collect();
         names.sort_by_key(|name| name.split('-').next().unwrap().parse::<u32>().unwrap());
@@ -355,7 +355,7 @@ fn operators_page(results: &OperatorResults) -> (String, Vec<String>) {
                 own.map(|(_, result)| *result).collect()
             };
             let columns = COLUMNS.map(of);
-            page += &format!("| {name} | {} |", columns.iter().map(Vec::len).min().unwrap_or(0));
+            page += &format!("| {name} |");
             columns.iter().for_each(|column| page += &format!(" {} |", cell(column)));
             page += "\n";
             wrong.extend(disorder(&columns).map(|what| format!("{name} at {spacing} mm: {what}")));
