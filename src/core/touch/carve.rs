@@ -17,6 +17,7 @@ use super::wear::{WearRate, WorkBudget};
 use crate::frame::{Quat, Vec3};
 use crate::tick::TICK_S;
 use crate::volume::{Density, Edit, Label, Volume, Voxel, density_at_distance};
+use std::ops::Range;
 
 /// Parameters of the cutting laws, from the scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,9 +60,14 @@ const MIN_FACING_COSINE: f32 = 0.02;
 /// thousands of small voxels, too many for a single tick. Rows interleave, so that the surface recedes evenly.
 const INTERLEAVE: u32 = 3;
 
-/// Maximum number of voxels changed in one tick. At 512×512×322 a bur of 1.2 mm radius changes about 7 000 per tick,
-/// a third of its increment.
-const EDITS_MAX: usize = 1 << 15;
+/// Number of voxels after which a phase is continued in the next tick, so that a tick ends in time whatever the size of
+/// the bur and the voxels: comparing so many takes about half a millisecond. At 512×512×322 a round bur of 1.2 mm radius
+/// examines 18 000 in a tick and changes 7 000, a third of its increment, so that only larger bites take more ticks.
+const EXAMINED_MAX: usize = 1 << 15;
+
+/// Greatest number of voxels examined, and so of edits, in one tick: a row that has been begun is finished. No row of
+/// voxels within a bur is longer than [`EXAMINED_MAX`].
+const EDITS_MAX: usize = 2 * EXAMINED_MAX;
 
 /// Cutting state: dwell, the increment in progress and the edits of this tick.
 #[derive(Clone, Debug)]
@@ -69,13 +75,15 @@ pub struct Carver {
     carving: CarvingParameters,
     dwell_point: Vec3,
     dwell_ticks: u32,
-    /// Cut increment in progress, and the number of its phases that are done.
-    increment: Option<(CutIncrement, u32)>,
+    /// Cut increment in progress, and the part of it that is done.
+    increment: Option<(CutIncrement, CutProgress)>,
     /// Tip position that the last increment should have made reachable, tooth space.
     carry: Option<Vec3>,
     /// Work available to the rate law.
     work_budget: WorkBudget,
     edits: Vec<Edit>,
+    /// Number of voxels compared with the tool in this tick.
+    examined: usize,
     /// Advance into each tissue in this increment, mm, by label.
     advance: [f32; 256],
 }
@@ -90,6 +98,7 @@ impl Carver {
             carry: None,
             work_budget: WorkBudget::default(),
             edits: Vec::with_capacity(EDITS_MAX),
+            examined: 0,
             advance: [0.0; 256],
         }
     }
@@ -117,6 +126,7 @@ impl Carver {
         load: &ToolLoad,
     ) -> bool {
         self.edits.clear();
+        self.examined = 0;
         // A blade does not rotate: it needs the whole threshold force and follows the threshold law.
         let threshold_share = if instrument.is_rotary { self.threshold_share(load.hand) } else { 1.0 };
         let cutting_law = self.cutting_law(instrument);
@@ -131,18 +141,22 @@ impl Carver {
                 self.work_budget.accumulate(&rate, instrument.head_radius(), load.contact_force.spring)
             }
         };
-        let planned = self
-            .increment
-            .or_else(|| Some((self.plan_increment(volume, instrument, materials, load, threshold_share)?, 0)));
-        let Some((increment, phase)) = planned else { return is_wearing };
-        match instrument.body() {
-            None => self.carve_ball(volume, &increment, phase),
-            Some(body) => self.carve_body(volume, body, &increment, phase),
-        }
+        let planned = self.increment.or_else(|| {
+            Some((self.plan_increment(volume, instrument, materials, load, threshold_share)?, CutProgress::default()))
+        });
+        let Some((increment, progress)) = planned else { return is_wearing };
+        let rows_left = match instrument.body() {
+            None => self.carve_ball(volume, &increment, progress),
+            Some(body) => self.carve_body(volume, body, &increment, progress),
+        };
         if let CuttingLaw::Rate(_) = cutting_law {
             self.work_budget.spend(&self.edits, materials, volume.grid().voxel_mm3() as f32);
         }
-        self.increment = (phase + 1 < INTERLEAVE).then_some((increment, phase + 1));
+        let next = match rows_left {
+            Some(rows) => CutProgress { rows, ..progress },
+            None => CutProgress { phase: progress.phase + 1, rows: 0 },
+        };
+        self.increment = (next.phase < INTERLEAVE).then_some((increment, next));
         true
     }
 
@@ -219,66 +233,77 @@ impl Carver {
         deepest
     }
 
-    /// Carries out one phase of an increment with a ball.
-    fn carve_ball(&mut self, volume: &mut Volume, increment: &CutIncrement, phase: u32) {
+    /// Carries out one phase of an increment with a ball, or a part of it. Returns the number of rows of the phase that
+    /// are done, if any are left.
+    fn carve_ball(&mut self, volume: &mut Volume, increment: &CutIncrement, progress: CutProgress) -> Option<u32> {
         let CutIncrement { tip, feed, radius, .. } = *increment;
         let (grid, band) = (*volume.grid(), volume.half_band());
         let centre = tip + feed;
         let reach = Vec3::splat(radius + band);
         let [xs, ys, zs] = grid.cells_within(centre - reach, centre + reach);
         if xs.is_empty() {
-            return;
+            return None;
         }
         let to_steps = grid.spacing.x.recip();
         let ahead = feed.normalize_or_zero();
-        for z in zs {
-            for y in ys.clone().filter(|y| (y + z) % INTERLEAVE == phase) {
-                // Vector from the bur's advanced centre to the first voxel of the row.
-                let first = grid.centre([xs.start, y, z]) - centre;
-                let aside_squared = first.y * first.y + first.z * first.z;
-                let half_squared = reach.x * reach.x - aside_squared;
-                if half_squared <= 0.0 {
-                    continue;
-                }
-                let half = half_squared.sqrt();
-                let (mut low, mut high) = (-half, half);
-                // The bur already occupies its position: matter well behind its centre needs no clearing.
-                let behind = -REAR_CLEARANCE * radius - first.y * ahead.y - first.z * ahead.z;
-                match ahead.x {
-                    x if x > 1e-3 => low = low.max(behind / x),
-                    x if x < -1e-3 => high = high.min(behind / x),
-                    _ if behind > 0.0 => continue,
-                    _ => {}
-                }
-                if low >= high {
-                    continue;
-                }
-                let step_at = |x: f32| (((x - first.x) * to_steps).max(-1.0) + 1.0) as u32;
-                let row = VoxelRow { cell: [xs.start, y, z], first_x: first.x, aside_squared };
-                self.carve_ball_row(volume, increment, &row, step_at(low)..step_at(high).min(xs.len() as u32));
+        for (row, [y, z]) in progress.rows_left(ys, zs) {
+            if self.examined >= EXAMINED_MAX {
+                return Some(row);
             }
+            // Vector from the bur's advanced centre to the first voxel of the row.
+            let first = grid.centre([xs.start, y, z]) - centre;
+            let aside_squared = first.y * first.y + first.z * first.z;
+            let half_squared = reach.x * reach.x - aside_squared;
+            if half_squared <= 0.0 {
+                continue;
+            }
+            let half = half_squared.sqrt();
+            let (mut low, mut high) = (-half, half);
+            // The bur already occupies its position: matter well behind its centre needs no clearing.
+            let behind = -REAR_CLEARANCE * radius - first.y * ahead.y - first.z * ahead.z;
+            match ahead.x {
+                x if x > 1e-3 => low = low.max(behind / x),
+                x if x < -1e-3 => high = high.min(behind / x),
+                _ if behind > 0.0 => continue,
+                _ => {}
+            }
+            if low >= high {
+                continue;
+            }
+            let step_at = |x: f32| (((x - first.x) * to_steps).max(-1.0) + 1.0) as u32;
+            let voxels = VoxelRow { cell: [xs.start, y, z], first_x: first.x, aside_squared };
+            self.carve_ball_row(volume, increment, &voxels, step_at(low)..step_at(high).min(xs.len() as u32));
         }
+        None
     }
 
-    /// Carries out one phase of an increment with a body.
-    fn carve_body(&mut self, volume: &mut Volume, body: &Body, increment: &CutIncrement, phase: u32) {
+    /// Carries out one phase of an increment with a body, as [`Carver::carve_ball`] does.
+    fn carve_body(
+        &mut self,
+        volume: &mut Volume,
+        body: &Body,
+        increment: &CutIncrement,
+        progress: CutProgress,
+    ) -> Option<u32> {
         let (grid, band) = (*volume.grid(), volume.half_band());
         let cylinder = SweptCylinder::of(body, increment, increment.run_out + band);
         let [low, high] = cylinder.extent();
         let [xs, ys, zs] = grid.cells_within(low, high);
         if xs.is_empty() {
-            return;
+            return None;
         }
         let to_steps = grid.spacing.x.recip();
-        for z in zs {
-            for y in ys.clone().filter(|y| (y + z) % INTERLEAVE == phase) {
-                let first = grid.centre([xs.start, y, z]);
-                let Some([low, high]) = cylinder.clip_row(first) else { continue };
-                let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
-                let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
-                self.carve_body_row(volume, body, increment, [xs.start, y, z], steps);
+        for (row, [y, z]) in progress.rows_left(ys, zs) {
+            if self.examined >= EXAMINED_MAX {
+                return Some(row);
             }
+            let first = grid.centre([xs.start, y, z]);
+            let Some([low, high]) = cylinder.clip_row(first) else { continue };
+            let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
+            let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
+            self.carve_body_row(volume, body, increment, [xs.start, y, z], steps);
         }
+        None
     }
 
     /// Cuts a part of a row; `steps` counts from the cell `row`.
@@ -288,13 +313,14 @@ impl Carver {
         body: &Body,
         increment: &CutIncrement,
         row: [u32; 3],
-        steps: std::ops::Range<u32>,
+        steps: Range<u32>,
     ) {
         let start = volume.grid().index(row);
         let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
         if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
             return;
         }
+        self.examined += steps.len();
         let [x, y, z] = row;
         let (grid, band) = (*volume.grid(), volume.half_band());
         let handle_from_tooth = glam::Mat3::from_quat(increment.orientation.conjugate());
@@ -328,13 +354,7 @@ impl Carver {
     }
 
     /// Cuts a part of a row; `steps` counts from the first voxel of the row.
-    fn carve_ball_row(
-        &mut self,
-        volume: &mut Volume,
-        increment: &CutIncrement,
-        row: &VoxelRow,
-        steps: std::ops::Range<u32>,
-    ) {
+    fn carve_ball_row(&mut self, volume: &mut Volume, increment: &CutIncrement, row: &VoxelRow, steps: Range<u32>) {
         let (spacing, band) = (volume.grid().spacing.x, volume.half_band());
         let [x, y, z] = row.cell;
         let start = volume.grid().index(row.cell);
@@ -343,6 +363,7 @@ impl Carver {
         if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
             return;
         }
+        self.examined += steps.len();
         // A voxel loses density if the bur's surface leaves less than it has, that is, if it is nearer to the bur's
         // centre than a distance given by its density. Distances are compared squared, to avoid a square root per
         // voxel. The margin of half a density step covers rounding.
@@ -417,6 +438,22 @@ struct CutIncrement {
     orientation: Quat,
 }
 
+/// Part of an increment that is done: whole phases, and rows of the next one.
+#[derive(Clone, Copy, Debug, Default)]
+struct CutProgress {
+    phase: u32,
+    rows: u32,
+}
+
+impl CutProgress {
+    /// The rows of the phase that are not done yet, as their number within the phase and their y and z, in order.
+    fn rows_left(self, ys: Range<u32>, zs: Range<u32>) -> impl Iterator<Item = (u32, [u32; 2])> {
+        let rows =
+            zs.flat_map(move |z| ys.clone().filter(move |y| (y + z) % INTERLEAVE == self.phase).map(move |y| [y, z]));
+        (0..).zip(rows).skip(self.rows as usize)
+    }
+}
+
 /// Cylinder about the shaft that contains everything an increment of a body can reach, tooth space.
 struct SweptCylinder {
     middle: Vec3,
@@ -467,5 +504,64 @@ impl SweptCylinder {
             return None;
         }
         (low < high).then_some([low, high])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touch::{EDGE_RADIUS, Material, Profile, WorkingEnd};
+    use crate::volume::Grid;
+
+    /// Digs to the full feed with a working end whose centre is at the surface of a block. Returns the greatest number
+    /// of voxels examined in a tick, the number of ticks and the solid voxels removed.
+    fn dig(end: WorkingEnd, spacing: f32) -> (usize, u32, usize) {
+        let tissue = Label(1);
+        let dims = [3.4, 3.4, 5.0].map(|extent| (extent / spacing) as u32);
+        let band = 1.5 * spacing;
+        let mut block = Volume::from_distance(Grid::centred(dims, Vec3::splat(spacing)), band, |p| (p.x, tissue));
+        let material = Material { stiffness: 1.0, cut_force: Some(0.1), ..Material::ZERO };
+        let materials = Materials::new().with(tissue, material);
+        let law = CuttingLaw::Threshold;
+        let mut carver = Carver::new(CarvingParameters { dwell: 1.0, dwell_share: 1.0, max_feed: 20.0, law });
+        let instrument = Instrument::new(end, true);
+        let contact_force = ContactForce { force: Vec3::X, spring: 1.0, stiffness: 1.0 };
+        let tip = Vec3::new(0.0, 0.0, -2.0);
+        let load = ToolLoad { tip, hand: tip - Vec3::X, orientation: Quat::IDENTITY, contact_force, label: tissue };
+        let (mut examined, mut ticks, mut removed) = (0, 0, 0);
+        loop {
+            assert!(carver.cut(&mut block, &instrument, &materials, &load));
+            examined = examined.max(carver.examined);
+            removed += carver.edits().iter().filter(|edit| edit.removes()).count();
+            ticks += 1;
+            if carver.increment.is_none() {
+                return (examined, ticks, removed);
+            }
+        }
+    }
+
+    #[test]
+    fn a_bite_is_spread_over_ticks_whatever_its_size() {
+        // Aim: no tick examines more voxels than its limit allows, a large bite is finished all the same, and what it
+        // removes does not depend on the number of ticks. Method: half of a long and of a thick working end in matter,
+        // from coarse voxels to very fine ones.
+        let long = || {
+            let profile = Profile::frustum(0.8, 0.8, 4.0, [EDGE_RADIUS; 2]);
+            WorkingEnd::Body(std::sync::Arc::new(Body::revolved(profile, None)))
+        };
+        for end in [long(), WorkingEnd::Ball { radius: 1.4 }] {
+            let mm3 = [0.17, 0.086, 0.043, 0.02].map(|spacing| {
+                let (examined, ticks, removed) = dig(end.clone(), spacing);
+                println!("{spacing} mm: {examined} voxels in a tick, {ticks} ticks, {removed} removed");
+                assert!(examined < EXAMINED_MAX + EXAMINED_MAX / 16, "{spacing} mm: {examined}");
+                assert!(
+                    if spacing > 0.08 { ticks == INTERLEAVE } else { ticks >= INTERLEAVE },
+                    "{spacing} mm: {ticks} ticks"
+                );
+                removed as f32 * spacing.powi(3)
+            });
+            let finest = mm3[3];
+            assert!(mm3[1..].iter().all(|mm3| (mm3 / finest - 1.0).abs() < 0.05), "{mm3:?}");
+        }
     }
 }
