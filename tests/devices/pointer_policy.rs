@@ -245,3 +245,12 @@ fn who_only_points_and_presses_passes_in_every_quarter() {
     println!("points: {all:?}");
     assert!(all.iter().all(|points| *points >= 70.0), "{all:?}");
 }
+
+#[test]
+fn who_only_points_and_presses_opens_a_fissure() {
+    // Aim: caries beneath a fissure can be followed by pointer, too. Method: the same policy, which sees it once it is open.
+    let score = score_by_pointer("scenarios/8-fissure.json", 1);
+    let points = score["grade"]["points"].as_f64().unwrap();
+    println!("exercise 8: {points} points");
+    assert!(score["grade"]["passed"].as_bool().unwrap() && points >= 70.0, "{points}: {:#}", score["grade"]);
+}
