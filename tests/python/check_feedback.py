@@ -40,8 +40,8 @@ EPISODES_MAX, VOLUME_MIN = 20, 0.02
 BLADES = {"spoon_excavator", "carver"}
 
 WALLS = {
-    "at the buccal wall": "buccal", "at the lingual wall": "lingual", "at the mesial wall": "mesial",
-    "at the distal wall": "distal", "towards the occlusal surface": "occlusal", "at the cavity floor": "apical",
+    "on the buccal wall": "buccal", "on the lingual wall": "lingual", "on the mesial wall": "mesial",
+    "on the distal wall": "distal", "towards the occlusal surface": "occlusal", "on the cavity floor": "apical",
 }
 
 
