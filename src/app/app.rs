@@ -817,6 +817,8 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::CapturePointer(is_held) => capture_pointer(lesson, is_held),
         PracticeCommand::PointAt(place) => lesson.point_at(place),
         PracticeCommand::ChangeStrength(steps) => lesson.change_strength(steps),
+        // A key of the same frame may have put the instrument down.
+        PracticeCommand::SetPressure(_) | PracticeCommand::SetDeviceButton { .. } if !lesson.is_pointer_captured => {}
         PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
         PracticeCommand::AdjustMouthOpening(by) => {

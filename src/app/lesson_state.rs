@@ -176,7 +176,9 @@ impl LessonState {
     pub fn poll(&mut self, volume: f32, elapsed: f32) {
         /// Number of frames over which the frame rate is smoothed.
         const SMOOTHED_FRAMES: f32 = 8.0;
-        self.mean_frame_time += (elapsed - self.mean_frame_time) / SMOOTHED_FRAMES;
+        if self.view_refresh.is_changing() {
+            self.mean_frame_time += (elapsed - self.mean_frame_time) / SMOOTHED_FRAMES;
+        }
         self.frames_per_second = 1.0 / self.mean_frame_time.max(1e-3);
         self.player.set_volume(volume);
         while let Some(event) = self.player.next_event() {

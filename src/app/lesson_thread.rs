@@ -271,6 +271,7 @@ fn run_lesson(
                 && !lesson.resume_with(device)?
             {
                 worker.events.send(LessonEvent::DifferentDevice);
+                (worker.wake)();
             }
         }
         if worker.handle_commands(&mut lesson)? {
@@ -290,7 +291,7 @@ impl LessonWorker {
     /// Passes events, edits and the newest tick of the servo to the window. Returns true if the window should show them.
     fn publish(&mut self, lesson: &mut Lesson) -> Result<bool, LessonError> {
         let events = lesson.poll()?;
-        let mut has_news = !events.is_empty();
+        let mut has_news = false;
         self.send_events(events);
         while let Some(event) = lesson.next_assist_event() {
             self.events.send(LessonEvent::SecondHand(event));
@@ -361,6 +362,9 @@ impl LessonWorker {
     }
 
     fn send_events(&mut self, events: Vec<LiveEvent>) {
+        if !events.is_empty() {
+            (self.wake)();
+        }
         for event in events {
             self.events.send(LessonEvent::Live(event));
         }

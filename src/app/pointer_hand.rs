@@ -54,17 +54,22 @@ impl Default for PointerHand {
 impl PointerHand {
     /// Maximum force of a press with an instrument, N.
     pub fn strength(&self, index: usize, instrument: &InstrumentEntry) -> f32 {
-        self.strengths.get(index).copied().flatten().unwrap_or_else(|| first_strength(instrument))
+        (self.exact_strength(index, instrument) * 10.0).round() / 10.0
     }
 
     /// Changes the strength by steps of the wheel; forward is stronger.
     pub fn change_strength(&mut self, steps: f32, index: usize, instrument: &InstrumentEntry) {
-        let strength = self.strength(index, instrument) + STRENGTH_STEP * steps;
+        let strength = self.exact_strength(index, instrument) + STRENGTH_STEP * steps;
         let [least, most] = STRENGTH_RANGE;
         if self.strengths.len() <= index {
             self.strengths.resize(index + 1, None);
         }
-        self.strengths[index] = Some(((strength * 10.0).round() / 10.0).clamp(least, most));
+        // Not rounded: a touchpad sends small parts of a step.
+        self.strengths[index] = Some(strength.clamp(least, most));
+    }
+
+    fn exact_strength(&self, index: usize, instrument: &InstrumentEntry) -> f32 {
+        self.strengths.get(index).copied().flatten().unwrap_or_else(|| first_strength(instrument))
     }
 
     /// Aims the hand at the surface under the pointer. `None`: the pointer is outside the view, and the hand stays where

@@ -318,7 +318,7 @@ fn refresh_view(
 ) -> Result<Option<egui::TextureId>, RenderError> {
     let Some(scene) = &lesson.scene else { return Ok(None) };
     let particles = scene.particles.as_ref();
-    let particle_count = particles.map_or(0, |field| field.opaque().len() + field.translucent().len());
+    let particle_count = particles.map_or(0, ParticleField::count);
     let stereo = [settings.stereo(), settings.second_eye()];
     let inputs = ViewInputs {
         size,

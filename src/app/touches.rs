@@ -22,14 +22,21 @@ impl Touches {
         }
     }
 
+    /// Forgets all of them: their ends were not seen.
+    pub fn clear(&mut self) {
+        self.0.clear();
+    }
+
     /// Share of the strength with which they press, 0 to 1; `None` if nothing touches the screen. A pen presses as hard as
     /// it is pressed; a finger points, and a second finger presses.
     pub fn pressure(&self) -> Option<f32> {
-        let (_, first_pressure) = self.0.first()?;
-        Some(match first_pressure {
-            Some(pressure) if *pressure >= LEAST_PRESSURE => pressure.min(1.0),
-            _ if self.0.len() > 1 => 1.0,
-            _ => 0.0,
-        })
+        let pens = self.0.iter().filter_map(|(_, pressure)| *pressure);
+        let fingers = self.0.iter().filter(|(_, pressure)| pressure.is_none()).count();
+        match pens.reduce(f32::max) {
+            // The palm beside a pen is no finger.
+            Some(pressure) => Some(if pressure >= LEAST_PRESSURE { pressure.min(1.0) } else { 0.0 }),
+            None if fingers == 0 => None,
+            None => Some(if fingers > 1 { 1.0 } else { 0.0 }),
+        }
     }
 }

@@ -95,6 +95,11 @@ impl ViewRefresh {
         now - self.changed_at >= SETTLING_TIME
     }
 
+    /// True if the view changed in the last frame.
+    pub fn is_changing(&self) -> bool {
+        self.last_changing_frame.is_some()
+    }
+
     /// Draws the next frame in any case, for instance after one has failed.
     pub fn invalidate(&mut self) {
         self.drawn = None;

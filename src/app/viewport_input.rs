@@ -24,8 +24,9 @@ const POINTS_PER_STEP: f32 = 40.0;
 
 /// Collects the commands of the pointer over a view, captured or free.
 pub fn collect_commands(ui: &egui::Ui, view: &egui::Response, is_captured: bool, commands: &mut Vec<AppCommand>) {
+    let contact = contact(ui, view);
     match is_captured {
-        true => captured_pointer(ui, view, commands),
+        true => captured_pointer(ui, view, &contact, commands),
         false => free_pointer(ui, view, commands),
     }
 }
@@ -92,12 +93,35 @@ fn free_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppComm
 /// Share of the pointer's movement that the hand follows while Shift is held.
 const FINE_SHARE: f32 = 0.25;
 
-fn captured_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppCommand>) {
+/// Contact of the pointer with the view, from frame to frame.
+#[derive(Clone, Debug, Default)]
+struct Contact {
+    touches: Touches,
+    /// True while a press lasts that began on the view.
+    began_on_view: bool,
+}
+
+/// Takes over the events of a frame, whether the pointer is captured or free, so that no end of a contact is missed.
+fn contact(ui: &egui::Ui, view: &egui::Response) -> Contact {
+    let (events, any_touches) = ui.input(|input| (input.events.clone(), input.any_touches()));
+    let (is_pressed, is_down) = ui.input(|input| (input.pointer.primary_pressed(), input.pointer.primary_down()));
+    ui.data_mut(|data| {
+        let contact = data.get_temp_mut_or_default::<Contact>(view.id.with("contact"));
+        contact.touches.update(&events);
+        if !any_touches {
+            contact.touches.clear();
+        }
+        // egui forgets the widget on which a long touch began.
+        contact.began_on_view = is_down && (contact.began_on_view || is_pressed && view.is_pointer_button_down_on());
+        contact.clone()
+    })
+}
+
+fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &Contact, commands: &mut Vec<AppCommand>) {
     view.clone().on_hover_cursor(egui::CursorIcon::Crosshair);
     let rect = view.rect;
-    let (modifiers, at, is_pressed) =
-        ui.input(|input| (input.modifiers, input.pointer.latest_pos(), input.pointer.primary_down()));
-    let is_on_view = view.contains_pointer() || view.is_pointer_button_down_on();
+    let (modifiers, at) = ui.input(|input| (input.modifiers, input.pointer.latest_pos()));
+    let is_on_view = view.contains_pointer() || contact.began_on_view;
     let drag = match (ui.input(camera_drag), modifiers.command) {
         (drag, true) => drag,
         (Some(CameraDrag::Zoom), false) => Some(CameraDrag::Orbit),
@@ -119,8 +143,8 @@ fn captured_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<App
     }
     let is_working = is_on_view && drag.is_none();
     // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
-    let pressure = touch_pressure(ui, view.id).unwrap_or(1.0);
-    let is_down = is_working && is_pressed && pressure > 0.0 && view.is_pointer_button_down_on();
+    let pressure = contact.touches.pressure().unwrap_or(1.0);
+    let is_down = is_working && contact.began_on_view && pressure > 0.0;
     commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
     commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
     let place = at.filter(|_| is_working).map(|at| {
@@ -128,16 +152,6 @@ fn captured_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<App
         PointedPlace { share: [share.x, share.y], aspect: rect.width() / rect.height().max(1.0) }
     });
     commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
-}
-
-/// Share of the strength with which pens and fingers press; `None` for a mouse.
-fn touch_pressure(ui: &egui::Ui, view: egui::Id) -> Option<f32> {
-    let events = ui.input(|input| input.events.clone());
-    ui.data_mut(|data| {
-        let touches = data.get_temp_mut_or_default::<Touches>(view.with("touches"));
-        touches.update(&events);
-        touches.pressure()
-    })
 }
 
 /// Position at which the hand points: that of the pointer, or, while Shift is held, one that follows it more finely
@@ -177,9 +191,14 @@ mod tests {
         /// Shows a frame in which these events come in; returns the share of the strength with which the hand presses, and
         /// the place at which it points.
         fn frame(&self, events: Vec<Event>) -> (f32, Option<[f32; 2]>) {
+            self.frame_at(None, events)
+        }
+
+        /// The same at a time, s.
+        fn frame_at(&self, time: Option<f64>, events: Vec<Event>) -> (f32, Option<[f32; 2]>) {
             let mut commands = Vec::new();
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 600.0)));
-            let input = RawInput { screen_rect, events, ..RawInput::default() };
+            let input = RawInput { screen_rect, time, events, ..RawInput::default() };
             let mut output = self.0.run_ui(input, |ui| {
                 let view = ui.interact(ui.max_rect(), ui.scope_id().with("view"), Sense::click_and_drag());
                 commands.clear();
@@ -235,6 +254,22 @@ mod tests {
         assert_eq!(screen.frame(touch(0, TouchPhase::Move, at, Some(0.4))).0, 0.4);
         assert_eq!(screen.frame(touch(0, TouchPhase::Move, at, Some(1.0))).0, 1.0);
         assert_eq!(screen.frame(touch(0, TouchPhase::End, at, Some(0.0))).0, 0.0);
+    }
+
+    #[test]
+    fn a_long_press_at_one_place_stays_a_press() {
+        let screen = Screen::default();
+        screen.frame_at(Some(0.0), Vec::new());
+        let (first, second) = (Pos2::new(400.0, 300.0), Pos2::new(200.0, 150.0));
+        screen.frame_at(Some(0.1), touch(0, TouchPhase::Start, first, None));
+        for tenth in 2..30 {
+            assert_eq!(screen.frame_at(Some(0.1 * f64::from(tenth)), Vec::new()), (0.0, Some([0.5, 0.5])));
+        }
+        assert_eq!(screen.frame_at(Some(3.0), touch(1, TouchPhase::Start, second, None)), (1.0, Some([0.5, 0.5])));
+        for tenth in 31..60 {
+            assert_eq!(screen.frame_at(Some(0.1 * f64::from(tenth)), Vec::new()).0, 1.0);
+        }
+        assert_eq!(screen.frame_at(Some(6.0), touch(1, TouchPhase::End, second, None)).0, 0.0);
     }
 
     #[test]

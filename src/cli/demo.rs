@@ -1,7 +1,7 @@
 //! `typodont demo`: runs the shipped exercises with a scripted operator and writes a page about them.
 
 use super::run::{RunRequest, SeedSource, SessionDriver, operator, run_session};
-use super::{CliError, DEFAULT_LANGUAGE, SESSIONS, cohort, print_line};
+use super::{CliError, DEFAULT_LANGUAGE, SESSIONS, cohort, print_line, verification};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -51,7 +51,8 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         };
         print_line(format!("  {}", run_session(run)?.join("report.html").display()))?;
     }
-    let cohort = Cohort::read(&arguments.out);
+    let mut cohort = Cohort::read(&arguments.out);
+    cohort.verify(&verification::verifier()?, |_| ());
     let page = arguments.out.join("cohort.html");
     cohort::write_all(
         &cohort,

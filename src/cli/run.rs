@@ -101,7 +101,7 @@ fn tooth_number(text: &str) -> Result<u8, String> {
     }
 }
 
-/// As the command line names a [`Role`].
+/// Role of a second hand, as the command line names it.
 #[derive(Clone, Copy, Debug, Default, clap::ValueEnum)]
 enum SecondHandRoleName {
     /// Follows the trainee's device, and leads it while the button is held
@@ -121,7 +121,7 @@ impl From<SecondHandRoleName> for SecondHandRole {
     }
 }
 
-/// Parses a key; it must be long enough to resist a thousand guesses per second.
+/// Parses a participant code.
 fn participant(text: &str) -> Result<String, String> {
     match lesson::is_valid_participant_code(text) {
         true => Ok(text.to_string()),

@@ -96,6 +96,7 @@ impl HandLink {
         let mut worker = UdpWorker {
             socket,
             peer,
+            given_peer: peer,
             end,
             keys: DirectionKeys::derive(key),
             ours: ours.clone(),
@@ -194,8 +195,10 @@ impl LinkEnd {
 struct UdpWorker {
     socket: UdpSocket,
     end: LinkEnd,
-    /// For the connecting end always the address that it was given.
+    /// Address of the present peer.
     peer: Option<SocketAddr>,
+    /// Address that the connecting end was given, to which it returns after silence.
+    given_peer: Option<SocketAddr>,
     keys: DirectionKeys,
     ours: Arc<SeqLock<SLOT_WORDS>>,
     theirs: Arc<SeqLock<SLOT_WORDS>>,
@@ -257,17 +260,18 @@ impl UdpWorker {
         if self.last_datagram.is_none_or(|last| last.at.elapsed() < PEER_TIMEOUT) {
             return;
         }
-        // If the generator fails, the next iteration tries again; until then the old connection stays closed to all.
+        // If the generator fails, the next iteration tries again.
         let Ok(nonce) = random_nonce() else { return };
         (self.own_nonce, self.peer_nonce, self.last_datagram) = (nonce, NO_NONCE, None);
-        if self.end == LinkEnd::Listening {
-            self.peer = None;
-        }
+        (self.peer, self.one_way_delay) = (self.given_peer, FIRST_DELAY);
     }
 
     fn send_to(&mut self, peer: SocketAddr, peer_nonce: Nonce) {
         let Some((_, words)) = self.ours.read() else { return };
-        let (hand, _) = decode_words(words);
+        let (hand, at) = decode_words(words);
+        // A hand that is not published any more, because its servo is paused or its device is lost, grows old at the other
+        // end, too, and leads no longer.
+        let age_ms = self.epoch.elapsed().saturating_sub(at).as_millis().min(u128::from(u8::MAX)) as u8;
         // At a thousand per second it does not overflow.
         self.sequence += 1;
         let (echo_us, echo_age_us) = match self.last_datagram {
@@ -276,7 +280,7 @@ impl UdpWorker {
         };
         let mut bytes = [0; DATAGRAM_LENGTH];
         bytes[..4].copy_from_slice(&MAGIC);
-        bytes[4..8].copy_from_slice(&[PROTOCOL, u8::from(hand.is_leading), self.end as u8, 0]);
+        bytes[4..8].copy_from_slice(&[PROTOCOL, u8::from(hand.is_leading), self.end as u8, age_ms]);
         bytes[8..16].copy_from_slice(&self.sequence.to_le_bytes());
         bytes[16..24].copy_from_slice(&(self.epoch.elapsed().as_micros() as u64).to_le_bytes());
         bytes[24..32].copy_from_slice(&echo_us.to_le_bytes());
@@ -335,7 +339,8 @@ impl UdpWorker {
         if !hand.position.is_finite() || !hand.orientation.is_finite() {
             return None;
         }
-        let was_there = self.epoch.elapsed().saturating_sub(Duration::from_secs_f32(self.one_way_delay));
+        let age = Duration::from_secs_f32(self.one_way_delay) + Duration::from_millis(u64::from(bytes[7]));
+        let was_there = self.epoch.elapsed().saturating_sub(age);
         self.theirs.write(encode_words(&hand, was_there));
         Some(())
     }
@@ -416,12 +421,35 @@ mod tests {
     fn two_ends_see_each_other_over_the_network() {
         let (here, address) = HandLink::listen("127.0.0.1:0", "secret").unwrap();
         let there = HandLink::connect(address, "secret").unwrap();
-        here.publish(&hand(1.0, false));
-        there.publish(&hand(2.0, true));
+        let publish = || {
+            here.publish(&hand(1.0, false));
+            there.publish(&hand(2.0, true));
+        };
+        publish();
         assert!(eventually(|| here.latest().is_some_and(|(m, _)| m == hand(2.0, true))));
         assert!(eventually(|| there.latest().is_some_and(|(m, _)| m == hand(1.0, false))));
         // The initial delay is 50 ms; on one machine the measured one is shorter.
-        assert!(eventually(|| here.latest().is_some_and(|(_, delay)| delay < 0.02)));
+        assert!(eventually(|| {
+            publish();
+            here.latest().is_some_and(|(_, delay)| delay < 0.02)
+        }));
+    }
+
+    #[test]
+    fn a_hand_that_is_not_published_any_more_leads_no_longer() {
+        // Aim: a device that is not ready, or a pause, does not hold the other hand at the last place. Method: one end stops
+        // to publish, while its datagrams go on.
+        let (here, address) = HandLink::listen("127.0.0.1:0", "secret").unwrap();
+        let there = HandLink::connect(address, "secret").unwrap();
+        here.publish(&hand(1.0, false));
+        assert!(eventually(|| {
+            there.publish(&hand(2.0, true));
+            here.remote_position(|hand| hand.is_leading).is_some_and(|seen| seen.delay < 0.05)
+        }));
+        assert!(eventually(|| here.latest().is_some_and(|(_, delay)| delay > 0.2)));
+        assert_eq!(here.rejected_count(), 0);
+        there.publish(&hand(3.0, true));
+        assert!(eventually(|| here.latest().is_some_and(|(seen, _)| seen == hand(3.0, true))), "the link has lasted");
     }
 
     #[test]

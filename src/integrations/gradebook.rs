@@ -218,10 +218,10 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
         }
         let max_points: Vec<f64> = graded
             .iter()
-            .filter(|g| g.session.scenario.id == exercise.scenario.id)
+            .filter(|g| g.session.scenario.id == exercise.scenario.id && !g.status.differs())
             .map(|g| g.grade.max_points)
             .collect();
-        if max_points.iter().any(|m| *m != max_points[0]) {
+        if max_points.windows(2).any(|pair| pair[0] != pair[1]) {
             warnings.push(format!("the sessions of \"{title}\" have different maximum points: export them separately"));
         }
         possible.push(max_points.iter().copied().fold(0.0, f64::max).to_string());
@@ -333,7 +333,7 @@ fn feedback(
 ) -> String {
     let grade = session.grade;
     let key = if grade.passed { "gradebook.passed" } else { "gradebook.not_passed" };
-    let (points, most) = (round(grade.points), round(grade.max_points));
+    let (points, most) = (round_beside(grade.points, grade.pass_points), round(grade.max_points));
     let mut sentences =
         vec![translator.text(key, &[("points", points), ("most", most), ("needed", round(grade.pass_points))])];
     if !session.status.is_verified() {
@@ -362,6 +362,12 @@ fn feedback(
         translator.text("gradebook.item", &[("title", item.title.clone()), ("points", points), ("most", most)])
     }));
     sanitize_display(&sentences.join(" "), FEEDBACK_MAX)
+}
+
+/// Formats points, rounded to one decimal place unless that would move them across the pass mark.
+fn round_beside(points: f64, pass_points: f64) -> String {
+    let rounded = (points * 10.0).round() / 10.0;
+    if (rounded < pass_points) == (points < pass_points) { rounded.to_string() } else { points.to_string() }
 }
 
 /// Formats points, rounded to one decimal place.

@@ -200,8 +200,10 @@ impl StatementBuilder<'_> {
         result.insert("duration".into(), json!(duration(self.length())));
         let name = match &self.session.grade {
             Some(grade) => {
-                result.insert("success".into(), json!(grade.passed));
-                if grade.max_points > 0.0 {
+                if !self.status.differs() {
+                    result.insert("success".into(), json!(grade.passed));
+                }
+                if grade.max_points > 0.0 && !self.status.differs() {
                     let raw = grade.points.clamp(0.0, grade.max_points);
                     let scaled = (raw / grade.max_points).clamp(-1.0, 1.0);
                     result.insert(
@@ -210,14 +212,23 @@ impl StatementBuilder<'_> {
                     );
                 }
                 extensions.insert(iri::extension("hard-fails"), json!(grade.hard_fails));
-                if grade.passed { "passed" } else { "failed" }
+                match (self.status.differs(), grade.passed) {
+                    // A result that its recording does not give is neither.
+                    (true, _) if whole => "completed",
+                    (true, _) => "terminated",
+                    (false, true) => "passed",
+                    (false, false) => "failed",
+                }
             }
             None if whole => "completed",
             None => "terminated",
         };
         result.insert("extensions".into(), extensions.into());
-        // Another scorer version yields a separate statement, not a changed one.
-        let part = format!("ended/scorer-{}", self.session.scorer_version);
+        // Another scorer version or another result of the verification yields a separate statement, not a changed one.
+        let part = match self.status {
+            VerificationStatus::Verified => format!("ended/scorer-{}", self.session.scorer_version),
+            status => format!("ended/scorer-{}/{}", self.session.scorer_version, status.name()),
+        };
         self.statement(&part, verb(name), self.scenario(), result.into(), Some(self.length()), Vec::new())
     }
 

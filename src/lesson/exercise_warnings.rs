@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 use typodont_exercise::local_text::LanguageGap;
-use typodont_exercise::scenario::{DecayPlace, DecayShape, QuestionKind, Scenario, Workpiece};
+use typodont_exercise::scenario::{QuestionKind, Scenario, Workpiece};
 use typodont_exercise::score::{decay_in_zones, decay_on_vulnerable_mm3, idle_grade};
 
 /// Points of 100 that a trainee who does nothing may earn before the rubric is reported.
@@ -30,11 +30,7 @@ pub struct ExerciseWarning {
 /// # Errors
 /// Returns a message if the workpiece cannot be made.
 pub fn exercise_warnings(scenario: &Arc<Scenario>) -> Result<Vec<ExerciseWarning>, String> {
-    let is_drawn = scenario.decay().any(|(_, decay)| {
-        let has_depths = matches!(&decay.shape, DecayShape::Grown(grown) if grown.depths.len() > 1);
-        has_depths || matches!(decay.place, DecayPlace::Random | DecayPlace::RandomQuadrant)
-    });
-    let seeds = if is_drawn { DRAWN } else { 1..=1 };
+    let seeds = if scenario.is_workpiece_drawn() { DRAWN } else { 1..=1 };
     let mut found = guessable_answers(scenario);
     found.extend(language_warning(scenario));
     for seed in seeds {

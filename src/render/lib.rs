@@ -64,6 +64,7 @@ mod gpu_offscreen;
 mod ambient_occlusion;
 #[cfg(feature = "gpu")]
 mod iso_pass;
+#[cfg(feature = "gpu")]
 mod mesh_parts;
 mod mirror;
 #[cfg(feature = "gpu")]

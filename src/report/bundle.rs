@@ -202,7 +202,12 @@ impl PartialBundle {
         let revealed = record::reveal(&bytes, code).map_err(unmade)?;
         // The recording is replaced as a whole, so that a power cut leaves one or the other.
         let copy = path.with_extension("revealed");
-        fs::write(&copy, revealed).and_then(|()| fs::rename(&copy, &path)).map_err(|e| unmade(e.to_string()))
+        let replaced = write_synced(&copy, &revealed).and_then(|()| fs::rename(&copy, &path));
+        sync_folder(&self.partial);
+        replaced.map_err(|error| {
+            let _ = fs::remove_file(&copy);
+            unmade(error.to_string())
+        })
     }
 
     /// Scores the finished recording, writes all files that follow from it, and renames the folder.
@@ -346,7 +351,7 @@ pub(super) fn derive_maps(recording: &Recording, scored: &Scored) -> Result<BTre
     ]))
 }
 
-pub(super) fn sha256(bytes: &[u8]) -> String {
+pub fn sha256(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }
 
@@ -409,7 +414,7 @@ pub fn verify(bundle: &Path, known: &[Templates]) -> Result<Verification, String
         }
     };
     complaints.extend(compare_files(bundle, &bytes, &session));
-    complaints.extend(compare_results(&recording, &scored, &session));
+    complaints.extend(compare_results(&SessionFile::of(&recording, &scored), &session));
     complaints.extend(unlisted_files(bundle, &session).iter().map(|name| unlisted_complaint(name)));
     if made_by != this {
         // The results are compared in any case; the drawings and texts of another version cannot be.
@@ -540,11 +545,10 @@ fn with_digests_of_page(derived: &[u8], session: &SessionFile) -> Option<String>
     Some(expected.to_json())
 }
 
-/// Complaints about results in `session.json` that differ from the recording's.
-fn compare_results(recording: &Recording, scored: &Scored, session: &SessionFile) -> Vec<String> {
-    let expected = SessionFile::of(recording, scored);
-    let mut complaints = compare_facts(&expected, session);
-    complaints.extend(compare_scores(&expected, session));
+/// Complaints about results that differ from those that a recording gives.
+pub fn compare_results(expected: &SessionFile, session: &SessionFile) -> Vec<String> {
+    let mut complaints = compare_facts(expected, session);
+    complaints.extend(compare_scores(expected, session));
     complaints
 }
 
@@ -585,6 +589,10 @@ pub(super) fn compare_scores(expected: &SessionFile, session: &SessionFile) -> V
         ("grade", expected.grade != session.grade),
         ("stages", expected.stages != session.stages),
         ("chart", expected.chart != session.chart),
+        ("episodes", expected.episodes != session.episodes),
+        ("seed_origin", expected.seed_origin != session.seed_origin),
+        ("voxel_mm", expected.voxel_mm != session.voxel_mm),
+        ("tooth_sha256", expected.tooth_sha256 != session.tooth_sha256),
         ("questionnaire", expected.questionnaire != session.questionnaire),
     ];
     complaints.extend(differing.into_iter().filter(|(_, differs)| *differs).map(|(name, _)| differing_part(name)));

@@ -27,6 +27,7 @@ mod labelmap;
 mod language;
 mod pictures;
 pub mod raycast;
+pub mod name_folding;
 pub mod phrases;
 mod session_file;
 mod session_page;

@@ -5,11 +5,12 @@ use super::bundle;
 use super::http::Response;
 use super::index::IndexedSession;
 use super::query::Query;
-use super::ratings::{RatingEntry, RatingSnapshot, examiner_key};
+use super::ratings::{RatingEntry, RatingSnapshot};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_report::cohort::{AgreementTables, Cohort, ExaminerRating, recording_of};
+use typodont_report::name_folding::examiner_key;
 
 #[derive(Serialize)]
 struct AgreementPage {

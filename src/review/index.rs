@@ -8,7 +8,7 @@ use super::chained_log::{IntegrityIssue, LogHead};
 use super::effective_grade::effective_grade;
 use super::overrides::OverrideSnapshot;
 use super::pseudonyms::Pseudonymizer;
-use super::query::{Query, ResultFilter, SortColumn, fold_case};
+use super::query::{Query, ResultFilter, SortColumn};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, Row, params, params_from_iter};
 use sha2::{Digest, Sha256};
@@ -19,6 +19,7 @@ use std::time::{Duration, UNIX_EPOCH};
 use typodont_exercise::scenario::hex;
 use typodont_integrations::session_id;
 use typodont_report::cohort::{FoundBundles, find_bundles};
+use typodont_report::name_folding::fold_case;
 use typodont_report::{GradeFile, SessionFile};
 
 pub const FILE_NAME: &str = "review.sqlite";

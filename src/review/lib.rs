@@ -48,9 +48,7 @@ pub use effective_grade::{EffectiveGrade, effective_grade, with_overrides};
 pub use http::{BODY_MAX, Request, Response};
 pub use overrides::{GivenPoints, OverrideDraft, OverrideEntry, OverrideLog, OverrideSnapshot};
 pub use page_renderer::PageRenderer;
-pub use ratings::{
-    ItemRating, RatingDraft, RatingEntry, RatingLog, RatingSnapshot, SCALE_MAX, SCALE_MIN, examiner_key,
-};
+pub use ratings::{ItemRating, RatingDraft, RatingEntry, RatingLog, RatingSnapshot, SCALE_MAX, SCALE_MIN};
 
 /// File names of the logs, in the folder of the bundles.
 pub const OVERRIDES: &str = <overrides::OverrideDraft as chained_log::LoggedDraft>::FILE_NAME;

@@ -5,11 +5,12 @@ use super::effective_grade::FailureReason;
 use super::http::Response;
 use super::index::IndexedSession;
 use super::query::{PAGE_LENGTHS, Query, ResultFilter, SortColumn, VerificationFilter};
-use super::ratings::{RatingSnapshot, examiner_key};
+use super::ratings::RatingSnapshot;
 use super::verification::{ShownVerification, VerificationProgress};
 use serde::Serialize;
 use std::sync::Arc;
 use typodont_report::display_format;
+use typodont_report::name_folding::examiner_key;
 use typodont_report::sanitize_display;
 
 #[derive(Serialize)]

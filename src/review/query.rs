@@ -190,12 +190,6 @@ impl Query {
     }
 }
 
-/// Folds a text for searching: lower case, without distinguishing the dotted and dotless i of Turkish.
-pub fn fold_case(text: &str) -> String {
-    let lower = text.chars().flat_map(char::to_lowercase);
-    lower.filter(|c| *c != '\u{307}').map(|c| if c == 'ı' { 'i' } else { c }).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,10 +207,5 @@ mod tests {
         assert_eq!(parse(&full.to_query_string()), full);
         assert_eq!(parse("sort=id;--&page=-1&length=7&result=x"), default);
         assert!(full.sorted_by(SortColumn::Machine).page == 1 && !full.sorted_by(SortColumn::Machine).is_descending);
-    }
-
-    #[test]
-    fn search_ignores_case() {
-        assert_eq!(fold_case("ISPARTA İzmir ığdır"), "isparta izmir iğdir");
     }
 }

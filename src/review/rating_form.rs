@@ -5,8 +5,9 @@ use super::chained_log::AppendError;
 use super::history::{format_time, sanitize_lines};
 use super::http::{Response, first_value};
 use super::override_form::{parse_name, rubric_item};
-use super::ratings::{ItemRating, RatingDraft, RatingEntry, RatingSnapshot, examiner_key};
+use super::ratings::{ItemRating, RatingDraft, RatingEntry, RatingSnapshot};
 use serde::Serialize;
+use typodont_report::name_folding::examiner_key;
 use typodont_report::{GradeFile, Message, phrases, sanitize_display};
 
 /// Maximum length of a note, characters.

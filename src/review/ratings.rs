@@ -5,8 +5,8 @@
 
 use super::chained_log::{ChainedLog, LogEntry, LogSnapshot, LoggedDraft};
 use super::overrides::RubricItemRef;
-use super::query::fold_case;
 use serde::{Deserialize, Serialize};
+use typodont_report::name_folding::examiner_key;
 
 /// Range of the highest value of a scale: at least fail, borderline and pass; at most what fits a row of choices.
 pub const SCALE_MIN: u8 = 3;
@@ -57,11 +57,6 @@ impl LoggedDraft for RatingDraft {
     fn session(&self) -> &str {
         &self.session
     }
-}
-
-/// Identity of an examiner: the name without regard to case and repeated spaces.
-pub fn examiner_key(name: &str) -> String {
-    fold_case(&name.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
 impl RatingSnapshot {

@@ -292,12 +292,12 @@ pub fn sessions(client: &mut Client, filter: &SessionFilter) -> Result<(Vec<Stor
     for row in client.query(sql, &[&filter.class, &scorer])? {
         let (id, as_written, scored): (String, String, Option<String>) = (row.get(0), row.get(4), row.get(6));
         let manifest: String = row.get(5);
-        let read = serde_json::from_str::<SessionFile>(&as_written).and_then(|written| {
+        let read = SessionFile::from_json(&as_written).and_then(|written| {
             let session = match scored {
                 None => written,
-                Some(text) => rescored_in_place(&written, serde_json::from_str(&text)?),
+                Some(text) => rescored_in_place(&written, SessionFile::from_json(&text)?),
             };
-            Ok((session, serde_json::from_str(&manifest)?))
+            Ok((session, serde_json::from_str(&manifest).map_err(|error| format!("manifest: {error}"))?))
         });
         let [class, bundle, month]: [String; 3] = [1, 2, 3].map(|column| row.get(column));
         match read {
@@ -319,7 +319,7 @@ pub fn sessions(client: &mut Client, filter: &SessionFilter) -> Result<(Vec<Stor
                 let differs = agrees == Some(false);
                 stored.push(StoredSession { id, class, bundle, month, session, manifest, differs, verification });
             }
-            Err(error) => unreadable.push(format!("{id}: not a session: {error}")),
+            Err(error) => unreadable.push(format!("{id}: {error}")),
         }
     }
     stored.sort_by(|a, b| {

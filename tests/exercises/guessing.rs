@@ -23,6 +23,8 @@ use typodont_exercise::session::{
 };
 use typodont_formats::Library;
 use typodont_formats::diagnostic::SourceText;
+use typodont_report::cohort::read_session;
+use typodont_report::{Templates, VerificationStatus, Verifier};
 
 /// The shipped exercises in which caries is to be found.
 const SEARCHES: [&str; 3] = ["3-detection", "4-diagnosis", "9-stain"];
@@ -296,6 +298,8 @@ fn a_sealed_draw_is_revealed_at_the_end_and_not_before() {
     assert_eq!(whole["seed_origin"], "sealed");
     assert_eq!(truths(&whole).len(), 8);
     assert!(typodont(&["verify", bundle.to_str().unwrap()]).status.success());
+    let read = read_session(&bundle.join("session.json")).unwrap();
+    assert_eq!(Verifier::new(&Templates::shipped()).verify(&bundle, &read), VerificationStatus::Verified);
     let bytes = std::fs::read(bundle.join("recording.mcap")).unwrap();
     let recording = Recording::parse("sealed", &bytes).unwrap();
     assert_eq!(Some(recording.head.seed), whole["seed"].as_u64());

@@ -15,6 +15,9 @@ use typodont_report::{Templates, VerificationStatus, Verifier};
 
 const EXERCISE: &str = "scenarios/1-introduction.json";
 
+/// An exercise with a rubric.
+const GRADED: &str = "scenarios/5-grinding.json";
+
 /// The program with a cache of replays of this test alone.
 fn reader(cache: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(program());
@@ -69,7 +72,7 @@ fn every_reader_says_which_results_follow_from_their_recordings() {
     // participant's own code; a copy under another code; a copy with a recording that is not the one of the digests.
     let out = folder("verification_readers");
     let (sessions, cache) = (out.join("sessions"), out.join("cache"));
-    let graded = "scenarios/5-grinding.json";
+    let graded = GRADED;
     let honest = run(graded, "hasty", &sessions, &["--participant", "HONEST"]);
     let best = run(graded, "hasty", &sessions, &["--participant", "CHEAT", "--seed", "2"]);
     forge(&best, full_marks);
@@ -152,6 +155,21 @@ fn all_text_below(folder: &Path) -> String {
         }
     }
     text
+}
+
+#[test]
+fn a_forged_copy_does_not_hide_the_session_that_it_copies() {
+    // Aim: of two bundles with the same recording, person and time the one counts that its recording confirms. Method: a copy
+    // with full marks in a folder that is read first.
+    let place = folder("forged_copy");
+    let original = run(GRADED, "hasty", &place.join("berk"), &["--participant", "BERK"]);
+    let forged = copy(&original, &place.join("aaa"));
+    forge(&forged, full_marks);
+    let mut cohort = Cohort::read(&place);
+    cohort.verify(&Verifier::new(&Templates::shipped()), |_| ());
+    let [(counted, _)] = &cohort.sessions[..] else { panic!("{:?}", cohort.skipped) };
+    assert_eq!((counted, cohort.status(counted)), (&original, &VerificationStatus::Verified));
+    assert!(cohort.skipped[0].1.contains("duplicate"), "{:?}", cohort.skipped);
 }
 
 #[test]

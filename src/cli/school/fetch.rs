@@ -13,10 +13,10 @@ use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use typodont_exercise::scenario::hex;
+use typodont_report::name_folding::examiner_key;
 use typodont_report::sanitize_display;
 use typodont_review::{
     AppendError, ChainedLog, LogEntry, LogSnapshot, LoggedDraft, OverrideSnapshot, RatingEntry, RatingSnapshot,
-    examiner_key,
 };
 use typodont_school::records;
 use typodont_school::records::{LogTable, StoredSession, is_plain_name};

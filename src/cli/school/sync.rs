@@ -16,7 +16,7 @@ use std::time::Duration;
 use typodont_integrations::session_id;
 use typodont_report::cohort::{find_bundles, read_session};
 use typodont_report::sanitize_display;
-use typodont_report::{SessionFile, VerificationStatus};
+use typodont_report::{SessionFile, Verifier};
 use typodont_school::records;
 use typodont_school::records::{InsertOutcome, NewSession, SyncStatus};
 use typodont_school::{ArchiveError, BundleArchive};
@@ -92,10 +92,12 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     }
     let mut connection = at.connection()?;
     let store = store.open(at.retry_policy()?)?;
+    // Before anything is sent: an unreadable template is a mistake to be mended, not a reason to send unchecked bundles.
+    let verifier = verification::verifier()?;
     let mut reported = BTreeSet::new();
     loop {
         let mut stats = SyncStats::default();
-        let sync_error = sync_once(arguments, &mut connection, &store, &mut stats, &mut reported).err();
+        let sync_error = sync_once(arguments, &verifier, &mut connection, &store, &mut stats, &mut reported).err();
         let words = describe(&stats);
         match sync_error {
             None if !stay && stats.refused == 0 => return print_line(words),
@@ -148,6 +150,7 @@ fn offline_error(failure: CliError, words: &str) -> CliError {
 
 fn sync_once(
     arguments: &Arguments,
+    verifier: &Verifier,
     connection: &mut DbConnection,
     store: &ObjectStoreHandle,
     stats: &mut SyncStats,
@@ -173,10 +176,9 @@ fn sync_once(
     let new = select_new(arguments, connection, stats, &found, &mut complain)?;
     let bar = progress_bar(new.len() as u64, "sent");
     // One after the other: the station's processors belong to the session that is running.
-    let verifier = if new.is_empty() { None } else { verification::verifier().ok() };
     for found in new {
-        let status = verifier.as_ref().map(|verifier| verifier.verify(&found.path, &found.session));
-        if let Some(status) = status.filter(VerificationStatus::differs) {
+        let status = verifier.verify(&found.path, &found.session);
+        if status.differs() {
             stats.refused += 1;
             complain(&found.path, &format!("differs: the bundle was not sent: {}", status.note()));
             bar.inc(1);

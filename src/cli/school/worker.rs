@@ -16,6 +16,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 use typodont_exercise::score::SCORER_VERSION;
 use typodont_report::SessionFile;
+use typodont_report::bundle::{compare_results, sha256};
 use typodont_report::sanitize_display;
 use typodont_school::jobs;
 use typodont_school::jobs::{Lease, ScoringJob};
@@ -182,11 +183,14 @@ fn process_job(
 ) -> Result<(), DbError> {
     let begun = Instant::now();
     let scored = store.read_bundle_file(&job.manifest, RECORDING).map_err(|(why, passing)| (why, !passing));
-    let scored = scored.and_then(|bytes| rescore(&job.session, &bytes).map_err(|unscored| (unscored.0, true)));
+    let scored = scored.and_then(|bytes| {
+        let result = rescore(&job.session, &bytes).map_err(|unscored| (unscored.0, true))?;
+        Ok((result, sha256(&bytes)))
+    });
     counters.add_seconds(begun.elapsed());
     match scored {
-        Ok(result) => {
-            let agrees = agrees_with_station(&job.station_result, &result);
+        Ok((result, recording_digest)) => {
+            let agrees = agrees_with_station(&job.station_result, &result, &recording_digest);
             let first = connection.query_with_retry(|client| jobs::finish_job(client, job, &result, agrees))?;
             counters.scored.fetch_add(u64::from(first), Ordering::Relaxed);
             if agrees == Some(false) {
@@ -210,12 +214,14 @@ fn process_job(
     Ok(())
 }
 
-/// True if the station's results equal those computed from the recording; `None` if it used another scorer version.
-fn agrees_with_station(station_result: &str, result: &SessionFile) -> Option<bool> {
-    let written: SessionFile = serde_json::from_str(station_result).ok()?;
-    let same =
-        written.metrics == result.metrics && written.grade == result.grade && written.participant == result.participant;
-    (written.scorer_version == result.scorer_version).then_some(same)
+/// True if the station's results are those of the recording that was scored, whose SHA-256 is given; `None` if it used another
+/// scorer version.
+fn agrees_with_station(station_result: &str, result: &SessionFile, recording_digest: &str) -> Option<bool> {
+    let Ok(written) = SessionFile::from_json(station_result) else { return Some(false) };
+    if written.digests.get(RECORDING).is_some_and(|digest| digest != recording_digest) {
+        return Some(false);
+    }
+    (written.scorer_version == result.scorer_version).then(|| compare_results(result, &written).is_empty())
 }
 
 /// Renews the lease of the current session, three times per lease, on a connection of its own.

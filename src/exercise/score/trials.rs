@@ -57,6 +57,8 @@ impl TrialSummary {
         self.time_sum += answer.at.seconds_since(result.started);
         let value = match answer.correct {
             Some(true) => 1.0,
+            // Where there is nothing to choose from, an answer shows nothing.
+            _ if chance >= 1.0 => 0.0,
             _ => -chance / (1.0 - chance),
         };
         match answer.correct {
@@ -88,8 +90,9 @@ impl TrialSummary {
         self.chance_sum / self.trials() as f64
     }
 
-    fn corrected_pct(&self, share: f64) -> f64 {
-        100.0 * (share - self.chance()) / (1.0 - self.chance())
+    /// Corrects a share of correct answers for guessing; `None` where a guess is always correct.
+    fn corrected_pct(&self, share: f64) -> Option<f64> {
+        (self.chance() < 1.0).then(|| 100.0 * (share - self.chance()) / (1.0 - self.chance()))
     }
 
     /// Computes one of the measures of the trials; `None` if it has no value.
@@ -97,9 +100,9 @@ impl TrialSummary {
         let interval = || statistics::wilson_interval(self.share(), self.trials());
         let answered = self.correct + self.incorrect;
         match name {
-            "detect_corrected_pct" => Some(self.corrected_pct(self.share())),
-            "detect_corrected_low_pct" => Some(self.corrected_pct(interval()[0])),
-            "detect_corrected_high_pct" => Some(self.corrected_pct(interval()[1])),
+            "detect_corrected_pct" => self.corrected_pct(self.share()),
+            "detect_corrected_low_pct" => self.corrected_pct(interval()[0]),
+            "detect_corrected_high_pct" => self.corrected_pct(interval()[1]),
             "detect_trials_right" => Some(self.correct as f64),
             "detect_level_corrected" => self.level_sum.map(|sum| sum / self.trials() as f64),
             "detect_trial_time_s" => (answered > 0).then(|| self.time_sum / answered as f64),

@@ -38,11 +38,7 @@ impl ComparableGroup {
 
     /// True for a session under these conditions.
     pub fn contains(&self, session: &SessionFile) -> bool {
-        session.scenario.id == self.scenario
-            && session.scorer_version == self.scorer_version
-            && session.tooth_fdi == self.tooth_fdi
-            && session.tooth_sha256 == self.tooth_sha256
-            && session.voxel_mm.map(voxel_steps) == self.voxel_steps
+        ComparableGroup::of(session) == *self
     }
 
     /// Size of a voxel, mm.

@@ -2,14 +2,14 @@
 
 use super::Cohort;
 use crate::session_file::{FILE_BYTES_MAX, SessionFile};
-use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Folders are looked into this deep: a class of sessions within a year within a school.
 const DEPTH_MAX: usize = 4;
 
-/// Every `session.json` below a folder, in order of exercise, participant, beginning and path.
+/// Every `session.json` below a folder, in order of exercise, participant, beginning and path. Copies are among them: which
+/// of them counts is decided when they have been verified.
 pub fn read_cohort(folder: &Path) -> Cohort {
     let mut cohort = Cohort::default();
     let FoundBundles { files, skipped: left_out } = find_bundles(folder);
@@ -21,24 +21,7 @@ pub fn read_cohort(folder: &Path) -> Cohort {
         }
     }
     cohort.sort();
-    skip_duplicates(&mut cohort);
     cohort
-}
-
-/// Skips copies: a backup beside its original is no second attempt. Of sessions with the same recording, person and
-/// time the first counts.
-fn skip_duplicates(cohort: &mut Cohort) {
-    let mut known: BTreeMap<(String, String, String), PathBuf> = BTreeMap::new();
-    let (sessions, skipped) = (&mut cohort.sessions, &mut cohort.skipped);
-    sessions.retain(|(path, session)| {
-        let Some(digest) = session.digests.get("recording.mcap") else { return true };
-        let key = (digest.clone(), session.participant.clone(), session.started.clone());
-        match known.get(&key) {
-            Some(first) => skipped.push((path.clone(), format!("duplicate of the session in {}", first.display()))),
-            None => _ = known.insert(key.clone(), path.clone()),
-        }
-        known[&key] == *path
-    });
 }
 
 /// Session files found below a folder.

@@ -86,15 +86,17 @@ impl Cohort {
         let own_graded = graded(own);
         let latest = own_graded.last().copied();
         let previous = own_graded.len().checked_sub(2).map(|at| own_graded[at].1);
-        // The class: everybody but the named experts, each with the last graded session.
+        // The class: everybody but the named experts, each with the last graded session. A result that its recording does not
+        // give is nobody's.
+        let counts = |index: usize| !self.status(&self.sessions[index].0).differs();
         let class: Vec<(usize, &GradeFile)> = people
             .iter()
             .filter(|person| !self.is_expert(session(person[0])) || person[0] == own[0])
-            .filter_map(|person| graded(person).last().copied())
+            .filter_map(|person| graded(person).into_iter().rfind(|(index, _)| counts(*index)))
             .collect();
         let is_shown = class.len() >= PEOPLE_LEAST;
         let better = |points: f64| class.iter().filter(|(_, grade)| grade.points > points).count();
-        let rank = latest.filter(|_| is_shown).map(|(_, grade)| {
+        let rank = latest.filter(|(index, _)| is_shown && counts(*index)).map(|(_, grade)| {
             let values = [("rank", (better(grade.points) + 1).to_string()), ("of", class.len().to_string())];
             translator.text("cohort.own_rank", &values)
         });
@@ -218,7 +220,8 @@ fn item_lines(
         let before = previous.and_then(|grade| same(grade, item));
         let mut all: Vec<f64> = class.iter().filter_map(|(_, grade)| same(grade, item)?.value).collect();
         all.sort_by(f64::total_cmp);
-        let median = (is_class_shown && !all.is_empty()).then(|| quantile(&all, 0.5));
+        // Of few people, each could derive the others' values.
+        let median = (is_class_shown && all.len() >= PEOPLE_LEAST).then(|| quantile(&all, 0.5));
         ItemLine {
             title: display_format::sanitize_display(&item.title, SHOWN_MAX),
             before: before.as_ref().map_or("–".into(), |b| value(b, b.value)),

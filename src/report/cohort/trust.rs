@@ -64,11 +64,17 @@ impl Cohort {
         for same in by_recording.into_values().filter(|same| same.len() > 1) {
             let Some(counted) = same.iter().copied().min_by_key(|&index| (rank(index), index)) else { continue };
             for &other in same.iter().filter(|&&other| other != counted) {
-                let participant = sanitize_display(&self.sessions[other].1.participant, 64);
-                let why = format!(
-                    "repeated recording: participant \"{participant}\" has the same recording as {}, which is counted",
-                    name(counted)
-                );
+                let ((path, first), (_, second)) = (&self.sessions[counted], &self.sessions[other]);
+                // A backup beside its original is no second attempt.
+                let is_copy = (&first.participant, &first.started) == (&second.participant, &second.started);
+                let participant = sanitize_display(&second.participant, 64);
+                let why = match is_copy {
+                    true => format!("duplicate of the session in {}", path.display()),
+                    false => format!(
+                        "repeated recording: participant \"{participant}\" has the same recording as {}, which is counted",
+                        name(counted)
+                    ),
+                };
                 repeated.insert(other, why);
             }
         }

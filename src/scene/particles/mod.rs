@@ -127,6 +127,11 @@ impl ParticleField {
         }
     }
 
+    /// Number of particles in flight.
+    pub fn count(&self) -> usize {
+        self.dust.particles().count() + self.water.particles().count()
+    }
+
     /// Updates the lists of particles, sorted for a viewpoint.
     pub fn sort_for_view(&mut self, viewpoint: &Viewpoint) {
         let ParticleField { dust, water, opaque, translucent, .. } = self;
