@@ -95,18 +95,18 @@ const FINE_SHARE: f32 = 0.25;
 
 /// Contact of the pointer with the view, from frame to frame.
 #[derive(Clone, Debug, Default)]
-struct Contact {
+struct PointerContact {
     touches: Touches,
     /// True while a press lasts that began on the view.
     began_on_view: bool,
 }
 
 /// Takes over the events of a frame, whether the pointer is captured or free, so that no end of a contact is missed.
-fn contact(ui: &egui::Ui, view: &egui::Response) -> Contact {
+fn contact(ui: &egui::Ui, view: &egui::Response) -> PointerContact {
     let (events, any_touches) = ui.input(|input| (input.events.clone(), input.any_touches()));
     let (is_pressed, is_down) = ui.input(|input| (input.pointer.primary_pressed(), input.pointer.primary_down()));
     ui.data_mut(|data| {
-        let contact = data.get_temp_mut_or_default::<Contact>(view.id.with("contact"));
+        let contact = data.get_temp_mut_or_default::<PointerContact>(view.id.with("contact"));
         contact.touches.update(&events);
         if !any_touches {
             contact.touches.clear();
@@ -117,7 +117,7 @@ fn contact(ui: &egui::Ui, view: &egui::Response) -> Contact {
     })
 }
 
-fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &Contact, commands: &mut Vec<AppCommand>) {
+fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &PointerContact, commands: &mut Vec<AppCommand>) {
     view.clone().on_hover_cursor(egui::CursorIcon::Crosshair);
     let rect = view.rect;
     let (modifiers, at) = ui.input(|input| (input.modifiers, input.pointer.latest_pos()));
