@@ -39,7 +39,9 @@ pub fn tools_panel_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translati
     }
     section_heading(ui, words.get("menu.views"));
     if let Some(scene) = &lesson.scene {
-        let choice = egui::ComboBox::from_id_salt("views").selected_text(words.get("views.choose")).width(200.0);
+        let choice = egui::ComboBox::from_id_salt("views")
+            .selected_text(words.get("views.choose"))
+            .width(ui.available_width().min(200.0));
         choice.height(400.0).show_ui(ui, |ui| {
             for (view, key) in CameraPreset::available(scene) {
                 if ui.selectable_label(false, words.get(key)).clicked() {
