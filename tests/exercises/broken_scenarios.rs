@@ -304,9 +304,9 @@ fn parts_that_do_not_fit_together() {
     check("weights that do not sum", "/rubric/items/0/points", json!(50), &[("wrong-sum", "/rubric/items")]);
     check(
         "the wrong end earns",
-        "/rubric/items/0/full_at",
-        json!(40),
-        &[("backward-rubric", "/rubric/items/0/full_at")],
+        "/rubric/items/1/full_at",
+        json!(150),
+        &[("backward-rubric", "/rubric/items/1/full_at")],
     );
     check(
         "decay measured where there is none",
