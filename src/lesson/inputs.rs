@@ -48,7 +48,7 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
 /// Key by which names sort as people expect: "2-decay" before "10-class-one".
 fn natural_key(path: &Path) -> Vec<(u64, String)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut key: Vec<(u64, String)> = vec![(0, String::new())];
+    let mut key: Vec<(u64, String)> = Vec::new();
     for c in name.chars() {
         match (c.to_digit(10), key.last_mut()) {
             (Some(digit), Some((number, text))) if text.is_empty() => {
@@ -56,7 +56,8 @@ fn natural_key(path: &Path) -> Vec<(u64, String)> {
             }
             (Some(digit), _) => key.push((u64::from(digit), String::new())),
             (None, Some((_, text))) => text.push(c),
-            (None, None) => {}
+            // Names that begin with a letter follow those that begin with a number.
+            (None, None) => key.push((u64::MAX, c.to_string())),
         }
     }
     key

@@ -74,6 +74,11 @@ def seeded_random(seed, name):
     return state
 
 
+def text(written):
+    """A text of an exercise in English: as it stands, or by language."""
+    return written if isinstance(written, str) else written["en"]
+
+
 class Session:
     """A bundle, as independent programs read it."""
 
@@ -93,7 +98,7 @@ class Session:
         self.scenario = json.loads(attached["scenario.json"])
         table = json.loads(attached["content/tissues.json"])["tissues"]
         self.number = {tissue["name"]: tissue["id"] for tissue in table}
-        self.title = {tissue["name"]: tissue["title"].lower() for tissue in table}
+        self.title = {tissue["name"]: text(tissue["title"]).lower() for tissue in table}
         self.role = np.zeros(256, object)
         for tissue in table:
             self.role[tissue["id"]] = tissue["role"]

@@ -168,7 +168,7 @@ mod tests {
         // Aim: nobody at a Windows machine is told to use apt, and nobody at a Mac to open Device Manager. Method: the
         // words of each system in the remedies of the others. A limit on the size of files exists only on Unix.
         let words = [
-            (OperatingSystem::Linux, &["sudo", "apt", "udev", "systemctl", "/etc/", "mount"][..]),
+            (OperatingSystem::Linux, &["sudo", "apt ", "udev", "systemctl", "/etc/", "mount"][..]),
             (OperatingSystem::Windows, &["Task Manager", "Device Manager", "Windows", "Direct3D", "drive "][..]),
             (OperatingSystem::MacOs, &["System Settings", "Mac ", "Metal"][..]),
         ];

@@ -161,11 +161,6 @@ impl Resolver<'_> {
         let capabilities = Capabilities::of(written, &stages);
         let rubric = written.rubric.as_ref().map(|r| self.rubric(r, &zones, capabilities));
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
-        if written.questionnaire_time.is_some() && written.questionnaire.is_none() {
-            let message = "there is no questionnaire to be asked at that time".to_string();
-            let help = "name it with \"questionnaire\", or remove this key".to_string();
-            self.complain("/questionnaire_time", "missing-questionnaire", message, help);
-        }
         let factors = self.factors(written, &instruments);
         let carving = self.carving(&written.carving);
         let operating_field = self.operating_field(written);
