@@ -338,8 +338,12 @@ impl ServoLoop {
     /// that the instrument is seen where it is.
     fn is_awaiting(&mut self, reading: &Reading) -> bool {
         let Some(first) = &mut self.awaited else { return false };
-        if self.simulation.tick() == Tick::ZERO || !first.is_left_by(reading) {
-            return self.simulation.tick() != Tick::ZERO;
+        if self.simulation.tick() == Tick::ZERO {
+            return false;
+        }
+        let is_led = self.second.as_mut().is_some_and(|second| second.await_lead(reading));
+        if !is_led && !first.is_left_by(reading) {
+            return true;
         }
         self.stop_awaiting();
         false

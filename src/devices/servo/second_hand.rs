@@ -83,6 +83,17 @@ impl SecondHandLink {
         self.coupling.force(position, self.link.remote_position(|hand| hand.is_leading))
     }
 
+    /// Publishes the position of a first hand that waits for its first movement. Returns true if an instructor's hand asks to
+    /// lead it.
+    pub(super) fn await_lead(&mut self, reading: &Reading) -> bool {
+        if self.suction_tip.is_some() || !reading.pose.is_valid() {
+            return false;
+        }
+        let (position, orientation) = (reading.pose.position, reading.pose.orientation);
+        self.link.publish(&LinkedHand { position, orientation, buttons: reading.buttons, is_leading: false });
+        self.link.remote_position(|hand| hand.is_leading).is_some_and(|remote| remote.delay < SILENCE_TIMEOUT_S)
+    }
+
     /// Fades the coupling in again after the first hand was released.
     pub(super) fn reset_coupling(&mut self) {
         // The tip of the second hand keeps its position: that hand was not lost.
