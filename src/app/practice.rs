@@ -187,12 +187,14 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
             painter.vline(x, rect.y_range(), Stroke::new(2.5, theme::ACCENT));
         }
         ui.monospace(format!("{force:4.1} N"));
-        if let Some(strength) = lesson.press_strength() {
-            ui.weak(words.format("practice.strength", format!("{strength:.1}")));
-        }
-        if let Some(key) = warning(lesson, &snapshot) {
-            ui.add_space(16.0);
-            ui.label(egui::RichText::new(format!("! {}", words.get(key))).strong().color(theme::ERROR));
+        // There is no room for both in a narrow window.
+        match (warning(lesson, &snapshot), lesson.press_strength()) {
+            (Some(key), _) => {
+                let text = egui::RichText::new(format!("! {}", words.get(key))).strong().color(theme::ERROR);
+                ui.add(egui::Label::new(text).wrap());
+            }
+            (None, Some(strength)) => _ = ui.weak(words.format("practice.strength", format!("{strength:.1}"))),
+            (None, None) => {}
         }
     });
 }

@@ -243,17 +243,27 @@ fn legend_ui(ui: &mut egui::Ui, legend: &[LegendEntry], texts: &ResultTexts) {
             let [r, g, b] = entry.color;
             let ink = if entry.is_dark { egui::Color32::WHITE } else { egui::Color32::BLACK };
             ui.painter().rect_filled(rect, 4, egui::Color32::from_rgb(r, g, b));
-            // The window's fonts have only the heavy forms of these signs.
-            let sign = match entry.sign {
-                "✓" => "✔",
-                "✗" => "✖",
-                sign => sign,
-            };
-            let font = egui::FontId::proportional(14.0);
-            ui.painter().text(rect.center(), egui::Align2::CENTER_CENTER, sign, font, ink);
+            sign_ui(ui.painter(), rect, entry.sign, ink);
             let text = format!("{} · {:.2} mm³", texts.text(&entry.title), entry.volume);
             ui.add(egui::Label::new(text).wrap());
         });
+    }
+}
+
+/// Draws the sign of a verdict. The window's fonts lack the tick and the cross, which are drawn as lines.
+fn sign_ui(painter: &egui::Painter, rect: egui::Rect, sign: &str, ink: egui::Color32) {
+    let at = |x: f32, y: f32| rect.lerp_inside(egui::vec2(x, y));
+    let stroke = egui::Stroke::new(2.0, ink);
+    match sign {
+        "✓" => _ = painter.line(vec![at(0.22, 0.52), at(0.42, 0.72), at(0.78, 0.28)], stroke),
+        "✗" => {
+            painter.line_segment([at(0.28, 0.28), at(0.72, 0.72)], stroke);
+            painter.line_segment([at(0.72, 0.28), at(0.28, 0.72)], stroke);
+        }
+        sign => {
+            let font = egui::FontId::proportional(14.0);
+            painter.text(rect.center(), egui::Align2::CENTER_CENTER, sign, font, ink);
+        }
     }
 }
 
