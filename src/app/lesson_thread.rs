@@ -217,8 +217,7 @@ fn run_worker(mut worker: LessonWorker, config: LessonConfig, mouse: Option<Box<
         Ok(path) => LessonEvent::Finished(path),
         Err(failed) => LessonEvent::Failed(failed.to_string()),
     };
-    worker.events.send(last);
-    (worker.wake)();
+    worker.send_event(last);
     while !worker.events.queue.is_empty() && !worker.inbox.is_abandoned() {
         std::thread::sleep(POLL_INTERVAL);
         worker.events.flush();
@@ -245,13 +244,12 @@ fn run_lesson(
     };
     let second = second.map(|(from, role)| PendingSecondHand::join(&from, role, (&name, device.spec()))).transpose()?;
     if let Some(address) = second.as_ref().and_then(PendingSecondHand::address) {
-        worker.events.send(LessonEvent::AwaitingSecondHand(address));
+        worker.send_event(LessonEvent::AwaitingSecondHand(address));
     }
     let opening = SessionConfig { scenario, seed, participant: &participant, out: &out, digests, templates, started };
     let workpiece = opening.make_workpiece()?;
     // It is drawn while its recording is opened.
-    worker.events.send(LessonEvent::WorkpieceReady(workpiece.clone()));
-    (worker.wake)();
+    worker.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
     let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
     let (mut lesson, events) = prepared.begin(device, second)?;
     worker.send_events(events);
@@ -259,9 +257,7 @@ fn run_lesson(
     let mut last_attempt = Instant::now();
     while !lesson.session().is_complete() {
         std::thread::sleep(POLL_INTERVAL);
-        if worker.publish(&mut lesson)? {
-            (worker.wake)();
-        }
+        worker.publish(&mut lesson)?;
         if lesson.live().is_suspended()
             && last_attempt.elapsed() > RECONNECT_INTERVAL
             && let Some((driver, argument)) = &reconnect
@@ -270,8 +266,7 @@ fn run_lesson(
             if let Ok(device) = driver.open(argument.as_deref())
                 && !lesson.resume_with(device)?
             {
-                worker.events.send(LessonEvent::DifferentDevice);
-                (worker.wake)();
+                worker.send_event(LessonEvent::DifferentDevice);
             }
         }
         if worker.handle_commands(&mut lesson)? {
@@ -281,21 +276,16 @@ fn run_lesson(
     worker.publish(&mut lesson)?;
     worker.sound.silence();
     let recorded = lesson.end()?;
-    recorded.complete(&mut |step| {
-        worker.events.send(LessonEvent::Completing(step));
-        (worker.wake)();
-    })
+    recorded.complete(&mut |step| worker.send_event(LessonEvent::Completing(step)))
 }
 
 impl LessonWorker {
-    /// Passes events, edits and the newest tick of the servo to the window. Returns true if the window should show them.
-    fn publish(&mut self, lesson: &mut Lesson) -> Result<bool, LessonError> {
+    /// Passes events, edits and the newest tick of the servo to the window.
+    fn publish(&mut self, lesson: &mut Lesson) -> Result<(), LessonError> {
         let events = lesson.poll()?;
-        let mut has_news = false;
         self.send_events(events);
         while let Some(event) = lesson.next_assist_event() {
-            self.events.send(LessonEvent::SecondHand(event));
-            has_news = true;
+            self.send_event(LessonEvent::SecondHand(event));
         }
         for edit in lesson.edits() {
             self.edits.queue.push_back(*edit);
@@ -316,9 +306,11 @@ impl LessonWorker {
                 Some((_, stage)) if !self.is_paused && !live.is_suspended() => self.sound.update(step, stage.cutting),
                 _ => self.sound.silence(),
             }
-            has_news |= self.is_worth_a_frame(snapshot);
+            if self.is_worth_a_frame(snapshot) {
+                (self.wake)();
+            }
         }
-        Ok(has_news)
+        Ok(())
     }
 
     /// True if a tick looks different from the last for which a frame was requested, and that is not too recent.
@@ -362,11 +354,14 @@ impl LessonWorker {
     }
 
     fn send_events(&mut self, events: Vec<LiveEvent>) {
-        if !events.is_empty() {
-            (self.wake)();
-        }
         for event in events {
-            self.events.send(LessonEvent::Live(event));
+            self.send_event(LessonEvent::Live(event));
         }
+    }
+
+    /// Sends an event, and requests a frame that shows it.
+    fn send_event(&mut self, event: LessonEvent) {
+        self.events.send(event);
+        (self.wake)();
     }
 }
