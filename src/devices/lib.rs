@@ -53,5 +53,5 @@ pub use driver::{Driver, FoundDevice, OpenError};
 pub use force_slot::FORCE_LIFE;
 pub use link::{HandLink, LinkedHand};
 pub use link_key::generate_key;
-pub use registry::{DRIVERS, driver_by_name};
+pub use registry::{DRIVERS, NamedDevice, UnknownDriverError, driver_by_name};
 pub use relay::{DeviceReport, Protocol, Relay};

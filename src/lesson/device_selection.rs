@@ -2,7 +2,7 @@
 
 use super::LessonError;
 use typodont_core::device::Device;
-use typodont_devices::Driver;
+use typodont_devices::{Driver, NamedDevice};
 
 /// An open device, with its driver and argument for opening it again.
 pub struct OpenDevice {
@@ -19,16 +19,10 @@ pub struct OpenDevice {
 ///
 /// [`LessonError::UnknownDevice`] for an unknown name, [`LessonError::NoDevice`] if the device cannot be opened.
 pub fn open_device(device_name: &str) -> Result<OpenDevice, LessonError> {
-    let (name, argument) = match device_name.split_once(':') {
-        Some((name, argument)) => (name, Some(argument.to_string())),
-        None => (device_name, None),
-    };
-    let Some(driver) = typodont_devices::driver_by_name(name) else {
-        let known = typodont_devices::DRIVERS.iter().map(|d| d.name()).collect::<Vec<_>>().join(", ");
-        return Err(LessonError::UnknownDevice { name: name.to_string(), known });
-    };
-    let opened = driver.open(argument.as_deref());
+    let NamedDevice { name, driver, argument } = NamedDevice::parse(device_name)
+        .map_err(|unknown| LessonError::UnknownDevice { name: unknown.name, known: unknown.known })?;
+    let opened = driver.open(argument);
     let device =
         opened.map_err(|trouble| LessonError::NoDevice { name: name.to_string(), why: trouble.to_string() })?;
-    Ok(OpenDevice { name: device_name.to_string(), device, driver, argument })
+    Ok(OpenDevice { name: device_name.to_string(), device, driver, argument: argument.map(str::to_string) })
 }

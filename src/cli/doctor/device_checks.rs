@@ -4,7 +4,7 @@ use super::super::CliError;
 use super::finding::{Finding, FindingStatus};
 use super::remedies::StationFault;
 use typodont_devices::realtime::{Priority, granted_priority};
-use typodont_devices::{DRIVERS, Driver, OpenError, access, driver_by_name};
+use typodont_devices::{DRIVERS, Driver, NamedDevice, OpenError, access};
 
 /// Drivers whose device is always there, so that finding it says nothing.
 const ALWAYS_THERE: [&str; 2] = ["mouse", "stream"];
@@ -13,8 +13,7 @@ const ALWAYS_THERE: [&str; 2] = ["mouse", "stream"];
 pub struct ChosenDevice<'a> {
     /// Name as in `--device`.
     name: &'a str,
-    driver: &'static dyn Driver,
-    argument: Option<&'a str>,
+    device: NamedDevice<'a>,
 }
 
 /// Driver and argument of `NAME[:WHICH]`.
@@ -22,22 +21,15 @@ pub struct ChosenDevice<'a> {
 /// # Errors
 /// There is no such driver.
 pub fn choose(chosen: &str) -> Result<ChosenDevice<'_>, CliError> {
-    let (name, argument) = match chosen.split_once(':') {
-        Some((name, argument)) => (name, Some(argument)),
-        None => (chosen, None),
-    };
-    let Some(driver) = driver_by_name(name) else {
-        let known = DRIVERS.iter().map(|driver| driver.name()).collect::<Vec<_>>().join(", ");
-        return Err(CliError::misuse(format!("unknown-device: there is no device named \"{name}\"; known: {known}")));
-    };
-    Ok(ChosenDevice { name: chosen, driver, argument })
+    let device = NamedDevice::parse(chosen).map_err(|error| CliError::misuse(format!("unknown-device: {error}")))?;
+    Ok(ChosenDevice { name: chosen, device })
 }
 
 /// Findings for the station's device and for everything that is connected.
 pub fn findings(chosen: &ChosenDevice) -> Vec<Finding> {
     let mut findings = vec![open_and_close(chosen)];
     findings.extend(hid_access());
-    let own = chosen.driver.name();
+    let own = chosen.device.driver.name();
     for other in DRIVERS.iter().filter(|other| other.name() != own && !ALWAYS_THERE.contains(&other.name())) {
         findings.extend(other_driver(*other));
     }
@@ -50,10 +42,10 @@ pub fn findings(chosen: &ChosenDevice) -> Vec<Finding> {
 fn open_and_close(chosen: &ChosenDevice) -> Finding {
     let name = chosen.name;
     // The mouse is moved by the window, which has one wherever there is a display.
-    if chosen.driver.name() == "mouse" {
+    if chosen.device.driver.name() == "mouse" {
         return Finding::ok("device", "mouse: the mouse of the window");
     }
-    match chosen.driver.open(chosen.argument) {
+    match chosen.device.driver.open(chosen.device.argument) {
         Ok(device) => {
             let spec = device.spec();
             let force = match spec.max_force > 0.0 {
