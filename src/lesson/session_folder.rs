@@ -7,7 +7,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use typodont_exercise::record::{self, Recording, SeedOriginFile};
 use typodont_formats::read_file;
-use typodont_report::bundle::{CompletedBundle, CompletionObserver, PartialBundle, SESSION_FILE, is_in_use};
+use typodont_report::bundle::{
+    CompletedBundle, CompletionObserver, PartialBundle, SESSION_FILE, is_in_use, is_partial,
+};
 use typodont_report::{RatingFile, SessionFile, Templates, Verifier};
 
 /// Folder, within that of the sessions, for interrupted sessions that are not to be finished.
@@ -16,9 +18,6 @@ const SET_ASIDE: &str = "set-aside";
 /// Contact time from which an exercise that is not graded counts as performed, s: a trainee who only confirms every stage
 /// has not.
 const CONTACT_LEAST: f64 = 2.0;
-
-/// Ending of the name of an unfinished session's folder.
-const PARTIAL: &str = "partial";
 
 /// An earlier attempt of a person at an exercise.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +66,7 @@ impl SessionFolder {
         folders.sort();
         let mut found = SessionFolder::default();
         for path in folders {
-            match path.extension().is_some_and(|extension| extension == PARTIAL) {
+            match is_partial(&path) {
                 true => found.interrupted.extend(interrupted(path)),
                 false => found.attempts.extend(attempt(&path, &verifier)),
             }

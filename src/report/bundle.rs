@@ -122,6 +122,11 @@ impl SessionLock {
     }
 }
 
+/// True for the name of a folder whose bundle is not made yet.
+pub fn is_partial(folder: &Path) -> bool {
+    folder.extension().is_some_and(|extension| extension == "partial")
+}
+
 /// True if a program is still recording or completing the session of this folder.
 pub fn is_in_use(partial: &Path) -> bool {
     let lock = File::open(partial.join(LOCK_FILE)).map(|file| file.try_lock_shared());
@@ -155,7 +160,7 @@ impl PartialBundle {
     ///
     /// When the folder's name does not end in `.partial`, the finished bundle exists, or the session is still running.
     pub fn resume(partial: &Path) -> Result<PartialBundle, BundleError> {
-        let path = match partial.extension().is_some_and(|e| e == "partial") {
+        let path = match is_partial(partial) {
             true => partial.with_extension(""),
             false => {
                 return Err(BundleError::new(
@@ -435,7 +440,7 @@ pub fn verify(bundle: &Path, known: &[Templates]) -> Result<Verification, String
 
 /// Reads `session.json`: its bytes and its content. The error is a complaint.
 fn read_session_file(bundle: &Path) -> Result<(Vec<u8>, SessionFile), String> {
-    let is_unfinished = bundle.extension().is_some_and(|e| e == "partial") && !bundle.join(SESSION_FILE).exists();
+    let is_unfinished = is_partial(bundle) && !bundle.join(SESSION_FILE).exists();
     if is_unfinished {
         let bundle = bundle.display();
         return Err(format!("this session was not finished; `typodont finish {bundle}` makes its bundle"));

@@ -5,6 +5,7 @@ use super::remedies::StationFault;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use typodont_report::bundle::is_partial;
 
 /// Space that must be free, bytes: a long session with its volumes, recording and pictures takes half of it.
 const SPACE: usize = 64 << 20;
@@ -77,8 +78,8 @@ impl Drop for DeletedOnDrop {
 /// Names of interrupted sessions.
 fn interrupted(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> = entries.map(|entry| entry.file_name().display().to_string()).collect();
-    names.retain(|name| name.ends_with(".partial"));
+    let partial = entries.filter(|entry| is_partial(&entry.path()));
+    let mut names: Vec<String> = partial.map(|entry| entry.file_name().display().to_string()).collect();
     names.sort();
     names
 }

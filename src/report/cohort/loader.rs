@@ -1,6 +1,7 @@
 //! Finds bundles and reads their results.
 
 use super::Cohort;
+use crate::bundle::is_partial;
 use crate::session_file::{FILE_BYTES_MAX, SessionFile};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -56,7 +57,7 @@ fn search_folder(found: &mut FoundBundles, folder: &Path, depth: usize) {
     let mut folders: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(|p| p.is_dir()).collect();
     folders.sort();
     // A folder that is still being written is not a session yet.
-    for folder in folders.iter().filter(|f| f.extension().is_none_or(|e| e != "partial")) {
+    for folder in folders.iter().filter(|folder| !is_partial(folder)) {
         search_folder(found, folder, depth + 1);
     }
 }
