@@ -7,10 +7,9 @@ use super::index::IndexedSession;
 use super::query::Query;
 use super::ratings::{RatingEntry, RatingSnapshot};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_report::cohort::{AgreementTables, Cohort, ExaminerRating, recording_of};
-use typodont_report::name_folding::examiner_key;
+use typodont_report::name_folding::ExaminerNames;
 
 #[derive(Serialize)]
 struct AgreementPage {
@@ -50,12 +49,11 @@ pub fn page(app: &ReviewApp, context: &RequestContext) -> Response {
 /// Reads the rated sessions with the ratings that count.
 fn rated_cohort(app: &ReviewApp, shown: &[&IndexedSession], ratings: &RatingSnapshot) -> Cohort {
     let mut cohort = Cohort::default();
-    // One examiner may write a name in several ways; the first one is shown.
-    let mut names: BTreeMap<String, String> = BTreeMap::new();
+    let mut names = ExaminerNames::default();
     for indexed in shown {
         let Ok(session) = bundle::read_bundle_session(&app.folder, &indexed.path) else { continue };
         for entry in ratings.counting(&indexed.id) {
-            let name = names.entry(examiner_key(&entry.draft.name)).or_insert_with(|| entry.draft.name.clone());
+            let name = names.first_spelling(&entry.draft.name);
             let about = |item, rating: u8| ExaminerRating {
                 participant: session.participant.clone(),
                 recording: recording_of(&session).to_string(),

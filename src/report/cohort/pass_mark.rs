@@ -3,7 +3,7 @@
 use super::agreement::MACHINE;
 use super::{Cohort, POINTS, points_or_measure};
 use crate::csv;
-use crate::name_folding::examiner_key;
+use crate::name_folding::{ExaminerNames, examiner_key};
 use crate::session_file::mean;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -95,15 +95,13 @@ pub fn read_ratings(name: &str, text: &str) -> Result<Vec<ExaminerRating>, Vec<S
     };
     let [scenario, rater, item, metric, scale] = ["scenario", "rater", "item", "metric", "scale"].map(column);
     let (mut read, mut wrong) = (Vec::new(), Vec::new());
-    // The first spelling of each rater's name.
-    let mut raters: BTreeMap<String, String> = BTreeMap::new();
+    let mut raters = ExaminerNames::default();
     for (number, row) in (2..).zip(lines) {
         let cell = |column: usize| row.get(column).map_or("", |c| c.trim());
         let text = |column: Option<usize>| column.map_or("", cell).to_string();
         let scale =
             scale.map(cell).and_then(|text| text.parse().ok()).filter(|s| (3..=10).contains(s)).unwrap_or(SCALE);
-        let key = examiner_key(&text(rater));
-        if key == MACHINE {
+        if examiner_key(&text(rater)) == MACHINE {
             wrong.push(format!("{name}: row {number}: wrong-rater: \"{MACHINE}\" stands for the computed marks"));
             continue;
         }
@@ -113,7 +111,7 @@ pub fn read_ratings(name: &str, text: &str) -> Result<Vec<ExaminerRating>, Vec<S
                 recording: text(recording),
                 scenario: Some(text(scenario)).filter(|s| !s.is_empty()),
                 item: Some((text(item), text(metric))).filter(|(title, _)| !title.is_empty()),
-                rater: raters.entry(key).or_insert_with(|| text(rater)).clone(),
+                rater: raters.first_spelling(&text(rater)),
                 rating,
                 scale,
             }),
