@@ -89,10 +89,7 @@ const BUSY_TIME: f64 = 2.0;
 impl App {
     pub fn new(context: &eframe::CreationContext, options: AppOptions) -> App {
         let ctx = &context.egui_ctx;
-        let (settings, complaint) = Settings::load();
-        let folder = settings::config_folder().map(|folder| folder.join("languages"));
-        let (languages, mut complaints) = i18n::load_all(folder.as_deref());
-        complaints.extend(complaint);
+        let (settings, languages, mut complaints) = settings::load_with_languages();
         let (replacements, broken) = wav_files::read_folder(&sounds_folder());
         complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
         theme::apply(ctx, &settings);
@@ -326,8 +323,7 @@ impl App {
     /// Shows the instructions of the selected exercise, if it is valid.
     fn open_briefing(&mut self) {
         let App { exercise_list: list, history, participant, settings, .. } = self;
-        let is_open = list.required_before(list.selected, history, participant, settings).is_none();
-        if is_open && list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
+        if list.can_open_selected(history, participant, settings) {
             self.screen = Screen::Briefing;
         }
     }
@@ -358,7 +354,11 @@ impl App {
         let orbit = match &mut self.screen {
             Screen::Lesson(lesson) => &mut lesson.orbit,
             Screen::Editor(editor) => &mut editor.preview.orbit,
-            _ => return,
+            Screen::ExerciseList
+            | Screen::Briefing
+            | Screen::Completion(_)
+            | Screen::Results(_)
+            | Screen::Failed(_) => return,
         };
         *orbit = match command {
             CameraCommand::Orbit { right, up } => orbit.rotated(right, up),

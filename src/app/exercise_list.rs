@@ -164,8 +164,14 @@ impl ExerciseList {
     ) -> Option<&Exercise> {
         let (first, asked) = (self.exercises.first()?, self.exercises.get(place)?);
         let is_waiting = settings.introduction_first && place > 0 && asked.path.is_none();
-        let is_passed = history.is_read() && history.summary(first.id(), participant).is_passed;
-        (is_waiting && !is_passed).then_some(first)
+        let is_passed = || history.is_read() && history.summary(first.id(), participant).is_passed;
+        (is_waiting && !is_passed()).then_some(first)
+    }
+
+    /// True if the selected exercise is valid and waits for no other.
+    pub fn can_open_selected(&self, history: &SessionHistory, participant: &str, settings: &Settings) -> bool {
+        self.selected_exercise().is_some_and(|exercise| exercise.scenario.is_ok())
+            && self.required_before(self.selected, history, participant, settings).is_none()
     }
 
     /// Selects the exercise with this id, if there is one.
@@ -233,8 +239,7 @@ pub fn exercise_list_ui(
             list.scroll_to_selected = false;
         });
         ui.add_space(12.0);
-        let is_valid = list.selected_exercise().is_some_and(|e| e.scenario.is_ok())
-            && list.required_before(list.selected, context.history, participant, context.settings).is_none();
+        let is_valid = list.can_open_selected(context.history, participant, context.settings);
         ui.horizontal(|ui| {
             if ui.add_enabled(is_valid, theme::primary_button(words.get("shelf.open"))).clicked() {
                 commands.push(AppCommand::OpenBriefing);

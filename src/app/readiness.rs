@@ -47,10 +47,7 @@ pub struct SettingsReview {
 
 /// Reads the settings and the languages as the window does.
 pub fn review_settings() -> SettingsReview {
-    let (settings, complaint) = settings::Settings::load();
-    let folder = settings::config_folder().map(|folder| folder.join("languages"));
-    let (languages, mut complaints) = i18n::load_all(folder.as_deref());
-    complaints.extend(complaint);
+    let (settings, languages, mut complaints) = settings::load_with_languages();
     let language = i18n::select_language(&languages, &settings.language);
     let is_system_language = settings.language == i18n::system_language();
     if language.code != settings.language && !is_system_language {

@@ -1,5 +1,6 @@
 //! The user's settings, kept in a file in the platform's configuration folder.
 
+use super::i18n::{self, Translations};
 use directories::ProjectDirs;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -68,9 +69,18 @@ impl Default for Settings {
     }
 }
 
+/// Reads the settings, and the languages that the program and the user's folder have, with complaints about both.
+pub fn load_with_languages() -> (Settings, Vec<Translations>, Vec<String>) {
+    let (settings, complaint) = Settings::load();
+    let folder = config_folder().map(|folder| folder.join("languages"));
+    let (languages, mut complaints) = i18n::load_all(folder.as_deref());
+    complaints.extend(complaint);
+    (settings, languages, complaints)
+}
+
 impl Settings {
     /// Reads the settings file; the defaults, with a complaint, if it cannot be read.
-    pub fn load() -> (Settings, Option<String>) {
+    fn load() -> (Settings, Option<String>) {
         let Some(path) = settings_file() else { return (Settings::default(), None) };
         match fs::read_to_string(&path) {
             Ok(text) => match serde_json::from_str::<Settings>(&text) {
