@@ -191,6 +191,10 @@ impl Device for MouseDevice {
         Pacing::Host
     }
 
+    fn renders_force(&self) -> bool {
+        false
+    }
+
     fn exchange(&mut self, output: &Wrench) -> Result<Reading, DeviceError> {
         const TICK: f32 = TICK_S as f32;
         let target = self.shared.target();

@@ -123,6 +123,12 @@ pub trait Device {
         Pacing::Host
     }
 
+    /// Returns true if a person feels the force. The servo of a device without motors spares the processor instead of
+    /// keeping each tick to some microseconds.
+    fn renders_force(&self) -> bool {
+        true
+    }
+
     /// State of the device as of the last exchange.
     fn state(&self) -> DeviceState {
         DeviceState::Ready
@@ -140,6 +146,10 @@ impl<D: Device + ?Sized> Device for Box<D> {
 
     fn pacing(&self) -> Pacing {
         (**self).pacing()
+    }
+
+    fn renders_force(&self) -> bool {
+        (**self).renders_force()
     }
 
     fn state(&self) -> DeviceState {

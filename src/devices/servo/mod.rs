@@ -275,7 +275,7 @@ impl ServoLoop {
     fn run(mut self, should_stop: &AtomicBool) -> ServoExit {
         let priority = realtime::raise_thread_priority();
         self.sink.send(ServoEvent::Started(priority));
-        let device_error = self.run_ticks(TickTimer::new(self.device.pacing(), priority), should_stop);
+        let device_error = self.run_ticks(TickTimer::new(&*self.device, priority), should_stop);
         if device_error.is_none() {
             // Even if this last exchange fails, the relay sends no force older than ten ticks.
             let _ = self.device.exchange(&Wrench::ZERO);

@@ -207,7 +207,7 @@ struct SecondHandLoop {
 impl SecondHandLoop {
     /// Runs the servo until it is stopped or its device fails.
     fn run(mut self, summary: &SeqLock<9>, should_stop: &AtomicBool) {
-        let mut timer = TickTimer::new(self.device.pacing(), realtime::raise_thread_priority());
+        let mut timer = TickTimer::new(&*self.device, realtime::raise_thread_priority());
         let mut stats = TimingStats::default();
         let mut coupled_ticks = 0u64;
         while !should_stop.load(Ordering::Acquire) {

@@ -1,13 +1,13 @@
 //! Timer for the 1 kHz ticks, or a measurement of them where the device sets the pace.
 //!
-//! Takes the pacing of a device and the priority of the thread. Gives the lateness of each tick. Never reads the time
+//! Takes a device and the priority of the thread. Gives the lateness of each tick. Never reads the time
 //! of day, only a monotonic clock.
 
 use crate::realtime::Priority;
 use crate::servo::timing::TimingStats;
 use std::thread;
 use std::time::{Duration, Instant};
-use typodont_core::device::Pacing;
+use typodont_core::device::{Device, Pacing};
 use typodont_core::tick::TICK_S;
 
 const TICK_INTERVAL: Duration = Duration::from_micros((TICK_S * 1e6) as u64);
@@ -29,14 +29,15 @@ const EARLY_MARGIN: Duration = Duration::from_micros(500);
 
 /// Duration of spinning at the end of a wait, with real-time priority: waking up takes 30–100 µs and varies. Without
 /// priority, the scheduler penalises spinning (measured: p99 of 2.5 ms instead of 0.1 ms), so the whole wait is
-/// slept.
+/// slept; so it is for a device whose force nobody feels.
 const SPIN_TIME: Duration = Duration::from_micros(80);
 
 impl TickTimer {
-    pub fn new(pacing: Pacing, priority: Priority) -> TickTimer {
-        let spin_time = if priority == Priority::Realtime { SPIN_TIME } else { Duration::ZERO };
+    pub fn new(device: &dyn Device, priority: Priority) -> TickTimer {
+        let spins = priority == Priority::Realtime && device.renders_force();
+        let spin_time = if spins { SPIN_TIME } else { Duration::ZERO };
         let now = Instant::now();
-        TickTimer { pacing, spin_time, next_due: now + TICK_INTERVAL, last_tick: now }
+        TickTimer { pacing: device.pacing(), spin_time, next_due: now + TICK_INTERVAL, last_tick: now }
     }
 
     /// Waits until the next tick is due, unless the device sets the pace.
