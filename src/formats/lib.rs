@@ -30,5 +30,6 @@ pub mod obj;
 pub mod visual_mesh;
 pub mod csv_tables;
 pub mod import;
+pub mod zip;
 
 pub use library::{Library, decode_text, read_file, read_text, write_failure};
