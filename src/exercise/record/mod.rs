@@ -1,4 +1,4 @@
-//! Recordings of sessions on disk, and their replay.
+//! Recordings of sessions, on disk or in memory, and their replay.
 //!
 //! Takes a session's readings, inputs and forces while it runs. Gives them back in order, and verifies that a replay
 //! produces the same forces and the same volume. Never scores: that is the task of `score`.
@@ -25,7 +25,7 @@ pub use reader::{Recording, RecordingError, RecordingLoss};
 pub use replay::{Difference, Replay, ReplayCheck, replay};
 pub use seal::{CODE_MIN, reveal, sealed_seed};
 pub use tick_record::TickRecord;
-pub use writer::{Recorder, RecorderError};
+pub use writer::{Recorder, RecorderError, RecordingSink};
 
 /// Name of the recording within a bundle.
 pub const FILE_NAME: &str = "recording.mcap";

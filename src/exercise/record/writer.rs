@@ -16,6 +16,7 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
+use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 use typodont_core::device::Reading;
 use typodont_core::sim::{Command, Step};
@@ -43,10 +44,15 @@ impl fmt::Display for RecorderError {
 
 impl std::error::Error for RecorderError {}
 
+/// Place for the bytes of a recording: a file, or a buffer in memory.
+pub trait RecordingSink: Write + Seek + Send {}
+
+impl<T: Write + Seek + Send> RecordingSink for T {}
+
 /// Writer of one recording.
 pub struct Recorder {
     path: PathBuf,
-    writer: Writer<File>,
+    writer: Writer<Box<dyn RecordingSink>>,
     tick_channel: u16,
     event_channel: u16,
     digest_channel: u16,
@@ -57,12 +63,28 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates a recording and writes everything that is known before the first tick. The seed of a head with the origin
-    /// [`SeedOriginFile::Sealed`] is written only when the recording is finished.
+    /// Creates a recording on disk and starts it; see [`Recorder::start`].
     ///
     /// # Errors
     /// Returns an error if the file cannot be created or written, or if a volume cannot be encoded.
     pub fn create(
+        path: &Path,
+        head: &RecordingHeadFile,
+        scenario: &Scenario,
+        workpiece: &Workpiece,
+    ) -> Result<Recorder, RecorderError> {
+        let failed = |e| RecorderError { path: path.to_path_buf(), why: typodont_formats::write_failure(&e) };
+        let file = File::create(path).map_err(failed)?;
+        Recorder::start(Box::new(file), path, head, scenario, workpiece)
+    }
+
+    /// Starts a recording and writes everything that is known before the first tick. The seed of a head with the origin
+    /// [`SeedOriginFile::Sealed`] is written only when the recording is finished. Complaints name the recording by `path`.
+    ///
+    /// # Errors
+    /// Returns an error if the recording cannot be written, or if a volume cannot be encoded.
+    pub fn start(
+        sink: Box<dyn RecordingSink>,
         path: &Path,
         head: &RecordingHeadFile,
         scenario: &Scenario,
@@ -77,7 +99,6 @@ impl Recorder {
         let (density, label) = volume::bytes(&workpiece.volume).map_err(|e| failed(e.to_string()))?;
         let original = workpiece.original.as_ref().map(|o| volume::bytes(o)).transpose();
         let original = original.map_err(|e| failed(e.to_string()))?;
-        let file = File::create(path).map_err(|e| failed(typodont_formats::write_failure(&e)))?;
         // One thread and chunks buffered in memory: equal sessions give equal bytes, and a killed one complete
         // chunks.
         let options = WriteOptions::new()
@@ -88,7 +109,7 @@ impl Recorder {
         #[cfg(not(target_family = "wasm"))]
         let options = options.compression_threads(0);
         let attempt = || -> Result<Recorder, McapError> {
-            let mut writer = options.create(file)?;
+            let mut writer = options.create(sink)?;
             let mut running = RunningDigest::new();
             running.part(HEAD, &json(head));
             writer.write_metadata(&metadata(HEAD, head))?;
