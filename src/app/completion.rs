@@ -92,7 +92,7 @@ impl Completion {
                 wake();
             };
             let ended = session.finish(&templates, &mut |step| send(CompletionMessage::Step(step)));
-            send(CompletionMessage::Ended(ended.map(|completed| completed.path)));
+            send(CompletionMessage::Ended(ended.map(|completed| completed.folder.path().to_path_buf())));
         })?;
         let state = CompletionState::default();
         Ok(Completion(CompletionSource::Interrupted(InterruptedCompletion { messages, state })))

@@ -246,7 +246,8 @@ fn run_lesson(
     if let Some(address) = second.as_ref().and_then(PendingSecondHand::address) {
         worker.send_event(LessonEvent::AwaitingSecondHand(address));
     }
-    let opening = SessionConfig { scenario, seed, participant: &participant, out: &out, digests, templates, started };
+    let opening =
+        SessionConfig { scenario, seed, participant: &participant, out: Some(&out), digests, templates, started };
     let workpiece = opening.make_workpiece()?;
     // It is drawn while its recording is opened.
     worker.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
@@ -276,7 +277,8 @@ fn run_lesson(
     worker.publish(&mut lesson)?;
     worker.sound.silence();
     let recorded = lesson.end()?;
-    recorded.complete(&mut |step| worker.send_event(LessonEvent::Completing(step)))
+    let bundle = recorded.complete(&mut |step| worker.send_event(LessonEvent::Completing(step)))?;
+    Ok(bundle.path().to_path_buf())
 }
 
 impl LessonWorker {

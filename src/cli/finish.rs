@@ -23,7 +23,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     }
     let completed = unfinished.complete_interrupted(&templates, &mut |_| ()).map_err(CliError::wrong)?;
     for remark in completed.remarks {
-        eprintln!("{}: {remark}", completed.path.display());
+        eprintln!("{}: {remark}", completed.folder.path().display());
     }
-    print_line(completed.path.display())
+    print_line(completed.folder.path().display())
 }

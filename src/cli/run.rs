@@ -311,7 +311,7 @@ pub fn run_session(run: RunRequest) -> Result<PathBuf, CliError> {
         SeedSource::Given(seed) => SessionSeed::given(seed),
         SeedSource::Sealed(code) => SessionSeed::sealed(&code, participant, started, &scenario)?,
     };
-    let config = SessionConfig { scenario, seed, participant, out, digests, templates, started };
+    let config = SessionConfig { scenario, seed, participant, out: Some(out), digests, templates, started };
     let workpiece = config.make_workpiece()?;
     let recorded = match driver {
         SessionDriver::Script(operator) => {
@@ -326,7 +326,7 @@ pub fn run_session(run: RunRequest) -> Result<PathBuf, CliError> {
     let bar = spinner("scoring and writing the report");
     let bundle = recorded.complete(&mut |_| ());
     bar.finish_and_clear();
-    Ok(bundle?)
+    Ok(bundle?.path().to_path_buf())
 }
 
 /// A progress indicator on a terminal; hidden elsewhere.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use typodont_exercise::record::RecorderError;
 use typodont_exercise::scenario::WorkpieceError;
 use typodont_formats::diagnostic::Diagnostic;
@@ -25,8 +25,8 @@ pub enum LessonError {
     NotSealable { scenario: String },
     /// The bundle's folder cannot be made or filled.
     Bundle(BundleError),
-    /// The session stopped; `folder` holds its recording up to then.
-    Stopped { why: String, folder: PathBuf },
+    /// The session stopped; `folder` holds its recording up to then, unless it was made in memory.
+    Stopped { why: String, folder: Option<PathBuf> },
     /// No device of that name; `known` lists the valid names.
     UnknownDevice { name: String, known: String },
     /// The device cannot be opened.
@@ -45,9 +45,7 @@ pub enum LessonError {
 
 impl LessonError {
     pub(super) fn stopped(partial_bundle: &PartialBundle, why: &dyn fmt::Display) -> LessonError {
-        let recording = partial_bundle.recording_path();
-        let folder = recording.parent().unwrap_or(&recording).to_path_buf();
-        LessonError::Stopped { why: why.to_string(), folder }
+        LessonError::Stopped { why: why.to_string(), folder: partial_bundle.folder().map(Path::to_path_buf) }
     }
 }
 
@@ -71,7 +69,8 @@ impl fmt::Display for LessonError {
                  positions or depths, which the recording contains from the beginning"
             ),
             LessonError::Bundle(unmade) => unmade.fmt(f),
-            LessonError::Stopped { why, folder } => {
+            LessonError::Stopped { why, folder: None } => f.write_str(why),
+            LessonError::Stopped { why, folder: Some(folder) } => {
                 write!(
                     f,
                     "{why}\nthe recording up to this point is in {0}; once the cause is removed, \

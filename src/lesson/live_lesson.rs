@@ -22,7 +22,7 @@ pub struct Lesson {
     /// Servo of the second device, if it is connected to this machine.
     assist: Option<SecondHandServo>,
     observer: RecordingObserver,
-    disk_sync: DiskSync,
+    disk_sync: Option<DiskSync>,
     partial_bundle: PartialBundle,
     templates: Templates,
 }
@@ -51,7 +51,7 @@ impl Lesson {
     /// [`LessonError::Stopped`] if the recording cannot be written or synced to the disk, or the servo failed.
     pub fn poll(&mut self) -> Result<Vec<LiveEvent>, LessonError> {
         self.observer.edits.clear();
-        if let Some(why) = self.disk_sync.error() {
+        if let Some(why) = self.disk_sync.as_ref().and_then(DiskSync::error) {
             return Err(LessonError::stopped(&self.partial_bundle, &why));
         }
         let events = self.live.poll(&mut self.session, &mut self.observer);

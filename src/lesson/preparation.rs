@@ -18,7 +18,7 @@ use typodont_exercise::record::{Recorder, RecordingEndFile, RecordingHeadFile, S
 use typodont_exercise::scenario::{Scenario, Workpiece, hex};
 use typodont_exercise::session::{Operator, OperatorFile, RunEnd, Session};
 use typodont_report::Templates;
-use typodont_report::bundle::{CompletionObserver, PartialBundle};
+use typodont_report::bundle::{BundleFolder, CompletionObserver, PartialBundle};
 
 /// Configuration of a session.
 pub struct SessionConfig<'a> {
@@ -27,8 +27,8 @@ pub struct SessionConfig<'a> {
     pub seed: SessionSeed,
     /// A code of up to 64 letters; never a name.
     pub participant: &'a str,
-    /// Folder in which the bundle is made.
-    pub out: &'a Path,
+    /// Folder in which the bundle is made; `None` for a bundle in memory.
+    pub out: Option<&'a Path>,
     /// SHA-256 of files that the scenario does not name, by name.
     pub digests: BTreeMap<String, String>,
     /// Templates of the bundle's pages.
@@ -42,7 +42,8 @@ pub struct PreparedSession {
     pub(super) scenario: Arc<Scenario>,
     pub(super) workpiece: Arc<Workpiece>,
     pub(super) recorder: Recorder,
-    pub(super) disk_sync: DiskSync,
+    /// `None` in memory.
+    pub(super) disk_sync: Option<DiskSync>,
     pub(super) partial_bundle: PartialBundle,
     pub(super) templates: Templates,
     spec: DeviceSpec,
@@ -82,12 +83,15 @@ impl SessionConfig<'_> {
             digests,
             ..RecordingHeadFile::of(&scenario, &spec, seed.value)
         };
-        let partial_bundle = PartialBundle::create(out, &bundle_name(&head, started))?;
-        let path = partial_bundle.recording_path();
-        let recorder = Recorder::create(&path, &head, &scenario, &workpiece).map_err(LessonError::RecordingNotStarted);
-        let opened = recorder.and_then(|recorder| {
-            let disk_sync = DiskSync::start(&path).map_err(|why| LessonError::NoDiskSync { path, why })?;
-            Ok((recorder, disk_sync))
+        let name = bundle_name(&head, started);
+        let partial_bundle = match out {
+            Some(out) => PartialBundle::create(out, &name)?,
+            None => PartialBundle::in_memory(&name),
+        };
+        let recorder = partial_bundle.start_recording(&head, &scenario, &workpiece);
+        let opened = recorder.map_err(LessonError::RecordingNotStarted).and_then(|recorder| {
+            let start = |path: PathBuf| DiskSync::start(&path).map_err(|why| LessonError::NoDiskSync { path, why });
+            Ok((recorder, partial_bundle.recording_path().map(start).transpose()?))
         });
         match opened {
             Ok((recorder, disk_sync)) => {
@@ -107,7 +111,9 @@ impl SessionConfig<'_> {
 fn bundle_name(head: &RecordingHeadFile, started: Timestamp) -> String {
     // The name of a folder must not help to find a sealed seed.
     let seed = if head.seed_origin == Some(SeedOriginFile::Sealed) { 0 } else { head.seed };
-    let digest = Sha256::digest(format!("{}/{seed}/{}/{started}", head.participant, std::process::id()));
+    // A browser has no processes.
+    let process = if cfg!(target_family = "wasm") { 0 } else { std::process::id() };
+    let digest = Sha256::digest(format!("{}/{seed}/{process}/{started}", head.participant));
     format!("{}_{}_{}", head.scenario_id, started.strftime("%Y%m%dT%H%M%SZ"), hex(&digest[..4]))
 }
 
@@ -162,23 +168,24 @@ pub struct RecordedSession {
 impl RecordedSession {
     pub(super) fn close(
         recorder: Recorder,
-        disk_sync: DiskSync,
+        disk_sync: Option<DiskSync>,
         end: &RecordingEndFile,
         partial_bundle: PartialBundle,
         templates: Templates,
     ) -> Result<RecordedSession, LessonError> {
         recorder.finish(end).map_err(|e| LessonError::stopped(&partial_bundle, &e))?;
-        disk_sync.finish().map_err(|e| LessonError::stopped(&partial_bundle, &e))?;
+        let synced = disk_sync.map_or(Ok(()), DiskSync::finish);
+        synced.map_err(|e| LessonError::stopped(&partial_bundle, &e))?;
         Ok(RecordedSession { partial_bundle, templates })
     }
 
-    /// Scores the recording and writes all files of the bundle; returns its folder. The result is known long before the
+    /// Scores the recording and makes all files of the bundle. The result is known long before the
     /// files are made: the observer is told of every step.
     ///
     /// # Errors
     ///
     /// [`LessonError::Bundle`] if the recording cannot be scored or a file cannot be written.
-    pub fn complete(self, observer: CompletionObserver) -> Result<PathBuf, LessonError> {
+    pub fn complete(self, observer: CompletionObserver) -> Result<BundleFolder, LessonError> {
         Ok(self.partial_bundle.complete(&self.templates, observer)?)
     }
 }

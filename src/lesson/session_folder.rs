@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use typodont_exercise::record::{self, Recording, SeedOriginFile};
 use typodont_formats::read_file;
 use typodont_report::bundle::{
-    CompletedBundle, CompletionObserver, PartialBundle, SESSION_FILE, is_in_use, is_partial,
+    BundleFolder, CompletedBundle, CompletionObserver, PartialBundle, SESSION_FILE, is_in_use, is_partial,
 };
 use typodont_report::{RatingFile, SessionFile, Templates, Verifier};
 
@@ -136,7 +136,7 @@ fn attempt(bundle: &Path, verifier: &Verifier) -> Option<Attempt> {
     let text = fs::read_to_string(bundle.join(SESSION_FILE)).ok()?;
     let session = SessionFile::from_json(&text).ok()?;
     let attempt = Attempt::of(&session)?;
-    (!verifier.check(bundle, &session).differs()).then_some(attempt)
+    (!verifier.check(&BundleFolder::on_disk(bundle), &session).differs()).then_some(attempt)
 }
 
 /// The interrupted session of a folder; `None` without a recording, and while a program is recording it.

@@ -6,8 +6,8 @@
 //! [`super::bundle::verify`] draws them again.
 
 use super::bundle::{
-    REPORT_FILE, SESSION_FILE, compare_facts, compare_files, compare_scores, derive_maps, read_plain_file, sha256,
-    unlisted_complaint, unlisted_files,
+    BundleFolder, REPORT_FILE, SESSION_FILE, compare_facts, compare_files, compare_scores, derive_maps, named_template,
+    sha256, unlisted_complaint, unlisted_files,
 };
 use super::session_file::{DeviceFile, GradeFile, POINTS_TOLERANCE, SessionFile};
 use super::templates::Templates;
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
 use std::panic::{self, AssertUnwindSafe};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use typodont_core::parallel;
 use typodont_exercise::record;
@@ -119,7 +119,7 @@ impl Verifier {
 
     /// Compares all that can be compared without a replay. The status is [`VerificationStatus::Pending`] if only a
     /// replay is missing that the cache does not have.
-    pub fn check(&self, bundle: &Path, session: &SessionFile) -> VerificationStatus {
+    pub fn check(&self, bundle: &BundleFolder, session: &SessionFile) -> VerificationStatus {
         match self.first_check(bundle, session) {
             FirstCheck::Decided(status) => status,
             FirstCheck::NeedsReplay { written, digest, .. } => {
@@ -130,7 +130,7 @@ impl Verifier {
     }
 
     /// Judges a bundle completely; replays its recording unless the cache has the replay.
-    pub fn verify(&self, bundle: &Path, session: &SessionFile) -> VerificationStatus {
+    pub fn verify(&self, bundle: &BundleFolder, session: &SessionFile) -> VerificationStatus {
         let (written, recording, digest) = match self.first_check(bundle, session) {
             FirstCheck::Decided(status) => return status,
             FirstCheck::NeedsReplay { written, recording, digest } => (written, recording, digest),
@@ -156,15 +156,15 @@ impl Verifier {
         let done = AtomicUsize::new(0);
         parallel::par_map(bundles.len(), |index| {
             let (bundle, session) = &bundles[index];
-            let status = self.verify(bundle, session);
+            let status = self.verify(&BundleFolder::on_disk(bundle), session);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             status
         })
     }
 
-    fn first_check(&self, bundle: &Path, session: &SessionFile) -> FirstCheck {
+    fn first_check(&self, bundle: &BundleFolder, session: &SessionFile) -> FirstCheck {
         let unverified = |why: String| FirstCheck::Decided(VerificationStatus::Unverified(why));
-        let written = match read_plain_file(bundle, SESSION_FILE) {
+        let written = match bundle.read(SESSION_FILE) {
             Ok(written) => written,
             Err(why) => return unverified(format!("{SESSION_FILE}: {why}")),
         };
@@ -176,7 +176,7 @@ impl Verifier {
         let Some(digest) = session.digests.get(record::FILE_NAME) else {
             return unverified("it has no recording".to_string());
         };
-        let recording = match read_plain_file(bundle, record::FILE_NAME) {
+        let recording = match bundle.read(record::FILE_NAME) {
             Ok(recording) => recording,
             Err(why) => {
                 let difference = format!("{}: {why}", record::FILE_NAME);
@@ -189,7 +189,7 @@ impl Verifier {
         differences.extend(session.grade.as_ref().map(sum_differences).unwrap_or_default());
         let head = Recording::parse_head(record::FILE_NAME, &recording);
         differences.extend(head.iter().flat_map(|head| head_differences(head, session)));
-        let page = read_plain_file(bundle, REPORT_FILE).unwrap_or_default();
+        let page = bundle.read(REPORT_FILE).unwrap_or_default();
         let named = named_template(&page);
         if named.is_some_and(|named| named != session.template_sha256.as_bytes()) {
             differences.push(format!("{REPORT_FILE}: it names another template than {SESSION_FILE}"));
@@ -204,7 +204,11 @@ impl Verifier {
             return unverified(format!("{REPORT_FILE} was made from a different template, which it does not name"));
         }
         // The digest is that of the recording, or the files would have differed.
-        FirstCheck::NeedsReplay { written, recording, digest: digest.clone() }
+        FirstCheck::NeedsReplay {
+            written: written.into_owned(),
+            recording: recording.into_owned(),
+            digest: digest.clone(),
+        }
     }
 }
 
@@ -348,30 +352,10 @@ fn is_of_a_bundle(name: &str) -> bool {
         || name.starts_with("views/") && name.ends_with(".png")
 }
 
-/// Beginning and end of the element in which a page names the digest of its template.
-const TEMPLATE_NAME: (&str, &str) = ("<meta name=\"typodont-template\" content=\"", "\">");
-
-/// Page that names the digest of its template, so that a changed digest in `session.json` is noticed although the
-/// template is not at hand.
-pub(super) fn with_template_name(page: &str, template_sha256: &str) -> String {
-    let (begin, end) = TEMPLATE_NAME;
-    page.replacen("<head>", &format!("<head>\n{begin}{template_sha256}{end}"), 1)
-}
-
-/// Digest of the template as the page names it.
-fn named_template(page: &[u8]) -> Option<&[u8]> {
-    /// The name is at the beginning of the page.
-    const SEARCHED: usize = 4096;
-    let start = &page[..page.len().min(SEARCHED)];
-    let (begin, end) = (TEMPLATE_NAME.0.as_bytes(), TEMPLATE_NAME.1.as_bytes());
-    let at = start.windows(begin.len()).position(|window| window == begin)? + begin.len();
-    let length = start[at..].windows(end.len()).position(|window| window == end)?;
-    Some(&start[at..at + length])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::Path;
 
     /// The committed example and what verifies it, whatever the templates are now.
     fn example() -> (PathBuf, SessionFile, Verifier) {
@@ -379,13 +363,6 @@ mod tests {
         let session = crate::cohort::read_session(&bundle.join(SESSION_FILE)).unwrap();
         let verifier = Verifier { template_sha256: session.template_sha256.clone(), cache: None };
         (bundle, session, verifier)
-    }
-
-    #[test]
-    fn the_name_of_a_template_is_found_in_its_page() {
-        let page = with_template_name("<html>\n<head>\n<title>a</title>", "ab12");
-        assert_eq!(named_template(page.as_bytes()), Some(&b"ab12"[..]));
-        assert_eq!(named_template(b"<html><head>"), None);
     }
 
     #[test]

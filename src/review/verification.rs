@@ -10,6 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::UNIX_EPOCH;
+use typodont_report::bundle::BundleFolder;
 use typodont_report::{VerificationStatus, Verifier, sanitize_display};
 
 /// Maximum displayed length of the differences of a bundle, characters.
@@ -81,8 +82,8 @@ impl ReviewApp {
     /// Judges the next bundle of the queue; returns false if it is empty. Several threads may call it at the same time.
     pub fn verify_next(&self, verifier: &Verifier) -> bool {
         let Some((path, replays)) = self.next_to_verify() else { return false };
-        let own = self.folder.join(&path);
-        let print = fingerprint(&own);
+        let print = fingerprint(&self.folder.join(&path));
+        let own = BundleFolder::on_disk(self.folder.join(&path));
         let status = match bundle::read_bundle_session(&self.folder, &path) {
             Ok(session) if replays => verifier.verify(&own, &session),
             Ok(session) => verifier.check(&own, &session),

@@ -23,6 +23,7 @@ use typodont_exercise::session::{
 };
 use typodont_formats::Library;
 use typodont_formats::diagnostic::SourceText;
+use typodont_report::bundle::BundleFolder;
 use typodont_report::cohort::read_session;
 use typodont_report::{Templates, VerificationStatus, Verifier};
 
@@ -299,7 +300,10 @@ fn a_sealed_draw_is_revealed_at_the_end_and_not_before() {
     assert_eq!(truths(&whole).len(), 8);
     assert!(typodont(&["verify", bundle.to_str().unwrap()]).status.success());
     let read = read_session(&bundle.join("session.json")).unwrap();
-    assert_eq!(Verifier::new(&Templates::shipped()).verify(&bundle, &read), VerificationStatus::Verified);
+    assert_eq!(
+        Verifier::new(&Templates::shipped()).verify(&BundleFolder::on_disk(&bundle), &read),
+        VerificationStatus::Verified
+    );
     let bytes = std::fs::read(bundle.join("recording.mcap")).unwrap();
     let recording = Recording::parse("sealed", &bytes).unwrap();
     assert_eq!(Some(recording.head.seed), whole["seed"].as_u64());

@@ -29,7 +29,7 @@ fn begin(out: &Path) -> Lesson {
         scenario: Arc::new(scenario),
         seed: SessionSeed::given(4),
         participant: "",
-        out,
+        out: Some(out),
         digests: BTreeMap::new(),
         templates: Templates::shipped(),
         started: jiff::Timestamp::now(),
@@ -81,12 +81,12 @@ fn losses_of_power_cuts(count: usize, mount: &Path, disk: &VolatileDisk) -> Vec<
             let bundle = lesson.end().unwrap().complete(&mut |_| ()).unwrap();
             let left = disk.after_power_cut(|_| Vec::new());
             let kept = folder("power_cut_bundle");
-            for (path, bytes) in left.iter().filter(|(path, _)| path.starts_with(bundle.file_name().unwrap())) {
+            for (path, bytes) in left.iter().filter(|(path, _)| path.starts_with(bundle.name().as_ref())) {
                 let path = kept.join(path);
                 fs::create_dir_all(path.parent().unwrap()).unwrap();
                 fs::write(path, bytes).unwrap();
             }
-            let output = typodont(&["verify", kept.join(bundle.file_name().unwrap()).to_str().unwrap()]);
+            let output = typodont(&["verify", kept.join(bundle.name().as_ref()).to_str().unwrap()]);
             assert!(output.status.success(), "{}", complained(&output));
         }
     }

@@ -2,6 +2,7 @@
 
 #[path = "../support/mod.rs"]
 mod support;
+mod bundle_in_memory;
 mod bundle_python;
 mod cohort;
 mod cohort_page;

@@ -10,6 +10,7 @@ use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use typodont_report::bundle::BundleFolder;
 use typodont_report::cohort::Cohort;
 use typodont_report::{Templates, VerificationStatus, Verifier};
 
@@ -181,6 +182,7 @@ fn a_replay_is_done_once_per_recording() {
     let bundle = run(EXERCISE, "careful", &out.join("a"), &["--participant", "A"]);
     let read = typodont_report::cohort::read_session(&bundle.join("session.json")).unwrap();
     let verifier = Verifier::new(&Templates::shipped()).with_cache(cache.clone(), "test".into());
+    let bundle = BundleFolder::on_disk(bundle);
     assert_eq!(verifier.check(&bundle, &read), VerificationStatus::Pending);
     assert_eq!(verifier.verify(&bundle, &read), VerificationStatus::Verified);
     assert_eq!(verifier.check(&bundle, &read), VerificationStatus::Verified);

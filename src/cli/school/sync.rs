@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 use typodont_integrations::session_id;
+use typodont_report::bundle::BundleFolder;
 use typodont_report::cohort::{find_bundles, read_session};
 use typodont_report::sanitize_display;
 use typodont_report::{SessionFile, Verifier};
@@ -177,7 +178,7 @@ fn sync_once(
     let bar = progress_bar(new.len() as u64, "sent");
     // One after the other: the station's processors belong to the session that is running.
     for found in new {
-        let status = verifier.verify(&found.path, &found.session);
+        let status = verifier.verify(&BundleFolder::on_disk(&found.path), &found.session);
         if status.differs() {
             stats.refused += 1;
             complain(&found.path, &format!("differs: the bundle was not sent: {}", status.note()));
