@@ -40,11 +40,27 @@ pub fn formula(metric: &str) -> Message {
 
 /// Dependence of an item's points on another item of the same grade; empty for an item that counts by itself.
 pub fn counts_with(item: &ItemResultFile, grade: Option<&GradeFile>, texts: &LocalTexts) -> Message {
-    let (Some(metric), Some(share)) = (&item.counts_with, item.counts_with_share) else { return Message::plain("") };
+    item.counts_with_share
+        .map_or_else(|| Message::plain(""), |share| share_of_other("points.counts_with", item, share, grade, texts))
+}
+
+/// Reason for an item's points after an examiner gave a share of its points, 0 to 1, to the item on which it depends.
+pub fn followed_share(item: &ItemResultFile, share: f64, grade: Option<&GradeFile>, texts: &LocalTexts) -> Message {
+    share_of_other("judge.followed", item, share, grade, texts)
+}
+
+fn share_of_other(
+    key: &str,
+    item: &ItemResultFile,
+    share: f64,
+    grade: Option<&GradeFile>,
+    texts: &LocalTexts,
+) -> Message {
+    let Some(metric) = &item.counts_with else { return Message::plain("") };
     let other = grade.and_then(|g| g.items.iter().find(|i| i.metric == *metric && i.counts_with.is_none()));
     let title = other.map_or_else(|| measure_title(metric), |other| Message::authored(texts, &other.title));
     let percent = Message::plain(display_format::plain_number((1000.0 * share).round() / 10.0));
-    Message::text("points.counts_with", &[("title", title), ("percent", percent)])
+    Message::text(key, &[("title", title), ("percent", percent)])
 }
 
 /// Place (directions and mm from the crown's centre) and time at which a measure arose. `tooth_fdi` is the FDI number

@@ -2,7 +2,7 @@
 
 use super::app::{LoadedSession, RequestContext, ReviewApp};
 use super::bundle::{self, VIEWS};
-use super::effective_grade::{EffectiveGrade, effective_grade};
+use super::effective_grade::{EffectiveGrade, EffectiveItem, effective_grade};
 use super::http::Response;
 use super::router::is_session_id;
 use super::session_page::{LegendColour, MapView, SessionFacts, facts, legend, map_view, measure_title};
@@ -155,18 +155,17 @@ fn items(
     let of = |side: usize| sessions[side].grade.as_ref().map_or(&[][..], |grade| grade.items.as_slice());
     let cell = |side: usize, index: usize| {
         let item = &of(side)[index];
-        let entry = effective_grades[side].as_ref().and_then(|now| now.items[index]);
+        let now = effective_grades[side].as_ref().map(|now| now.items[index]);
+        let is_judged = |now: &EffectiveItem| now.judged.is_some() || now.followed_share.is_some();
         ComparedItemCell {
             value: app.translate(context, &phrases::value(&item.metric, item.value)),
             points: display_format::number(item.points),
             max_points: display_format::plain_number(item.max_points),
-            judged: entry.and_then(|e| e.draft.examiner).map(|judged| display_format::number(judged.points)),
+            judged: now.filter(is_judged).map(|now| display_format::number(now.points)),
         }
     };
-    // Effective points: the examiner's where the item is overridden.
     let points = |side: usize, index: usize| {
-        let entry = effective_grades[side].as_ref().and_then(|now| now.items[index]);
-        entry.and_then(|e| e.draft.examiner).map_or(of(side)[index].points, |judged| judged.points)
+        effective_grades[side].as_ref().map_or(of(side)[index].points, |now| now.items[index].points)
     };
     let is_like = |a: &ItemResultFile, b: &ItemResultFile| a.metric == b.metric && a.title == b.title;
     let mut unmatched: Vec<usize> = (0..of(1).len()).collect();

@@ -1,17 +1,30 @@
 //! Effective grade: the scorer's grade combined with the examiners' overrides.
 //!
-//! An overridden item counts with the examiner's points. The grade is a pass under the exercise's own rules: enough
-//! points, no critical error, and the session finished. An override of the whole grade replaces both points and
-//! result.
+//! An overridden item counts with the examiner's points. An item that depends on it (`counts_with`) follows: it is
+//! multiplied by the share of the points that the examiner gave, unless it is overridden itself. The grade is a pass
+//! under the exercise's own rules: enough points, no critical error, and the session finished. An override of the whole
+//! grade replaces both points and result.
 
 use super::overrides::{OverrideEntry, OverrideSnapshot};
-use typodont_report::GradeFile;
+use typodont_report::{GradeFile, ItemResultFile};
+
+/// Item of a rubric after overrides.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EffectiveItem<'a> {
+    /// Override in effect for this item.
+    pub judged: Option<&'a OverrideEntry>,
+    /// Resulting points; the scorer's if no override concerns the item.
+    pub points: f64,
+    /// Share of its points, 0 to 1, that an examiner gave to the item on which this one depends; `None` if this item's
+    /// points do not follow from an override of another one.
+    pub followed_share: Option<f64>,
+}
 
 /// Grade after overrides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EffectiveGrade<'a> {
-    /// Override in effect for each item, in the rubric's order.
-    pub items: Vec<Option<&'a OverrideEntry>>,
+    /// Items, in the rubric's order.
+    pub items: Vec<EffectiveItem<'a>>,
     /// Override in effect for the whole grade.
     pub whole: Option<&'a OverrideEntry>,
     /// Resulting points; the scorer's without overrides.
@@ -25,12 +38,12 @@ pub struct EffectiveGrade<'a> {
 impl EffectiveGrade<'_> {
     /// Returns the overrides in effect, that of the whole grade first.
     pub fn entries(&self) -> impl Iterator<Item = &OverrideEntry> {
-        self.whole.into_iter().chain(self.items.iter().flatten().copied())
+        self.whole.into_iter().chain(self.items.iter().filter_map(|item| item.judged))
     }
 
     /// Returns the number of overrides in effect.
     pub fn overrides(&self) -> usize {
-        self.items.iter().flatten().count() + usize::from(self.whole.is_some())
+        self.items.iter().filter(|item| item.judged.is_some()).count() + usize::from(self.whole.is_some())
     }
 }
 
@@ -70,7 +83,7 @@ impl FailureReason {
 
 /// Computes the effective grade of a session.
 pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a OverrideSnapshot) -> EffectiveGrade<'a> {
-    let mut items: Vec<Option<&OverrideEntry>> = vec![None; grade.items.len()];
+    let mut by_item: Vec<Option<&OverrideEntry>> = vec![None; grade.items.len()];
     let mut whole = None;
     let mut orphaned = vec![];
     for entry in log.valid_entries().filter(|entry| entry.draft.session == session) {
@@ -78,7 +91,7 @@ pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a OverrideSn
         match &entry.draft.item {
             None => whole = judged,
             Some(item) => match grade.items.get(item.index).filter(|own| own.metric == item.metric) {
-                Some(_) => items[item.index] = judged,
+                Some(_) => by_item[item.index] = judged,
                 None => {
                     orphaned.retain(|index| *index != item.index);
                     orphaned.extend(judged.map(|_| item.index));
@@ -86,15 +99,13 @@ pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a OverrideSn
             },
         }
     }
-    let more = grade.items.iter().zip(&items).filter_map(|(item, entry)| {
-        let judged = entry.as_ref()?.draft.examiner?;
-        Some(judged.points - item.points)
-    });
-    let more: Vec<f64> = more.collect();
+    let items: Vec<EffectiveItem> =
+        (0..grade.items.len()).map(|index| effective_item(grade, &by_item, index)).collect();
     let mut points = grade.points;
     let mut passed = grade.passed;
-    if !more.is_empty() {
-        points = tidy(grade.points + more.iter().sum::<f64>()).min(grade.max_points).max(0.0);
+    if items.iter().any(|item| item.judged.is_some()) {
+        let more: f64 = items.iter().zip(&grade.items).map(|(item, machine)| item.points - machine.points).sum();
+        points = tidy(grade.points + more).min(grade.max_points).max(0.0);
         passed = grade.finished && grade.hard_fails.is_empty() && points >= grade.pass_points;
     }
     if let Some(judged) = whole.and_then(|entry| entry.draft.examiner) {
@@ -104,15 +115,33 @@ pub fn effective_grade<'a>(grade: &GradeFile, session: &str, log: &'a OverrideSn
     EffectiveGrade { items, whole, points, passed, orphaned: orphaned.len() }
 }
 
+/// Returns an item after the overrides, which are given by item.
+fn effective_item<'a>(grade: &GradeFile, by_item: &[Option<&'a OverrideEntry>], index: usize) -> EffectiveItem<'a> {
+    let machine = &grade.items[index];
+    let given = |entry: &OverrideEntry| entry.draft.examiner.map(|examiner| examiner.points);
+    let judged = by_item[index];
+    if let Some(points) = judged.and_then(given) {
+        return EffectiveItem { judged, points, followed_share: None };
+    }
+    let other = machine.counts_with.as_ref().and_then(|metric| {
+        let is_other = |(_, item): &(usize, &ItemResultFile)| item.metric == *metric && item.counts_with.is_none();
+        grade.items.iter().enumerate().find(is_other)
+    });
+    let followed_share = other
+        .filter(|(_, item)| item.max_points > 0.0)
+        .and_then(|(other, item)| Some((by_item[other].and_then(given)? / item.max_points).clamp(0.0, 1.0)));
+    let points = followed_share.map_or(machine.points, |share| tidy(machine.own_points() * share));
+    EffectiveItem { judged, points, followed_share }
+}
+
 /// Returns the grade with all overrides applied, for consumers that take a single grade, and the number of overrides
 /// in effect.
 pub fn with_overrides(grade: &GradeFile, session: &str, log: &OverrideSnapshot) -> (GradeFile, usize) {
     let effective = effective_grade(grade, session, log);
     let mut overridden = grade.clone();
-    for (item, entry) in overridden.items.iter_mut().zip(&effective.items) {
-        if let Some(judged) = entry.and_then(|entry| entry.draft.examiner) {
-            item.points = judged.points;
-        }
+    for (item, now) in overridden.items.iter_mut().zip(&effective.items) {
+        item.points = now.points;
+        item.counts_with_share = now.followed_share.or(item.counts_with_share);
     }
     (overridden.points, overridden.passed) = (effective.points, effective.passed);
     if effective.passed {
@@ -132,7 +161,6 @@ mod tests {
     use super::*;
     use crate::chained_log::{LogEntry, LogLine};
     use crate::overrides::{GivenPoints, OverrideDraft, RubricItemRef};
-    use typodont_report::ItemResultFile;
 
     fn grade() -> GradeFile {
         let item = |metric: &str, points: f64| ItemResultFile {
@@ -208,6 +236,40 @@ mod tests {
         check(log_of(&[(Some((0, "jaccard")), points(50.0))]), (60.0, false, 0));
         assert_eq!(effective_grade(&grade(), "s", &log_of(&[(Some((7, "x")), points(1.0))])).orphaned, 1);
         assert_eq!(effective_grade(&grade(), "another", &log_of(&[(dice, points(50.0))])).points, 60.0);
+    }
+
+    #[test]
+    fn an_item_follows_the_override_of_the_item_on_which_it_depends() {
+        // Aim: what an examiner gives for the work also decides the share of what depends on it. Method: "jerk" earns 50
+        // of 50 by itself and depends on "dice", of which the scorer saw nothing, and the examiner a half.
+        let mut own = grade();
+        own.points = 0.0;
+        own.items[0].points = 0.0;
+        let depends = Some("dice".to_string());
+        own.items[1] = ItemResultFile {
+            value: Some(1.0),
+            points: 0.0,
+            counts_with: depends,
+            counts_with_share: Some(0.0),
+            ..own.items[1].clone()
+        };
+        let now = |log: &OverrideSnapshot| {
+            let now = effective_grade(&own, "s", log);
+            (now.points, now.items[1].points, now.items[1].followed_share, now.overrides())
+        };
+        let (dice, jerk) = (Some((0, "dice")), Some((1, "jerk")));
+        assert_eq!(now(&log_of(&[])), (0.0, 0.0, None, 0));
+        assert_eq!(now(&log_of(&[(dice, points(25.0))])), (50.0, 25.0, Some(0.5), 1));
+        assert_eq!(now(&log_of(&[(dice, points(25.0)), (dice, None)])), (0.0, 0.0, None, 0));
+        assert_eq!(now(&log_of(&[(dice, points(25.0)), (jerk, points(50.0))])), (75.0, 50.0, None, 2));
+        let (exported, _) = with_overrides(&own, "s", &log_of(&[(dice, points(25.0))]));
+        assert_eq!((exported.items[1].points, exported.items[1].counts_with_share), (25.0, Some(0.5)));
+        // Points for the work that are taken away are taken from what depends on it, too.
+        own.items[0].points = 50.0;
+        own.items[1].points = 50.0;
+        own.items[1].counts_with_share = Some(1.0);
+        own.points = 100.0;
+        assert_eq!(effective_grade(&own, "s", &log_of(&[(dice, points(0.0))])).points, 0.0);
     }
 
     #[test]

@@ -44,7 +44,7 @@ mod agreement_page;
 pub use app::{ReviewApp, ReviewOptions};
 pub use auth::{AuthMode, PASSWORD_MIN};
 pub use chained_log::{AppendError, ChainedLog, IntegrityIssue, LogEntry, LogSnapshot, LoggedDraft};
-pub use effective_grade::{EffectiveGrade, effective_grade, with_overrides};
+pub use effective_grade::{EffectiveGrade, EffectiveItem, effective_grade, with_overrides};
 pub use http::{BODY_MAX, Request, Response};
 pub use overrides::{GivenPoints, OverrideDraft, OverrideEntry, OverrideLog, OverrideSnapshot};
 pub use page_renderer::PageRenderer;

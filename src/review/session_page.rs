@@ -3,7 +3,7 @@
 use super::app::{LoadedSession, RequestContext, ReviewApp, SHOWN_MAX};
 use super::blind_page;
 use super::bundle::{self, VIEWS};
-use super::effective_grade::{EffectiveGrade, effective_grade};
+use super::effective_grade::{EffectiveGrade, EffectiveItem, effective_grade};
 use super::history::{self, HistoryRow};
 use super::http::Response;
 use super::overrides::OverrideEntry;
@@ -89,6 +89,15 @@ struct ReviewItem {
     points: String,
     max_points: String,
     judged: ReviewOverride,
+    /// Points that follow from the override of the item on which this one depends, and the reason; `None` otherwise.
+    followed: Option<FollowedPoints>,
+}
+
+/// Points of an item that follow from the override of another one.
+#[derive(Serialize)]
+struct FollowedPoints {
+    points: String,
+    reason: String,
 }
 
 /// Override of an item or of the whole grade, if there is one, and the initial values of its form.
@@ -289,9 +298,9 @@ impl ReviewLocalizer<'_> {
             overrides: effective.overrides(),
             homeless: effective.orphaned,
             items: items
-                .map(|(index, (item, entry))| {
-                    let judged = judged(*entry, item.points, Some(index), item.points, item.max_points);
-                    self.item(index, item, judged)
+                .map(|(index, (item, now))| {
+                    let judged = judged(now.judged, item.points, Some(index), now.points, item.max_points);
+                    self.item(index, item, judged, self.followed(grade, item, now))
                 })
                 .collect(),
             whole: judged(effective.whole, grade.points, None, effective.points, grade.max_points),
@@ -323,7 +332,20 @@ impl ReviewLocalizer<'_> {
         }
     }
 
-    fn item(&self, index: usize, item: &ItemResultFile, judged: ReviewOverride) -> ReviewItem {
+    /// Returns the points of an item that follow from the override of another one.
+    fn followed(&self, grade: &GradeFile, item: &ItemResultFile, now: &EffectiveItem) -> Option<FollowedPoints> {
+        let share = now.followed_share?;
+        let reason = phrases::followed_share(item, share, Some(grade), &LocalTexts::default());
+        Some(FollowedPoints { points: display_format::number(now.points), reason: self.translate(&reason) })
+    }
+
+    fn item(
+        &self,
+        index: usize,
+        item: &ItemResultFile,
+        judged: ReviewOverride,
+        followed: Option<FollowedPoints>,
+    ) -> ReviewItem {
         ReviewItem {
             index,
             title: sanitize_display(&item.title, 200),
@@ -340,6 +362,7 @@ impl ReviewLocalizer<'_> {
             points: display_format::number(item.points),
             max_points: display_format::plain_number(item.max_points),
             judged,
+            followed,
         }
     }
 
