@@ -189,7 +189,7 @@ impl CavityMap {
 }
 
 /// Selects columns spaced evenly from the first to the last, at most `apart` columns from one to the next.
-fn spread(columns: impl Iterator<Item = u32>, apart: u32) -> Vec<u32> {
+pub(super) fn spread(columns: impl Iterator<Item = u32>, apart: u32) -> Vec<u32> {
     let columns: Vec<u32> = columns.collect();
     let (Some(first), Some(last)) = (columns.first(), columns.last()) else { return Vec::new() };
     let parts = (last - first).div_ceil(apart).max(1);

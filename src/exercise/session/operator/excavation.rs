@@ -3,8 +3,13 @@
 //! The bur's centre stays inside the decay's outline by the bur's radius, so that its surface meets the decay's
 //! border. The path descends layer by layer to the lower end of the decay in each column.
 
+use super::cavity_map::spread;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Grid, Label, Volume, distance};
+
+/// Greatest distance between places at which a path may run, mm. Coarser voxels are divided: a hand is not bound to the
+/// columns of the voxels, and a bur that could only follow every fourth of a millimetre would miss the walls.
+const FINEST_TRACK: f32 = 0.1;
 
 /// Parameters of an excavation path; lengths in mm.
 #[derive(Clone, Copy, Debug)]
@@ -33,10 +38,10 @@ struct DecayColumn {
 impl Excavation {
     /// Returns the path of the bur's centre, tooth space, mm. Empty without decay.
     pub fn path(&self, volume: &Volume, is_decay: impl Fn(Vec3, Label) -> bool) -> Vec<Vec3> {
-        let grid = volume.grid();
-        let columns = columns(volume, is_decay);
+        let grid = &divided(volume.grid());
+        let columns = columns(volume, grid, is_decay);
         let flat = Grid { dims: [grid.dims[0], grid.dims[1], 1], ..*grid };
-        // The border lies between two columns, half a voxel before the centre of the first column without decay.
+        // The border lies between two columns, half a column before the centre of the first one without decay.
         let half = 0.5 * grid.spacing.x.max(grid.spacing.y);
         let inside: Vec<f32> =
             distance::to_set(&flat, |i| columns[i].is_none()).into_iter().map(|d| (d - half).max(0.0)).collect();
@@ -59,37 +64,56 @@ impl Excavation {
         path
     }
 
-    /// Returns the columns one pitch apart, in rows of alternating direction along y, which keeps the hand's paths
-    /// short.
+    /// Returns the columns at most one pitch apart, in rows of alternating direction along y, which keeps the hand's
+    /// paths short. The outermost tracks run along the walls: parts that no track comes near would stay.
     fn tracks(&self, grid: &Grid, column: impl Fn(usize) -> Option<DecayColumn>) -> Vec<(Vec3, DecayColumn)> {
-        let step = |axis: usize| ((self.pitch / grid.spacing[axis]).round() as usize).max(1);
+        let step = |axis: usize| ((self.pitch / grid.spacing[axis]).round() as u32).max(1);
+        let column_at = |x: u32, y: u32| column(grid.index([x, y, 0])).map(|column| (grid.centre([x, y, 0]), column));
+        let [nx, ny, _] = grid.dims;
+        let rows = spread((0..nx).filter(|&x| (0..ny).any(|y| column_at(x, y).is_some())), step(0));
         let mut tracks = Vec::new();
-        for (count, x) in (0..grid.dims[0]).step_by(step(0)).enumerate() {
-            let mut ys: Vec<u32> = (0..grid.dims[1]).step_by(step(1)).collect();
+        for (count, x) in rows.into_iter().enumerate() {
+            let mut ys = spread((0..ny).filter(|&y| column_at(x, y).is_some()), step(1));
             if count % 2 == 1 {
                 ys.reverse();
             }
-            tracks.extend(ys.into_iter().filter_map(|y| {
-                let index = grid.index([x, y, 0]);
-                column(index).map(|column| (grid.centre([x, y, 0]), column))
-            }));
+            tracks.extend(ys.into_iter().filter_map(|y| column_at(x, y)));
         }
         tracks
     }
 }
 
-/// Returns the decay of every column of the volume, x fastest; `None` for a column without decay.
-fn columns(volume: &Volume, is_decay: impl Fn(Vec3, Label) -> bool) -> Vec<Option<DecayColumn>> {
+/// Returns a grid with its cells divided to at most [`FINEST_TRACK`].
+fn divided(grid: &Grid) -> Grid {
+    let parts = parts_of(grid);
+    let spacing = grid.spacing / parts as f32;
+    let origin = grid.origin - 0.5 * (grid.spacing - spacing);
+    Grid { dims: grid.dims.map(|n| n * parts), spacing, origin }
+}
+
+/// Returns the number of parts into which a cell is divided in each direction.
+fn parts_of(grid: &Grid) -> u32 {
+    ((grid.spacing.max_element() / FINEST_TRACK - 0.01).ceil() as u32).max(1)
+}
+
+/// Returns the decay of every column of a divided grid of the volume, x fastest; `None` for a column without decay.
+fn columns(volume: &Volume, fine: &Grid, is_decay: impl Fn(Vec3, Label) -> bool) -> Vec<Option<DecayColumn>> {
     let grid = volume.grid();
-    let flat = grid.dims[0] as usize * grid.dims[1] as usize;
+    let parts = parts_of(grid);
+    let flat = fine.dims[0] as usize * fine.dims[1] as usize;
     let mut tops = vec![f32::NEG_INFINITY; flat];
     let mut floors = vec![f32::INFINITY; flat];
     for (index, label) in volume.tissues().enumerate().filter(|(_, label)| *label != Label::AIR) {
-        let place = grid.centre(grid.cell(index));
-        let column = index % flat;
-        tops[column] = tops[column].max(place.z);
-        if floors[column].is_infinite() && is_decay(place, label) {
-            floors[column] = place.z - 0.5 * grid.spacing.z;
+        let first = grid.cell(index).map(|n| n * parts);
+        for part in 0..parts.pow(3) {
+            let [x, y, z] = [part % parts, part / parts % parts, part / parts.pow(2)];
+            let cell = [first[0] + x, first[1] + y, first[2] + z];
+            let place = fine.centre(cell);
+            let column = fine.index([cell[0], cell[1], 0]);
+            tops[column] = tops[column].max(place.z);
+            if floors[column].is_infinite() && is_decay(place, label) {
+                floors[column] = place.z - 0.5 * fine.spacing.z;
+            }
         }
     }
     let both = tops.into_iter().zip(floors);
@@ -99,6 +123,24 @@ fn columns(volume: &Volume, is_decay: impl Fn(Vec3, Label) -> bool) -> Vec<Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_path_reaches_the_same_walls_in_coarse_voxels() {
+        // Aim: the size of the voxels does not decide how far the bur reaches. Method: an outline of 1.2 mm × 4 mm, 2 mm
+        // deep, in a sound block of voxels of 0.1 and 0.25 mm, for a bur of 0.4 mm radius; the extent of both paths.
+        let extent = |spacing: f32| {
+            let size = |mm: f32| (mm / spacing).round() as u32;
+            let grid = Grid::centred([size(4.0), size(6.0), size(6.0)], Vec3::splat(spacing));
+            let volume = Volume::from_distance(grid, 1.5 * spacing, |p| (p.z - 1.0, Label(1)));
+            let excavation = Excavation { radius: 0.4, below: 0.4, pitch: 0.2, margin: 0.0 };
+            let path = excavation.path(&volume, |p, _| p.x.abs() < 0.6 && p.y.abs() < 2.0 && p.z > -1.0);
+            path.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)))
+        };
+        let ((low, high), (coarse_low, coarse_high)) = (extent(0.1), extent(0.25));
+        assert!((low - coarse_low).abs().max_element() < 0.11, "{low} {coarse_low}");
+        assert!((high - coarse_high).abs().truncate().max_element() < 0.11, "{high} {coarse_high}");
+        assert!(coarse_high.x - coarse_low.x > 0.25, "tracks along both walls: {coarse_low} {coarse_high}");
+    }
 
     #[test]
     fn a_box_of_decay_is_removed_up_to_its_border_and_no_further() {
