@@ -379,6 +379,15 @@ fn parts_that_do_not_fit_together() {
         json!("around"),
         &[("unknown-zone", "/rubric/hard_fails/1/metric"), ("duplicate-id", "/zones/1/id")],
     );
+    let mut search: Value = serde_json::from_str(&shipped("9-stain.json")).unwrap();
+    let mut rest = search["stages"][0].clone();
+    rest["id"] = json!("search-3");
+    for key in ["draw", "ask"] {
+        rest.as_object_mut().unwrap().remove(key);
+    }
+    rest["ends_when"] = json!(["confirmed"]);
+    search["stages"].as_array_mut().unwrap().push(rest);
+    check_text("a stage of a trial's name", &search.to_string(), &[("duplicate-id", "/stages/1/id")]);
     let one_tooth = edited("4-diagnosis.json", "/stages/0/ask/0/answer", Some(json!({ "tooth_with": "lesion" })));
     check_text("which tooth of one", &one_tooth, &[("no-choice", "/stages/0/ask/0/answer")]);
     let tissue = json!([{ "id": 1, "name": "enamel", "title": "E", "role": "sound", "color": "red", "stiffness": 1, "damping": 1, "static_friction": 0, "dynamic_friction": 0, "cut_force_n": 1 }]);

@@ -10,6 +10,7 @@ use typodont_formats::diagnostic::did_you_mean;
 impl Resolver<'_> {
     pub(super) fn stages(&mut self, written: &ScenarioFile, lesions: &[String]) -> Vec<Stage> {
         self.unique(written.stages.iter().enumerate().map(|(i, s)| (s.id.as_str(), format!("/stages/{i}/id"))));
+        self.check_trial_ids(written);
         let questions = written.stages.iter().enumerate().flat_map(|(i, s)| {
             s.ask.iter().enumerate().map(move |(j, q)| (q.id.as_str(), format!("/stages/{i}/ask/{j}/id")))
         });
@@ -20,6 +21,21 @@ impl Resolver<'_> {
             .enumerate()
             .flat_map(|(i, s)| trials(self.stage(s, written, lesions, &format!("/stages/{i}"))))
             .collect()
+    }
+
+    /// Reports a stage that has the id of a trial of another stage, which results could not tell apart.
+    fn check_trial_ids(&mut self, written: &ScenarioFile) {
+        for stage in &written.stages {
+            let trials = stage.draw.as_ref().map_or(1, |draw| draw.trials);
+            for number in (1..=trials).filter(|_| trials > 1) {
+                let id = trial_id(&stage.id, number);
+                if let Some(index) = written.stages.iter().position(|other| other.id == id) {
+                    let message = format!("\"{id}\" is the id of trial {number} of the stage \"{}\"", stage.id);
+                    let help = "give one of the two stages another id";
+                    self.complain(&format!("/stages/{index}/id"), "duplicate-id", message, help);
+                }
+            }
+        }
     }
 
     fn stage(&mut self, written: &file::StageFile, scenario: &ScenarioFile, lesions: &[String], path: &str) -> Stage {
@@ -345,6 +361,11 @@ impl Resolver<'_> {
     }
 }
 
+/// Returns the id of a trial of a stage with several trials.
+fn trial_id(id: &str, number: u32) -> String {
+    format!("{id}-{number}")
+}
+
 /// Returns the title of a trial of a stage.
 pub(super) fn trial_title(title: &str, number: u32, trials: u32) -> String {
     format!("{title} ({number}/{trials})")
@@ -354,7 +375,7 @@ pub(super) fn trial_title(title: &str, number: u32, trials: u32) -> String {
 fn trials(stage: Stage) -> Vec<Stage> {
     let Some(draw) = stage.draw.clone().filter(|draw| draw.trials > 1) else { return vec![stage] };
     let trial = |number: u32| Stage {
-        id: format!("{}-{number}", stage.id),
+        id: trial_id(&stage.id, number),
         title: trial_title(&stage.title, number, draw.trials),
         draw: Some(Draw { trial: number, ..draw.clone() }),
         ..stage.clone()
