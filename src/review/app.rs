@@ -377,7 +377,8 @@ impl ReviewApp {
 pub(super) const SHOWN_MAX: usize = 80;
 
 impl ReviewState {
-    fn refresh(&mut self, folder: &Path) -> Result<OverrideSnapshot, String> {
+    /// Updates the index from the folder and the logs, and returns the log of overrides.
+    pub(super) fn refresh(&mut self, folder: &Path) -> Result<OverrideSnapshot, String> {
         let known = self.index.known_head(OVERRIDES_HEAD);
         let unreadable = |name: &str, e: std::io::Error| format!("{name}: unreadable-file: {e}");
         let log = self.log.read(known.as_ref()).map_err(|e| unreadable(super::OVERRIDES, e))?;

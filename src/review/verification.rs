@@ -27,6 +27,21 @@ pub(super) struct VerificationQueue {
     to_replay: BTreeSet<PathBuf>,
 }
 
+impl VerificationQueue {
+    /// Drops what concerns bundles that are no longer listed, so that a desk that runs for months neither grows nor counts
+    /// deleted sessions as done.
+    fn keep_listed(&mut self, listed: &BTreeSet<PathBuf>) {
+        self.judged.retain(|path, _| listed.contains(path));
+        self.to_check.retain(|path| listed.contains(path));
+        self.to_replay.retain(|path| listed.contains(path));
+    }
+
+    /// Number of bundles whose judgement is final.
+    fn done(&self) -> usize {
+        self.judged.values().filter(|(_, status)| *status != VerificationStatus::Pending).count()
+    }
+}
+
 /// A status as it is shown: a word and, for a result that differs, its differences.
 #[derive(Serialize)]
 pub(super) struct ShownVerification {
@@ -67,9 +82,17 @@ pub(super) struct VerificationProgress {
 }
 
 impl ReviewApp {
-    /// Puts bundles that are new or changed into the queue.
+    /// Searches the folder for bundles that are new, changed or deleted, whether or not anybody opens a page, and brings
+    /// the queue up to date with it.
     pub fn queue_changed_bundles(&self) {
-        let listed = self.state().index.paths().unwrap_or_default();
+        let listed = {
+            let mut state = self.state();
+            // A folder or an index that cannot be read is reported on every page.
+            let read = state.refresh(&self.folder).and_then(|_| state.index.paths().map_err(|e| e.to_string()));
+            let Ok(listed) = read else { return };
+            BTreeSet::from_iter(listed)
+        };
+        self.verification_queue().keep_listed(&listed);
         for path in listed {
             let print = fingerprint(&self.folder.join(&path));
             let mut queue = self.verification_queue();
@@ -132,9 +155,7 @@ impl ReviewApp {
     }
 
     pub(super) fn verification_progress(&self, count: usize) -> VerificationProgress {
-        let queue = self.verification_queue();
-        let done = queue.judged.values().filter(|(_, status)| *status != VerificationStatus::Pending).count();
-        VerificationProgress { left: count.saturating_sub(done), count }
+        VerificationProgress { left: count.saturating_sub(self.verification_queue().done()), count }
     }
 
     fn verification_queue(&self) -> MutexGuard<'_, VerificationQueue> {
@@ -172,4 +193,26 @@ fn changed_at(meta: &fs::Metadata) -> i128 {
 #[cfg(not(unix))]
 fn changed_at(_: &fs::Metadata) -> i128 {
     0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bundles_that_are_no_longer_listed_are_forgotten() {
+        // Aim: a deleted bundle is not counted as done, which would hide that another one is still to be judged.
+        let mut queue = VerificationQueue::default();
+        for name in ["kept", "deleted"] {
+            queue.judged.insert(name.into(), (String::new(), VerificationStatus::Verified));
+            queue.to_check.insert(name.into());
+            queue.to_replay.insert(name.into());
+        }
+        queue.judged.insert("waiting".into(), (String::new(), VerificationStatus::Pending));
+        assert_eq!(queue.done(), 2);
+        queue.keep_listed(&["kept", "waiting", "new"].map(PathBuf::from).into());
+        assert_eq!(queue.done(), 1);
+        assert_eq!(queue.judged.keys().collect::<Vec<_>>(), [Path::new("kept"), Path::new("waiting")]);
+        assert_eq!((queue.to_check.len(), queue.to_replay.len()), (1, 1));
+    }
 }

@@ -940,3 +940,29 @@ fn the_list_can_be_restricted_by_verification() {
     assert!(page.contains("<option value=\"differs\" selected>"), "{page}");
     assert!(page.contains("berk") && !page.contains("anna"), "{page}");
 }
+
+#[test]
+fn a_bundle_that_arrives_later_is_judged_before_anybody_opens_the_page() {
+    // Aim: what a station copies into the folder of a running desk is listed and judged without a restart, and what is
+    // deleted is no longer listed. Method: nobody asks the desk for a page until its cache names the new participant.
+    let folder = folder("review_arrivals");
+    let first = enter(&folder, &session("5-grinding", "anna", 80.0));
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    enter(&folder, &session("5-grinding", "berk", 61.0));
+    fs::remove_dir_all(first).unwrap();
+    let is_indexed = || {
+        let cached = ["review.sqlite", "review.sqlite-wal"].map(|name| fs::read(folder.join(name)).unwrap_or_default());
+        cached.concat().windows(4).any(|bytes| bytes == b"berk")
+    };
+    let since = Instant::now();
+    while !is_indexed() {
+        assert!(since.elapsed() < Duration::from_secs(60), "the desk never looked into the folder again");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    std::thread::sleep(Duration::from_secs(1));
+    let export: Value = serde_json::from_str(&browser.get("/sessions.json").text()).unwrap();
+    let listed = export["sessions"].as_array().unwrap();
+    assert_eq!(listed.len(), 1, "{export}");
+    assert_eq!(listed[0]["participant"], "berk");
+}
