@@ -13,8 +13,9 @@ use typodont_core::touch::Coefficient;
 use typodont_core::volume::Label;
 
 /// Version of the recording format. A reader refuses a newer version, and replays an older one as its program did:
-/// version 1 has no torque, no force ramp at the start of contact and no second hand.
-pub const VERSION: u32 = 2;
+/// version 1 has no torque, no force ramp at the start of contact and no second hand. Version 2 has no draws, no sealed
+/// seeds and no substituted tooth with a number of its own.
+pub const VERSION: u32 = 3;
 
 /// Name of the metadata record written before the first tick.
 pub(super) const HEAD: &str = "session";

@@ -16,6 +16,7 @@ use crate::scenario;
 use crate::scenario::{ResolveMode, Scenario, Workpiece};
 use crate::session::Input;
 use mcap::records::Record;
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
@@ -95,7 +96,8 @@ impl fmt::Display for RecordingError {
             RecordingError::Newer { name, version } => {
                 write!(
                     f,
-                    "{name}: newer-recording: the recording has version {version}, this program reads up to {VERSION}"
+                    "{name}: newer-recording: made by a newer version of Typodont: the recording has version {version}, \
+                     this program reads up to {VERSION}; update the program"
                 )
             }
             RecordingError::Sealed { name } => write!(
@@ -111,10 +113,18 @@ impl fmt::Display for RecordingError {
 
 impl std::error::Error for RecordingError {}
 
+/// The part of the session metadata that every version has.
+#[derive(Deserialize)]
+struct VersionFile {
+    version: u32,
+}
+
 /// Contents of a recording's file before they are checked and assembled.
 #[derive(Default)]
 struct RecordingParts {
     head: Option<RecordingHeadFile>,
+    /// Version of a recording that was made by a newer program, of which nothing else is read.
+    newer_version: Option<u32>,
     end: Option<RecordingEndFile>,
     files: BTreeMap<String, Vec<u8>>,
     channels: BTreeMap<u16, String>,
@@ -278,6 +288,10 @@ impl RecordingParts {
     }
 
     fn add(&mut self, record: Record) -> Result<(), String> {
+        if self.newer_version.is_some() {
+            // The whole recording is refused once everything is read: a newer format cannot be checked here.
+            return Ok(());
+        }
         match record {
             Record::Metadata(metadata) => {
                 let text = metadata.metadata.get("json").map_or("", String::as_str);
@@ -285,7 +299,11 @@ impl RecordingParts {
                 match metadata.name.as_str() {
                     HEAD => {
                         self.initial_digest.part(HEAD, text.as_bytes());
-                        self.head = Some(serde_json::from_str(text).map_err(broken)?);
+                        let VersionFile { version } = serde_json::from_str(text).map_err(broken)?;
+                        match version > VERSION {
+                            true => self.newer_version = Some(version),
+                            false => self.head = Some(serde_json::from_str(text).map_err(broken)?),
+                        }
                     }
                     SEED => {
                         let SeedFile { seed } = serde_json::from_str(text).map_err(broken)?;
@@ -322,10 +340,6 @@ impl RecordingParts {
     fn add_tick(&mut self, data: &[u8]) -> Result<(), String> {
         let next = self.ticks.len() as u64;
         let version = self.head.as_ref().map_or(VERSION, |head| head.version);
-        if version > VERSION {
-            // The whole recording is refused once everything is read: a newer format cannot be checked here.
-            return Ok(());
-        }
         let tick = TickRecord::parse(data, TickLayout::of(version)).ok_or(format!("tick {next} cannot be decoded"))?;
         if tick.tick.0 != next {
             return Err(format!("tick {} found where tick {next} was expected", tick.tick.0));
@@ -335,9 +349,6 @@ impl RecordingParts {
     }
 
     fn add_event(&mut self, data: &[u8]) -> Result<(), String> {
-        if self.head.as_ref().is_some_and(|head| head.version > VERSION) {
-            return Ok(());
-        }
         let event: EventFile = serde_json::from_slice(data).map_err(|e| format!("invalid event: {e}"))?;
         let tick = Tick(event.tick);
         if self.events.last().is_some_and(|(before, _)| *before > tick) || tick.0 > self.ticks.len() as u64 {
@@ -355,6 +366,9 @@ impl RecordingParts {
 
     fn assemble(self, name: &str, loss: Option<RecordingLoss>) -> Result<Recording, RecordingError> {
         let damaged = |what: &str| RecordingError::Damaged { name: name.to_string(), what: what.to_string() };
+        if let Some(version) = self.newer_version {
+            return Err(RecordingError::Newer { name: name.to_string(), version });
+        }
         let RecordingParts {
             head,
             end,
@@ -370,9 +384,6 @@ impl RecordingParts {
             ..
         } = self;
         let mut head = head.ok_or(damaged("the session metadata is missing"))?;
-        if head.version > VERSION {
-            return Err(RecordingError::Newer { name: name.to_string(), version: head.version });
-        }
         if let Some(expected) = &head.seed_sha256 {
             let seed = revealed_seed.ok_or(RecordingError::Sealed { name: name.to_string() })?;
             if commitment(&head, seed) != *expected {
@@ -443,4 +454,38 @@ fn check_agreement(head: &RecordingHeadFile, scenario: &Scenario, has_original: 
         return Err("the duration of a tick is not the one of this program");
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mcap::records::{MessageHeader, Metadata};
+    use mcap::write::WriteOptions;
+
+    #[test]
+    fn a_recording_of_a_newer_program_is_named_as_that() {
+        // Aim: whoever opens tomorrow's recording with today's program reads what to do, and not of damage in the middle
+        // of it. Method: a recording of the next version, with other metadata, ticks of another length and a command that
+        // this version does not have.
+        let mut bytes = Vec::new();
+        let options = WriteOptions::new().chunk_size(None).disable_seeking(true).compression_threads(0);
+        let mut writer = options.create(std::io::Cursor::new(&mut bytes)).unwrap();
+        let json = format!("{{\"version\":{},\"session\":\"of another form\"}}", VERSION + 1);
+        let metadata = [("json".to_string(), json)].into_iter().collect();
+        writer.write_metadata(&Metadata { name: HEAD.to_string(), metadata }).unwrap();
+        let none = BTreeMap::new();
+        for (topic, data) in [("/haptic", &b"short"[..]), ("/event", b"{\"tick\":0,\"command\":{\"sterilise\":{}}}")] {
+            let channel_id = writer.add_channel(0, topic, "json", &none).unwrap();
+            let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, data).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        let error = Recording::parse("new.mcap", &bytes).err().expect("it cannot be read");
+        assert_eq!(error, RecordingError::Newer { name: "new.mcap".to_string(), version: VERSION + 1 });
+        assert!(error.to_string().contains("newer version of Typodont"), "{error}");
+        // A power cut in the middle does not hide the reason.
+        let error = Recording::parse("new.mcap", &bytes[..bytes.len() - 40]).err().expect("it cannot be read");
+        assert!(matches!(error, RecordingError::Newer { .. }), "{error}");
+    }
 }
