@@ -1,5 +1,6 @@
 //! The application: chooses the screen that is shown, and carries out the commands of every screen.
 
+use super::briefing::BriefingFields;
 use super::command::{AppCommand, CameraCommand, PracticeCommand};
 use super::completion::{Completion, CompletionProgress};
 use super::editor::{self, EditorCommand, EditorState, OpenMode};
@@ -43,6 +44,8 @@ pub struct App {
     /// Bundles that are still being made after their results were left.
     completions: Vec<Completion>,
     participant: String,
+    /// Examiner's code for the next session, as typed in the briefing. Forgotten when that session begins.
+    examiner_code: String,
     screen: Screen,
     /// The editor to return to after the test run of an exercise.
     test_run_origin: Option<Box<EditorState>>,
@@ -111,6 +114,7 @@ impl App {
             completions: Vec::new(),
             words: i18n::select_language(&languages, &settings.language),
             participant: options.participant.clone(),
+            examiner_code: String::new(),
             options,
             settings,
             languages,
@@ -324,6 +328,7 @@ impl App {
     fn open_briefing(&mut self) {
         let App { exercise_list: list, history, participant, settings, .. } = self;
         if list.can_open_selected(history, participant, settings) {
+            self.examiner_code.clear();
             self.screen = Screen::Briefing;
         }
     }
@@ -331,6 +336,7 @@ impl App {
     /// Returns to the author's screen after a test run, otherwise to the list of exercises.
     fn go_back(&mut self) {
         self.leave_results();
+        self.examiner_code.clear();
         if let Some(mut editor) = self.test_run_origin.take() {
             editor.invalidate_preview();
             self.screen = Screen::Editor(editor);
@@ -489,7 +495,8 @@ impl App {
         }
         let Some(exercise) = self.exercise_list.selected_exercise() else { return };
         let (Ok(scenario), library) = (&exercise.scenario, exercise.library.clone()) else { return };
-        if !lesson::is_valid_participant_code(&self.participant) {
+        let is_code_valid = briefing::is_valid_examiner_code(&self.examiner_code);
+        if !lesson::is_valid_participant_code(&self.participant) || !is_code_valid {
             return;
         }
         let (scenario, digests, out) = (scenario.clone(), exercise.digests.clone(), self.options.out.clone());
@@ -515,7 +522,8 @@ impl App {
             },
         };
         let started = jiff::Timestamp::now();
-        let seed = match (&self.options.seed_code, self.options.seed) {
+        let typed = Some(std::mem::take(&mut self.examiner_code)).filter(|code| !code.is_empty());
+        let seed = match (typed.as_ref().or(self.options.seed_code.as_ref()), self.options.seed) {
             (Some(code), _) => SessionSeed::sealed(code, &self.participant, started, &scenario),
             (None, Some(seed)) => Ok(SessionSeed::given(seed)),
             (None, None) => SessionSeed::drawn(),
@@ -574,6 +582,7 @@ impl App {
         let is_test_run = self.test_run_origin.is_some();
         let completion = self.background_progress();
         let App { screen, exercise_list, history, options, words, settings, participant, viewport, .. } = self;
+        let examiner_code = options.seed_code.is_none().then_some(&mut self.examiner_code);
         match screen {
             Screen::ExerciseList => {
                 let context = ListContext { history, settings, words };
@@ -587,7 +596,8 @@ impl App {
             }
             Screen::Briefing => {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
-                    briefing::briefing_ui(ui, scenario, participant, completion, words, commands);
+                    let fields = BriefingFields { participant, examiner_code };
+                    briefing::briefing_ui(ui, scenario, fields, completion, words, commands);
                 }
             }
             Screen::Lesson(lesson) if lesson.are_stages_over && !lesson.is_submitted => {

@@ -8,20 +8,36 @@ use eframe::egui;
 use typodont_exercise::scenario::{Scenario, Stage};
 use typodont_lesson as lesson;
 
-/// Draws the exercise's instructions, and the field for the participant code.
+/// What is typed before an exercise.
+pub struct BriefingFields<'a> {
+    pub participant: &'a mut String,
+    /// Examiner's code, empty for a session without one; `None` where the code was given at the command line.
+    pub examiner_code: Option<&'a mut String>,
+}
+
+/// Returns true if a session with this examiner's code, which may be empty, can begin.
+pub fn is_valid_examiner_code(code: &str) -> bool {
+    code.is_empty() || lesson::is_long_enough(code)
+}
+
+/// Draws the exercise's instructions, and the fields for the participant code and for the examiner's code.
 pub fn briefing_ui(
     ui: &mut egui::Ui,
     scenario: &Scenario,
-    participant: &mut String,
+    fields: BriefingFields,
     completion: Option<CompletionProgress>,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
+    let BriefingFields { participant, examiner_code } = fields;
+    let mut examiner_code = examiner_code.filter(|_| lesson::is_sealable(scenario));
     theme::centered_column(ui, |ui| {
         ui.heading(words.own(&scenario.texts, &scenario.title));
         ui.label(words.own(&scenario.texts, &scenario.summary));
         ui.add_space(16.0);
-        let room = (ui.available_height() - if completion.is_some() { 210.0 } else { 140.0 }).max(160.0);
+        let below = [(true, 140.0), (completion.is_some(), 70.0), (examiner_code.is_some(), 60.0)];
+        let below: f32 = below.iter().filter(|(is_shown, _)| *is_shown).map(|(_, height)| height).sum();
+        let room = (ui.available_height() - below).max(160.0);
         egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
             for (number, stage) in scenario.stages.iter().enumerate() {
                 stage_ui(ui, scenario, stage, number + 1, words);
@@ -36,6 +52,10 @@ pub fn briefing_ui(
         if !lesson::is_valid_participant_code(participant) {
             ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
         }
+        let has_valid_code = examiner_code.as_ref().is_none_or(|code| is_valid_examiner_code(code.as_str()));
+        if let Some(code) = examiner_code.as_deref_mut() {
+            examiner_code_ui(ui, code, words);
+        }
         ui.add_space(8.0);
         if let Some(progress) = completion {
             // Drawing images takes all processors, and the next session's force would suffer.
@@ -43,7 +63,7 @@ pub fn briefing_ui(
             theme::progress_bar(ui, words.get(progress.key), progress.share);
         }
         ui.horizontal(|ui| {
-            let is_ready = completion.is_none() && lesson::is_valid_participant_code(participant);
+            let is_ready = completion.is_none() && has_valid_code && lesson::is_valid_participant_code(participant);
             if ui.add_enabled(is_ready, theme::primary_button(words.get("briefing.begin"))).clicked() {
                 commands.push(AppCommand::BeginLesson);
             }
@@ -52,6 +72,19 @@ pub fn briefing_ui(
             }
         });
     });
+}
+
+/// Draws the field for the code that makes an examination of the session.
+fn examiner_code_ui(ui: &mut egui::Ui, code: &mut String, words: &Translations) {
+    ui.horizontal(|ui| {
+        let label = ui.label(words.get("briefing.code")).id;
+        let edit = egui::TextEdit::singleline(code).password(true).char_limit(200).desired_width(180.0);
+        ui.add(edit.hint_text(words.get("briefing.code_hint"))).labelled_by(label);
+    });
+    match is_valid_examiner_code(code) {
+        true => ui.weak(words.get("briefing.code_about")),
+        false => ui.colored_label(theme::ERROR, words.get("briefing.code_short")),
+    };
 }
 
 fn stage_ui(ui: &mut egui::Ui, scenario: &Scenario, stage: &Stage, number: usize, words: &Translations) {

@@ -1,9 +1,7 @@
 //! Key of the link to a second device: from a file, the environment or, with a warning, the command line.
 
 use super::CliError;
-use super::secret_file::require_private;
-use std::fs::OpenOptions;
-use std::io::{ErrorKind, Write};
+use super::secret_file::{self, require_private};
 use std::path::Path;
 
 /// Environment variable with the key.
@@ -53,18 +51,5 @@ pub fn read(file: Option<&Path>, typed: Option<TypedKey>, file_option: &str) -> 
 /// A message if the file exists or cannot be written.
 pub fn write_new(path: &Path) -> Result<(), CliError> {
     let key = typodont_devices::generate_key().map_err(|why| CliError::wrong(format!("no-key: {why}")))?;
-    let mut options = OpenOptions::new();
-    options.write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    let written = options.open(path).and_then(|mut file| writeln!(file, "{key}"));
-    written.map_err(|error| {
-        let place = path.display();
-        CliError::wrong(match error.kind() {
-            ErrorKind::AlreadyExists => {
-                format!("{place}: known-file: the file already exists; choose another name, or delete it first")
-            }
-            _ => format!("{place}: unwritable-file: {error}"),
-        })
-    })
+    secret_file::write_new(path, &key)
 }

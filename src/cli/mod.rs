@@ -41,7 +41,6 @@ mod progress;
 #[cfg(feature = "review")]
 mod review;
 mod run;
-#[cfg(any(feature = "devices", feature = "school"))]
 mod secret_file;
 #[cfg(feature = "school")]
 mod school;

@@ -6,7 +6,7 @@ use super::link_key::{self, TypedKey};
 use super::live;
 #[cfg(not(all(feature = "desktop", feature = "devices")))]
 use super::missing_part;
-use super::{CliError, SESSIONS, print_line};
+use super::{CliError, SESSIONS, print_line, secret_file};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::collections::BTreeMap;
@@ -31,7 +31,8 @@ const SCRIPTED: &str = "scripted";
 #[derive(Args)]
 pub struct Arguments {
     /// Scenario file of the exercise
-    scenario: PathBuf,
+    #[arg(required_unless_present = "new_code")]
+    scenario: Option<PathBuf>,
     /// Run without a window, as fast as the computer allows
     #[arg(long)]
     headless: bool,
@@ -64,6 +65,9 @@ pub struct Arguments {
     /// input. What is drawn stays unknown until the end of the session
     #[arg(long, value_name = "FILE", conflicts_with = "seed")]
     seed_sealed: Option<PathBuf>,
+    /// Write a new random examiner's code to a file that only you can read, and end
+    #[arg(long, value_name = "FILE", exclusive = true)]
+    new_code: Option<PathBuf>,
     /// CT volume, or label map as written by `typodont import` (NRRD), used instead of the exercise's own tooth
     #[arg(long, value_name = "VOLUME")]
     tooth: Option<PathBuf>,
@@ -161,13 +165,25 @@ pub enum SessionDriver {
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+    if let Some(path) = &arguments.new_code {
+        secret_file::write_new(path, &lesson::new_examiner_code()?)?;
+        return print_line(format!(
+            "{}: a new code; give it by --seed-sealed, or type it in the window",
+            path.display()
+        ));
+    }
+    let Some(scenario) = &arguments.scenario else { return Err(CliError::misuse("SCENARIO is required")) };
+    run_exercise(arguments, scenario)
+}
+
+fn run_exercise(arguments: &Arguments, exercise: &Path) -> Result<(), CliError> {
     super::check_output_folder(&arguments.out)?;
     let is_scripted = arguments.device == SCRIPTED;
     if !arguments.headless && (is_scripted || arguments.device == MOUSE) {
-        return open_in_window(arguments);
+        return open_in_window(arguments, exercise);
     }
-    let library = lesson::library_for(&arguments.scenario);
-    let mut scenario = lesson::read_scenario(&arguments.scenario, ResolveMode::MakeWorkpiece)?;
+    let library = lesson::library_for(exercise);
+    let mut scenario = lesson::read_scenario(exercise, ResolveMode::MakeWorkpiece)?;
     let mut digests = BTreeMap::new();
     if let Some(scan) = read_tooth_scan(arguments)? {
         scan.replace_teeth(&mut scenario)?;
@@ -219,15 +235,15 @@ fn open_devices(_: &Arguments) -> Result<SessionDriver, CliError> {
 
 /// Complains that this build has no window.
 #[cfg(not(feature = "desktop"))]
-fn open_in_window(_: &Arguments) -> Result<(), CliError> {
+fn open_in_window(_: &Arguments, _: &Path) -> Result<(), CliError> {
     Err(missing_part::error("the window; without it, give --headless", "desktop"))
 }
 
 /// Opens the exercise in the window of the desktop application.
 #[cfg(feature = "desktop")]
-fn open_in_window(arguments: &Arguments) -> Result<(), CliError> {
+fn open_in_window(arguments: &Arguments, exercise: &Path) -> Result<(), CliError> {
     super::open_window(typodont_app::AppOptions {
-        exercise: Some(arguments.scenario.clone()),
+        exercise: Some(exercise.to_path_buf()),
         tooth: read_tooth_scan(arguments)?,
         second: second_hand_source(arguments)?,
         begins_at_once: arguments.begin,

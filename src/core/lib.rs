@@ -26,6 +26,7 @@ pub mod frame;
 pub mod mesh;
 pub mod image;
 pub mod mailbox;
+pub mod readable_key;
 pub mod parallel;
 pub mod statistics;
 pub mod volume;

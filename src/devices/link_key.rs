@@ -8,6 +8,7 @@
 use argon2::{Algorithm, Argon2, Params, Version};
 use hmac::{Hmac, KeyInit, Mac};
 use sha2::Sha256;
+use typodont_core::readable_key::{KEY_BYTES, readable_key};
 
 /// Cost of stretching: 64 MiB, three passes, one lane; a tenth of a second to half a second once per connection
 /// (RFC 9106, section 4, second recommendation, with one lane in place of four). A try cannot be made cheaper than this.
@@ -48,24 +49,15 @@ fn expanded(key: &[u8; 32], purpose: &[u8]) -> [u8; 32] {
     hmac.finalize().into_bytes().into()
 }
 
-/// Letters of a generated key: 32 that are not mistaken for one another when they are read aloud or copied.
-const LETTERS: &[u8; 32] = b"abcdefghjkmnpqrstuvwxyz023456789";
-
-/// Groups of a generated key, and letters in each: 125 bits.
-const GROUPS: usize = 5;
-const GROUP_LETTERS: usize = 5;
-
 /// Returns a new random key, such as `k3f9w-…`.
 ///
 /// # Errors
 ///
 /// Returns a message when the system's random number generator fails.
 pub fn generate_key() -> Result<String, String> {
-    let mut bytes = [0; GROUPS * GROUP_LETTERS];
+    let mut bytes = [0; KEY_BYTES];
     getrandom::fill(&mut bytes).map_err(|e| format!("the system's random number generator failed: {e}"))?;
-    // 256 is a multiple of 32, so that every letter is equally probable.
-    let letters = bytes.map(|byte| char::from(LETTERS[usize::from(byte) % LETTERS.len()]));
-    Ok(letters.chunks(GROUP_LETTERS).map(|group| group.iter().collect::<String>()).collect::<Vec<_>>().join("-"))
+    Ok(readable_key(&bytes))
 }
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ pub use error::LessonError;
 pub use exercise_warnings::{ExerciseWarning, IDLE_POINTS_MAX, caries_warnings, exercise_warnings};
 pub use inputs::{is_valid_participant_code, library_for, read_scenario, scenario_files};
 pub use preparation::{PreparedSession, RecordedSession, SessionConfig};
-pub use seed::SessionSeed;
+pub use seed::{SessionSeed, is_long_enough, is_sealable, new_examiner_code};
 pub use session_folder::{Attempt, InterruptedSession, SessionFolder};
 pub use tooth_scan::ToothScan;
 

@@ -2,6 +2,7 @@
 
 use super::LessonError;
 use jiff::Timestamp;
+use typodont_core::readable_key::{KEY_BYTES, readable_key};
 use typodont_exercise::record::{CODE_MIN, SeedOriginFile, sealed_seed};
 use typodont_exercise::scenario::Scenario;
 
@@ -41,10 +42,10 @@ impl SessionSeed {
         started: Timestamp,
         scenario: &Scenario,
     ) -> Result<SessionSeed, LessonError> {
-        if code.chars().count() < CODE_MIN {
+        if !is_long_enough(code) {
             return Err(LessonError::ShortCode { least: CODE_MIN });
         }
-        if !scenario.stages.iter().any(|stage| stage.draw.is_some()) || scenario.is_workpiece_drawn() {
+        if !is_sealable(scenario) {
             return Err(LessonError::NotSealable { scenario: scenario.id.clone() });
         }
         let value = sealed_seed(code, participant, &started_text(started), &scenario.sha256);
@@ -54,6 +55,27 @@ impl SessionSeed {
     pub fn is_sealed(&self) -> bool {
         self.origin == SeedOriginFile::Sealed
     }
+}
+
+/// Returns true if an examiner's code has enough characters.
+pub fn is_long_enough(code: &str) -> bool {
+    code.chars().count() >= CODE_MIN
+}
+
+/// Returns true if everything that an exercise leaves to chance can be sealed: it has a draw, and no other random choices.
+pub fn is_sealable(scenario: &Scenario) -> bool {
+    scenario.stages.iter().any(|stage| stage.draw.is_some()) && !scenario.is_workpiece_drawn()
+}
+
+/// Returns a new examiner's code that cannot be guessed, such as `k3f9w-…`.
+///
+/// # Errors
+///
+/// [`LessonError::NoRandomness`] if the system gives no random numbers.
+pub fn new_examiner_code() -> Result<String, LessonError> {
+    let mut bytes = [0; KEY_BYTES];
+    getrandom::fill(&mut bytes).map_err(|why| LessonError::NoRandomness { why: why.to_string() })?;
+    Ok(readable_key(&bytes))
 }
 
 /// The start of a session as recordings contain it.

@@ -6,11 +6,12 @@
 //!
 //! The seed depends on the session as well as on the code, so that the same code gives each participant, and each
 //! session of a participant, draws of its own. A recording reveals the seed and not the code, which may be used again.
-//! Anybody who knows the code before the session ends can compute the draws, and so can anybody who guesses it, at
-//! [`ROUNDS`] digests a guess.
+//! Anybody who knows the code before the session ends can compute the draws, and so can anybody who guesses it. The code
+//! is therefore stretched by Argon2id, which takes memory and time for every guess, on any hardware.
 
 use super::file::RecordingHeadFile;
 use crate::scenario::hex;
+use argon2::{Algorithm, Argon2, Params, Version};
 use mcap::MAGIC;
 use mcap::records::op;
 use serde::{Deserialize, Serialize};
@@ -19,8 +20,12 @@ use sha2::{Digest, Sha256};
 /// Name of the metadata record that reveals the seed of a sealed session.
 pub(super) const SEED: &str = "seed";
 
-/// Number of SHA-256 digests between a code and its seed: about 20 ms, which slows down the guessing of codes.
-const ROUNDS: u32 = 100_000;
+/// Cost of a guess: 64 MiB, three passes, one lane; a tenth of a second to half a second once per session (RFC 9106,
+/// section 4, second recommendation, with one lane in place of four). A changed cost changes all seeds, and with them what
+/// `finish` needs of a session that was cut off: it belongs to [`super::VERSION`].
+const MEMORY_KIB: u32 = 64 << 10;
+const PASSES: u32 = 3;
+const LANES: u32 = 1;
 
 /// Fewest characters of an examiner's code.
 pub const CODE_MIN: usize = 12;
@@ -31,13 +36,16 @@ pub(super) struct SeedFile {
     pub seed: u64,
 }
 
-/// Returns the seed of a session from the examiner's code; below 2⁵³, so that every JSON reader keeps it exactly.
+/// Returns the seed of a session from the examiner's code; below 2⁵³, so that every JSON reader keeps it exactly. Takes
+/// 64 MiB of memory and up to half a second.
 pub fn sealed_seed(code: &str, participant: &str, started: &str, scenario_sha256: &str) -> u64 {
-    let mut digest = session_digest("seed", participant, started, scenario_sha256);
-    for _ in 0..ROUNDS {
-        digest = Sha256::new().chain_update(digest).chain_update(code).finalize().into();
-    }
-    let [a, b, c, d, e, f, g, h, ..] = digest;
+    let salt = session_digest("seed", participant, started, scenario_sha256);
+    let mut stretched = [0; 32];
+    let params = Params::new(MEMORY_KIB, PASSES, LANES, Some(stretched.len()));
+    Argon2::new(Algorithm::Argon2id, Version::V0x13, params.expect("the costs are within Argon2's limits"))
+        .hash_password_into(code.as_bytes(), &salt, &mut stretched)
+        .expect("the code, the salt and the output have lengths that Argon2 takes");
+    let [a, b, c, d, e, f, g, h, ..] = stretched;
     u64::from_le_bytes([a, b, c, d, e, f, g, h]) >> 11
 }
 
@@ -113,6 +121,8 @@ mod tests {
         let seed = sealed_seed("a code of the school", "anna", "2026-05-01T09:00:00Z", "ab");
         assert_eq!(seed, sealed_seed("a code of the school", "anna", "2026-05-01T09:00:00Z", "ab"));
         assert!(seed < 1 << 53);
+        // Another implementation of Argon2id gives the same seed (argon2-cffi, hash_secret_raw).
+        assert_eq!(seed, 667_621_344_426_805);
         for (code, participant, started, scenario) in [
             ("another code of it", "anna", "2026-05-01T09:00:00Z", "ab"),
             ("a code of the school", "berk", "2026-05-01T09:00:00Z", "ab"),
