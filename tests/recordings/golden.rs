@@ -16,8 +16,8 @@ use typodont_exercise::score;
 use typodont_report::SessionFile;
 
 /// One recording of each version of the format.
-const VERSIONS: [&str; 2] = ["tests/golden/version-1", "tests/golden/version-2"];
-const GOLDEN: &str = "tests/golden/version-2.mcap";
+const VERSIONS: [&str; 3] = ["tests/golden/version-1", "tests/golden/version-2", "tests/golden/version-3"];
+const GOLDEN: &str = "tests/golden/version-3.mcap";
 
 #[test]
 fn golden_recordings_replay_and_score_unchanged() {
