@@ -8,7 +8,7 @@ use eframe::egui;
 use typodont_exercise::scenario::{Scenario, Stage};
 use typodont_lesson as lesson;
 
-/// What is typed before an exercise.
+/// Texts typed before an exercise.
 pub struct BriefingFields<'a> {
     pub participant: &'a mut String,
     /// Examiner's code, empty for a session without one; `None` where the code was given at the command line.
