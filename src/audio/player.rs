@@ -15,9 +15,9 @@ use super::synth::{Synth, SynthOptions};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 use typodont_core::mailbox;
 use typodont_core::mailbox::{Receiver, Sender};
+use web_time::{Duration, Instant};
 
 /// Events of the player. Each is sent once, and again only after its opposite.
 #[derive(Clone, Debug, PartialEq)]

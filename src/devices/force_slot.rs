@@ -3,10 +3,10 @@
 //!
 //! Takes outputs from one thread; gives the newest one to another. Never waits, never allocates.
 
-use std::time::{Duration, Instant};
 use typodont_core::device::Wrench;
 use typodont_core::frame::Vec3;
 use typodont_core::mailbox::SeqLock;
+use web_time::{Duration, Instant};
 
 /// Longest time for which a force may be sent after the servo wrote it: ten ticks. With a longer time, a stalled
 /// program would keep pushing the hand; with a much shorter one, every short delay of a busy machine could be felt.

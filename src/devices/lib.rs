@@ -26,26 +26,38 @@
 //! assert!(reading.pose.position.distance(Vec3::X * 10.0) < 0.01);
 //! ```
 
+#[cfg(not(target_family = "wasm"))]
 pub mod access;
 mod coupling;
 mod driver;
+#[cfg(not(target_family = "wasm"))]
 mod forcedimension;
+#[cfg(not(target_family = "wasm"))]
 mod haply;
+#[cfg(not(target_family = "wasm"))]
 pub mod hid;
 mod link_key;
 mod link;
 pub mod mouse;
+#[cfg(not(target_family = "wasm"))]
 pub mod open_handle;
+#[cfg(not(target_family = "wasm"))]
 mod openhaptics;
+#[cfg(not(target_family = "wasm"))]
 pub mod polhem;
 pub mod realtime;
 mod registry;
+#[cfg(not(target_family = "wasm"))]
 mod relay;
 pub mod servo;
+#[cfg(not(target_family = "wasm"))]
 mod shared_library;
+#[cfg(not(target_family = "wasm"))]
 pub mod spacemouse;
+#[cfg(not(target_family = "wasm"))]
 mod stream;
 mod force_slot;
+#[cfg(not(target_family = "wasm"))]
 mod report_filter;
 
 pub use coupling::{Coupling, CouplingParams, DelayedPosition};
@@ -54,4 +66,5 @@ pub use force_slot::FORCE_LIFE;
 pub use link::{HandLink, LinkedHand};
 pub use link_key::generate_key;
 pub use registry::{DRIVERS, NamedDevice, UnknownDriverError, driver_by_name};
+#[cfg(not(target_family = "wasm"))]
 pub use relay::{DeviceReport, Protocol, Relay};

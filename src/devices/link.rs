@@ -20,9 +20,9 @@ use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 use typodont_core::frame::{Quat, Vec3};
 use typodont_core::mailbox::SeqLock;
+use web_time::{Duration, Instant};
 
 /// State of one hand as sent to the other end. World space, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -51,9 +51,14 @@ fn raise_to_realtime() -> bool {
     set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy).is_ok()
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
 fn raise_to_realtime() -> bool {
     thread_priority::set_current_thread_priority(thread_priority::ThreadPriority::Max).is_ok()
+}
+
+#[cfg(not(any(unix, windows)))]
+fn raise_to_realtime() -> bool {
+    false
 }
 
 /// Sets the timer slack to its minimum. Linux lets ordinary threads oversleep by 50 µs to save power: 5 % of a tick.

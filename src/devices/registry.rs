@@ -4,6 +4,7 @@ use super::driver::Driver;
 use std::fmt;
 
 /// All drivers, in the order in which `typodont devices` lists them.
+#[cfg(not(target_family = "wasm"))]
 pub static DRIVERS: &[&dyn Driver] = &[
     &crate::mouse::MouseDriver,
     &crate::spacemouse::SpaceMouseDriver,
@@ -14,6 +15,10 @@ pub static DRIVERS: &[&dyn Driver] = &[
     &crate::open_handle::OpenHandleDriver,
     &crate::stream::StreamDriver,
 ];
+
+/// All drivers of a browser.
+#[cfg(target_family = "wasm")]
+pub static DRIVERS: &[&dyn Driver] = &[&crate::mouse::MouseDriver];
 
 /// Returns the driver with this name.
 pub fn driver_by_name(name: &str) -> Option<&'static dyn Driver> {

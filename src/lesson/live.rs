@@ -242,6 +242,9 @@ impl LiveSession {
         observer: &mut O,
     ) -> Result<Vec<LiveEvent>, LiveError<O::Error>> {
         let mut events = Vec::new();
+        if let Some(servo) = self.servo_mut() {
+            servo.advance();
+        }
         // Checked before the events are fetched: a servo that has ended sends no more of them.
         let has_ended = self.servo().is_some_and(|servo| servo.has_ended());
         while !session.are_stages_over() {

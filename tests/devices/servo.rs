@@ -107,6 +107,48 @@ fn wander(hand: &SharedHand, ms: u64) {
 }
 
 #[test]
+fn a_servo_without_a_thread_makes_up_for_a_tenth_of_a_second_and_counts_the_rest() {
+    // Aim: in a page, which has no threads, the same ticks run as natively, and none is lost in silence. Method: poll late
+    // by a little and by a lot; every reading is stepped again by hand; ticks run and ticks missed are the time that passed.
+    let hand = SharedHand::at_rest(0.0);
+    let before = Instant::now();
+    let simulation = Simulation::new(world());
+    let mut servo = Servo::start_inline(simulation, Box::new(InHand::new(&hand)), None, TimingStats::default());
+    let mut ticks: Vec<TickReport> = Vec::new();
+    let mut edits = Vec::new();
+    let mut run_after = |servo: &mut Servo, wait: u64, to: Vec3| {
+        hand.reach(to);
+        std::thread::sleep(Duration::from_millis(wait));
+        servo.advance();
+        let count = ticks.len();
+        while let Some(event) = servo.next_event() {
+            if let ServoEvent::Ticked(tick) = event {
+                servo.take_edits(&tick, &mut edits);
+                ticks.push(tick);
+            }
+        }
+        ticks.len() - count
+    };
+    assert!(run_after(&mut servo, 20, Vec3::new(3.0, 2.0, 0.0)) >= 20);
+    assert_eq!(run_after(&mut servo, 400, Vec3::new(3.0, -1.5, 0.0)), 100, "no more than a tenth of a second");
+    assert!(run_after(&mut servo, 30, Vec3::new(3.0, -1.5, 0.0)) >= 30);
+    servo.send(ServoCommand::Pause);
+    run_after(&mut servo, 5, Vec3::new(3.0, -1.5, 0.0));
+    assert_eq!(run_after(&mut servo, 5, Vec3::new(3.0, -1.5, 0.0)), 0, "a pause");
+    let elapsed = before.elapsed().as_millis() as u64;
+    let ended = servo.stop().unwrap();
+    let due = ended.timing.late.count() + ended.timing.missed;
+    assert!(ended.timing.missed >= 300 && due <= elapsed && due + 5 >= 460, "{due} of {elapsed} ms");
+    assert_eq!((ended.timing.late_releases, ended.timing.dropped_events), (0, 0));
+    let mut again = Simulation::new(world());
+    for tick in &ticks {
+        assert_eq!(again.step(&tick.reading), tick.step);
+    }
+    assert!(ticks.iter().any(|tick| tick.step.touch.is_some()), "the bur touched nothing");
+    assert_eq!(edits.len(), ticks.iter().map(|tick| tick.edits).sum::<usize>());
+}
+
+#[test]
 fn a_waiting_simulation_starts_with_the_first_movement_of_the_hand() {
     // Aim: no time passes while the trainee reads. Method: the hand trembles by less than a movement, then moves; only
     // the first tick, by which the instrument is seen, comes before. A second wait ends by request.

@@ -9,6 +9,7 @@
 //! reading, the simulation is stepped with [`Reading::ABSENT`], which gives zero force; forces fade in again over
 //! half a second.
 
+mod inline;
 mod second_hand;
 mod suction_tip;
 mod timing;
@@ -19,10 +20,10 @@ pub use timing::{DurationHistogram, TimingStats, TimingSummary};
 
 use crate::realtime;
 use crate::realtime::Priority;
+use inline::InlineServo;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant};
 use tick_timer::TickTimer;
 use typodont_core::device::{Device, DeviceError, DeviceState, Reading, Wrench};
 use typodont_core::frame::Vec3;
@@ -32,6 +33,7 @@ use typodont_core::sim::{Command, Simulation, Step};
 use typodont_core::tick::Tick;
 use typodont_core::touch::Gate;
 use typodont_core::volume::Edit;
+use web_time::{Duration, Instant};
 
 /// Commands to the servo, carried out in order before the next tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,9 +80,18 @@ pub struct Servo {
     events: Receiver<ServoEvent>,
     edits: Receiver<Edit>,
     timing: Arc<SeqLock<9>>,
-    stop: Arc<AtomicBool>,
-    /// `None` once the thread has been joined.
-    thread: Option<JoinHandle<ServoExit>>,
+    runner: ServoRunner,
+}
+
+/// Where the ticks of a servo run.
+enum ServoRunner {
+    Thread {
+        stop: Arc<AtomicBool>,
+        thread: JoinHandle<ServoExit>,
+    },
+    /// On the session's own thread, when it polls.
+    Inline(Box<InlineServo>),
+    Stopped,
 }
 
 /// Everything that a servo returns when it ends.
@@ -126,34 +137,40 @@ impl Servo {
     pub fn start(
         simulation: Simulation,
         device: Box<dyn Device + Send>,
-        mut second: Option<SecondHandLink>,
+        second: Option<SecondHandLink>,
         timing: TimingStats,
     ) -> Result<Servo, String> {
-        if let Some(second) = &mut second {
-            second.enter_world(&simulation);
+        if cfg!(target_family = "wasm") {
+            // A page has no threads.
+            return Ok(Servo::start_inline(simulation, device, second, timing));
         }
-        let (commands, inbox) = mailbox::channel(COMMAND_CAPACITY);
-        let (event_sender, events) = mailbox::channel(EVENT_CAPACITY);
-        let (edit_sender, edits) = mailbox::channel(EDIT_CAPACITY);
-        let summary = Arc::new(SeqLock::new());
-        let sink = EventSink { events: event_sender, edits: edit_sender, timing, summary: summary.clone() };
-        let servo = ServoLoop {
-            simulation,
-            device,
-            second,
-            commands: inbox,
-            sink,
-            output: Wrench::ZERO,
-            state: None,
-            is_paused: false,
-            awaited: None,
-            is_hand_trusted: false,
-        };
+        let (servo_loop, mut servo) = ServoLoop::new(simulation, device, second, timing);
         let stop = Arc::new(AtomicBool::new(false));
         let should_stop = stop.clone();
-        let thread = thread::Builder::new().name("servo".into()).spawn(move || servo.run(&should_stop));
+        let thread = thread::Builder::new().name("servo".into()).spawn(move || servo_loop.run(&should_stop));
         let thread = thread.map_err(|e| format!("cannot start a thread for the servo: {e}"))?;
-        Ok(Servo { commands, events, edits, timing: summary, stop, thread: Some(thread) })
+        servo.runner = ServoRunner::Thread { stop, thread };
+        Ok(servo)
+    }
+
+    /// Starts a servo without a thread: [`Servo::advance`] runs the ticks that have become due. Only for a device that
+    /// renders no force, because many ticks run at once.
+    pub fn start_inline(
+        simulation: Simulation,
+        device: Box<dyn Device + Send>,
+        second: Option<SecondHandLink>,
+        timing: TimingStats,
+    ) -> Servo {
+        let (servo_loop, mut servo) = ServoLoop::new(simulation, device, second, timing);
+        servo.runner = ServoRunner::Inline(Box::new(InlineServo::new(servo_loop)));
+        servo
+    }
+
+    /// Runs the ticks that have become due, if this servo has no thread.
+    pub fn advance(&mut self) {
+        if let ServoRunner::Inline(servo) = &mut self.runner {
+            servo.advance();
+        }
     }
 
     /// Sends a command; returns false if the channel is full or the servo has ended.
@@ -178,7 +195,11 @@ impl Servo {
 
     /// Returns whether the thread has ended by itself because the device is lost.
     pub fn has_ended(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+        match &self.runner {
+            ServoRunner::Thread { thread, .. } => thread.is_finished(),
+            ServoRunner::Inline(servo) => servo.has_ended(),
+            ServoRunner::Stopped => true,
+        }
     }
 
     /// Stops the servo and waits for its thread. Events that have not been received are lost: receive them first.
@@ -187,8 +208,14 @@ impl Servo {
     ///
     /// Returns an error if the thread panicked; the hand was released then.
     pub fn stop(mut self) -> Result<ServoExit, String> {
-        self.stop.store(true, Ordering::Release);
-        let exit = self.thread.take().and_then(|thread| thread.join().ok());
+        let exit = match std::mem::replace(&mut self.runner, ServoRunner::Stopped) {
+            ServoRunner::Thread { stop, thread } => {
+                stop.store(true, Ordering::Release);
+                thread.join().ok()
+            }
+            ServoRunner::Inline(servo) => Some(servo.stop()),
+            ServoRunner::Stopped => None,
+        };
         exit.ok_or_else(|| "the servo crashed and switched the forces off; please report this".to_string())
     }
 }
@@ -196,8 +223,8 @@ impl Servo {
 /// Dropping a servo stops it and releases the hand.
 impl Drop for Servo {
     fn drop(&mut self) {
-        self.stop.store(true, Ordering::Release);
-        if let Some(thread) = self.thread.take() {
+        if let ServoRunner::Thread { stop, thread } = std::mem::replace(&mut self.runner, ServoRunner::Stopped) {
+            stop.store(true, Ordering::Release);
             // The thread checks the flag every tick; the device is closed together with the thread's result.
             let _ = thread.join();
         }
@@ -271,11 +298,46 @@ struct ServoLoop {
 }
 
 impl ServoLoop {
+    /// Creates a servo that does not run yet, and the session's ends of its channels.
+    fn new(
+        simulation: Simulation,
+        device: Box<dyn Device + Send>,
+        mut second: Option<SecondHandLink>,
+        timing: TimingStats,
+    ) -> (ServoLoop, Servo) {
+        if let Some(second) = &mut second {
+            second.enter_world(&simulation);
+        }
+        let (commands, inbox) = mailbox::channel(COMMAND_CAPACITY);
+        let (event_sender, events) = mailbox::channel(EVENT_CAPACITY);
+        let (edit_sender, edits) = mailbox::channel(EDIT_CAPACITY);
+        let summary = Arc::new(SeqLock::new());
+        let sink = EventSink { events: event_sender, edits: edit_sender, timing, summary: summary.clone() };
+        let servo = ServoLoop {
+            simulation,
+            device,
+            second,
+            commands: inbox,
+            sink,
+            output: Wrench::ZERO,
+            state: None,
+            is_paused: false,
+            awaited: None,
+            is_hand_trusted: false,
+        };
+        (servo, Servo { commands, events, edits, timing: summary, runner: ServoRunner::Stopped })
+    }
+
     /// Runs the servo until it is stopped or its device fails.
     fn run(mut self, should_stop: &AtomicBool) -> ServoExit {
         let priority = realtime::raise_thread_priority();
         self.sink.send(ServoEvent::Started(priority));
         let device_error = self.run_ticks(TickTimer::new(&*self.device, priority), should_stop);
+        self.exit(priority, device_error)
+    }
+
+    /// Releases the hand and returns everything that the next servo takes over.
+    fn exit(mut self, priority: Priority, device_error: Option<DeviceError>) -> ServoExit {
         if device_error.is_none() {
             // Even if this last exchange fails, the relay sends no force older than ten ticks.
             let _ = self.device.exchange(&Wrench::ZERO);
@@ -297,19 +359,26 @@ impl ServoLoop {
             if late.is_none() && exchanged.is_ok() {
                 continue;
             }
-            self.drain_commands();
-            let is_ready = self.report_state().is_ready();
-            match exchanged {
-                Ok(reading) if is_ready && !self.is_paused && !self.is_awaiting(&reading) => {
-                    self.run_tick(reading, late.unwrap_or_default())
-                }
-                Ok(_) => self.release_if_held(),
-                Err(gone) => {
-                    self.release_if_held();
-                    return Some(gone);
-                }
+            if let Err(gone) = self.process(exchanged, late.unwrap_or_default()) {
+                return Some(gone);
             }
         }
+    }
+
+    /// Carries out commands, then runs a tick with what the device gave, if the simulation is to go on. Returns the error
+    /// of a device that has ended.
+    fn process(&mut self, exchanged: Result<Reading, DeviceError>, late: Duration) -> Result<(), DeviceError> {
+        self.drain_commands();
+        let is_ready = self.report_state().is_ready();
+        match exchanged {
+            Ok(reading) if is_ready && !self.is_paused && !self.is_awaiting(&reading) => self.run_tick(reading, late),
+            Ok(_) => self.release_if_held(),
+            Err(gone) => {
+                self.release_if_held();
+                return Err(gone);
+            }
+        }
+        Ok(())
     }
 
     /// Carries out the commands received since the last tick.

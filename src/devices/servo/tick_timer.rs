@@ -6,9 +6,9 @@
 use crate::realtime::Priority;
 use crate::servo::timing::TimingStats;
 use std::thread;
-use std::time::{Duration, Instant};
 use typodont_core::device::{Device, Pacing};
 use typodont_core::tick::TICK_S;
+use web_time::{Duration, Instant};
 
 const TICK_INTERVAL: Duration = Duration::from_micros((TICK_S * 1e6) as u64);
 
@@ -52,6 +52,23 @@ impl TickTimer {
         while Instant::now() < self.next_due {
             std::hint::spin_loop();
         }
+    }
+
+    /// Returns the number of ticks that are due and have not run, at most `most`, and records their lateness. The oldest
+    /// beyond `most` are skipped and counted as missed.
+    pub fn ticks_due(&mut self, most: u32, stats: &mut TimingStats) -> u32 {
+        let now = Instant::now();
+        let Some(behind) = now.checked_duration_since(self.next_due) else { return 0 };
+        let due = (behind.as_secs_f64() / TICK_S) as u32 + 1;
+        let run = due.min(most);
+        stats.missed += u64::from(due - run);
+        self.next_due += TICK_INTERVAL * (due - run);
+        for _ in 0..run {
+            stats.late.add(now.saturating_duration_since(self.next_due));
+            self.next_due += TICK_INTERVAL;
+        }
+        self.last_tick = now;
+        run
     }
 
     /// Records that a tick was reached. Returns its lateness, or `None` if it comes before it is due.
