@@ -6,10 +6,11 @@ use super::completion::{Completion, CompletionProgress};
 use super::editor::{self, EditorCommand, EditorState, OpenMode};
 use super::exercise_list::{self, ExerciseList, ListContext, exercise_list_ui};
 use super::i18n::{self, Translations};
+use super::lesson_backend::{InputDevice, LessonConfig};
 use super::lesson_scene::DisplayMode;
 use super::lesson_state::LessonState;
-use super::lesson_thread::{InputDevice, LessonConfig};
 use super::messages::SecondHandStatus;
+use super::platform;
 use super::results::{BundleState, LessonResults, ResultTexts, results_ui};
 use super::screen::Screen;
 use super::session_history::SessionHistory;
@@ -148,6 +149,7 @@ impl App {
             self.last_input = now;
         }
         match &self.screen {
+            Screen::Lesson(lesson) if lesson.needs_frames() => Duration::ZERO,
             // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
             Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
             Screen::Lesson(lesson) if !lesson.are_stages_over => {
@@ -294,6 +296,7 @@ impl App {
                 }
             }
             AppCommand::OpenReport => self.open_report(ctx),
+            AppCommand::DownloadBundle => self.download_bundle(),
             AppCommand::TryAgain => {
                 self.leave_results();
                 self.screen = Screen::Briefing;
@@ -352,6 +355,16 @@ impl App {
             && let Some(page) = results.report_url()
         {
             ctx.open_url(egui::OpenUrl::new_tab(page));
+        }
+    }
+
+    /// Gives the bundle of the results to the user as one file.
+    fn download_bundle(&mut self) {
+        if let Screen::Results(results) = &self.screen
+            && let BundleState::Finished(bundle) = &results.state
+            && let Some(complaint) = platform::download(bundle)
+        {
+            self.complaints.push(complaint);
         }
     }
 
@@ -451,7 +464,7 @@ impl App {
             Err(_) => return editor.execute(EditorCommand::Check),
         };
         let library = editor.library.clone();
-        let out = settings::config_folder().unwrap_or_else(std::env::temp_dir).join("tried");
+        let out = platform::config_folder().unwrap_or_else(std::env::temp_dir).join("tried");
         let _ = std::fs::remove_dir_all(&out);
         let left = std::mem::replace(&mut self.screen, Screen::ExerciseList);
         if let Screen::Editor(editor) = left {
@@ -539,7 +552,8 @@ impl App {
             scenario,
             seed,
             participant: self.participant.clone(),
-            out,
+            // A page has no folders.
+            out: (!platform::IS_PAGE).then_some(out),
             templates: self.options.templates.clone(),
             started,
             input_device,
@@ -693,7 +707,7 @@ impl App {
             Screen::Completion(_) => state_log.record("screen", "scoring"),
             Screen::Results(results) => {
                 if let BundleState::Finished(bundle) = &results.state {
-                    state_log.record("bundle", bundle.display());
+                    state_log.record("bundle", bundle.path().display());
                 }
                 state_log.record("screen", "results");
             }
@@ -863,7 +877,7 @@ fn capture_pointer(lesson: &mut LessonState, is_held: bool) {
 /// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the settings folder.
 fn sounds_folder() -> PathBuf {
     let beside = PathBuf::from("content/sounds");
-    match settings::config_folder() {
+    match platform::config_folder() {
         Some(folder) if !beside.is_dir() => folder.join("sounds"),
         _ => beside,
     }

@@ -35,6 +35,8 @@ pub enum AppCommand {
     /// A movement of the camera, in a lesson or at the author's screen.
     Camera(CameraCommand),
     OpenReport,
+    /// Gives the bundle to the user as one file; only in a page.
+    DownloadBundle,
     /// Shows the instructions of the exercise whose results are shown again.
     TryAgain,
     /// Scores the interrupted session that the list offers, and makes its bundle.

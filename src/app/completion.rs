@@ -1,10 +1,9 @@
 //! The making of a bundle after its session: of a lesson in this window, or of a session that was interrupted.
 
 use super::lesson_state::LessonState;
-use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use typodont_lesson::InterruptedSession;
-use typodont_report::bundle::CompletionStep;
+use typodont_report::bundle::{BundleFolder, CompletionStep};
 use typodont_report::{FirstResult, Templates};
 
 /// State of a completion, as far as its steps have been reported.
@@ -12,8 +11,8 @@ use typodont_report::{FirstResult, Templates};
 pub struct CompletionState {
     pub progress: CompletionProgress,
     pub first_result: Option<Box<FirstResult>>,
-    /// Folder of the bundle, or the reason why there is none.
-    pub outcome: Option<Result<PathBuf, String>>,
+    /// The bundle, or the reason why there is none.
+    pub outcome: Option<Result<BundleFolder, String>>,
 }
 
 /// Progress of a completion.
@@ -67,7 +66,7 @@ struct InterruptedCompletion {
 
 enum CompletionMessage {
     Step(CompletionStep),
-    Ended(Result<PathBuf, String>),
+    Ended(Result<BundleFolder, String>),
 }
 
 impl Completion {
@@ -92,7 +91,7 @@ impl Completion {
                 wake();
             };
             let ended = session.finish(&templates, &mut |step| send(CompletionMessage::Step(step)));
-            send(CompletionMessage::Ended(ended.map(|completed| completed.folder.path().to_path_buf())));
+            send(CompletionMessage::Ended(ended.map(|completed| completed.folder)));
         })?;
         let state = CompletionState::default();
         Ok(Completion(CompletionSource::Interrupted(InterruptedCompletion { messages, state })))

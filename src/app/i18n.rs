@@ -2,6 +2,7 @@
 //!
 //! A language is a file of texts by key. English and Turkish ship; a file in the settings folder's `languages` adds another.
 
+use super::platform;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -76,9 +77,9 @@ pub fn select_language(all: &[Translations], code: &str) -> Translations {
     wanted.cloned().unwrap_or_default()
 }
 
-/// Language code of the system, from its environment variables.
+/// Language code of the user's locale.
 pub fn system_language() -> String {
-    let locale = ["LC_ALL", "LC_MESSAGES", "LANG"].into_iter().find_map(|name| std::env::var(name).ok());
+    let locale = platform::locale();
     // "C.UTF-8" and "POSIX" name no language.
     let is_code = |code: &&str| code.bytes().all(|letter| letter.is_ascii_lowercase());
     let code = locale.as_deref().and_then(|locale| locale.get(..2)).filter(is_code);

@@ -3,16 +3,18 @@
 use super::answer_draft::parse_draft;
 use super::completion::CompletionState;
 use super::controls_guide::{ControlsProgress, LessonProgress};
+use super::inline_lesson::InlineLesson;
+use super::lesson_backend::{LessonBackend, LessonClient, LessonCommand, LessonConfig, LessonEvent};
+use super::lesson_run::LessonRun;
 use super::lesson_scene::{DisplayMode, LessonScene};
-use super::lesson_thread::{LessonCommand, LessonConfig, LessonEvent, LessonThread};
+use super::lesson_thread::LessonThread;
 use super::messages::{self, PauseReason, SecondHandStatus};
 use super::pointer_hand::{PointedPlace, PointerHand};
 use super::snapshot::LessonSnapshot;
 use super::view_refresh::ViewRefresh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
-use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer};
+use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer, SoundSender};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Command as Tell;
 use typodont_core::touch::{Coefficient, Materials};
@@ -24,13 +26,16 @@ use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
 use typodont_scene::particles::CollisionWorld;
 use typodont_scene::{self as scene};
+use web_time::{Duration, Instant};
 
 /// Maximum number of voxel edits taken over per frame, so that a burst of edits does not delay the frame.
 const MAX_EDITS_PER_FRAME: usize = 1 << 16;
 
 pub struct LessonState {
     pub scenario: Arc<Scenario>,
-    thread: LessonThread,
+    client: LessonClient,
+    /// Dropped after the client, whose end tells it that the window is closed.
+    backend: Box<dyn LessonBackend>,
     player: SoundPlayer,
     /// Reason why there is no sound, if there is none.
     pub audio_error: Option<String>,
@@ -110,11 +115,12 @@ impl LessonState {
         let scenario = config.scenario.clone();
         let materials = scenario.tissues.materials();
         let (sound_sender, sound_receiver) = audio::sound_channel();
-        let thread = LessonThread::start(config, sound_sender)
-            .map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
+        let (client, backend) =
+            start_lesson(config, sound_sender).map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
         Ok(LessonState {
             scenario,
-            thread,
+            client,
+            backend,
             player: SoundPlayer::start(sound_receiver, output),
             audio_error: None,
             mean_frame_time: 0.0,
@@ -161,13 +167,18 @@ impl LessonState {
         self.stage.and_then(|stage| self.scenario.stages.get(stage))
     }
 
+    /// True if the lesson runs only within frames.
+    pub fn needs_frames(&self) -> bool {
+        self.backend.needs_frames()
+    }
+
     /// True if the pointer can act as the device.
     pub fn has_mouse(&self) -> bool {
-        self.thread.mouse.is_some()
+        self.client.mouse.is_some()
     }
 
     pub fn mouse(&self) -> Option<&typodont_devices::mouse::Mouse> {
-        self.thread.mouse.as_ref()
+        self.client.mouse.as_ref()
     }
 
     /// Takes over all events of the lesson since the last frame.
@@ -190,7 +201,7 @@ impl LessonState {
         self.poll_events();
         if let Some(scene) = &mut self.scene {
             for _ in 0..MAX_EDITS_PER_FRAME {
-                let Some(edit) = self.thread.next_edit() else { break };
+                let Some(edit) = self.client.next_edit() else { break };
                 if let Some(particles) = &mut scene.particles {
                     particles.record_removal(&edit, scene.volume.grid());
                 }
@@ -198,7 +209,7 @@ impl LessonState {
                 scene.edit_count += 1;
             }
         }
-        self.snapshot = self.thread.snapshot().or(self.snapshot);
+        self.snapshot = self.client.snapshot().or(self.snapshot);
         if let Some(seen) = &self.snapshot {
             self.controls.update(&LessonProgress {
                 hand: seen.hand,
@@ -219,13 +230,14 @@ impl LessonState {
     }
 
     fn poll_events(&mut self) {
-        while let Some(event) = self.thread.next_event() {
+        self.backend.advance();
+        while let Some(event) = self.client.next_event() {
             self.apply_event(event);
         }
     }
 
     fn check_thread(&mut self) {
-        if self.completion.outcome.is_none() && self.thread.is_finished() {
+        if self.completion.outcome.is_none() && self.client.is_finished() {
             self.completion.outcome = Some(Err(
                 "broken-off: the session ended unexpectedly; its recording is in the folder of finished sessions, and \
                  the list of exercises offers to finish it when the program is started again"
@@ -289,7 +301,7 @@ impl LessonState {
                 self.is_scoring = true;
                 self.completion.apply(step);
             }
-            LessonEvent::Finished(path) => self.completion.outcome = Some(Ok(path)),
+            LessonEvent::Finished(bundle) => self.completion.outcome = Some(Ok(bundle)),
             LessonEvent::Failed(why) => self.completion.outcome = Some(Err(why)),
         }
     }
@@ -369,7 +381,7 @@ impl LessonState {
 
     /// Sends a command to the lesson. Returns false, and sets a message, if the lesson has ended.
     fn send(&mut self, command: LessonCommand) -> bool {
-        let is_accepted = self.thread.send(command);
+        let is_accepted = self.client.send(command);
         if !is_accepted {
             self.refusal_key = Some(messages::NOT_LISTENING);
         }
@@ -438,12 +450,12 @@ impl LessonState {
 
     /// Aims the hand at the surface under the pointer.
     pub fn point_at(&mut self, place: Option<PointedPlace>) {
-        let LessonState { thread, scene: Some(scene), snapshot: Some(snapshot), scenario, orbit, pointer_hand, .. } =
+        let LessonState { client, scene: Some(scene), snapshot: Some(snapshot), scenario, orbit, pointer_hand, .. } =
             self
         else {
             return;
         };
-        let Some(mouse) = thread.mouse.as_ref().filter(|_| self.is_pointer_captured) else { return };
+        let Some(mouse) = client.mouse.as_ref().filter(|_| self.is_pointer_captured) else { return };
         if let Some(instrument) = scenario.instruments.get(snapshot.instrument as usize) {
             pointer_hand.point_at(place, mouse, orbit, scene, snapshot, instrument);
         }
@@ -500,7 +512,7 @@ impl LessonState {
         if is_paused {
             self.release_pointer();
         }
-        self.thread.send(LessonCommand::Pause(is_paused));
+        self.client.send(LessonCommand::Pause(is_paused));
     }
 
     /// Submits the questionnaire with the present ratings.
@@ -512,7 +524,7 @@ impl LessonState {
             self.submit(Input::Rate { item, value });
         }
         self.ended = Some(Instant::now());
-        self.is_submitted = self.thread.send(LessonCommand::FinishQuestionnaire);
+        self.is_submitted = self.client.send(LessonCommand::FinishQuestionnaire);
     }
 
     /// Aborts the lesson; all actions, answers and ratings so far are kept.
@@ -522,4 +534,17 @@ impl LessonState {
             false => self.submit(Input::Abort),
         }
     }
+}
+
+/// Begins a lesson where this platform can run it. A lesson that cannot begin reports [`LessonEvent::Failed`].
+///
+/// # Errors
+/// The system's error if the lesson needs a thread that cannot be started.
+fn start_lesson(config: LessonConfig, sounds: SoundSender) -> std::io::Result<(LessonClient, Box<dyn LessonBackend>)> {
+    let (client, run) = LessonRun::new(config, sounds);
+    let backend: Box<dyn LessonBackend> = match cfg!(target_family = "wasm") {
+        true => Box::new(InlineLesson::new(run)),
+        false => Box::new(LessonThread::start(run)?),
+    };
+    Ok((client, backend))
 }

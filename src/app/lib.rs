@@ -15,10 +15,14 @@
 
 mod editor;
 mod briefing;
+mod lesson_backend;
+mod lesson_run;
 mod lesson_thread;
+mod inline_lesson;
 mod command;
 mod screen;
 mod app;
+mod platform;
 mod state_log;
 mod shortcuts;
 mod i18n;
@@ -50,11 +54,13 @@ mod transfer_function_editor;
 mod transfer_function_draft;
 mod viewport;
 mod camera_preset;
+#[cfg(not(target_family = "wasm"))]
 pub mod readiness;
 
 pub use editor::OpenMode;
 
 use app::App;
+#[cfg(not(target_family = "wasm"))]
 use eframe::egui;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -111,15 +117,18 @@ impl AppOptions {
 }
 
 /// Width and height of a new window, points: fits a small laptop's screen.
+#[cfg(not(target_family = "wasm"))]
 const SIZE: [f32; 2] = [1280.0, 780.0];
 
 /// Minimum width and height, points; below it parts of the window would be cut off.
+#[cfg(not(target_family = "wasm"))]
 const SIZE_LEAST: [f32; 2] = [960.0, 640.0];
 
 /// Opens the window; returns when it is closed.
 ///
 /// # Errors
 /// A message with the reason why the window cannot be opened, and the remedy.
+#[cfg(not(target_family = "wasm"))]
 pub fn open_window(options: AppOptions) -> Result<(), String> {
     let viewport = egui::ViewportBuilder::default()
         .with_title("Typodont")
@@ -140,7 +149,23 @@ pub fn open_window(options: AppOptions) -> Result<(), String> {
     })
 }
 
+/// Runs the program in a canvas of a page; returns once it has begun.
+///
+/// # Errors
+/// The browser's reason why nothing can be drawn.
+#[cfg(target_family = "wasm")]
+pub async fn open_page(canvas: web_sys::HtmlCanvasElement, options: AppOptions) -> Result<(), String> {
+    let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
+        Ok(Box::new(App::new(context, options)))
+    });
+    // As in a window: rendering in software is common, and dithering would take a large part of it.
+    let web = eframe::WebOptions { dithering: false, ..Default::default() };
+    let began = eframe::WebRunner::new().start(canvas, web, made).await;
+    began.map_err(|error| error.as_string().unwrap_or_else(|| format!("{error:?}")))
+}
+
 /// The text of an error without the line of winit's own source with which it begins, which is of no use to the user.
+#[cfg(not(target_family = "wasm"))]
 fn without_source_line(message: &str) -> String {
     let after_place = message.rsplit_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
     after_place.map_or(message, |(_, why)| why).trim_end_matches('.').to_string()

@@ -3,7 +3,7 @@
 //! Takes the system as it is. Gives, for each, a name or the reason why it cannot be used. Never changes a setting, plays
 //! nothing and opens no window.
 
-use super::{i18n, settings};
+use super::{i18n, platform, settings};
 use std::path::PathBuf;
 use typodont_audio::AudioError;
 use winit::event_loop::EventLoop;
@@ -57,7 +57,7 @@ pub fn review_settings() -> SettingsReview {
         ));
     }
     SettingsReview {
-        file: settings::settings_file(),
+        file: platform::settings_file(),
         device: settings.device,
         language: language.name().to_string(),
         exercises: settings.exercises,

@@ -4,13 +4,13 @@
 
 use super::command::AppCommand;
 use super::completion::Completion;
+use super::editor;
 use super::i18n::Translations;
+use super::platform;
 use super::theme;
 use eframe::egui;
-use std::fs;
-use std::path::{Path, PathBuf};
 use typodont_lesson::Attempt;
-use typodont_report::bundle::REPORT_FILE;
+use typodont_report::bundle::BundleFolder;
 use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, SessionFile, phrases};
 
 /// The result of a session, and its bundle as far as it is made.
@@ -26,7 +26,7 @@ pub struct LessonResults {
 /// State of the bundle of a result.
 pub enum BundleState {
     Pending(Completion),
-    Finished(PathBuf),
+    Finished(BundleFolder),
     /// The reason why there is none.
     Failed(String),
 }
@@ -61,13 +61,12 @@ impl LessonResults {
     /// URL of the report page; `None` before the page exists, and if its path cannot be written as a URL.
     pub fn report_url(&self) -> Option<String> {
         let BundleState::Finished(bundle) = &self.state else { return None };
-        let path = std::path::absolute(bundle.join(REPORT_FILE)).ok()?;
-        url::Url::from_file_path(path).ok().map(String::from)
+        platform::report_url(bundle)
     }
 }
 
-fn load_map(bundle: &Path, name: &str, ctx: &egui::Context) -> Option<egui::TextureHandle> {
-    let bytes = fs::read(bundle.join("views").join(format!("{name}.png"))).ok()?;
+fn load_map(bundle: &BundleFolder, name: &str, ctx: &egui::Context) -> Option<egui::TextureHandle> {
+    let bytes = bundle.read(&format!("views/{name}.png")).ok()?;
     let image = image::load_from_memory(&bytes).ok()?.to_rgba8();
     let size = [image.width() as usize, image.height() as usize];
     let pixels = egui::ColorImage::from_rgba_unmultiplied(size, image.as_raw());
@@ -275,9 +274,11 @@ fn bundle_ui(ui: &mut egui::Ui, results: &LessonResults, words: &Translations) {
             theme::progress_bar(ui, words.get(progress.key), progress.share);
         }
         BundleState::Finished(bundle) => {
-            ui.add(
-                egui::Label::new(egui::RichText::new(words.format("results.bundle", bundle.display())).weak()).wrap(),
-            );
+            let text = match platform::IS_PAGE {
+                true => words.get("results.in_page").to_string(),
+                false => words.format("results.bundle", bundle.path().display()),
+            };
+            ui.add(egui::Label::new(egui::RichText::new(text).weak()).wrap());
         }
         BundleState::Failed(why) => {
             ui.colored_label(theme::ERROR, why);
@@ -300,6 +301,13 @@ fn buttons_ui(
         let is_finished = matches!(results.state, BundleState::Finished(_));
         if ui.add_enabled(is_finished, egui::Button::new(words.get("results.report"))).clicked() {
             commands.push(AppCommand::OpenReport);
+        }
+        if platform::IS_PAGE {
+            let button = ui.add_enabled(is_finished, egui::Button::new(words.get("results.download")));
+            editor::anchor(ui, "results.download", button.rect);
+            if button.clicked() {
+                commands.push(AppCommand::DownloadBundle);
+            }
         }
         if ui.button(words.get(if is_test_run { "author.back" } else { "results.again" })).clicked() {
             commands.push(AppCommand::BackToList);

@@ -1,9 +1,8 @@
-//! The user's settings, kept in a file in the platform's configuration folder.
+//! The user's settings, kept where the platform keeps them: in a file, or in the page's own storage.
 
 use super::i18n::{self, Translations};
-use directories::ProjectDirs;
+use super::platform;
 use serde::{Deserialize, Serialize};
-use std::fs;
 use std::path::PathBuf;
 use typodont_render::{Stereo, StereoLayout};
 
@@ -72,36 +71,32 @@ impl Default for Settings {
 /// Reads the settings, and the languages that the program and the user's folder have, with complaints about both.
 pub fn load_with_languages() -> (Settings, Vec<Translations>, Vec<String>) {
     let (settings, complaint) = Settings::load();
-    let folder = config_folder().map(|folder| folder.join("languages"));
+    let folder = platform::config_folder().map(|folder| folder.join("languages"));
     let (languages, mut complaints) = i18n::load_all(folder.as_deref());
     complaints.extend(complaint);
     (settings, languages, complaints)
 }
 
 impl Settings {
-    /// Reads the settings file; the defaults, with a complaint, if it cannot be read.
+    /// Reads the kept settings; the defaults, with a complaint, if it cannot be read.
     fn load() -> (Settings, Option<String>) {
-        let Some(path) = settings_file() else { return (Settings::default(), None) };
-        match fs::read_to_string(&path) {
-            Ok(text) => match serde_json::from_str::<Settings>(&text) {
-                Ok(settings) => (settings.in_range(), None),
-                Err(error) => {
-                    let what = format!("{}: wrong-settings: {error}; the default settings are used", path.display());
-                    (Settings::default(), Some(what))
-                }
-            },
-            Err(_) => (Settings::default(), None),
+        let Some(text) = platform::read_settings() else { return (Settings::default(), None) };
+        match serde_json::from_str::<Settings>(&text) {
+            Ok(settings) => (settings.in_range(), None),
+            Err(error) => {
+                let place = platform::settings_place();
+                let what = format!("{place}: wrong-settings: {error}; the default settings are used");
+                (Settings::default(), Some(what))
+            }
         }
     }
 
-    /// Writes the settings file; returns a complaint if that fails.
+    /// Keeps the settings; returns a complaint if that fails.
     pub fn save(&self) -> Option<String> {
-        let path = settings_file()?;
-        let folder = path.parent()?;
         let text = serde_json::to_string_pretty(self).ok()?;
-        let result = fs::create_dir_all(folder).and_then(|()| fs::write(&path, text + "\n"));
-        result.err().map(|e| {
-            format!("{}: unwritable-file: {e}; the settings will be lost when the window is closed", path.display())
+        platform::write_settings(&(text + "\n")).map(|why| {
+            let place = platform::settings_place();
+            format!("{place}: unwritable-file: {why}; the settings will be lost when the window is closed")
         })
     }
 
@@ -136,13 +131,4 @@ impl Settings {
         let has_two = self.stereo == StereoMode::TwoWindows;
         has_two.then_some(Stereo { layout: StereoLayout::Right, eye_distance: self.eye_distance_mm })
     }
-}
-
-/// Folder of the settings on this platform; `None` if the user has no home folder.
-pub fn config_folder() -> Option<PathBuf> {
-    ProjectDirs::from("", "", "typodont").map(|dirs| dirs.config_dir().to_path_buf())
-}
-
-pub fn settings_file() -> Option<PathBuf> {
-    config_folder().map(|folder| folder.join("settings.json"))
 }

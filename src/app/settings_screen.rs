@@ -2,7 +2,8 @@
 
 use super::command::AppCommand;
 use super::i18n::Translations;
-use super::settings::{FONT_SIZES, Settings, StereoMode, settings_file};
+use super::platform;
+use super::settings::{FONT_SIZES, Settings, StereoMode};
 use eframe::egui;
 use typodont_devices::DRIVERS;
 
@@ -54,7 +55,7 @@ pub fn settings_ui(
         commands.push(AppCommand::ApplySettings(Box::new(new)));
     }
     ui.add_space(12.0);
-    if let Some(path) = settings_file() {
+    if let Some(path) = platform::settings_file() {
         ui.weak(words.format("settings.kept", path.display()));
     }
     ui.add_space(8.0);
@@ -99,7 +100,9 @@ fn stereo_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) 
         let current =
             STEREO_MODES.iter().find(|(mode, _)| *mode == settings.stereo).map_or("", |(_, key)| words.get(key));
         let choice = egui::ComboBox::from_id_salt("stereo").selected_text(current).show_ui(ui, |ui| {
-            for (mode, key) in STEREO_MODES {
+            // A page has one window.
+            let modes = STEREO_MODES.into_iter();
+            for (mode, key) in modes.filter(|(mode, _)| !platform::IS_PAGE || *mode != StereoMode::TwoWindows) {
                 ui.selectable_value(&mut settings.stereo, mode, words.get(key));
             }
         });

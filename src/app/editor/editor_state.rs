@@ -1,6 +1,6 @@
 //! The exercise being edited: its draft, its file, its built workpiece and the complaints about it.
 
-use super::super::settings;
+use super::super::platform;
 use super::build_worker::{BuildJob, BuildResult, BuildWorker};
 use super::editor_command::EditorCommand;
 use super::editor_section::EditorSection;
@@ -454,14 +454,12 @@ impl EditorState {
 
 /// Folder of the automatically saved drafts.
 fn drafts_folder() -> Option<PathBuf> {
-    settings::config_folder().map(|folder| folder.join("drafts"))
+    platform::config_folder().map(|folder| folder.join("drafts"))
 }
 
 /// Folder that is suggested for an author's new exercises.
 fn exercises_folder() -> PathBuf {
-    let dirs = directories::UserDirs::new();
-    let home = dirs.as_ref().map(|dirs| dirs.document_dir().unwrap_or(dirs.home_dir()).to_path_buf());
-    home.unwrap_or_default().join("Typodont").join("exercises")
+    platform::documents_folder().unwrap_or_default().join("Typodont").join("exercises")
 }
 
 /// The text of a value that is a text, or texts by language; English if it is among them.

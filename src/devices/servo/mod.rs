@@ -83,7 +83,7 @@ pub struct Servo {
     runner: ServoRunner,
 }
 
-/// Where the ticks of a servo run.
+/// Runner of a servo's ticks.
 enum ServoRunner {
     Thread {
         stop: Arc<AtomicBool>,

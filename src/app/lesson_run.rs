@@ -1,0 +1,327 @@
+//! The course of a lesson, from its exercise to its bundle, in steps that a backend asks for.
+//!
+//! Takes the window's commands. Gives events, edits and the newest tick; messages that do not fit into a full queue wait
+//! here. Never waits: a step does what is due and returns.
+
+use super::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent};
+use super::lesson_sound::LessonSound;
+use super::snapshot::{LessonSnapshot, SNAPSHOT_WORDS};
+use std::collections::VecDeque;
+use std::sync::Arc;
+use typodont_audio::SoundSender;
+use typodont_core::device::Device;
+use typodont_core::mailbox;
+use typodont_core::mailbox::{Receiver, Sender, SeqLock};
+use typodont_core::volume::Edit;
+use typodont_devices::Driver;
+use typodont_devices::mouse::Mouse;
+use typodont_exercise::session::Input;
+use typodont_lesson::live::LiveEvent;
+use typodont_lesson::{Lesson, LessonError, PendingSecondHand, PreparedSession, RecordedSession, SessionConfig};
+use typodont_report::bundle::CompletionStep;
+use web_time::{Duration, Instant};
+
+/// Minimum time between two frames that movement of the hand requests.
+const WAKE_INTERVAL: Duration = Duration::from_millis(16);
+
+/// Interval between attempts to find a disconnected device.
+const RECONNECT_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Capacity of the command queue and of the event queue, messages.
+const EVENT_CAPACITY: usize = 256;
+
+/// Capacity of the queue of changed voxels: some seconds of the hardest cutting. Further ones wait here.
+const EDIT_CAPACITY: usize = 1 << 16;
+
+/// A lesson that a backend runs.
+pub struct LessonRun {
+    port: LessonPort,
+    phase: LessonPhase,
+}
+
+/// Phase of a lesson, and what is needed for it.
+enum LessonPhase {
+    Opening(Box<LessonConfig>, PointerDevice),
+    Running(Box<RunningLesson>),
+    /// The session is over, and its recording is closed.
+    Recorded(Box<RecordedSession>),
+    Over,
+}
+
+/// The window's pointer as a device, if it is the device of the lesson.
+type PointerDevice = Option<Box<dyn Device + Send>>;
+
+struct RunningLesson {
+    lesson: Lesson,
+    /// Opens the device again when it was disconnected.
+    reconnect: Option<(&'static dyn Driver, Option<String>)>,
+    last_attempt: Instant,
+}
+
+impl LessonRun {
+    /// Creates a lesson that has not begun, and the window's ends of its queues.
+    pub fn new(config: LessonConfig, sounds: SoundSender) -> (LessonClient, LessonRun) {
+        let (commands, inbox) = mailbox::channel(EVENT_CAPACITY);
+        let (event_sender, events) = mailbox::channel(EVENT_CAPACITY);
+        let (edit_sender, edits) = mailbox::channel(EDIT_CAPACITY);
+        let snapshot = Arc::new(SeqLock::new());
+        let port = LessonPort {
+            inbox,
+            events: BufferedSender::new(event_sender),
+            edits: BufferedSender::new(edit_sender),
+            snapshot: snapshot.clone(),
+            sound: LessonSound::new(&config.scenario, sounds),
+            is_paused: false,
+            shown: None,
+            wake: config.wake.clone(),
+        };
+        let (mouse, device): (_, PointerDevice) = match &config.input_device {
+            InputDevice::Mouse => {
+                let (mouse, device) = Mouse::new();
+                (Some(mouse), Some(Box::new(device)))
+            }
+            InputDevice::Device(_) => (None, None),
+        };
+        let client = LessonClient { commands, events, edits, snapshot, mouse };
+        (client, LessonRun { port, phase: LessonPhase::Opening(Box::new(config), device) })
+    }
+
+    /// Does what is due. Returns false once the lesson is over and the window has room for all its events, or is closed.
+    pub fn advance(&mut self) -> bool {
+        self.phase = match std::mem::replace(&mut self.phase, LessonPhase::Over) {
+            LessonPhase::Over => {
+                self.port.events.flush();
+                LessonPhase::Over
+            }
+            phase => self.port.advance(phase).unwrap_or_else(|failed| {
+                self.port.send_event(LessonEvent::Failed(failed.to_string()));
+                LessonPhase::Over
+            }),
+        };
+        let is_over = matches!(self.phase, LessonPhase::Over);
+        !is_over || !(self.port.events.queue.is_empty() || self.port.inbox.is_abandoned())
+    }
+
+    /// True if the next step takes so long that the window should say so before.
+    pub fn is_next_step_long(&self) -> bool {
+        matches!(self.phase, LessonPhase::Opening(..) | LessonPhase::Recorded(_))
+    }
+}
+
+/// The lesson's ends of its queues.
+struct LessonPort {
+    inbox: Receiver<LessonCommand>,
+    events: BufferedSender<LessonEvent>,
+    edits: BufferedSender<Edit>,
+    snapshot: Arc<SeqLock<SNAPSHOT_WORDS>>,
+    sound: LessonSound,
+    is_paused: bool,
+    /// The newest tick for which a frame was requested, and the time of the request.
+    shown: Option<(LessonSnapshot, Instant)>,
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl LessonPort {
+    /// Does what is due in a phase, and returns the next one.
+    fn advance(&mut self, phase: LessonPhase) -> Result<LessonPhase, LessonError> {
+        match phase {
+            LessonPhase::Opening(config, mouse) => {
+                self.open(*config, mouse).map(|lesson| LessonPhase::Running(Box::new(lesson)))
+            }
+            LessonPhase::Running(running) => self.run(running),
+            LessonPhase::Recorded(recorded) => {
+                let bundle = recorded.complete(&mut |step| self.send_event(LessonEvent::Completing(step)))?;
+                self.send_event(LessonEvent::Finished(bundle));
+                Ok(LessonPhase::Over)
+            }
+            LessonPhase::Over => Ok(LessonPhase::Over),
+        }
+    }
+
+    /// Makes the workpiece and begins the session.
+    fn open(&mut self, config: LessonConfig, mouse: PointerDevice) -> Result<RunningLesson, LessonError> {
+        let LessonConfig {
+            scenario, seed, participant, out, templates, started, input_device, second, digests, ..
+        } = config;
+        let open_device = match input_device {
+            InputDevice::Mouse => None,
+            InputDevice::Device(held) => Some(held),
+        };
+        let (name, device, reconnect) = match (open_device, mouse) {
+            (Some(held), _) => (held.name, held.device, Some((held.driver, held.argument))),
+            (None, Some(mouse)) => ("mouse".to_string(), mouse, None),
+            (None, None) => {
+                return Err(LessonError::NoDevice { name: "mouse".into(), why: "no device is connected".into() });
+            }
+        };
+        let second =
+            second.map(|(from, role)| PendingSecondHand::join(&from, role, (&name, device.spec()))).transpose()?;
+        if let Some(address) = second.as_ref().and_then(PendingSecondHand::address) {
+            self.send_event(LessonEvent::AwaitingSecondHand(address));
+        }
+        let opening = SessionConfig {
+            scenario,
+            seed,
+            participant: &participant,
+            out: out.as_deref(),
+            digests,
+            templates,
+            started,
+        };
+        let workpiece = opening.make_workpiece()?;
+        // It is drawn while its recording is opened.
+        self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
+        let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
+        let (mut lesson, events) = prepared.begin(device, second)?;
+        self.send_events(events);
+        lesson.await_movement();
+        Ok(RunningLesson { lesson, reconnect, last_attempt: Instant::now() })
+    }
+
+    /// Passes on what happened; ends the session when it is complete or the window asks for it.
+    fn run(&mut self, mut running: Box<RunningLesson>) -> Result<LessonPhase, LessonError> {
+        let mut is_over = running.lesson.session().is_complete();
+        if !is_over {
+            self.publish(&mut running.lesson)?;
+            self.reconnect(&mut running)?;
+            is_over = self.handle_commands(&mut running.lesson)? || running.lesson.session().is_complete();
+        }
+        if !is_over {
+            return Ok(LessonPhase::Running(running));
+        }
+        self.publish(&mut running.lesson)?;
+        self.sound.silence();
+        let recorded = running.lesson.end()?;
+        self.send_event(LessonEvent::Completing(CompletionStep::Scoring));
+        Ok(LessonPhase::Recorded(Box::new(recorded)))
+    }
+
+    /// Looks for a disconnected device.
+    fn reconnect(&mut self, running: &mut RunningLesson) -> Result<(), LessonError> {
+        let RunningLesson { lesson, reconnect, last_attempt } = running;
+        if lesson.live().is_suspended()
+            && last_attempt.elapsed() > RECONNECT_INTERVAL
+            && let Some((driver, argument)) = reconnect
+        {
+            *last_attempt = Instant::now();
+            if let Ok(device) = driver.open(argument.as_deref())
+                && !lesson.resume_with(device)?
+            {
+                self.send_event(LessonEvent::DifferentDevice);
+            }
+        }
+        Ok(())
+    }
+
+    /// Passes events, edits and the newest tick of the servo to the window.
+    fn publish(&mut self, lesson: &mut Lesson) -> Result<(), LessonError> {
+        let events = lesson.poll()?;
+        self.send_events(events);
+        while let Some(event) = lesson.next_assist_event() {
+            self.send_event(LessonEvent::SecondHand(event));
+        }
+        for edit in lesson.edits() {
+            self.edits.queue.push_back(*edit);
+        }
+        self.edits.flush();
+        self.events.flush();
+        let (session, live) = (lesson.session(), lesson.live());
+        if let Some(step) = live.latest_step() {
+            let snapshot = LessonSnapshot::new(
+                step,
+                lesson.handle_orientation(),
+                session.stage_seconds(),
+                session.cleared_pct(),
+                live.timing(),
+            );
+            self.snapshot.write(snapshot.encode());
+            match session.stage() {
+                Some((_, stage)) if !self.is_paused && !live.is_suspended() => self.sound.update(step, stage.cutting),
+                _ => self.sound.silence(),
+            }
+            if self.is_worth_a_frame(snapshot) {
+                (self.wake)();
+            }
+        }
+        Ok(())
+    }
+
+    /// True if a tick looks different from the last for which a frame was requested, and that is not too recent.
+    fn is_worth_a_frame(&mut self, snapshot: LessonSnapshot) -> bool {
+        let is_news = match &self.shown {
+            None => true,
+            Some((shown, at)) => at.elapsed() >= WAKE_INTERVAL && snapshot.looks_different(shown),
+        };
+        if is_news {
+            self.shown = Some((snapshot, Instant::now()));
+        }
+        is_news
+    }
+
+    /// Carries out the window's commands; returns true when the lesson is to end.
+    fn handle_commands(&mut self, lesson: &mut Lesson) -> Result<bool, LessonError> {
+        // Checked first, so that commands sent before the window was closed are still carried out.
+        let is_abandoned = self.inbox.is_abandoned();
+        while let Some(command) = self.inbox.try_recv() {
+            match command {
+                LessonCommand::StageInput(stage, _)
+                    if lesson.session().stage().map(|(running, _)| running) != Some(stage) => {}
+                LessonCommand::Input(input) | LessonCommand::StageInput(_, input) => {
+                    let events = lesson.submit(&input)?;
+                    self.send_events(events);
+                }
+                LessonCommand::Pause(is_paused) => {
+                    self.is_paused = is_paused;
+                    lesson.set_paused(is_paused);
+                }
+                LessonCommand::FinishQuestionnaire if lesson.session().are_stages_over() => return Ok(true),
+                LessonCommand::FinishQuestionnaire => {}
+            }
+        }
+        if is_abandoned {
+            // The window was closed.
+            lesson.submit(&Input::Abort)?;
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
+    fn send_events(&mut self, events: Vec<LiveEvent>) {
+        for event in events {
+            self.send_event(LessonEvent::Live(event));
+        }
+    }
+
+    /// Sends an event, and requests a frame that shows it.
+    fn send_event(&mut self, event: LessonEvent) {
+        self.events.send(event);
+        (self.wake)();
+    }
+}
+
+/// A bounded queue with a buffer before it: messages that do not fit wait in order.
+struct BufferedSender<T> {
+    sender: Sender<T>,
+    queue: VecDeque<T>,
+}
+
+impl<T> BufferedSender<T> {
+    fn new(sender: Sender<T>) -> BufferedSender<T> {
+        BufferedSender { sender, queue: VecDeque::new() }
+    }
+
+    fn send(&mut self, item: T) {
+        self.queue.push_back(item);
+        self.flush();
+    }
+
+    /// Moves as many buffered messages into the queue as fit.
+    fn flush(&mut self) {
+        for _ in 0..self.sender.free_slots().min(self.queue.len()) {
+            if let Some(item) = self.queue.pop_front() {
+                // There is room: only this side fills it.
+                let _ = self.sender.try_send(item);
+            }
+        }
+    }
+}

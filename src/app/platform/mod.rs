@@ -1,0 +1,13 @@
+//! Surroundings of the window: settings that are kept, the user's language, the log of its state.
+//!
+//! One file for a computer and one for a page in a browser, with the same functions.
+
+#[cfg(not(target_family = "wasm"))]
+mod native;
+#[cfg(target_family = "wasm")]
+mod web;
+
+#[cfg(not(target_family = "wasm"))]
+pub use native::*;
+#[cfg(target_family = "wasm")]
+pub use web::*;

@@ -1,0 +1,69 @@
+//! A computer: settings in a file of the user's configuration folder, bundles in a folder.
+
+use directories::{ProjectDirs, UserDirs};
+use std::fs;
+use std::fs::File;
+use std::io::Write;
+use std::path::PathBuf;
+use typodont_report::bundle::{BundleFolder, REPORT_FILE};
+
+/// True for a page in a browser: it has no folders, and one device, the pointer.
+pub const IS_PAGE: bool = false;
+
+/// Environment variable that names the file of the state log; without it nothing is written.
+const LOG_VARIABLE: &str = "TYPODONT_STATE_LOG";
+
+/// Folder of the settings on this platform; `None` if the user has no home folder.
+pub fn config_folder() -> Option<PathBuf> {
+    ProjectDirs::from("", "", "typodont").map(|dirs| dirs.config_dir().to_path_buf())
+}
+
+/// Folder of the user's documents, else the home folder.
+pub fn documents_folder() -> Option<PathBuf> {
+    let dirs = UserDirs::new();
+    dirs.as_ref().map(|dirs| dirs.document_dir().unwrap_or(dirs.home_dir()).to_path_buf())
+}
+
+/// URL of a bundle's report; `None` if its path cannot be written as one.
+pub fn report_url(bundle: &BundleFolder) -> Option<String> {
+    let path = std::path::absolute(bundle.path().join(REPORT_FILE)).ok()?;
+    url::Url::from_file_path(path).ok().map(String::from)
+}
+
+/// Bundles are in folders here: there is nothing to download.
+pub fn download(_: &BundleFolder) -> Option<String> {
+    None
+}
+
+pub fn settings_file() -> Option<PathBuf> {
+    config_folder().map(|folder| folder.join("settings.json"))
+}
+
+/// Name of the place where settings are kept, for messages.
+pub fn settings_place() -> String {
+    settings_file().map(|path| path.display().to_string()).unwrap_or_default()
+}
+
+/// Text of the settings; `None` if none are kept.
+pub fn read_settings() -> Option<String> {
+    fs::read_to_string(settings_file()?).ok()
+}
+
+/// Keeps the text of the settings; returns the reason if that fails.
+pub fn write_settings(text: &str) -> Option<String> {
+    let path = settings_file()?;
+    let folder = path.parent()?;
+    fs::create_dir_all(folder).and_then(|()| fs::write(&path, text)).err().map(|e| e.to_string())
+}
+
+/// Locale of the user, from the system's environment variables.
+pub fn locale() -> Option<String> {
+    ["LC_ALL", "LC_MESSAGES", "LANG"].into_iter().find_map(|name| std::env::var(name).ok())
+}
+
+/// Writer of the state log's lines, to the file that the environment names; `None` unless it names one.
+pub fn open_log() -> Option<Box<dyn FnMut(&str)>> {
+    let mut file = File::create(std::env::var_os(LOG_VARIABLE)?).ok()?;
+    // The program goes on if the log cannot be written.
+    Some(Box::new(move |line| _ = writeln!(file, "{line}")))
+}

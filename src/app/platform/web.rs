@@ -1,0 +1,93 @@
+//! A page in a browser: settings in the page's own storage, bundles in memory and as downloads.
+
+use std::path::PathBuf;
+use typodont_report::bundle::{BundleFolder, REPORT_FILE};
+use wasm_bindgen::{JsCast, JsValue};
+
+/// True for a page in a browser: it has no folders, and one device, the pointer.
+pub const IS_PAGE: bool = true;
+
+/// Key of the settings in the page's own storage.
+const SETTINGS_KEY: &str = "typodont.settings";
+
+/// Part of the page's address after the `?` that asks for the state log in the browser's console.
+const LOG_QUERY: &str = "state-log";
+
+/// A page has no folder for settings.
+pub fn config_folder() -> Option<PathBuf> {
+    None
+}
+
+/// A page has no folder for documents.
+pub fn documents_folder() -> Option<PathBuf> {
+    None
+}
+
+/// URL of a bundle's report, which lives as long as the page.
+pub fn report_url(bundle: &BundleFolder) -> Option<String> {
+    object_url(&bundle.read(REPORT_FILE).ok()?, "text/html;charset=utf-8").ok()
+}
+
+/// Lets the browser save a bundle as one ZIP file; returns a complaint if that fails.
+pub fn download(bundle: &BundleFolder) -> Option<String> {
+    let folder = bundle.name().into_owned();
+    let saved = bundle.to_zip().and_then(|bytes| {
+        save_as(&format!("{folder}.zip"), &bytes, "application/zip").map_err(|error| format!("{error:?}"))
+    });
+    saved.err().map(|why| format!("{folder}.zip: unwritable-file: {why}"))
+}
+
+fn save_as(name: &str, bytes: &[u8], media_type: &str) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
+    let link: web_sys::HtmlAnchorElement = document.create_element("a")?.dyn_into()?;
+    let url = object_url(bytes, media_type)?;
+    link.set_href(&url);
+    link.set_download(name);
+    link.click();
+    Ok(())
+}
+
+/// URL under which the page keeps bytes.
+fn object_url(bytes: &[u8], media_type: &str) -> Result<String, JsValue> {
+    let parts = js_sys::Array::of1(&js_sys::Uint8Array::from(bytes));
+    let options = web_sys::BlobPropertyBag::new();
+    options.set_type(media_type);
+    let blob = web_sys::Blob::new_with_u8_array_sequence_and_options(&parts, &options)?;
+    web_sys::Url::create_object_url_with_blob(&blob)
+}
+
+pub fn settings_file() -> Option<PathBuf> {
+    None
+}
+
+/// Name of the place where settings are kept, for messages.
+pub fn settings_place() -> String {
+    format!("localStorage/{SETTINGS_KEY}")
+}
+
+/// Text of the settings; `None` if none are kept, or if the browser keeps nothing for this page.
+pub fn read_settings() -> Option<String> {
+    storage()?.get_item(SETTINGS_KEY).ok().flatten()
+}
+
+/// Keeps the text of the settings; returns the reason if that fails.
+pub fn write_settings(text: &str) -> Option<String> {
+    let kept = storage().map(|storage| storage.set_item(SETTINGS_KEY, text));
+    (!matches!(kept, Some(Ok(())))).then(|| "the browser keeps nothing for this page".to_string())
+}
+
+fn storage() -> Option<web_sys::Storage> {
+    web_sys::window()?.local_storage().ok().flatten()
+}
+
+/// Locale of the user, from the browser's preferred language.
+pub fn locale() -> Option<String> {
+    web_sys::window()?.navigator().language()
+}
+
+/// Writer of the state log's lines, to the browser's console; `None` unless the page's address asks for it.
+pub fn open_log() -> Option<Box<dyn FnMut(&str)>> {
+    let query = web_sys::window()?.location().search().ok()?;
+    let write = |line: &str| web_sys::console::log_1(&JsValue::from_str(&format!("typodont: {line}")));
+    query.contains(LOG_QUERY).then(|| Box::new(write) as Box<dyn FnMut(&str)>)
+}
