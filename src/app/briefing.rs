@@ -2,6 +2,7 @@
 
 use super::command::AppCommand;
 use super::completion::CompletionProgress;
+use super::editor;
 use super::i18n::Translations;
 use super::theme;
 use eframe::egui;
@@ -64,7 +65,9 @@ pub fn briefing_ui(
         }
         ui.horizontal(|ui| {
             let is_ready = completion.is_none() && has_valid_code && lesson::is_valid_participant_code(participant);
-            if ui.add_enabled(is_ready, theme::primary_button(words.get("briefing.begin"))).clicked() {
+            let begin = ui.add_enabled(is_ready, theme::primary_button(words.get("briefing.begin")));
+            editor::anchor(ui, "briefing.begin", begin.rect);
+            if begin.clicked() {
                 commands.push(AppCommand::BeginLesson);
             }
             if ui.button(words.get("briefing.back")).clicked() {

@@ -3,6 +3,7 @@
 use super::command::AppCommand;
 use super::editor;
 use super::i18n::Translations;
+use super::platform;
 use super::session_history::{AttemptSummary, SessionHistory};
 use super::settings::Settings;
 use super::theme;
@@ -241,10 +242,14 @@ pub fn exercise_list_ui(
         ui.add_space(12.0);
         let is_valid = list.can_open_selected(context.history, participant, context.settings);
         ui.horizontal(|ui| {
-            if ui.add_enabled(is_valid, theme::primary_button(words.get("shelf.open"))).clicked() {
+            let open = ui.add_enabled(is_valid, theme::primary_button(words.get("shelf.open")));
+            editor::anchor(ui, "shelf.open", open.rect);
+            if open.clicked() {
                 commands.push(AppCommand::OpenBriefing);
             }
-            for (key, command) in [("shelf.edit", AppCommand::EditExercise), ("shelf.new", AppCommand::NewExercise)] {
+            // The author's screen keeps files and builds teeth on a thread: a page has neither.
+            let authoring = [("shelf.edit", AppCommand::EditExercise), ("shelf.new", AppCommand::NewExercise)];
+            for (key, command) in authoring.into_iter().filter(|_| !platform::IS_PAGE) {
                 let button = ui.button(words.get(key));
                 editor::anchor(ui, key, button.rect);
                 if button.clicked() {
@@ -252,6 +257,9 @@ pub fn exercise_list_ui(
                 }
             }
         });
+        if platform::IS_PAGE {
+            return;
+        }
         ui.horizontal_wrapped(|ui| {
             let label = ui.label(words.get("shelf.folder")).id;
             let edit = egui::TextEdit::singleline(&mut list.folder).desired_width(260.0);
