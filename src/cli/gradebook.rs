@@ -48,17 +48,37 @@ enum LmsName {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum AttemptPolicyName {
+pub(super) enum AttemptPolicyName {
     Last,
     Best,
     First,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum CriticalErrorPolicyName {
+pub(super) enum CriticalErrorPolicyName {
     Keep,
     Cap,
     Zero,
+}
+
+impl AttemptPolicyName {
+    pub(super) fn policy(self) -> AttemptPolicy {
+        match self {
+            AttemptPolicyName::Last => AttemptPolicy::Last,
+            AttemptPolicyName::Best => AttemptPolicy::Best,
+            AttemptPolicyName::First => AttemptPolicy::First,
+        }
+    }
+}
+
+impl CriticalErrorPolicyName {
+    pub(super) fn policy(self) -> CriticalErrorPolicy {
+        match self {
+            CriticalErrorPolicyName::Keep => CriticalErrorPolicy::Keep,
+            CriticalErrorPolicyName::Cap => CriticalErrorPolicy::Cap,
+            CriticalErrorPolicyName::Zero => CriticalErrorPolicy::Zero,
+        }
+    }
 }
 
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
@@ -80,16 +100,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         LmsName::Moodle => Lms::Moodle,
         LmsName::Canvas => Lms::Canvas,
     };
-    let policy = match arguments.take {
-        AttemptPolicyName::Last => AttemptPolicy::Last,
-        AttemptPolicyName::Best => AttemptPolicy::Best,
-        AttemptPolicyName::First => AttemptPolicy::First,
-    };
-    let critical = match arguments.critical {
-        CriticalErrorPolicyName::Keep => CriticalErrorPolicy::Keep,
-        CriticalErrorPolicyName::Cap => CriticalErrorPolicy::Cap,
-        CriticalErrorPolicyName::Zero => CriticalErrorPolicy::Zero,
-    };
+    let (policy, critical) = (arguments.take.policy(), arguments.critical.policy());
     let options =
         GradebookOptions { lms, policy, critical, students: students.as_ref(), changes: &changes, translator };
     let made = gradebook(&cohort, &options);

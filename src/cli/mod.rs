@@ -35,6 +35,8 @@ mod parquet;
     feature = "school"
 )))]
 mod missing_part;
+#[cfg(feature = "integrations")]
+mod package;
 mod path;
 mod preview;
 mod progress;
@@ -130,6 +132,12 @@ enum CliCommand {
     #[cfg(not(feature = "integrations"))]
     #[command(hide = true, disable_help_flag = true)]
     Xapi(IgnoredArguments),
+    /// Put exercises and the web page into one archive that a learning platform plays and marks
+    #[cfg(feature = "integrations")]
+    Package(package::Arguments),
+    #[cfg(not(feature = "integrations"))]
+    #[command(hide = true, disable_help_flag = true)]
+    Package(IgnoredArguments),
     /// Export sessions, measures and events as Parquet files for analysis
     #[cfg(feature = "integrations")]
     Parquet(parquet::Arguments),
@@ -318,6 +326,10 @@ fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
         Some(CliCommand::Xapi(arguments)) => xapi::run(&arguments),
         #[cfg(not(feature = "integrations"))]
         Some(CliCommand::Xapi(_)) => Err(missing_part::error("typodont xapi", "integrations")),
+        #[cfg(feature = "integrations")]
+        Some(CliCommand::Package(arguments)) => package::run(&arguments),
+        #[cfg(not(feature = "integrations"))]
+        Some(CliCommand::Package(_)) => Err(missing_part::error("typodont package", "integrations")),
         #[cfg(feature = "integrations")]
         Some(CliCommand::Parquet(arguments)) => parquet::run(&arguments),
         #[cfg(not(feature = "integrations"))]

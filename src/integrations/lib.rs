@@ -1,4 +1,4 @@
-//! Exports for a school's other systems: gradebooks, learning record stores and data analysis.
+//! Exports for a school's other systems: gradebooks, learning record stores, learning platforms and data analysis.
 //!
 //! Takes a cohort of sessions. Gives CSV tables for Moodle and Canvas, xAPI statements in a spool on disk, and
 //! Parquet tables. Never reads a clock or opens a network connection: the command line sends the statements.
@@ -17,6 +17,7 @@
 pub mod gradebook;
 mod identity;
 mod iri;
+pub mod learning_platform;
 pub mod spool;
 mod xapi;
 pub mod parquet_tables;

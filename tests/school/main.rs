@@ -5,6 +5,7 @@ mod support;
 mod agreement;
 mod blind;
 mod handover;
+mod learning_platform;
 mod review;
 mod review_page;
 mod stations;

@@ -112,6 +112,22 @@ pub enum SceneFile {
     Jaw(JawFile),
 }
 
+impl SceneFile {
+    /// Names of the scans and label maps of its teeth.
+    pub fn scans(&self) -> impl Iterator<Item = &str> {
+        let teeth = match self {
+            SceneFile::Tooth(tooth) => vec![tooth],
+            SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
+            SceneFile::Jaw(jaw) => vec![&jaw.tooth],
+        };
+        teeth.into_iter().filter_map(|tooth| match &tooth.form {
+            ToothSourceFile::Procedural(_) => None,
+            ToothSourceFile::Ct(scan) => Some(scan.file.as_str()),
+            ToothSourceFile::Labels(map) => Some(map.file.as_str()),
+        })
+    }
+}
+
 /// Two teeth side by side.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
