@@ -7,6 +7,7 @@ mod dependencies;
 mod names;
 mod parts;
 mod sources;
+mod thesis_table;
 // Without the rest of the tests' support, which the workspace's rules do not need.
 #[allow(dead_code)]
 #[path = "../support/tools.rs"]
