@@ -20,7 +20,7 @@ use typodont_core::sim::Command as Tell;
 use typodont_core::touch::{Coefficient, Materials};
 use typodont_core::volume::Label;
 use typodont_exercise::scenario::{Scenario, Stage};
-use typodont_exercise::session::{AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input};
+use typodont_exercise::session::{AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input, TraineeView};
 use typodont_formats::Library;
 use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
@@ -69,6 +69,8 @@ pub struct LessonState {
     pub is_confirming_abort: bool,
     pub orbit: Orbit,
     pub view_refresh: ViewRefresh,
+    /// View of the trainee as the recording has it; `None` until the first image.
+    recorded_view: Option<TraineeView>,
     /// Source of the instruments' models.
     library: Library,
     /// Entries of the running stage's periodontal chart.
@@ -143,6 +145,7 @@ impl LessonState {
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
             view_refresh: ViewRefresh::default(),
+            recorded_view: None,
             library,
             display_mode,
             materials,
@@ -179,6 +182,25 @@ impl LessonState {
 
     pub fn mouse(&self) -> Option<&typodont_devices::mouse::Mouse> {
         self.client.mouse.as_ref()
+    }
+
+    /// Passes the view to the recording, if it has changed and a stage runs. `aspect`: width of the image divided by its
+    /// height.
+    pub fn record_view(&mut self, aspect: f32) {
+        let eye = self.orbit.viewpoint().eye(aspect);
+        let view = TraineeView {
+            eye: eye.position,
+            focus: self.orbit.middle,
+            up: eye.up,
+            half_extent: [eye.window.right, eye.window.top],
+            mirror: None,
+        };
+        if self.stage.is_some()
+            && self.recorded_view != Some(view)
+            && self.client.send(LessonCommand::Input(Input::Look(view)))
+        {
+            self.recorded_view = Some(view);
+        }
     }
 
     /// Takes over all events of the lesson since the last frame.

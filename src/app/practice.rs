@@ -234,6 +234,9 @@ fn view_ui(
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
     let mut viewport = viewport;
     let now = ui.input(|input| input.time);
+    if lesson.scene.is_some() && viewport.is_some() {
+        lesson.record_view(size[0] as f32 / size[1] as f32);
+    }
     match viewport.as_deref_mut().map(|viewport| refresh_view(lesson, settings, viewport, size, now)) {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));

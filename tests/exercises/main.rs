@@ -11,3 +11,4 @@ mod guessing;
 mod operators;
 mod restoring;
 mod schema;
+mod visibility;

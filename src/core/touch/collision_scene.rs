@@ -71,7 +71,7 @@ impl Collider {
     }
 
     /// Greatest change of the distance per millimetre of motion: 1, unless samples describe a steeper shape.
-    pub(super) fn steepness(&self) -> f32 {
+    pub fn steepness(&self) -> f32 {
         if let ColliderGeometry::Sdf(field) = &self.geometry { field.steepness() } else { 1.0 }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::catalog::CoefficientName;
 use crate::scenario::Scenario;
-use crate::session::{AnswerValue, ChartInput, EndedBy, Input};
+use crate::session::{AnswerValue, ChartInput, EndedBy, Input, MirrorFace, TraineeView};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use typodont_core::device::DeviceSpec;
@@ -252,6 +252,59 @@ pub enum InputFile {
     Confirm {},
     Rate { item: String, value: u8 },
     Abort {},
+    Look(ViewFile),
+}
+
+/// File form of [`TraineeView`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ViewFile {
+    pub eye_mm: [f32; 3],
+    pub focus_mm: [f32; 3],
+    pub up: [f32; 3],
+    /// Half the width and half the height of the picture at a depth of 1 mm.
+    pub half_extent: [f32; 2],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mirror: Option<MirrorFaceFile>,
+}
+
+/// File form of [`MirrorFace`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MirrorFaceFile {
+    pub centre_mm: [f32; 3],
+    pub normal: [f32; 3],
+    pub radius_mm: f32,
+}
+
+impl From<&TraineeView> for ViewFile {
+    fn from(view: &TraineeView) -> ViewFile {
+        ViewFile {
+            eye_mm: view.eye.to_array(),
+            focus_mm: view.focus.to_array(),
+            up: view.up.to_array(),
+            half_extent: view.half_extent,
+            mirror: view.mirror.map(|face| MirrorFaceFile {
+                centre_mm: face.centre.to_array(),
+                normal: face.normal.to_array(),
+                radius_mm: face.radius,
+            }),
+        }
+    }
+}
+
+impl From<ViewFile> for TraineeView {
+    fn from(file: ViewFile) -> TraineeView {
+        TraineeView {
+            eye: Vec3::from_array(file.eye_mm),
+            focus: Vec3::from_array(file.focus_mm),
+            up: Vec3::from_array(file.up),
+            half_extent: file.half_extent,
+            mirror: file.mirror.map(|face| MirrorFace {
+                centre: Vec3::from_array(face.centre_mm),
+                normal: Vec3::from_array(face.normal),
+                radius: face.radius_mm,
+            }),
+        }
+    }
 }
 
 /// File form of [`ChartInput`].
@@ -280,6 +333,7 @@ impl From<&Input> for InputFile {
             Input::Confirm => InputFile::Confirm {},
             Input::Rate { item, value } => InputFile::Rate { item, value },
             Input::Abort => InputFile::Abort {},
+            Input::Look(view) => InputFile::Look(ViewFile::from(&view)),
         }
     }
 }
@@ -304,6 +358,7 @@ impl From<InputFile> for Input {
             InputFile::Confirm {} => Input::Confirm,
             InputFile::Rate { item, value } => Input::Rate { item, value },
             InputFile::Abort {} => Input::Abort,
+            InputFile::Look(view) => Input::Look(TraineeView::from(view)),
         }
     }
 }

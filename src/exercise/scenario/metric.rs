@@ -432,6 +432,33 @@ pub const OF_DRAWS: &[MetricInfo] = &[
     ),
 ];
 
+/// Measures of visibility, computed if the trainee's view was recorded, as the window records it.
+pub const OF_VIEWS: &[MetricInfo] = &[
+    info(
+        "unseen_cut_pct",
+        "Tissue cut out of sight",
+        "%",
+        Lower,
+        "100·|H| / |R′|; R′ are the voxels removed while the view is known, H those of them that were hidden from the \
+         eye at that moment by the tooth, the gingiva or an adjacent tooth, or lay outside of the picture, and were not \
+         seen in a mirror either; what is within 0.5 mm of a voxel does not hide it; no value if nothing was cut or no view was recorded",
+    ),
+    info(
+        "unseen_cut_mm3",
+        "Volume of tissue cut out of sight",
+        "mm³",
+        Lower,
+        "volume of H, as in unseen_cut_pct; no value if no view was recorded",
+    ),
+    info(
+        "unseen_sound_cut_mm3",
+        "Volume of sound tissue cut out of sight",
+        "mm³",
+        Lower,
+        "volume of the sound voxels of H, as in unseen_cut_pct; no value if no view was recorded",
+    ),
+];
+
 /// Measures of a periodontal chart, computed if a stage asks for one. The sites are the six sites of the tooth.
 pub const CHARTING: &[MetricInfo] = &[
     info("sites_read_pct", "Sites probed", "%", Higher, "100·sites with a reading / 6"),
@@ -580,7 +607,7 @@ impl fmt::Display for Metric {
 
 /// Returns every measure without an argument, in the order of reports.
 pub fn without_argument() -> impl Iterator<Item = &'static MetricInfo> + Clone {
-    PLAIN.iter().chain(OF_FILLINGS).chain(OF_DRAWS).chain(CHARTING)
+    PLAIN.iter().chain(OF_FILLINGS).chain(OF_DRAWS).chain(OF_VIEWS).chain(CHARTING)
 }
 
 /// Returns every measure.

@@ -2,13 +2,14 @@
 
 use super::charting::{self, SiteResult};
 use super::nearest_offset::{AnatomicalDirection, NearestOffsets};
-use super::process::{PeakValue, ProcessStats};
+use super::process::{PeakValue, ProcessStats, UnseenVoxel};
 use super::removal_comparison::{RemovalComparison, VoxelDistance, VoxelFlags};
 use super::restoration::Restoration;
 use super::trials::{TrialSummary, tissue_felt};
+use crate::catalog::TissueRole;
 use crate::record::{Recording, Replay};
 use crate::scenario::file::ZoneRole;
-use crate::scenario::metric::{CHARTING, MetricArgument, OF_DRAWS, OF_FILLINGS, PLAIN};
+use crate::scenario::metric::{CHARTING, MetricArgument, OF_DRAWS, OF_FILLINGS, OF_VIEWS, PLAIN};
 use crate::scenario::{Metric, QuestionKind, Rubric};
 use crate::session::{AnswerRecord, StageResult};
 use typodont_core::frame::Vec3;
@@ -120,8 +121,9 @@ pub fn all(
     let of_fillings = if restoration.is_some() { OF_FILLINGS } else { &[] };
     let charting = if chart.is_some() { CHARTING } else { &[] };
     let of_draws = if source.trials.is_some() { OF_DRAWS } else { &[] };
+    let of_views = if process.unseen.is_some() { OF_VIEWS } else { &[] };
     let mut metrics: Vec<Metric> =
-        PLAIN.iter().chain(of_fillings).chain(of_draws).chain(charting).map(Metric::plain).collect();
+        PLAIN.iter().chain(of_fillings).chain(of_draws).chain(of_views).chain(charting).map(Metric::plain).collect();
     let zones = scenario.zones.iter().map(|z| Metric::parse(&format!("zone_removed_pct({})", z.id)));
     let tolerance = Metric::parse(&format!("surface_within_tol({})", scenario.measures.tolerance));
     metrics.extend(zones.chain([tolerance]).flatten());
@@ -169,6 +171,7 @@ impl MeasureSource<'_> {
                 .or_else(|| self.of_removed_volume(name))
                 .or_else(|| self.of_removal_depth(name))
                 .or_else(|| self.of_process(name))
+                .or_else(|| self.of_visibility(name))
                 .unwrap_or_else(|| self.of_filling_trials_or_chart(name)),
         }
     }
@@ -268,6 +271,30 @@ impl MeasureSource<'_> {
             "session_time_s" => seconds(stats.ticks).into(),
             _ => return None,
         })
+    }
+
+    /// Computes a measure of visibility, with the first hidden removal as evidence; `None` for other measures.
+    fn of_visibility(&self, name: &str) -> Option<ComputedValue> {
+        if !OF_VIEWS.iter().any(|about| about.name == name) {
+            return None;
+        }
+        let Some(unseen) = &self.process.unseen else { return Some(ComputedValue::default()) };
+        let is_sound =
+            |voxel: &&UnseenVoxel| self.recording.scenario.tissues.role(voxel.tissue) == Some(TissueRole::Sound);
+        let hidden = unseen.hidden.iter();
+        let (first, count) = match name {
+            "unseen_sound_cut_mm3" => (hidden.clone().find(is_sound), hidden.filter(is_sound).count()),
+            _ => (unseen.hidden.first(), unseen.hidden.len()),
+        };
+        let value = match name {
+            "unseen_cut_pct" => (unseen.judged > 0).then(|| 100.0 * count as f64 / unseen.judged as f64),
+            _ => Some(count as f64 * self.comparison.grid.voxel_mm3()),
+        };
+        let evidence = first.map(|found| {
+            let place = self.comparison.grid.centre(self.comparison.grid.cell(found.voxel as usize));
+            Evidence { at: Some(found.at), tissue: Some(found.tissue), ..Evidence::at_place(place) }
+        });
+        Some(ComputedValue { value, evidence })
     }
 
     /// Computes a measure of a filling, of trials or of a periodontal chart; other measures have no value.

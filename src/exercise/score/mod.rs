@@ -10,6 +10,7 @@ mod cropped_grid;
 mod voxel_removals;
 mod grade;
 mod idle;
+mod line_of_sight;
 mod error_episodes;
 mod measures;
 mod nearest_offset;
@@ -28,7 +29,7 @@ pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
 pub use idle::{idle_grade, trainee_grade};
 pub use measures::{Evidence, Measure, Measures};
 pub use nearest_offset::AnatomicalDirection;
-pub use process::{Trace, TraceSample};
+pub use process::{Trace, TraceSample, UnseenCut, UnseenVoxel};
 pub use restoration::Restoration;
 pub use trials::TrialSummary;
 pub use verdict::Verdict;
@@ -66,6 +67,8 @@ pub struct Scored {
     pub chart: Option<Vec<SiteResult>>,
     /// Number of ticks in which another person guided the trainee's hand, by stage of the scenario.
     pub led_ticks: Vec<u64>,
+    /// Removals out of the trainee's sight; `None` if the recording has no view.
+    pub unseen: Option<UnseenCut>,
 }
 
 /// A replayed session with its process statistics, before it is scored.
@@ -108,7 +111,7 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
     let measures = measures::all(recording, &replay, &seen, &comparison, restoration.as_ref(), chart.as_deref());
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
-    let process::ProcessStats { removals, trace, led_ticks, hard_presses, forbidden_contacts, .. } = seen;
+    let process::ProcessStats { removals, trace, led_ticks, hard_presses, forbidden_contacts, unseen, .. } = seen;
     Scored {
         replay,
         measures,
@@ -122,5 +125,6 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
         restoration,
         chart,
         led_ticks,
+        unseen,
     }
 }

@@ -1,12 +1,13 @@
 //! The process of the work: force, speed and path, tick by tick.
 
 use super::contact_spell::{ContactSpell, ContactSpells};
+use super::line_of_sight::LineOfSight;
 use super::removal_comparison::ProximityField;
 use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
 use crate::catalog::TissueRole;
 use crate::record::{Recording, TickRecord};
 use crate::scenario::{Limit, Scenario, Workpiece};
-use crate::session::Session;
+use crate::session::{Input, Session};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::tick::{TICK_S, Tick};
@@ -77,6 +78,25 @@ pub struct ProcessStats {
     pub hard_presses: Vec<ContactSpell>,
     /// Spells in which a running bur touched soft tissue or an adjacent tooth in a cutting stage.
     pub forbidden_contacts: Vec<ContactSpell>,
+    /// Removals out of the trainee's sight; `None` if the recording has no view.
+    pub unseen: Option<UnseenCut>,
+}
+
+/// Voxels that were removed while the trainee could not see them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct UnseenCut {
+    /// Number of removed voxels of which it is known from where the trainee looked.
+    pub judged: u64,
+    /// Those of them that were hidden, in order of time.
+    pub hidden: Vec<UnseenVoxel>,
+}
+
+/// A voxel that was removed out of sight, and its tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnseenVoxel {
+    pub voxel: u32,
+    pub at: Tick,
+    pub tissue: Label,
 }
 
 /// One sample of the curves in a report.
@@ -112,6 +132,8 @@ pub struct ProcessObserver {
     is_rotary: Vec<bool>,
     proximity: ProximityField,
     stats: ProcessStats,
+    /// Everything that can hide a voxel; `None` if the recording has no view.
+    sight: Option<LineOfSight>,
     /// Force above which a press is recorded, N; `None` if the rubric does not limit the force.
     force_limit: Option<f64>,
     hard_presses: ContactSpells,
@@ -130,6 +152,7 @@ impl ProcessObserver {
     pub fn new(recording: &Recording, workpiece: &Workpiece) -> ProcessObserver {
         let scenario = &recording.scenario;
         let roles = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
+        let has_views = recording.inputs.iter().any(|(_, input)| matches!(input, Input::Look(_)));
         let now = TraceSample { at: Tick::ZERO, force: 0.0, speed: 0.0, cleared: 0.0, touched: false, cutting: false };
         ProcessObserver {
             tooth_from_world: workpiece.world_from_tooth.inverse(),
@@ -153,7 +176,9 @@ impl ProcessObserver {
                 trace: Trace::default(),
                 hard_presses: Vec::new(),
                 forbidden_contacts: Vec::new(),
+                unseen: has_views.then(UnseenCut::default),
             },
+            sight: has_views.then(|| LineOfSight::of(workpiece)),
             force_limit: force_limit(scenario),
             hard_presses: ContactSpells::default(),
             forbidden_contacts: ContactSpells::default(),
@@ -174,6 +199,7 @@ impl ProcessObserver {
         let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
         let removal = VoxelRemoval { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
         self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
+        self.observe_visibility(tick, edits, session);
         self.stats.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
         if step.coupling_force != Vec3::ZERO
@@ -211,6 +237,20 @@ impl ProcessObserver {
             let cleared = session.cleared_pct().unwrap_or(0.0) as f32;
             self.stats.trace.samples.push(TraceSample { at: tick.next(), cleared, ..self.now });
             self.now = TraceSample { force: 0.0, touched: false, cutting: false, ..self.now };
+        }
+    }
+
+    /// Counts the removed voxels that the trainee cannot see.
+    fn observe_visibility(&mut self, at: Tick, edits: &[Edit], session: &Session) {
+        let (Some(sight), Some(unseen)) = (&mut self.sight, &mut self.stats.unseen) else { return };
+        sight.apply_edits(edits);
+        let Some(view) = session.view() else { return };
+        let view = view.transformed(&self.tooth_from_world);
+        for edit in edits.iter().filter(|edit| edit.removes()) {
+            unseen.judged += 1;
+            if !sight.is_visible(&view, edit.index as usize) {
+                unseen.hidden.push(UnseenVoxel { voxel: edit.index, at, tissue: edit.before.label });
+            }
         }
     }
 

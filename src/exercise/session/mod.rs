@@ -7,10 +7,12 @@
 mod run;
 mod operator;
 mod input_error;
+mod trainee_view;
 
 pub use input_error::InputError;
 pub use operator::{ActionFile, Operator, OperatorFile};
 pub use run::{Observer, RunEnd, Trainee, run};
+pub use trainee_view::{MirrorFace, TraineeView};
 
 use crate::catalog::{TissueRole, WorkingEndEntry};
 use crate::scenario::{
@@ -62,6 +64,8 @@ pub enum Input {
     Rate { item: String, value: u8 },
     /// Ends the session early.
     Abort,
+    /// Tells from where the person looks. It changes nothing in the simulation.
+    Look(TraineeView),
 }
 
 /// Finding to be recorded in the periodontal chart.
@@ -234,6 +238,8 @@ pub struct Session {
     instrument: usize,
     /// Filling material that carriers place.
     filling: Option<Label>,
+    /// Latest view of the person; `None` if none was told.
+    view: Option<TraineeView>,
     /// Number of decayed voxels at the start.
     decay_at_start: usize,
     /// Number of decayed voxels removed so far.
@@ -287,6 +293,7 @@ impl Session {
             last_step: None,
             instrument: 0,
             filling: None,
+            view: None,
             decay_at_start,
             decay_gone: 0,
             outcome: SessionOutcome { ratings: vec![None; ratings], ..SessionOutcome::default() },
@@ -331,6 +338,11 @@ impl Session {
     /// Returns the share of the initial decay that has been removed, %; `None` without decay.
     pub fn cleared_pct(&self) -> Option<f64> {
         (self.decay_at_start > 0).then(|| 100.0 * self.decay_gone as f64 / self.decay_at_start as f64)
+    }
+
+    /// Returns the latest view of the person; `None` if none was told.
+    pub fn view(&self) -> Option<&TraineeView> {
+        self.view.as_ref()
     }
 
     pub fn are_stages_over(&self) -> bool {
@@ -484,6 +496,10 @@ impl Session {
     fn input(&mut self, input: &Input) -> Vec<Effect> {
         let refused = |why| vec![Effect::Refused { why }];
         match (input, self.phase) {
+            (Input::Look(view), _) => {
+                self.view = Some(*view).filter(TraineeView::is_valid);
+                Vec::new()
+            }
             (Input::Rate { item, value }, SessionPhase::Over) => self.rate(item, *value),
             (Input::Rate { .. }, _) => refused(InputError::TooEarly),
             (_, SessionPhase::Waiting | SessionPhase::Over) => refused(InputError::NoStage),
