@@ -31,7 +31,7 @@ pub fn briefing_ui(
     commands: &mut Vec<AppCommand>,
 ) {
     let BriefingFields { participant, examiner_code } = fields;
-    let mut examiner_code = examiner_code.filter(|_| lesson::is_sealable(scenario));
+    let examiner_code = examiner_code.filter(|_| lesson::is_sealable(scenario));
     theme::centered_column(ui, |ui| {
         ui.heading(words.own(&scenario.texts, &scenario.title));
         ui.label(words.own(&scenario.texts, &scenario.summary));
@@ -54,7 +54,7 @@ pub fn briefing_ui(
             ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
         }
         let has_valid_code = examiner_code.as_ref().is_none_or(|code| is_valid_examiner_code(code.as_str()));
-        if let Some(code) = examiner_code.as_deref_mut() {
+        if let Some(code) = examiner_code {
             examiner_code_ui(ui, code, words);
         }
         ui.add_space(8.0);
