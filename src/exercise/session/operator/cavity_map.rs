@@ -9,14 +9,26 @@ use typodont_core::touch::Instrument;
 use typodont_core::volume::{Grid, Volume, distance};
 
 /// A point to press on; tooth space, mm.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PressPoint {
     /// Point on the original contour.
     pub contour: Vec3,
     /// Last known height of the surface there.
     pub height: f32,
-    /// Number of visits at which the surface must still be met high enough.
-    pub visits_left: u32,
+    /// Column of the point.
+    column: usize,
+    /// Columns of the cavity under the instrument's face.
+    under_face: Vec<usize>,
+}
+
+impl PressPoint {
+    /// Returns true if the filling under the face is seen to reach a height, mm, or to stand so far above it that more
+    /// would only pile up: a corner that no face reaches stays low.
+    pub fn is_full(&self, surface: &[f32], height: f32) -> bool {
+        /// Height above the target from which a point gets no more, mm.
+        const PILED: f32 = 0.3;
+        surface[self.column] >= height + PILED || self.under_face.iter().all(|&column| surface[column] >= height)
+    }
 }
 
 /// Arrangement of strokes over a cavity; lengths in mm.
@@ -46,9 +58,6 @@ pub struct CavityMap {
 /// Clearance between the instrument's face and the cavity wall beside it, mm: a hand trembles, and walls are
 /// inclined.
 const WALL_CLEARANCE: f32 = 0.15;
-
-/// Number of times a point must be found full: the first time the cavity beside the face may still be open.
-const VISITS: u32 = 2;
 
 impl CavityMap {
     /// Returns the map of a workpiece's cavity; `None` without a cavity.
@@ -92,10 +101,20 @@ impl CavityMap {
             }
             places.extend(ys.into_iter().filter(|&y| is_meant(x, y)).map(|y| {
                 let (at, i) = (self.grid.centre([x, y, 0]), self.grid.index([x, y, 0]));
-                PressPoint { contour: at.with_z(self.contour[i]), height: self.start[i], visits_left: VISITS }
+                let under_face = self.open_columns_near(at, radius);
+                PressPoint { contour: at.with_z(self.contour[i]), height: self.start[i], column: i, under_face }
             }));
         }
         places
+    }
+
+    /// Returns the columns of the cavity within a distance of a place.
+    fn open_columns_near(&self, place: Vec3, radius: f32) -> Vec<usize> {
+        let is_near = |&i: &usize| {
+            let centre = self.grid.centre(self.grid.cell(i));
+            self.depth_inside[i] > 0.0 && centre.truncate().distance(place.truncate()) <= radius
+        };
+        (0..self.depth_inside.len()).filter(is_near).collect()
     }
 
     /// Returns the path of an instrument's tip over the contour on which no part of its end cuts below the intended
@@ -199,7 +218,7 @@ pub(super) fn spread(columns: impl Iterator<Item = u32>, apart: u32) -> Vec<u32>
 }
 
 /// Returns the height of the highest surface of every column, mm; −∞ for a column without matter.
-fn heights(volume: &Volume) -> Vec<f32> {
+pub(super) fn heights(volume: &Volume) -> Vec<f32> {
     let grid = volume.grid();
     let flat = grid.dims[0] as usize * grid.dims[1] as usize;
     let mut heights = vec![f32::NEG_INFINITY; flat];
@@ -239,6 +258,14 @@ mod tests {
         }
         let places = cavity_map.press_points(0.4, 0.3);
         assert!(!places.is_empty());
+        // A face finds a point full once nothing under it is low, and never before.
+        let mut seen = heights(&workpiece.volume);
+        assert!(!places[0].is_full(&seen, 0.0));
+        places[0].under_face.iter().skip(1).for_each(|&column| seen[column] = 0.1);
+        assert!(!places[0].is_full(&seen, 0.0), "one column is still low");
+        seen[places[0].under_face[0]] = 0.1;
+        assert!(places[0].is_full(&seen, 0.0));
+        assert!(!places[0].is_full(&seen, 0.2));
         for PressPoint { contour, height, .. } in places {
             assert!(contour.x.abs() <= 0.55 && contour.y.abs() <= 0.55 && surface(contour).abs() < 0.03, "{contour}");
             assert!((height + 1.0).abs() < 0.06, "{height}");

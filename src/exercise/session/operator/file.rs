@@ -206,6 +206,9 @@ pub struct CutFile {
     /// Share of the decay removed at which the operator stops, %: 1 to 100.
     #[schemars(range(min = 1.0, max = 100.0))]
     pub until_cleared_pct: f64,
+    /// The hand backs off at once where the bur is beyond its path, as before a thin wall that gives way.
+    #[serde(default)]
+    pub backs_off: bool,
 }
 
 /// Place a filling into the prepared cavity, press by press, from its floor up.

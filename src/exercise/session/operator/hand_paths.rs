@@ -25,7 +25,7 @@ pub(super) struct StrokeParams {
 impl From<&CutFile> for StrokeParams {
     fn from(file: &CutFile) -> StrokeParams {
         let CutFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
-        StrokeParams { speed, lean, force, patience, yields: false }
+        StrokeParams { speed, lean, force, patience, yields: file.backs_off }
     }
 }
 

@@ -20,6 +20,9 @@ pub(super) struct PreparingTask {
     passes_left: u32,
 }
 
+/// Distance by which each further pass over a lesion goes beyond the pass before, mm: what is left lies at the border.
+const FURTHER: f32 = 0.04;
+
 /// Depth by which the bur must overlap a remnant of the target for a person to see the remnant, mm: half a voxel.
 const VISIBLE_REMNANT: f32 = 0.05;
 
@@ -55,7 +58,8 @@ impl Operator {
         /// Angle above the lesion's equator up to which its walls are followed, rad.
         const TOP: f32 = 0.6;
         const POINTS: u32 = 32;
-        let bowl = (radii - radius + cut.margin_mm).max(Vec3::splat(0.02));
+        let margin = cut.margin_mm + pass as f32 * FURTHER;
+        let bowl = (radii - radius + margin).max(Vec3::splat(0.02));
         let floor = -0.5 * core::f32::consts::PI;
         let rings = ((TOP - floor) * bowl.max_element() / cut.pitch_mm).ceil().max(2.0) as u32;
         let on_bowl = |i: u32| {

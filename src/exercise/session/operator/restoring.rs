@@ -1,6 +1,6 @@
 //! Placing a filling, condensing it, and carving it back to the contour.
 
-use crate::session::operator::cavity_map::{CavityMap, PressPoint, StrokePattern};
+use crate::session::operator::cavity_map::{CavityMap, PressPoint, StrokePattern, heights};
 use crate::session::operator::file::{CarveAgainFile, CarveFile, CondenseFile, FillFile};
 use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT};
 use typodont_core::frame::Vec3;
@@ -50,19 +50,16 @@ impl Operator {
     pub(super) fn continue_filling(&mut self, mut filling: FillingTask) {
         let tooth_from_world = self.workpiece.world_from_tooth.inverse();
         if let Some(last) = filling.last {
-            let target = filling.places[last].contour.z + filling.file.to_mm;
-            let contact_point = self.device.take_result().and_then(|felt| felt.touched_at);
             filling.places[last].height = (tooth_from_world * self.tip).z;
-            // A point is full once the surface was met high enough before more was placed, and that more than once.
-            let is_high = contact_point.is_some_and(|at| (tooth_from_world * at).z >= target);
-            filling.places[last].visits_left = filling.places[last].visits_left.saturating_sub(u32::from(is_high));
         }
+        let Some(surface) = self.visible_volume.as_ref().map(heights) else { return };
         let count = filling.places.len();
-        let is_low = |p: &PressPoint| p.visits_left > 0;
+        // A press lays some tenths of a millimetre: whoever presses on a point to find out whether it is full overfills it.
+        let is_low = |p: &PressPoint| !p.is_full(&surface, p.contour.z + filling.file.to_mm);
         let after = filling.last.map_or(0, |last| last + 1);
         let next = (0..count).map(|i| (after + i) % count).find(|&i| is_low(&filling.places[i]));
         let Some(next) = next.filter(|_| filling.presses < filling.file.presses) else { return };
-        let place = filling.places[next];
+        let place = filling.places[next].clone();
         // Filling placed beside the point may be higher, and the rim of the face would meet it.
         let reach = 2.0 * filling.radius + TOUCH_HEIGHT;
         let beside = filling.places.iter().filter(|p| p.contour.truncate().distance(place.contour.truncate()) < reach);
