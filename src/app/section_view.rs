@@ -1,7 +1,7 @@
 //! A section through the working end, beside the picture: how deep the instrument is, which the picture does not show.
 
 use super::lesson_scene::LessonScene;
-use super::snapshot::LessonSnapshot;
+use super::snapshot::{LessonSnapshot, is_still};
 use eframe::egui::{self, Color32, Pos2, Rect, Stroke, vec2};
 use typodont_core::frame::{Quat, Vec3};
 use typodont_exercise::catalog::InstrumentEntry;
@@ -80,11 +80,11 @@ fn scale_ui(painter: &egui::Painter, rect: Rect, points_per_mm: f32) {
     painter.text(at + vec2(6.0, 0.0), egui::Align2::LEFT_CENTER, "1 mm", egui::FontId::proportional(11.0), LINE);
 }
 
-/// Texture of the section, drawn again only if one of its inputs has changed.
+/// Texture of the section, drawn again only if one of its inputs has changed visibly, as the view is.
 fn section_texture(ui: &egui::Ui, scene: &mut LessonScene, azimuth: f32, tip: Vec3) -> egui::TextureId {
     let edit_count = scene.edit_count;
     let is_same =
-        |image: &&SectionImage| image.tip == tip && image.azimuth == azimuth && image.edit_count == edit_count;
+        |image: &&SectionImage| is_still(image.tip, tip) && image.azimuth == azimuth && image.edit_count == edit_count;
     if let Some(image) = scene.section.as_ref().filter(is_same) {
         return image.texture.id();
     }

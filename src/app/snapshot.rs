@@ -42,9 +42,14 @@ impl From<&LessonSnapshot> for InstrumentPose {
 impl PartialEq for InstrumentPose {
     fn eq(&self, other: &InstrumentPose) -> bool {
         self.index == other.index
-            && self.tip.distance(other.tip) < STILL_DISTANCE
+            && is_still(self.tip, other.tip)
             && 1.0 - self.orientation.dot(other.orientation).abs() < STILL_ROTATION
     }
+}
+
+/// True if a tip has moved less than can be seen; mm.
+pub fn is_still(drawn: Vec3, now: Vec3) -> bool {
+    drawn.distance(now) < STILL_DISTANCE
 }
 
 /// Timing of the servo, µs and counts.
