@@ -188,6 +188,14 @@ fn an_interrupted_session_is_named() {
     fs::create_dir_all(home.join("sessions/20261123-molar.partial")).unwrap();
     let output = doctor(&home).args(["--out", "sessions"]).output().unwrap();
     finds(&output, "sessions", "warning", "20261123-molar.partial", "typodont finish");
+    // A program that records it holds the lock of its folder.
+    let lock = fs::File::create(home.join("sessions/20261123-molar.partial/session.lock")).unwrap();
+    lock.lock().unwrap();
+    let output = doctor(&home).args(["--out", "sessions"]).output().unwrap();
+    assert!(!String::from_utf8_lossy(&output.stdout).contains("20261123-molar.partial"));
+    drop(lock);
+    let output = doctor(&home).args(["--out", "sessions"]).output().unwrap();
+    finds(&output, "sessions", "warning", "20261123-molar.partial", "typodont finish");
 }
 
 #[test]

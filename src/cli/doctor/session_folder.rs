@@ -5,7 +5,7 @@ use super::remedies::StationFault;
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use typodont_report::bundle::is_partial;
+use typodont_report::bundle::{is_in_use, is_partial};
 
 /// Space that must be free, bytes: a long session with its volumes, recording and pictures takes half of it.
 const SPACE: usize = 64 << 20;
@@ -75,11 +75,11 @@ impl Drop for DeletedOnDrop {
     }
 }
 
-/// Names of interrupted sessions.
+/// Names of interrupted sessions; one that a program is recording at present is not.
 fn interrupted(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let partial = entries.filter(|entry| is_partial(&entry.path()));
-    let mut names: Vec<String> = partial.map(|entry| entry.file_name().display().to_string()).collect();
+    let partial = entries.map(|entry| entry.path()).filter(|path| is_partial(path) && !is_in_use(path));
+    let mut names: Vec<String> = partial.filter_map(|path| Some(path.file_name()?.display().to_string())).collect();
     names.sort();
     names
 }
