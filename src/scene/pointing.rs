@@ -6,6 +6,7 @@
 use super::particles::CollisionWorld;
 use typodont_core::frame::{Quat, Vec3};
 use typodont_core::touch::Collider;
+use typodont_core::volume::RAY_LENGTH_MAX;
 use typodont_exercise::catalog::{InstrumentEntry, WorkingEndEntry};
 
 /// A point of a visible surface.
@@ -41,7 +42,7 @@ pub fn spot_under_ray(world: &CollisionWorld, from: Vec3, along: Vec3) -> Option
     let (from, along) = (tooth_from_world * from, tooth_from_world.rotate(along).normalize_or(Vec3::NEG_Z));
     let on_tooth =
         world.volume.raycast(from, along).map(|(place, normal)| (place, smooth_normal(world, place, normal)));
-    let farthest = on_tooth.map_or(FARTHEST, |(place, _)| place.distance(from));
+    let farthest = on_tooth.map_or(RAY_LENGTH_MAX, |(place, _)| place.distance(from));
     let (place, normal) = collider_on_ray(world.obstacles, from, along, farthest).or(on_tooth)?;
     // A surface that is seen faces the eye.
     let normal = if normal.dot(along) > 0.0 { -normal } else { normal };
@@ -57,9 +58,6 @@ fn smooth_normal(world: &CollisionWorld, place: Vec3, normal: Vec3) -> Vec3 {
     let slope = |offset: Vec3| world.volume.density_and_gradient_at(place + offset * REACH).1;
     (-around.into_iter().map(slope).sum::<Vec3>()).normalize_or(normal)
 }
-
-/// Maximum length of a ray, mm: more than the distance of any viewpoint.
-const FARTHEST: f32 = 700.0;
 
 /// First surface of a collider nearer than `farthest`, and its normal; tooth space.
 fn collider_on_ray(obstacles: &[Collider], from: Vec3, along: Vec3, farthest: f32) -> Option<(Vec3, Vec3)> {
@@ -106,10 +104,9 @@ pub fn hand_at_spot(
     const PROBE_DEPTH: f32 = 12.0;
     /// Maximum offset of a working end that presses, mm: about the radius of a bur, whose flank may bear on a wall.
     const PRESS_REACH: f32 = 0.9;
-    /// Displacement of the hand for each millimetre of that offset.
-    const ASIDE_GAIN: f32 = 1.0;
     let touching = spot.place + spot.normal * support(&instrument.end, world_from_handle.inverse() * spot.normal);
-    // Offset of the working end along the surface; the hand is moved against it, so that a slope does not lead it away.
+    // Offset of the working end along the surface. A hand that presses is moved by as much beyond the spot, so that a slope
+    // does not lead it away.
     let aside = (touching - tip).reject_from_normalized(spot.normal);
     let shaft_down = world_from_handle * Vec3::NEG_Z;
     match action {
@@ -118,7 +115,7 @@ pub fn hand_at_spot(
         }
         HandAction::Press { max_force } if aside.length() < PRESS_REACH => {
             let depth = PRESS_DEPTH + DEPTH_PER_FORCE * (max_force - DEEP_FORCE).max(0.0);
-            PointedHand { place: touching + aside * ASIDE_GAIN - spot.normal * depth, max_force }
+            PointedHand { place: touching + aside - spot.normal * depth, max_force }
         }
         HandAction::Rest | HandAction::Press { .. } if instrument.is_bur() => {
             PointedHand { place: touching + spot.normal * HOVER, max_force: REST_FORCE }

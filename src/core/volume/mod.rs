@@ -17,6 +17,7 @@ pub mod subgrid;
 pub use bricks::{BRICK, Bricks};
 pub use edit::Edit;
 pub use grid::Grid;
+pub use sample::RAY_LENGTH_MAX;
 
 use crate::frame::Vec3;
 

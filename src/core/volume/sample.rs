@@ -3,18 +3,19 @@
 use crate::frame::Vec3;
 use crate::volume::{Density, ISO, Volume};
 
+/// Maximum length of a ray, mm: more than the distance of any viewpoint.
+pub const RAY_LENGTH_MAX: f32 = 700.0;
+
 impl Volume {
     /// Returns the first point of matter along a ray and the outward unit normal there; tooth space, mm. `along` is a
     /// unit vector.
     pub fn raycast(&self, from: Vec3, along: Vec3) -> Option<(Vec3, Vec3)> {
-        /// Maximum length of the ray, mm: more than the distance of any viewpoint.
-        const FARTHEST: f32 = 700.0;
         let step = 0.5 * self.grid().spacing.min_element();
         let [low, high] = self.grid().extent();
         // The search begins at the point at which the ray enters the grid.
         let (a, b) = ((low - from) / along, (high - from) / along);
         let enters = a.min(b).max_element().max(0.0);
-        let leaves = a.max(b).min_element().min(FARTHEST);
+        let leaves = a.max(b).min_element().min(RAY_LENGTH_MAX);
         let steps = ((leaves - enters).max(0.0) / step) as u32;
         let point = |i: u32| from + along * (enters + i as f32 * step);
         let hit = (0..steps).map(point).find(|&p| self.density_at(p) >= ISO)?;
