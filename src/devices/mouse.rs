@@ -9,7 +9,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, Pacing, Reading, UPRIGHT, Wrench};
 use typodont_core::frame::{Pose, Quat, Vec3};
-use typodont_core::mailbox::SeqLock;
 use typodont_core::tick::TICK_S;
 
 /// Half the box that the hand can reach, mm: the teeth of a quadrant with room around them.
@@ -71,8 +70,6 @@ struct MouseState {
     buttons: AtomicU32,
     /// Maximum force of a target, N: that of the device.
     force_limit: f32,
-    /// Hand position and force, three floats each. Written only by the device.
-    feedback: SeqLock<6>,
 }
 
 impl Mouse {
@@ -85,7 +82,6 @@ impl Mouse {
             yaw: AtomicI32::new(0),
             buttons: AtomicU32::new(0),
             force_limit: spec.max_force,
-            feedback: SeqLock::new(),
         });
         let device = MouseDevice {
             shared: shared.clone(),
@@ -124,13 +120,6 @@ impl Mouse {
     pub fn release_at(&self, place: Vec3) {
         self.aim(HandTarget { place, max_force: 0.0, ..self.0.target() });
         self.0.buttons.store(0, Ordering::Relaxed);
-    }
-
-    /// Returns the hand's position (world space, mm) and the force that it does not feel (N). `None` before the first
-    /// tick.
-    pub fn hand_and_force(&self) -> Option<(Vec3, Vec3)> {
-        let [a, b, c, d, e, f] = self.0.feedback.read()?.1.map(f32::from_bits);
-        Some((Vec3::new(a, b, c), Vec3::new(d, e, f)))
     }
 }
 
@@ -202,9 +191,6 @@ impl Device for MouseDevice {
         self.hand += self.displacement(&target);
         let upright = Quat::from_rotation_y(target.yaw) * UPRIGHT;
         self.orientation = self.orientation.slerp(upright, TICK / TURN_TIME).normalize();
-        let [a, b, c] = self.hand.to_array().map(f32::to_bits);
-        let [d, e, f] = output.force.to_array().map(f32::to_bits);
-        self.shared.feedback.write([a, b, c, d, e, f]);
         let pose = Pose { position: self.hand, orientation: self.orientation };
         Ok(Reading { pose, buttons: self.shared.buttons.load(Ordering::Relaxed) })
     }

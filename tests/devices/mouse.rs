@@ -126,18 +126,6 @@ fn the_handle_turns_with_the_view() {
 }
 
 #[test]
-fn the_force_is_kept_for_the_window() {
-    let (mouse, mut device) = Mouse::new();
-    assert_eq!(mouse.hand_and_force(), None);
-    mouse.aim(target(Vec3::X * 5.0, 1.0));
-    settle(&mut device);
-    let output = Wrench { force: Vec3::new(0.0, 0.5, 0.0), ..Wrench::ZERO };
-    device.exchange(&output).unwrap();
-    let (hand, force) = mouse.hand_and_force().unwrap();
-    assert!(hand.distance(Vec3::X * 5.0) < 0.2 && force == output.force, "{hand} {force}");
-}
-
-#[test]
 fn a_mouse_is_always_there_but_needs_a_window() {
     crate::support::peace::in_real_time(|| {
         let mouse = driver_by_name("mouse").expect("it is a driver");
