@@ -17,6 +17,7 @@ use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider, Compliance, SdfGrid};
 use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_formats::limits::WORKPIECE_VOXELS_MAX;
 
 /// The workpiece of a session.
 #[derive(Clone, Debug)]
@@ -104,9 +105,6 @@ impl fmt::Display for WorkpieceError {
 
 impl std::error::Error for WorkpieceError {}
 
-/// Maximum number of voxels of a workpiece: one and a half times 512×512×322, about 1 GiB of memory in use.
-const VOXELS_MAX: u64 = 130_000_000;
-
 impl Workpiece {
     /// Makes the workpiece of a scenario; the seed determines everything that the scenario leaves to chance.
     ///
@@ -162,7 +160,7 @@ impl Workpiece {
             SceneLayout::Single | SceneLayout::Jaw => (parts.swap_remove(0), wholes.pop()),
         };
         let original = original.map(Arc::new);
-        if volume.grid().len() as u64 > VOXELS_MAX {
+        if volume.grid().len() as u64 > WORKPIECE_VOXELS_MAX {
             return Err(WorkpieceError::TooLarge { voxels: volume.grid().len() as u64 });
         }
         for (zone, region) in scenario.zones.iter().map(|z| &z.region).enumerate() {
@@ -333,7 +331,7 @@ fn side_by_side(teeth: &[Volume], whole: &[Volume], gap: f32) -> Result<Volume, 
     let low = (low / spacing).round() * spacing;
     let grid = Grid::covering(low, high, spacing, 4);
     let voxels = grid.dims.iter().map(|&n| u64::from(n)).product();
-    if voxels > VOXELS_MAX {
+    if voxels > WORKPIECE_VOXELS_MAX {
         return Err(WorkpieceError::TooLarge { voxels });
     }
     let mut density = vec![Default::default(); grid.len()];

@@ -3,7 +3,8 @@
 //! Takes an image, a box and a voxel spacing, both in mm. Gives the cut or resampled image. Never reads a file.
 
 use crate::imaging::error::ScanError;
-use crate::nrrd::{AXIS_MAX, Geometry, Samples, VOXELS_MAX, VoxelImage};
+use crate::limits::{AXIS_MAX, VOXELS_MAX};
+use crate::nrrd::{Geometry, Samples, VoxelImage};
 use glam::{DMat3, DVec3};
 use typodont_core::parallel::{available_threads, par_rows};
 

@@ -305,10 +305,10 @@ impl fmt::Display for NrrdErrorKind {
             NrrdErrorKind::Unsupported { field, text, .. } => write!(f, "`{field}: {text}` is not supported"),
             NrrdErrorKind::Layered { layers } => write!(f, "the volume contains {layers} values per voxel, not one"),
             NrrdErrorKind::TooLarge { axis: Some(axis), voxels } => {
-                write!(f, "{voxels} voxels along axis {axis} are more than {}", crate::nrrd::AXIS_MAX)
+                write!(f, "{voxels} voxels along axis {axis} are more than {}", crate::limits::AXIS_MAX)
             }
             NrrdErrorKind::TooLarge { axis: None, voxels } => {
-                write!(f, "{voxels} voxels are more than {}", crate::nrrd::VOXELS_MAX)
+                write!(f, "{voxels} voxels are more than {}", crate::limits::VOXELS_MAX)
             }
             NrrdErrorKind::Spacing { axis, mm } => write!(f, "the spacing along axis {axis} is {mm} mm"),
             NrrdErrorKind::SpacingsDisagree { axis, stated, length } => {

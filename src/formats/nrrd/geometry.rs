@@ -1,7 +1,7 @@
 //! Position and orientation of the voxels of a file.
 
+use crate::limits::{AXIS_MAX, VOXELS_MAX};
 use crate::nrrd::error::NrrdErrorKind;
-use crate::nrrd::{AXIS_MAX, VOXELS_MAX};
 use glam::DVec3;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::Grid;

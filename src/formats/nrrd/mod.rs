@@ -25,14 +25,6 @@ pub(super) use layout::{ByteSkip, SampleLayout, SampleType};
 pub(super) use reader::{decode, decode_zlib};
 pub(super) use source::ByteSource;
 
-/// Maximum number of voxels along one axis: a scan of a whole head at 0.08 mm has 3000; a larger claim is damaged or
-/// unsuitable.
-pub const AXIS_MAX: u32 = 4096;
-
-/// Maximum total number of voxels: three times the largest ordinary scan (512×512×322), and small enough that the
-/// indices and byte counts derived from it fit everywhere.
-pub const VOXELS_MAX: u64 = 1 << 28;
-
 /// A volume as stored in a file: samples on a regular grid, their geometry, and custom entries.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelImage {

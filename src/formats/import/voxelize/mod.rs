@@ -9,6 +9,7 @@ mod mesh_check;
 pub use mesh_check::{UNITS, VoxelizeError};
 
 use crate::import::orientation;
+use crate::limits::{AXIS_MAX, VOXELS_MAX};
 use mesh_check::{CheckedMesh, bounds};
 use typodont_anatomy::TissueLabels;
 use typodont_core::frame::Vec3;
@@ -19,10 +20,6 @@ use typodont_core::volume::{Density, Grid, Label, Volume, density_at_distance, d
 
 /// Margin of empty voxels around the tooth.
 const MARGIN: u32 = 4;
-
-/// Maximum number of voxels in total and along one axis, as for scans.
-const VOXELS_MAX: f64 = (1u64 << 28) as f64;
-const AXIS_MAX: f32 = 4096.0;
 
 /// Fraction of the inside that may be inside twice before it counts as a mistake: slivers where shells were drawn
 /// slightly into one another.
@@ -201,7 +198,7 @@ fn grid_around(parts: &[TissueSurface], spacing: f32, crop: Option<[Vec3; 2]>) -
     }
     let counts = (high - low) / spacing + 2.0 * MARGIN as f32 + 2.0;
     let voxels = f64::from(counts.x) * f64::from(counts.y) * f64::from(counts.z);
-    if !(voxels <= VOXELS_MAX && counts.max_element() <= AXIS_MAX) {
+    if !(voxels <= VOXELS_MAX as f64 && counts.max_element() <= AXIS_MAX as f32) {
         return Err(VoxelizeError::TooFine { spacing, voxels });
     }
     // Shifted by half a voxel, so that flat sides lie between voxel centres.
