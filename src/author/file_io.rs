@@ -4,12 +4,13 @@
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::fmt;
-use std::fs::{self, File};
-use std::io::{ErrorKind, Write};
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use typodont_formats::diagnostic::Diagnostic;
 use typodont_formats::json::TEXT_MAX;
+use typodont_formats::write_atomically;
 
 /// Byte order mark, which some editors write before a text.
 const MARK: &str = "\u{feff}";
@@ -129,24 +130,6 @@ pub fn save(path: &Path, text: &str, overwrite: Overwrite) -> Result<FileStamp, 
     let bytes = if has_byte_order_mark { format!("{MARK}{text}") } else { text.to_string() };
     write_atomically(&target, bytes.as_bytes()).map_err(|e| unwritable(&e))?;
     Ok(FileStamp::new(&target, bytes.as_bytes()))
-}
-
-fn write_atomically(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let temporary = folder.join(format!(".{name}.{}.new", std::process::id()));
-    let written = File::create(&temporary).and_then(|mut file| {
-        file.write_all(bytes)?;
-        if let Ok(meta) = fs::metadata(path) {
-            file.set_permissions(meta.permissions())?;
-        }
-        file.sync_all()
-    });
-    let result = written.and_then(|()| fs::rename(&temporary, path));
-    if result.is_err() {
-        let _ = fs::remove_file(&temporary);
-    }
-    result
 }
 
 fn digest(bytes: &[u8]) -> [u8; 32] {

@@ -22,6 +22,7 @@ pub mod json;
 pub mod pointer;
 mod json_hints;
 mod library;
+mod file_writer;
 pub mod limits;
 pub mod nrrd;
 pub mod imaging;
@@ -32,4 +33,5 @@ pub mod csv_tables;
 pub mod import;
 pub mod zip;
 
+pub use file_writer::{sync_folder, write_atomically, write_synced};
 pub use library::{Library, decode_text, read_file, read_text, write_failure};

@@ -59,10 +59,7 @@ impl Spool {
             return Ok(false);
         }
         let place = self.folder.join(WAITING).join(&name);
-        let partial = place.with_extension("partial");
-        fs::write(&partial, text)?;
-        File::open(&partial)?.sync_all()?;
-        fs::rename(&partial, &place)?;
+        typodont_formats::write_atomically(&place, text.as_bytes())?;
         Ok(true)
     }
 

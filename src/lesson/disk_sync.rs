@@ -10,7 +10,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
-use typodont_report::bundle::sync_folder;
+use typodont_formats::sync_folder;
 
 /// Pause between two syncs. With the 0.1 s that the recorder keeps, a power cut loses at most 1.2 s as long as a sync
 /// takes no more than 0.1 s.

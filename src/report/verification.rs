@@ -237,10 +237,7 @@ impl ReplayCache {
         }
         let Ok(text) = serde_json::to_vec(replayed) else { return };
         // Programs that write the same entry at the same time write the same bytes; a reader sees all of them or none.
-        let partial = path.with_extension(format!("{:p}.partial", std::ptr::from_ref(replayed)));
-        if fs::write(&partial, text).and_then(|()| fs::rename(&partial, &path)).is_err() {
-            let _ = fs::remove_file(&partial);
-        }
+        let _ = typodont_formats::write_atomically(&path, &text);
     }
 }
 

@@ -14,6 +14,7 @@ use std::io::{self, ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use typodont_exercise::scenario::hex;
+use typodont_formats::sync_folder;
 
 /// Version of the line format.
 const VERSION: u32 = 1;
@@ -229,7 +230,8 @@ impl<D: LoggedDraft> ChainedLog<D> {
             return Err(failed(error));
         }
         if is_new {
-            sync_folder(&self.path);
+            // The directory entry of a new file survives a power cut, too.
+            sync_folder(self.path.parent().unwrap_or(Path::new(".")));
         }
         self.cached = None;
         Ok(entry)
@@ -257,14 +259,6 @@ fn lock_with_timeout(lock: impl Fn() -> Result<(), TryLockError>) -> io::Result<
         }
     }
     Err(io::Error::other("the log is locked by another program"))
-}
-
-/// Syncs the folder of a new file, so that its directory entry survives a power cut.
-fn sync_folder(path: &Path) {
-    if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
-        // Systems on which folders cannot be synced do so by themselves.
-        let _ = folder.sync_all();
-    }
 }
 
 impl<D> Default for LogSnapshot<D> {

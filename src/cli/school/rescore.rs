@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use typodont_exercise::scenario::hex;
 use typodont_exercise::score::SCORER_VERSION;
-use typodont_formats::read_file;
+use typodont_formats::{read_file, write_atomically};
 use typodont_integrations::session_id;
 use typodont_report::{SessionFile, sanitize_display};
 use typodont_school::{RECORDING, Shard, rescore};
@@ -46,10 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
             match read.and_then(|bytes| rescore(&id, &bytes).map_err(|unscored| unscored.0)) {
                 Ok(result) => {
                     // The file is complete or absent: a killed program leaves nothing that looks finished.
-                    let partial = file.with_extension("partial");
-                    fs::write(&partial, result.to_json())
-                        .and_then(|()| fs::rename(&partial, &file))
-                        .map_err(unwritable)?;
+                    write_atomically(&file, result.to_json().as_bytes()).map_err(unwritable)?;
                     done += 1;
                 }
                 Err(why) => {

@@ -16,6 +16,7 @@ use typodont_exercise::record;
 use typodont_exercise::record::{Recorder, RecorderError, Recording, RecordingError, RecordingHeadFile, ReplayCheck};
 use typodont_exercise::scenario::{Scenario, Workpiece};
 use typodont_exercise::score;
+use typodont_formats::{sync_folder, write_atomically, write_synced};
 
 /// Name of the file that a running session keeps locked in its folder.
 const LOCK_FILE: &str = "session.lock";
@@ -389,13 +390,7 @@ impl PartialFolder {
         let bytes = fs::read(&path).map_err(|e| unmade(e.to_string()))?;
         let revealed = record::reveal(&bytes, code).map_err(unmade)?;
         // The recording is replaced as a whole, so that a power cut leaves one or the other.
-        let copy = path.with_extension("revealed");
-        let replaced = write_synced(&copy, &revealed).and_then(|()| fs::rename(&copy, &path));
-        sync_folder(&self.partial);
-        replaced.map_err(|error| {
-            let _ = fs::remove_file(&copy);
-            unmade(error.to_string())
-        })
+        write_atomically(&path, &revealed).map_err(|error| unmade(typodont_formats::write_failure(&error)))
     }
 
     /// Writes all files and renames the folder; returns its new path.
@@ -419,18 +414,4 @@ impl PartialFolder {
         sync_folder(path.parent().unwrap_or(Path::new(".")));
         Ok(path)
     }
-}
-
-/// Writes a file and syncs it to the disk.
-fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(bytes)?;
-    file.sync_data()
-}
-
-/// Syncs the names in a folder to the disk, where the system can. A file system that cannot is not an error: the files
-/// are written in any case.
-pub fn sync_folder(folder: &Path) {
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let _ = File::open(folder).and_then(|folder| folder.sync_all());
 }
