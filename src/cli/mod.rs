@@ -47,8 +47,6 @@ mod secret_file;
 #[cfg(feature = "school")]
 mod school;
 mod score;
-#[cfg(feature = "integrations")]
-mod tls_roots;
 mod verification;
 mod verify;
 #[cfg(feature = "integrations")]

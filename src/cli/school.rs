@@ -7,7 +7,6 @@ pub mod enqueue;
 mod erase;
 mod export;
 pub mod fetch;
-mod http_client;
 mod store_marker;
 mod metrics;
 mod retry;

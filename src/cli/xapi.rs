@@ -1,6 +1,5 @@
 //! `typodont xapi`: exports sessions to a learning record store, by a spool on disk from which they are sent.
 
-mod lrs;
 mod sending;
 
 use super::verification::{self, VerificationArguments};

@@ -1,7 +1,7 @@
 //! Exports for a school's other systems: gradebooks, learning record stores, learning platforms and data analysis.
 //!
 //! Takes a cohort of sessions. Gives CSV tables for Moodle and Canvas, xAPI statements in a spool on disk, and
-//! Parquet tables. Never reads a clock or opens a network connection: the command line sends the statements.
+//! Parquet tables. Never reads a clock. Only [`lrs`] opens network connections, behind the feature `network`.
 //!
 //! ```
 //! use typodont_integrations::Pseudonyms;
@@ -18,9 +18,15 @@ pub mod gradebook;
 mod identity;
 mod iri;
 pub mod learning_platform;
+#[cfg(feature = "network")]
+pub mod lrs;
 pub mod spool;
 mod xapi;
 pub mod parquet_tables;
+mod this_machine;
+#[cfg(feature = "network")]
+pub mod tls_roots;
 
 pub use identity::{Pseudonyms, session_id};
+pub use this_machine::is_this_machine;
 pub use xapi::{XapiNaming, statements};

@@ -2,6 +2,7 @@
 
 use postgres::Config;
 use postgres::config::{Host, SslMode};
+use typodont_integrations::is_this_machine;
 
 /// Parses `postgres://user@host/name` or `host=… user=… dbname=…`. TLS is required for every server that is not on
 /// this machine, whatever SSL mode the URL states.
@@ -30,7 +31,7 @@ pub fn parse_database_url(text: &str) -> Result<Config, String> {
 /// Returns true if every server of the configuration is on this machine: a Unix socket or a loopback address.
 pub fn is_local(config: &Config) -> bool {
     let host = |host: &Host| match host {
-        Host::Tcp(name) => name == "localhost" || name.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback()),
+        Host::Tcp(name) => is_this_machine(name),
         #[cfg(unix)]
         Host::Unix(path) => path != std::path::Path::new(""),
     };

@@ -1,7 +1,8 @@
 //! Central records of a school with many stations: rows in PostgreSQL, bundles in an object store.
 //!
 //! Takes finished bundles and an open database connection. Gives database rows, bundle archives, scoring jobs and
-//! their results. Never opens a connection or an object of the store, reads a clock or prints: the command line does.
+//! their results. Never reads a clock, prints, or decides when to connect: the command line does. [`UreqHttpClient`] alone
+//! opens connections, for the object store.
 //!
 //! ```
 //! use typodont_school::Shard;
@@ -15,6 +16,7 @@
 
 mod database_url;
 mod erasure;
+mod http_client;
 mod migrations;
 mod archive;
 pub mod partition;
@@ -28,6 +30,7 @@ pub use archive::{
 };
 pub use database_url::{is_local, parse_database_url};
 pub use erasure::{PendingDeletion, erase_participant, expired_sessions, mark_deleted, pending_deletions};
+pub use http_client::UreqHttpClient;
 pub use migrations::{MigrationError, apply_migrations};
 pub use scoring::{ScoringError, rescore};
 pub use shard::Shard;

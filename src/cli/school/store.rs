@@ -1,6 +1,5 @@
 //! The store of bundles: a folder, S3, Azure or Google, named by a URL.
 
-use super::http_client::UreqHttpClient;
 use super::retry::{RetryPolicy, Transient};
 use crate::cli::CliError;
 use clap::Args;
@@ -17,6 +16,7 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 use typodont_report::sanitize_display;
 use typodont_school::Manifest;
+use typodont_school::UreqHttpClient;
 use typodont_school::records::is_plain_name;
 use url::Url;
 

@@ -1,11 +1,11 @@
 //! `typodont xapi send`: sends the spool to the store, with retries.
 
-use super::lrs::{Lrs, LrsResponse};
 use super::{CliError, describe, open_spool, print_line, spool_error};
 use serde_json::Value as Json;
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::{Duration, Instant};
+use typodont_integrations::lrs::{Lrs, LrsResponse};
 use typodont_integrations::spool::Spool;
 
 #[derive(clap::Args)]

@@ -1,6 +1,7 @@
 //! Client of a learning record store, by xAPI 1.0.3 (Part Three) or 2.0.0 (IEEE 9274.1.1).
 
-use crate::cli::tls_roots;
+use crate::is_this_machine;
+use crate::tls_roots;
 use base64::Engine;
 use serde_json::Value as Json;
 use std::time::Duration;
@@ -48,12 +49,7 @@ impl Lrs {
             --secret-file"
                 .into());
         }
-        let is_local = match url.host() {
-            Some(url::Host::Domain(name)) => name == "localhost",
-            Some(url::Host::Ipv4(ip)) => ip.is_loopback(),
-            Some(url::Host::Ipv6(ip)) => ip.is_loopback(),
-            None => false,
-        };
+        let is_local = url.host_str().is_some_and(is_this_machine);
         match url.scheme() {
             "https" => {}
             "http" if is_local => {}

@@ -1,6 +1,5 @@
 //! HTTP client for object stores, based on the HTTP library used by the rest of the program.
 
-use crate::cli::tls_roots;
 use async_trait::async_trait;
 use http_body_util::BodyExt;
 use object_store::ClientOptions;
@@ -9,6 +8,7 @@ use object_store::client::{
 };
 use std::io;
 use std::time::Duration;
+use typodont_integrations::{is_this_machine, tls_roots};
 use ureq::{Agent, http};
 
 /// Time limit of one request with its response: enough for a part of 8 MiB over a slow line.
@@ -21,6 +21,7 @@ const RESPONSE_BYTES_MAX: u64 = 256 << 20;
 const CLOUD_METADATA_HOSTS: [&str; 4] =
     ["169.254.169.254", "169.254.170.2", "169.254.170.23", "metadata.google.internal"];
 
+/// Client of an object store's HTTP interface.
 #[derive(Clone, Debug)]
 pub struct UreqHttpClient {
     direct: Agent,
@@ -29,6 +30,10 @@ pub struct UreqHttpClient {
 
 impl UreqHttpClient {
     /// Creates a client. `roots` are certificates in PEM that replace the public authorities.
+    ///
+    /// # Errors
+    ///
+    /// A message if `roots` contains no certificate.
     pub fn new(roots: Option<&[u8]>) -> Result<UreqHttpClient, String> {
         let tls = tls_roots::tls_config(roots)?;
         let agent = |proxy| -> Agent {
@@ -57,10 +62,9 @@ impl HttpConnector for UreqHttpClient {
 impl HttpService for UreqHttpClient {
     async fn call(&self, request: HttpRequest) -> Result<HttpResponse, HttpError> {
         let (head, body) = request.into_parts();
-        let host = head.uri.host().unwrap_or_default().trim_matches(['[', ']']).to_string();
-        let is_local = host == "localhost" || host.parse::<std::net::IpAddr>().is_ok_and(|ip| ip.is_loopback());
+        let host = head.uri.host().unwrap_or_default().to_string();
         let is_plain = head.uri.scheme_str() != Some("https");
-        if is_plain && !is_local && !CLOUD_METADATA_HOSTS.contains(&host.as_str()) {
+        if is_plain && !is_this_machine(&host) && !CLOUD_METADATA_HOSTS.contains(&host.as_str()) {
             let why = format!("plain-http: http would transmit data to {host} without encryption; use https");
             return Err(HttpError::new(HttpErrorKind::Unknown, io::Error::other(why)));
         }
