@@ -70,6 +70,16 @@ const INSTALL: &str = if cfg!(windows) {
      forcedimension:/path/to/libdrd.so"
 };
 
+/// Remedy for a device that the SDK does not find, in the words of the system.
+const CONNECT: &str = if cfg!(windows) {
+    "plug the device in and switch it on; if Windows' Device Manager shows it with a warning sign, install the USB driver of \
+     the Force Dimension SDK"
+} else if cfg!(target_os = "macos") {
+    "plug the device in and switch it on; System Information, USB, must list it"
+} else {
+    "plug the device in, switch it on, and give users access to it (udev rule for vendor 1451)"
+};
+
 /// Returns the paths to try: those of the system's loader, then those of the vendor's instructions and installer.
 fn default_paths() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::new()];
@@ -214,7 +224,7 @@ impl Sdk {
         }
         let help = match self.error() {
             ERROR_DEVICE_IN_USE => "close the other program that uses the device",
-            _ => "plug the device in, switch it on, and give users access to it (udev rule for vendor 1451)",
+            _ => CONNECT,
         };
         Err(OpenError::new(format!("the Force Dimension SDK cannot open a device: {}", self.error_text()), help))
     }

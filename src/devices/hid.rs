@@ -109,7 +109,11 @@ pub fn find(kinds: &[HidMatch]) -> Result<Vec<HidDeviceInfo>, OpenError> {
 fn enumeration_error(error: HidError) -> OpenError {
     OpenError::new(
         format!("cannot list the HID devices: {error}"),
-        "unplug the device and plug it in again; on Linux the kernel needs hidraw (CONFIG_HIDRAW)",
+        if cfg!(target_os = "linux") {
+            "unplug the device and plug it in again; the kernel needs hidraw (CONFIG_HIDRAW)"
+        } else {
+            "unplug the device and plug it in again; if that does not help, restart the computer"
+        },
     )
 }
 

@@ -51,7 +51,8 @@ pub fn open(port: &str) -> Result<SerialArm, OpenError> {
     let opened = SerialPort::open(port, BAUD).and_then(SerialArm::new);
     opened.map_err(|error| {
         let help = match error.kind() {
-            ErrorKind::PermissionDenied => {
+            // Windows denies a port that another program has open.
+            ErrorKind::PermissionDenied if cfg!(target_os = "linux") => {
                 "join the group that owns it (`sudo usermod -aG dialout $USER`) and log in again"
             }
             ErrorKind::NotFound => "plug the arm in; `typodont devices` lists the serial ports",
