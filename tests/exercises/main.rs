@@ -8,6 +8,7 @@ mod charting;
 mod fairness;
 mod fuzz_scenario;
 mod guessing;
+mod near_zones;
 mod operators;
 mod restoring;
 mod schema;

@@ -90,7 +90,7 @@ fn metric_choices(form: &FormContext) -> Vec<NamedChoice> {
         metric::without_argument().map(|about| titled(about, about.name.into(), "")).collect();
     for about in metric::WITH_ARGUMENT {
         match about.name {
-            "zone_removed_pct" => {
+            _ if about.takes_zone() => {
                 for zone in form.editor.ids(&["/zones".to_string()]) {
                     all.push(titled(about, format!("{}({zone})", about.name), &format!(": {zone}")));
                 }

@@ -102,6 +102,16 @@ const REQUIRED_FEATURES: &[(&str, &[RequiredFeature])] = &[
 ];
 
 impl MetricInfo {
+    /// Returns true for a measure of force or speed near a zone.
+    pub fn is_near_zone(&self) -> bool {
+        self.takes_zone() && self.name != "zone_removed_pct"
+    }
+
+    /// Returns true for a measure whose argument is a zone.
+    pub fn takes_zone(&self) -> bool {
+        OF_ZONES.contains(&self.name)
+    }
+
     pub fn is_of_target(&self) -> bool {
         OF_TARGET.contains(&self.name)
     }
@@ -515,6 +525,9 @@ pub const CHARTING: &[MetricInfo] = &[
     ),
 ];
 
+/// Measures whose argument is a zone.
+const OF_ZONES: [&str; 3] = ["zone_removed_pct", "force_max_near_n", "speed_max_near_mm_s"];
+
 /// Measures with an argument in brackets.
 pub const WITH_ARGUMENT: &[MetricInfo] = &[
     info(
@@ -524,6 +537,20 @@ pub const WITH_ARGUMENT: &[MetricInfo] = &[
         Neither,
         "100·|R∩Z| / |Z|; caries does not count in a zone that must be preserved or must not be touched; no value if \
          the zone is empty",
+    ),
+    info(
+        "force_max_near_n",
+        "Maximum force near a zone",
+        "N",
+        Lower,
+        "within near_mm of the zone at the start, without guidance forces; 0 if never there",
+    ),
+    info(
+        "speed_max_near_mm_s",
+        "Maximum speed near a zone",
+        "mm/s",
+        Lower,
+        "within near_mm of the zone at the start, over intervals of 20 ms with any contact; 0 if never there",
     ),
     info(
         "surface_within_tol",
@@ -564,12 +591,12 @@ impl Metric {
         }
         let info =
             WITH_ARGUMENT.iter().find(|a| a.name == name).ok_or_else(|| MetricParseError::Name(name.to_string()))?;
-        let argument = match (name, inner) {
-            ("zone_removed_pct", Some(zone)) if !zone.is_empty() => MetricArgument::Zone(zone.to_string()),
-            ("zone_removed_pct", _) => {
+        let argument = match inner {
+            Some(zone) if info.takes_zone() && !zone.is_empty() => MetricArgument::Zone(zone.to_string()),
+            _ if info.takes_zone() => {
                 return Err(MetricParseError::Argument("name a zone in brackets: zone_removed_pct(target)"));
             }
-            (_, Some(number)) => match number.parse() {
+            Some(number) => match number.parse() {
                 Ok(mm) if mm > 0.0 && mm < 10.0 => MetricArgument::ToleranceMm(mm),
                 _ => {
                     return Err(MetricParseError::Argument(
@@ -577,7 +604,7 @@ impl Metric {
                     ));
                 }
             },
-            (_, None) => {
+            None => {
                 return Err(MetricParseError::Argument("give a tolerance in mm in brackets: surface_within_tol(0.3)"));
             }
         };
@@ -626,7 +653,7 @@ mod tests {
 
     #[test]
     fn names_round_trip() {
-        for name in ["dice", "zone_removed_pct(target)", "surface_within_tol(0.3)"] {
+        for name in ["dice", "zone_removed_pct(target)", "force_max_near_n(nerve)", "surface_within_tol(0.3)"] {
             assert_eq!(Metric::parse(name).map(|m| m.name()), Ok(name.to_string()));
         }
         for about in without_argument() {
@@ -637,7 +664,9 @@ mod tests {
     #[test]
     fn wrong_names_say_what_is_missing() {
         assert_eq!(Metric::parse("dise"), Err(MetricParseError::Name("dise".into())));
-        for name in ["zone_removed_pct", "zone_removed_pct()", "surface_within_tol(x)", "dice(1)", "dice("] {
+        for name in
+            ["zone_removed_pct", "zone_removed_pct()", "force_max_near_n", "surface_within_tol(x)", "dice(1)", "dice("]
+        {
             assert!(matches!(Metric::parse(name), Err(MetricParseError::Argument(_))), "{name}");
         }
     }

@@ -166,6 +166,11 @@ impl MeasureSource<'_> {
                 self.outline_share(*tolerance).into()
             }
             ("zone_removed_pct", Some(MetricArgument::Zone(id))) => self.zone_removed_pct(id),
+            (_, Some(MetricArgument::Zone(id))) => match self.process.near_zones.get(id) {
+                Some(near) if name == "force_max_near_n" => highest_or_zero(near.force.highest),
+                Some(near) => highest_or_zero(near.speed.highest),
+                None => ComputedValue::default(),
+            },
             _ => self
                 .of_stages(name)
                 .or_else(|| self.of_removed_volume(name))

@@ -6,8 +6,10 @@ use super::removal_comparison::ProximityField;
 use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
 use crate::catalog::TissueRole;
 use crate::record::{Recording, TickRecord};
-use crate::scenario::{Limit, Scenario, Workpiece};
+use crate::scenario::metric::MetricArgument;
+use crate::scenario::{Limit, Rubric, Scenario, Workpiece, Zone};
 use crate::session::{Input, Session};
+use std::collections::BTreeMap;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::tick::{TICK_S, Tick};
@@ -55,6 +57,13 @@ impl RunningStats {
     }
 }
 
+/// Force and speed near a zone.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct NearZoneStats {
+    pub force: RunningStats,
+    pub speed: RunningStats,
+}
+
 /// Process statistics of a whole session.
 #[derive(Clone, Debug)]
 pub struct ProcessStats {
@@ -63,6 +72,8 @@ pub struct ProcessStats {
     pub speed: RunningStats,
     pub force_near: RunningStats,
     pub speed_near: RunningStats,
+    /// Force and speed near the zones for which the rubric asks, by id.
+    pub near_zones: BTreeMap<String, NearZoneStats>,
     pub path_mm: f64,
     pub drilling_ticks: u64,
     pub contact_ticks: u64,
@@ -131,6 +142,8 @@ pub struct ProcessObserver {
     roles: [Option<TissueRole>; 256],
     is_rotary: Vec<bool>,
     proximity: ProximityField,
+    /// Fields of the zones for which the rubric asks, in the order of `near_zones` of the statistics.
+    near_zones: Vec<ProximityField>,
     stats: ProcessStats,
     /// Everything that can hide a voxel; `None` if the recording has no view.
     sight: Option<LineOfSight>,
@@ -152,19 +165,24 @@ impl ProcessObserver {
     pub fn new(recording: &Recording, workpiece: &Workpiece) -> ProcessObserver {
         let scenario = &recording.scenario;
         let roles = std::array::from_fn(|l| scenario.tissues.role(Label(l as u8)));
+        let within = scenario.measures.pulp_proximity;
+        let asked_zones = zones_near_which_is_measured(scenario);
+        let field_of = |zone: &&Zone| ProximityField::around_zone(zone, scenario, &workpiece.volume, within);
         let has_views = recording.inputs.iter().any(|(_, input)| matches!(input, Input::Look(_)));
         let now = TraceSample { at: Tick::ZERO, force: 0.0, speed: 0.0, cleared: 0.0, touched: false, cutting: false };
         ProcessObserver {
             tooth_from_world: workpiece.world_from_tooth.inverse(),
             roles,
             is_rotary: scenario.instruments.iter().map(|i| i.is_bur()).collect(),
-            proximity: ProximityField::around(scenario, &workpiece.volume, scenario.measures.pulp_proximity),
+            proximity: ProximityField::around_vulnerable(scenario, &workpiece.volume, within),
+            near_zones: asked_zones.values().map(field_of).collect(),
             stats: ProcessStats {
                 ticks: 0,
                 force: RunningStats::default(),
                 speed: RunningStats::default(),
                 force_near: RunningStats::default(),
                 speed_near: RunningStats::default(),
+                near_zones: asked_zones.keys().map(|id| (id.to_string(), NearZoneStats::default())).collect(),
                 path_mm: 0.0,
                 drilling_ticks: 0,
                 contact_ticks: 0,
@@ -216,6 +234,9 @@ impl ProcessObserver {
             if self.proximity.is_near(place) {
                 self.stats.force_near.add(reached);
             }
+            for stats in stats_near(&self.near_zones, &mut self.stats.near_zones, place) {
+                stats.force.add(reached);
+            }
             self.now.force = self.now.force.max(force);
             self.now.touched = true;
             // Matter too thin to have a tissue is not named.
@@ -266,6 +287,9 @@ impl ProcessObserver {
             if self.proximity.is_near(place) {
                 self.stats.speed_near.add(reached);
             }
+            for stats in stats_near(&self.near_zones, &mut self.stats.near_zones, place) {
+                stats.speed.add(reached);
+            }
             match self.contact_runs.last_mut() {
                 Some(spell) if !spell.is_empty() => spell.push(place),
                 _ => self.contact_runs.push(vec![place]),
@@ -284,6 +308,27 @@ impl ProcessObserver {
         self.stats.forbidden_contacts = self.forbidden_contacts.finish();
         self.stats
     }
+}
+
+/// Returns the zones of the rubric's measures of force and speed near a zone, by id.
+fn zones_near_which_is_measured(scenario: &Scenario) -> BTreeMap<&str, &Zone> {
+    let asked = scenario.rubric.iter().flat_map(Rubric::metrics).filter(|metric| metric.info.is_near_zone());
+    let ids = asked.filter_map(|metric| match &metric.argument {
+        Some(MetricArgument::Zone(id)) => Some(id),
+        _ => None,
+    });
+    ids.filter_map(|id| scenario.zones.iter().find(|zone| zone.id == *id))
+        .map(|zone| (zone.id.as_str(), zone))
+        .collect()
+}
+
+/// Returns the statistics of the zones near a point in tooth space.
+fn stats_near<'a>(
+    fields: &'a [ProximityField],
+    stats: &'a mut BTreeMap<String, NearZoneStats>,
+    place: Vec3,
+) -> impl Iterator<Item = &'a mut NearZoneStats> {
+    fields.iter().zip(stats.values_mut()).filter(move |(field, _)| field.is_near(place)).map(|(_, stats)| stats)
 }
 
 /// Returns the greatest force that costs no points, N: the least of the rubric's values for `force_max_n`; `None` if

@@ -5,8 +5,8 @@ use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
 use super::zones::ZoneVoxels;
 use crate::catalog::TissueRole;
 use crate::record::Replay;
-use crate::scenario::Scenario;
 use crate::scenario::file::ZoneRole;
+use crate::scenario::{Scenario, Zone};
 use typodont_core::volume::{Grid, Label, Volume, distance};
 
 /// Distances that differ by less are equal, mm: the same distance along other axes differs by rounding errors.
@@ -254,7 +254,7 @@ impl RemovalCounts {
     }
 }
 
-/// Distance to the vulnerable tissue of a volume, up to a maximum distance.
+/// Distance to the vulnerable tissue or to a zone of a volume, up to a maximum distance.
 pub struct ProximityField {
     crop: Option<CroppedGrid>,
     distances: Vec<f32>,
@@ -262,13 +262,22 @@ pub struct ProximityField {
 }
 
 impl ProximityField {
-    pub fn around(scenario: &Scenario, initial: &Volume, within: f32) -> ProximityField {
+    pub fn around_vulnerable(scenario: &Scenario, initial: &Volume, within: f32) -> ProximityField {
         let is_vulnerable = |i: usize| scenario.tissues.role(initial.tissue(i)) == Some(TissueRole::Vulnerable);
-        let grid = initial.grid();
+        ProximityField::around(initial.grid(), within, is_vulnerable)
+    }
+
+    /// Returns the field of a zone as it is judged: of a protected zone, without its decay.
+    pub fn around_zone(zone: &Zone, scenario: &Scenario, initial: &Volume, within: f32) -> ProximityField {
+        let ZoneVoxels { counted, .. } = ZoneVoxels::of(zone, scenario, initial);
+        ProximityField::around(initial.grid(), within, |i| counted.contains(i))
+    }
+
+    fn around(grid: &Grid, within: f32, is_in: impl Fn(usize) -> bool) -> ProximityField {
         let margin = (within / grid.spacing.min_element()).ceil() as u32 + 1;
-        let crop = CroppedGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_vulnerable(i)));
+        let crop = CroppedGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_in(i)));
         let distances = match &crop {
-            Some(crop) => distance::to_set(&crop.grid, |i| is_vulnerable(crop.whole_index(i))),
+            Some(crop) => distance::to_set(&crop.grid, |i| is_in(crop.whole_index(i))),
             None => Vec::new(),
         };
         ProximityField { crop, distances, within }
