@@ -107,7 +107,7 @@ impl Course {
         Ok(files)
     }
 
-    /// What the launch page is told of the course.
+    /// Settings of the course, for the launch page.
     fn settings(&self, standard: PackageStandard) -> String {
         let standard = match standard {
             PackageStandard::Scorm12 => "1.2",
