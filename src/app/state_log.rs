@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 #[derive(Default)]
 pub struct StateLog {
-    sink: Option<Box<dyn FnMut(&str)>>,
+    sink: Option<platform::LogSink>,
     last: BTreeMap<&'static str, String>,
 }
 

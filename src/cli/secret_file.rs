@@ -9,7 +9,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// A message if other users can.
-#[cfg(unix)]
+#[cfg(all(unix, any(feature = "devices", feature = "school")))]
 pub fn require_private(path: &Path) -> Result<(), CliError> {
     use std::os::unix::fs::PermissionsExt;
     let mode = std::fs::metadata(path).map_or(0, |meta| meta.permissions().mode());
@@ -22,7 +22,7 @@ pub fn require_private(path: &Path) -> Result<(), CliError> {
     }
 }
 
-#[cfg(not(unix))]
+#[cfg(all(not(unix), any(feature = "devices", feature = "school")))]
 pub fn require_private(_: &Path) -> Result<(), CliError> {
     Ok(())
 }

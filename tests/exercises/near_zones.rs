@@ -19,7 +19,10 @@ fn exercise(name: &str, zone_of_measures: Option<&str>) -> PathBuf {
         zones.push(json!({ "id": id, "title": id, "role": "leeway", "region": region }));
     }
     let items = scenario["rubric"]["items"].as_array_mut().unwrap();
-    for zone in zone_of_measures.map_or(vec!["nerve", "enamel", "apex"], |zone| vec![zone]) {
+    let named = zone_of_measures.map_or(vec!["nerve", "enamel", "apex"], |zone| vec![zone]);
+    // The sum of the points stays 100.
+    items[0]["points"] = json!(items[0]["points"].as_i64().unwrap() - 2 * named.len() as i64);
+    for zone in named {
         for (measure, zero_at) in [("force_max_near_n", 4), ("speed_max_near_mm_s", 200)] {
             let metric = format!("{measure}({zone})");
             items.push(json!({ "title": metric, "metric": metric, "points": 1, "full_at": 1, "zero_at": zero_at }));

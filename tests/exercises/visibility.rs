@@ -128,8 +128,11 @@ fn scored(name: &str, ball: bool, views: Vec<(u64, TraineeView)>) -> Scored {
     scored
 }
 
+/// Views by the tick from which they count.
+type Views = Vec<(u64, TraineeView)>;
+
 /// The three sessions: views that change from above to beside; a mirror behind the tooth; an obstacle before it.
-fn sessions() -> [(&'static str, bool, Vec<(u64, TraineeView)>); 3] {
+fn sessions() -> [(&'static str, bool, Views); 3] {
     let crown = Vec3::new(0.0, -2.0, 0.0);
     let behind = Vec3::new(0.0, 10.0, -16.0);
     // It reflects an eye that looks along −z down to the crown.

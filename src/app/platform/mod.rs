@@ -11,3 +11,6 @@ mod web;
 pub use native::*;
 #[cfg(target_family = "wasm")]
 pub use web::*;
+
+/// Writer of a line of the state log.
+pub type LogSink = Box<dyn FnMut(&str)>;

@@ -1,5 +1,6 @@
 //! A computer: settings in a file of the user's configuration folder, bundles in a folder.
 
+use super::LogSink;
 use directories::{ProjectDirs, UserDirs};
 use std::fs;
 use std::fs::File;
@@ -62,7 +63,7 @@ pub fn locale() -> Option<String> {
 }
 
 /// Writer of the state log's lines, to the file that the environment names; `None` unless it names one.
-pub fn open_log() -> Option<Box<dyn FnMut(&str)>> {
+pub fn open_log() -> Option<LogSink> {
     let mut file = File::create(std::env::var_os(LOG_VARIABLE)?).ok()?;
     // The program goes on if the log cannot be written.
     Some(Box::new(move |line| _ = writeln!(file, "{line}")))

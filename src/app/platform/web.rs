@@ -1,5 +1,6 @@
 //! A page in a browser: settings in the page's own storage, bundles in memory and as downloads.
 
+use super::LogSink;
 use std::path::PathBuf;
 use typodont_report::bundle::{BundleFolder, REPORT_FILE};
 use wasm_bindgen::{JsCast, JsValue};
@@ -86,8 +87,8 @@ pub fn locale() -> Option<String> {
 }
 
 /// Writer of the state log's lines, to the browser's console; `None` unless the page's address asks for it.
-pub fn open_log() -> Option<Box<dyn FnMut(&str)>> {
+pub fn open_log() -> Option<LogSink> {
     let query = web_sys::window()?.location().search().ok()?;
     let write = |line: &str| web_sys::console::log_1(&JsValue::from_str(&format!("typodont: {line}")));
-    query.contains(LOG_QUERY).then(|| Box::new(write) as Box<dyn FnMut(&str)>)
+    query.contains(LOG_QUERY).then(|| Box::new(write) as LogSink)
 }

@@ -481,11 +481,11 @@ mod tests {
         }
         writer.finish().unwrap();
         drop(writer);
-        let error = Recording::parse("new.mcap", &bytes).err().expect("it cannot be read");
+        let Err(error) = Recording::parse("new.mcap", &bytes) else { panic!("it is read") };
         assert_eq!(error, RecordingError::Newer { name: "new.mcap".to_string(), version: VERSION + 1 });
         assert!(error.to_string().contains("newer version of Typodont"), "{error}");
         // A power cut in the middle does not hide the reason.
-        let error = Recording::parse("new.mcap", &bytes[..bytes.len() - 40]).err().expect("it cannot be read");
+        let Err(error) = Recording::parse("new.mcap", &bytes[..bytes.len() - 40]) else { panic!("it is read") };
         assert!(matches!(error, RecordingError::Newer { .. }), "{error}");
     }
 }
