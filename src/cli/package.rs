@@ -139,8 +139,7 @@ fn page_folder(named: Option<&Path>) -> Result<PathBuf, CliError> {
     let folder = program.parent().unwrap_or(Path::new("."));
     let installed = [folder.join("../share/typodont/web"), folder.join("web"), folder.join("../web")];
     installed.into_iter().find(|folder| is_page(folder)).ok_or_else(|| {
-        let remedy = "make it with scripts/web, and name its folder with --page";
-        CliError::wrong(format!("no-page: the web page was not installed with this program; {remedy}"))
+        CliError::wrong("no-page: the web page was not installed with this program; name its folder with --page")
     })
 }
 
