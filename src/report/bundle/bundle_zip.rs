@@ -45,8 +45,8 @@ impl BundleFolder {
                 count => format!("the archive has {count} recordings; unpack it and give one of its bundles"),
             });
         };
-        // A file outside the bundle's folder keeps its whole name, which is not that of a file in a bundle.
-        let short = |name: String| name.strip_prefix(folder).map(str::to_string).unwrap_or(name);
+        // A file outside the bundle's folder must not replace one in it: no file of an archive may begin with "../".
+        let short = |name: String| name.strip_prefix(folder).map_or_else(|| format!("../{name}"), str::to_string);
         let files: BTreeMap<String, Vec<u8>> = files.into_iter().map(|(name, bytes)| (short(name), bytes)).collect();
         let last = folder.trim_end_matches('/').rsplit('/').next().filter(|last| !last.is_empty());
         Ok(BundleFolder::InMemory { name: last.unwrap_or(otherwise).to_string(), files })
@@ -56,6 +56,8 @@ impl BundleFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Templates;
+    use crate::bundle::{VerificationOutcome, verify};
     use std::path::Path;
 
     fn in_memory(names: &[&str]) -> BundleFolder {
@@ -74,6 +76,25 @@ mod tests {
     }
 
     #[test]
+    fn a_file_beside_the_folder_of_a_bundle_does_not_replace_a_forged_one() {
+        // Aim: what is verified is what anybody finds who unpacks the folder. Method: a changed session.json in the bundle,
+        // and the true one beside its folder.
+        let example = BundleFolder::on_disk(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../reports/example"));
+        let name = "session.json";
+        let genuine = example.read(name).unwrap().into_owned();
+        let forged = [genuine.as_slice(), b" "].concat();
+        let read = |name: &str| example.read(name).unwrap().into_owned();
+        let mut files: Vec<(String, Vec<u8>)> =
+            example.names().iter().filter(|n| *n != name).map(|n| (format!("a/{n}"), read(n))).collect();
+        files.extend([(format!("a/{name}"), forged.clone()), (name.to_string(), genuine)]);
+        let archive = zip::write(files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice()))).unwrap();
+        let bundle = BundleFolder::from_zip(&archive, "other").unwrap();
+        assert_eq!(bundle.read(name).unwrap().as_ref(), forged);
+        let verification = verify(&bundle, &[Templates::shipped()]).unwrap();
+        assert_eq!(verification.outcome(), VerificationOutcome::Differs, "{:?}", verification.complaints);
+    }
+
+    #[test]
     fn an_archive_of_one_bundle_is_found_wherever_its_files_are() {
         let pack = |names: &[&str]| zip::write(names.iter().map(|name| (name.to_string(), name.as_bytes()))).unwrap();
         let read = |names: &[&str]| BundleFolder::from_zip(&pack(names), "other");
@@ -84,7 +105,7 @@ mod tests {
         let found = read(&inside).unwrap();
         assert_eq!(
             (&*found.name(), found.names().join(" ")),
-            ("anna", "class/note.txt recording.mcap session.json".into())
+            ("anna", "../class/note.txt recording.mcap session.json".into())
         );
         assert!(read(&["a/recording.mcap", "b/recording.mcap"]).unwrap_err().contains("2 recordings"));
         assert!(read(&["session.json", "my-recording.mcap"]).unwrap_err().contains("no recording.mcap"));
