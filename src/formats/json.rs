@@ -35,8 +35,8 @@ pub struct ParsedJson<T> {
 /// Positions of the parts of a text, by JSON pointer.
 #[derive(Clone, Debug)]
 pub struct SourceMap {
-    source: Arc<SourceText>,
-    spans: BTreeMap<String, Range<usize>>,
+    pub(crate) source: Arc<SourceText>,
+    pub(crate) spans: BTreeMap<String, Range<usize>>,
 }
 
 impl SourceMap {
@@ -133,14 +133,8 @@ fn read_with<T: DeserializeOwned + JsonSchema>(
     source: Arc<SourceText>,
     accepts_all_characters: bool,
 ) -> Result<ParsedJson<T>, Vec<Diagnostic>> {
-    let whole = |code, message: String, help: &str| {
-        let help = (!help.is_empty()).then(|| help.to_string());
-        Diagnostic { code, source: source.clone(), span: None, path: String::new(), message, help }
-    };
-    if source.text.len() > TEXT_MAX {
-        let message = format!("the file has {} bytes", source.text.len());
-        return Err(vec![whole("too-large", message, "a file of this kind may have at most 4 MiB")]);
-    }
+    let whole = |code, message, help: &str| about_text(&source, code, message, help);
+    refuse_large(&source)?;
     let parsed = parse_to_ast(&source.text, &CollectOptions::default(), &strict_parse_options()).map_err(|error| {
         let message = error.kind().to_string().to_lowercase();
         let span = clip(error.range(), source.text.len());
@@ -150,20 +144,7 @@ fn read_with<T: DeserializeOwned + JsonSchema>(
     let Some(value) = parsed.value else {
         return Err(vec![whole("syntax", "the file is empty".into(), "")]);
     };
-    let root = schema_of::<T>();
-    let mut check = Check {
-        source: source.clone(),
-        root: root.as_value(),
-        accepts_all_characters,
-        found: Vec::new(),
-        spans: BTreeMap::new(),
-    };
-    check.value(&value, root.as_value(), &mut String::new());
-    let Check { mut found, spans, .. } = check;
-    if !found.is_empty() {
-        found.sort_by_key(|d| d.span.as_ref().map(|s| s.start));
-        return Err(found);
-    }
+    let spans = check::<T>(&source, &value, accepts_all_characters)?;
     let value = serde_json::from_str(&source.text).map(with_whole_numbers).and_then(serde_json::from_value);
     match value {
         Ok(value) => Ok(ParsedJson { value, source_map: SourceMap { source, spans } }),
@@ -176,17 +157,52 @@ fn read_with<T: DeserializeOwned + JsonSchema>(
                 ..whole("syntax", message, json_hints::likely_fix(&source.text, at))
             }])
         }
-        Err(error) => {
-            // No known input gets here, because the schema states all that serde requires. If one does, the author is
-            // told.
-            let help = "this is a gap in the schema of this kind of file; please report it";
-            Err(vec![whole("unreadable", error.to_string(), help)])
-        }
+        Err(error) => Err(vec![gap_in_schema(&source, &error)]),
     }
 }
 
+/// Complaint about a text as a whole; without `help` if it is empty.
+pub(crate) fn about_text(source: &Arc<SourceText>, code: &'static str, message: String, help: &str) -> Diagnostic {
+    let help = (!help.is_empty()).then(|| help.to_string());
+    Diagnostic { code, source: source.clone(), span: None, path: String::new(), message, help }
+}
+
+/// Refuses a text of more than [`TEXT_MAX`] bytes.
+pub(crate) fn refuse_large(source: &Arc<SourceText>) -> Result<(), Vec<Diagnostic>> {
+    let length = source.text.len();
+    match length > TEXT_MAX {
+        true => {
+            let help = "a file of this kind may have at most 4 MiB";
+            Err(vec![about_text(source, "too-large", format!("the file has {length} bytes"), help)])
+        }
+        false => Ok(()),
+    }
+}
+
+/// Complaint about a value that agrees with the schema and that serde refuses. No known input gets here, because the
+/// schema states all that serde requires. If one does, the author is told.
+pub(crate) fn gap_in_schema(source: &Arc<SourceText>, error: &serde_json::Error) -> Diagnostic {
+    let help = "this is a gap in the schema of this kind of file; please report it";
+    about_text(source, "unreadable", error.to_string(), help)
+}
+
+/// Compares a value with the schema of `T`. Returns the positions of its parts, or all complaints.
+pub(crate) fn check<T: JsonSchema>(
+    source: &Arc<SourceText>,
+    value: &Value,
+    accepts_all_characters: bool,
+) -> Result<BTreeMap<String, Range<usize>>, Vec<Diagnostic>> {
+    let root = schema_of::<T>();
+    let (found, spans) = (Vec::new(), BTreeMap::new());
+    let mut check = Check { source: source.clone(), root: root.as_value(), accepts_all_characters, found, spans };
+    check.value(value, root.as_value(), &mut String::new());
+    let Check { mut found, spans, .. } = check;
+    found.sort_by_key(|d| d.span.as_ref().map(|s| s.start));
+    if found.is_empty() { Ok(spans) } else { Err(found) }
+}
+
 /// Writes 36.0 as 36, which is the same number to JSON Schema but not to serde's integer types.
-fn with_whole_numbers(value: Json) -> Json {
+pub(crate) fn with_whole_numbers(value: Json) -> Json {
     /// Beyond 2⁵³ not every whole number is representable as a JSON number.
     const EXACT: f64 = 9_007_199_254_740_992.0;
     match value {

@@ -1,4 +1,4 @@
-//! File formats: scans, surfaces, label maps, tables, and JSON that people write.
+//! File formats: scans, surfaces, label maps, tables, and JSON and TOML that people write.
 //!
 //! Takes files and bytes. Gives validated values, or complaints with their places. Never changes a file that it
 //! reads.
@@ -21,6 +21,7 @@ pub mod diagnostic;
 pub mod json;
 pub mod pointer;
 mod json_hints;
+pub mod toml_reader;
 mod library;
 mod file_writer;
 pub mod limits;
