@@ -6,6 +6,7 @@ use super::completion::{Completion, CompletionProgress};
 use super::editor::{self, EditorCommand, EditorState, OpenMode};
 use super::exercise_list::{self, ExerciseList, ListContext, exercise_list_ui};
 use super::i18n::{self, Translations};
+use super::kiosk::{self, KioskExit};
 use super::lesson_backend::{InputDevice, LessonConfig};
 use super::lesson_scene::DisplayMode;
 use super::lesson_state::LessonState;
@@ -15,7 +16,7 @@ use super::results::{BundleState, LessonResults, ResultTexts, results_ui};
 use super::screen::Screen;
 use super::session_history::SessionHistory;
 use super::settings::{self, Settings};
-use super::settings_screen::settings_ui;
+use super::settings_screen::{kiosk_settings_ui, settings_ui};
 use super::state_log::StateLog;
 use super::viewport::Viewport;
 use super::{AppOptions, briefing, practice, questionnaire, shortcuts, theme, viewport};
@@ -52,6 +53,10 @@ pub struct App {
     test_run_origin: Option<Box<EditorState>>,
     overlay: shortcuts::OverlayState,
     closing: CloseState,
+    /// A supervisor's attempt to close a kiosk.
+    kiosk_exit: KioskExit,
+    /// Settings with which the window opened.
+    first_settings: Settings,
     /// True if a widget had the keyboard focus at the end of the last frame.
     had_focus: bool,
     /// True if settings were changed and are not saved yet.
@@ -93,7 +98,11 @@ const BUSY_TIME: f64 = 2.0;
 impl App {
     pub fn new(context: &eframe::CreationContext, options: AppOptions) -> App {
         let ctx = &context.egui_ctx;
-        let (settings, languages, mut complaints) = settings::load_with_languages();
+        let (mut settings, languages, mut complaints) = settings::load_with_languages();
+        if let Some(station) = &options.station {
+            settings = station.settings(settings);
+            complaints.extend(station.complaint.clone());
+        }
         let (replacements, broken) = wav_files::read_folder(&sounds_folder());
         complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
         theme::apply(ctx, &settings);
@@ -117,6 +126,8 @@ impl App {
             participant: options.participant.clone(),
             examiner_code: String::new(),
             options,
+            first_settings: settings.clone(),
+            kiosk_exit: KioskExit::default(),
             settings,
             languages,
             exercise_list,
@@ -170,6 +181,7 @@ impl App {
             editor.poll(ctx.input(|input| input.time));
         }
         self.history.poll();
+        self.poll_kiosk(ctx);
         for completion in &mut self.completions {
             completion.poll();
             if let Some(Err(why)) = &completion.state().outcome {
@@ -189,6 +201,48 @@ impl App {
             }
             Screen::Results(results) => results.poll(ctx),
             _ => {}
+        }
+    }
+
+    /// Makes a kiosk ready for the next participant after some time without input, and keeps it on the whole screen.
+    fn poll_kiosk(&mut self, ctx: &egui::Context) {
+        let Some(kiosk) = self.options.kiosk() else { return };
+        let now = ctx.input(|input| input.time);
+        let is_at_rest = matches!(self.screen, Screen::Briefing | Screen::Results(_) | Screen::Failed(_))
+            || (matches!(self.screen, Screen::ExerciseList) && !self.participant.is_empty());
+        let idle_limit = kiosk.idle.as_secs_f64();
+        if !is_at_rest {
+            // Whoever moves a haptic device touches neither the mouse nor the keyboard.
+            self.last_input = now;
+        } else if now - self.last_input > idle_limit {
+            self.change_participant(ctx);
+        }
+        let (is_full, is_minimized) =
+            ctx.input(|input| (input.viewport().fullscreen, input.viewport().minimized.unwrap_or(false)));
+        if is_full == Some(false) || is_minimized {
+            ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
+            ctx.send_viewport_cmd(ViewportCommand::Fullscreen(true));
+        }
+    }
+
+    /// Shows the list without a participant. In a kiosk, the language and the size of the last one are forgotten, too.
+    fn change_participant(&mut self, ctx: &egui::Context) {
+        self.go_back();
+        self.participant.clear();
+        self.examiner_code.clear();
+        if self.options.kiosk().is_some() {
+            self.exercise_list.selected = 0;
+            self.overlay = shortcuts::OverlayState::default();
+            self.kiosk_exit.ask(false);
+            self.apply_settings(self.first_settings.clone(), ctx);
+        }
+    }
+
+    /// Closes a kiosk if what was typed is the supervisor's code.
+    fn leave_kiosk(&mut self, ctx: &egui::Context) {
+        let App { kiosk_exit, options, .. } = self;
+        if options.kiosk().is_some_and(|kiosk| kiosk_exit.try_code(kiosk)) {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
 
@@ -225,7 +279,8 @@ impl App {
         if self.test_run_origin.is_none() {
             self.history.add(&first.session);
         }
-        self.screen = Screen::Results(Box::new(LessonResults::new(first, completion, has_retry)));
+        let has_report = self.options.kiosk().is_none();
+        self.screen = Screen::Results(Box::new(LessonResults::new(first, completion, has_retry, has_report)));
     }
 
     /// Ends a lesson without its questionnaire if the exercise asks it at the end of the course, and that is not yet.
@@ -276,6 +331,9 @@ impl App {
     }
 
     fn execute(&mut self, command: AppCommand, ctx: &egui::Context) {
+        if self.options.kiosk().is_some() && kiosk::is_refused(&command) {
+            return;
+        }
         match command {
             AppCommand::SelectExercise(place) => self.exercise_list.selected = place,
             AppCommand::SelectNextExercise(by) => self.select_next_exercise(by),
@@ -309,6 +367,9 @@ impl App {
             AppCommand::ShowSettings(is_open) => {
                 self.open_overlay(shortcuts::OverlayState { shortcuts: false, settings: is_open })
             }
+            AppCommand::ChangeParticipant => self.change_participant(ctx),
+            AppCommand::AskToLeaveKiosk(is_asked) => self.kiosk_exit.ask(is_asked),
+            AppCommand::LeaveKiosk => self.leave_kiosk(ctx),
             AppCommand::CloseWindow(is_closing) => self.confirm_close(is_closing, ctx),
             AppCommand::ApplySettings(settings) => self.apply_settings(*settings, ctx),
             AppCommand::Practice(command) => {
@@ -475,6 +536,12 @@ impl App {
 
     /// Delays a request to close the window while a lesson runs and until its bundle is written.
     fn handle_close_request(&mut self, ctx: &egui::Context) {
+        let is_asked = ctx.input(|input| input.viewport().close_requested());
+        if is_asked && self.options.kiosk().is_some() && !self.kiosk_exit.is_allowed {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.open_overlay(shortcuts::OverlayState::default());
+            return self.kiosk_exit.ask(true);
+        }
         let is_in_lesson = matches!(self.screen, Screen::Lesson(_));
         let is_completing = !self.completions.is_empty()
             || match &self.screen {
@@ -504,6 +571,9 @@ impl App {
 
     fn begin_lesson(&mut self, ctx: &egui::Context) {
         if !self.completions.is_empty() {
+            return;
+        }
+        if self.options.kiosk().is_some() && self.participant.is_empty() {
             return;
         }
         let Some(exercise) = self.exercise_list.selected_exercise() else { return };
@@ -587,7 +657,12 @@ impl App {
     fn save_settings(&mut self, ctx: &egui::Context) {
         if self.has_unsaved_settings && !ctx.input(|input| input.pointer.any_down()) {
             theme::apply(ctx, &self.settings);
-            self.complaints.extend(self.settings.save());
+            let own = match &self.options.station {
+                Some(station) if station.kiosk.is_some() => None,
+                Some(station) => Some(station.own_settings(&self.settings, Settings::load().0)),
+                None => Some(self.settings.clone()),
+            };
+            self.complaints.extend(own.and_then(|own| own.save()));
             self.has_unsaved_settings = false;
         }
     }
@@ -599,7 +674,7 @@ impl App {
         let examiner_code = options.seed_code.is_none().then_some(&mut self.examiner_code);
         match screen {
             Screen::ExerciseList => {
-                let context = ListContext { history, settings, words };
+                let context = ListContext { history, settings, words, is_kiosk: options.kiosk().is_some() };
                 exercise_list_ui(ui, exercise_list, participant, &context, commands);
             }
             Screen::Editor(editor) => {
@@ -610,7 +685,8 @@ impl App {
             }
             Screen::Briefing => {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
-                    let fields = BriefingFields { participant, examiner_code };
+                    let is_code_required = options.kiosk().is_some();
+                    let fields = BriefingFields { participant, is_code_required, examiner_code };
                     briefing::briefing_ui(ui, scenario, fields, completion, words, commands);
                 }
             }
@@ -646,14 +722,19 @@ impl App {
     }
 
     /// Pages over the screen: shortcuts, settings, the question before closing.
-    fn overlay_ui(&self, ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
+    fn overlay_ui(&mut self, ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
         let words = &self.words;
+        if let Some(kiosk) = self.options.kiosk().filter(|_| self.kiosk_exit.is_asked) {
+            let exit = &mut self.kiosk_exit;
+            modal_page(ctx, words.get("kiosk.close_title"), |ui| kiosk::exit_ui(ui, exit, kiosk, words, commands));
+        }
         if self.overlay.shortcuts {
             modal_page(ctx, words.get("keys.title"), |ui| shortcuts::shortcuts_ui(ui, words, commands));
         }
         if self.overlay.settings {
-            modal_page(ctx, words.get("settings.title"), |ui| {
-                settings_ui(ui, &self.settings, self.has_graphics, &self.languages, words, commands);
+            modal_page(ctx, words.get("settings.title"), |ui| match self.options.kiosk() {
+                Some(_) => kiosk_settings_ui(ui, &self.settings, &self.languages, words, commands),
+                None => settings_ui(ui, &self.settings, self.has_graphics, &self.languages, words, commands),
             });
         }
         if self.closing == CloseState::Asked {
@@ -673,7 +754,8 @@ impl App {
 
     /// Writes the state of the screen to the state log, a line per change.
     fn log_state(&mut self) {
-        let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, .. } = self;
+        let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, kiosk_exit, .. } = self;
+        state_log.record("kiosk", kiosk_exit.state());
         let (history, participant, settings) = (&self.history, &self.participant, &self.settings);
         state_log.record(
             "over",

@@ -12,6 +12,8 @@ use typodont_lesson as lesson;
 /// Texts typed before an exercise.
 pub struct BriefingFields<'a> {
     pub participant: &'a mut String,
+    /// True if a session needs a participant's code, as in a kiosk.
+    pub is_code_required: bool,
     /// Examiner's code, empty for a session without one; `None` where the code was given at the command line.
     pub examiner_code: Option<&'a mut String>,
 }
@@ -30,7 +32,7 @@ pub fn briefing_ui(
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
-    let BriefingFields { participant, examiner_code } = fields;
+    let BriefingFields { participant, is_code_required, examiner_code } = fields;
     let examiner_code = examiner_code.filter(|_| lesson::is_sealable(scenario));
     theme::centered_column(ui, |ui| {
         ui.heading(words.own(&scenario.texts, &scenario.title));
@@ -53,6 +55,10 @@ pub fn briefing_ui(
         if !lesson::is_valid_participant_code(participant) {
             ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
         }
+        let is_code_missing = is_code_required && participant.is_empty();
+        if is_code_missing {
+            ui.label(words.get("kiosk.code_required"));
+        }
         let has_valid_code = examiner_code.as_ref().is_none_or(|code| is_valid_examiner_code(code.as_str()));
         if let Some(code) = examiner_code {
             examiner_code_ui(ui, code, words);
@@ -64,7 +70,8 @@ pub fn briefing_ui(
             theme::progress_bar(ui, words.get(progress.key), progress.share);
         }
         ui.horizontal(|ui| {
-            let is_ready = completion.is_none() && has_valid_code && lesson::is_valid_participant_code(participant);
+            let has_participant = !is_code_missing && lesson::is_valid_participant_code(participant);
+            let is_ready = completion.is_none() && has_valid_code && has_participant;
             let begin = ui.add_enabled(is_ready, theme::primary_button(words.get("briefing.begin")));
             editor::anchor(ui, "briefing.begin", begin.rect);
             if begin.clicked() {

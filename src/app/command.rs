@@ -48,6 +48,12 @@ pub enum AppCommand {
     ApplySettings(Box<Settings>),
     /// Closes the window (asks first if work would be lost), or withdraws that request.
     CloseWindow(bool),
+    /// Makes the list ready for the next participant.
+    ChangeParticipant,
+    /// Opens or closes the question for the supervisor's code.
+    AskToLeaveKiosk(bool),
+    /// Closes a kiosk if the supervisor's code was typed.
+    LeaveKiosk,
 }
 
 /// A command of the practice screen, for the running lesson and its questionnaire.

@@ -204,6 +204,8 @@ pub struct ListContext<'a> {
     pub history: &'a SessionHistory,
     pub settings: &'a Settings,
     pub words: &'a Translations,
+    /// True if the list has no way to the author's screen or to another folder.
+    pub is_kiosk: bool,
 }
 
 /// Draws the list. Pushes a command when the user selects an exercise or another folder.
@@ -217,7 +219,7 @@ pub fn exercise_list_ui(
     let words = context.words;
     theme::centered_column(ui, |ui| {
         ui.heading(words.get("shelf.title"));
-        participant_ui(ui, participant, words);
+        participant_ui(ui, participant, words, commands);
         if let Some(session) = context.history.interrupted() {
             interrupted_ui(ui, list, session, words, commands);
         }
@@ -249,7 +251,7 @@ pub fn exercise_list_ui(
             }
             // The author's screen keeps files and builds teeth on a thread: a page has neither.
             let authoring = [("shelf.edit", AppCommand::EditExercise), ("shelf.new", AppCommand::NewExercise)];
-            for (key, command) in authoring.into_iter().filter(|_| !platform::IS_PAGE) {
+            for (key, command) in authoring.into_iter().filter(|_| !platform::IS_PAGE && !context.is_kiosk) {
                 let button = ui.button(words.get(key));
                 editor::anchor(ui, key, button.rect);
                 if button.clicked() {
@@ -260,28 +262,35 @@ pub fn exercise_list_ui(
         if platform::IS_PAGE {
             return;
         }
-        ui.horizontal_wrapped(|ui| {
-            let label = ui.label(words.get("shelf.folder")).id;
-            let edit = egui::TextEdit::singleline(&mut list.folder).desired_width(260.0);
-            let typed = ui.add(edit.hint_text(words.get("shelf.folder_hint"))).labelled_by(label);
-            if typed.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
-                commands.push(AppCommand::OpenFolder(list.folder.clone().into()));
-            }
-        });
+        if !context.is_kiosk {
+            folder_ui(ui, &mut list.folder, words, commands);
+        }
         if let Some(complaint) = &list.complaint {
             ui.colored_label(theme::ERROR, complaint);
         }
     });
 }
 
+/// The field for a further folder with exercises.
+fn folder_ui(ui: &mut egui::Ui, folder: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
+    ui.horizontal_wrapped(|ui| {
+        let label = ui.label(words.get("shelf.folder")).id;
+        let edit = egui::TextEdit::singleline(folder).desired_width(260.0);
+        let typed = ui.add(edit.hint_text(words.get("shelf.folder_hint"))).labelled_by(label);
+        if typed.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
+            commands.push(AppCommand::OpenFolder(folder.clone().into()));
+        }
+    });
+}
+
 /// The field for the participant code, whose results the list shows.
-fn participant_ui(ui: &mut egui::Ui, participant: &mut String, words: &Translations) {
+fn participant_ui(ui: &mut egui::Ui, participant: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
     ui.horizontal_wrapped(|ui| {
         let label = ui.label(words.get("briefing.participant")).id;
         let edit = egui::TextEdit::singleline(participant).char_limit(64).desired_width(180.0);
         ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
         if !participant.is_empty() && ui.button(words.get("shelf.someone_else")).clicked() {
-            participant.clear();
+            commands.push(AppCommand::ChangeParticipant);
         }
     });
     if !lesson::is_valid_participant_code(participant) {

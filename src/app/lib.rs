@@ -44,6 +44,8 @@ mod snapshot;
 mod settings;
 mod settings_screen;
 mod exercise_list;
+mod kiosk;
+mod supervisor_code;
 mod lesson_state;
 mod lesson_scene;
 mod pointer_hand;
@@ -58,6 +60,8 @@ mod camera_preset;
 pub mod readiness;
 
 pub use editor::OpenMode;
+pub use kiosk::{KioskOptions, StationOptions};
+pub use supervisor_code::SupervisorCode;
 
 use app::App;
 #[cfg(not(target_family = "wasm"))]
@@ -93,9 +97,16 @@ pub struct AppOptions {
     pub templates: Templates,
     /// Delay of every frame, for tests that the session does not wait for frames.
     pub frame_delay: Option<Duration>,
+    /// The station that this machine is, if its administrator has made it one.
+    pub station: Option<StationOptions>,
 }
 
 impl AppOptions {
+    /// The kiosk that the station is, if it is one.
+    pub fn kiosk(&self) -> Option<&KioskOptions> {
+        self.station.as_ref()?.kiosk.as_ref()
+    }
+
     /// Options of a window that opens at the exercise list.
     pub fn at_exercise_list(out: impl Into<PathBuf>, templates: Templates) -> AppOptions {
         let (exercise, seed, seed_code, frame_delay) = (None, None, None, None);
@@ -112,6 +123,7 @@ impl AppOptions {
             out: out.into(),
             templates,
             frame_delay,
+            station: None,
         }
     }
 }
@@ -135,6 +147,10 @@ pub fn open_window(options: AppOptions) -> Result<(), String> {
         .with_app_id("typodont")
         .with_inner_size(SIZE)
         .with_min_inner_size(SIZE_LEAST);
+    let viewport = match options.kiosk() {
+        Some(_) => viewport.with_fullscreen(true).with_decorations(false),
+        None => viewport,
+    };
     // With rendering in software, dithering takes a large part of the time of a frame, and pages have few flat colours.
     let native = eframe::NativeOptions { viewport, dithering: false, ..Default::default() };
     let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {

@@ -45,6 +45,11 @@ pub struct SettingsReview {
     pub complaints: Vec<String>,
 }
 
+/// Codes of the languages that the program and the user's folder have.
+pub fn language_codes() -> Vec<String> {
+    settings::load_with_languages().1.into_iter().map(|language| language.code).collect()
+}
+
 /// Reads the settings and the languages as the window does.
 pub fn review_settings() -> SettingsReview {
     let (settings, languages, mut complaints) = settings::load_with_languages();

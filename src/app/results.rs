@@ -21,6 +21,8 @@ pub struct LessonResults {
     pub maps: Vec<egui::TextureHandle>,
     /// True if the exercise can be tried again from here.
     pub has_retry: bool,
+    /// True if the report may be opened in the browser.
+    pub has_report: bool,
 }
 
 /// State of the bundle of a result.
@@ -36,8 +38,8 @@ const MAPS: [&str; 2] = ["map-occlusal", "after-occlusal"];
 
 impl LessonResults {
     /// The result of a session whose bundle is still being made.
-    pub fn new(first: FirstResult, completion: Completion, has_retry: bool) -> LessonResults {
-        LessonResults { first, state: BundleState::Pending(completion), maps: Vec::new(), has_retry }
+    pub fn new(first: FirstResult, completion: Completion, has_retry: bool, has_report: bool) -> LessonResults {
+        LessonResults { first, state: BundleState::Pending(completion), maps: Vec::new(), has_retry, has_report }
     }
 
     /// Takes over the steps of the completion, and loads the maps at its end.
@@ -299,7 +301,9 @@ fn buttons_ui(
             commands.push(AppCommand::TryAgain);
         }
         let is_finished = matches!(results.state, BundleState::Finished(_));
-        if ui.add_enabled(is_finished, egui::Button::new(words.get("results.report"))).clicked() {
+        // A browser leads out of a kiosk.
+        let report = egui::Button::new(words.get("results.report"));
+        if results.has_report && ui.add_enabled(is_finished, report).clicked() {
             commands.push(AppCommand::OpenReport);
         }
         if platform::IS_PAGE {

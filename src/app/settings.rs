@@ -79,7 +79,7 @@ pub fn load_with_languages() -> (Settings, Vec<Translations>, Vec<String>) {
 
 impl Settings {
     /// Reads the kept settings; the defaults, with a complaint, if it cannot be read.
-    fn load() -> (Settings, Option<String>) {
+    pub fn load() -> (Settings, Option<String>) {
         let Some(text) = platform::read_settings() else { return (Settings::default(), None) };
         match serde_json::from_str::<Settings>(&text) {
             Ok(settings) => (settings.in_range(), None),

@@ -1,6 +1,7 @@
 //! The screen of the settings.
 
 use super::command::AppCommand;
+use super::editor;
 use super::i18n::Translations;
 use super::platform;
 use super::settings::{FONT_SIZES, Settings, StereoMode};
@@ -38,9 +39,7 @@ pub fn settings_ui(
             let percent = |share: f64, _| format!("{:.0} %", 100.0 * share);
             ui.add(egui::Slider::new(&mut new.volume, 0.0..=1.0).custom_formatter(percent))
         });
-        row(ui, words.get("settings.font"), |ui| {
-            ui.add(egui::Slider::new(&mut new.font_size, FONT_SIZES).step_by(0.1).fixed_decimals(1))
-        });
+        font_row(ui, &mut new, words);
         ui.label("");
         let mut is_smooth = settings.is_smooth(has_graphics);
         if ui.checkbox(&mut is_smooth, words.get("settings.smooth")).changed() {
@@ -64,6 +63,35 @@ pub fn settings_ui(
     }
 }
 
+/// Draws the settings of a kiosk: language and size, which hold until the next participant; and the way to close it.
+pub fn kiosk_settings_ui(
+    ui: &mut egui::Ui,
+    settings: &Settings,
+    languages: &[Translations],
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let mut new = settings.clone();
+    egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
+        language_row(ui, &mut new, languages, words);
+        font_row(ui, &mut new, words);
+    });
+    if new != *settings {
+        commands.push(AppCommand::ApplySettings(Box::new(new)));
+    }
+    ui.add_space(12.0);
+    ui.horizontal(|ui| {
+        if ui.button(words.get("settings.close")).clicked() {
+            commands.push(AppCommand::ShowSettings(false));
+        }
+        let close = ui.button(words.get("kiosk.close_program"));
+        editor::anchor(ui, "kiosk.close_program", close.rect);
+        if close.clicked() {
+            commands.extend([AppCommand::ShowSettings(false), AppCommand::AskToLeaveKiosk(true)]);
+        }
+    });
+}
+
 /// Draws one row of the settings: a label, and the widget that it names.
 fn row(ui: &mut egui::Ui, label: &str, widget: impl FnOnce(&mut egui::Ui) -> egui::Response) {
     let label = ui.label(label).id;
@@ -80,6 +108,12 @@ fn language_row(ui: &mut egui::Ui, settings: &mut Settings, languages: &[Transla
             }
         });
         choice.response
+    });
+}
+
+fn font_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    row(ui, words.get("settings.font"), |ui| {
+        ui.add(egui::Slider::new(&mut settings.font_size, FONT_SIZES).step_by(0.1).fixed_decimals(1))
     });
 }
 

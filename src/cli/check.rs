@@ -1,6 +1,6 @@
 //! `typodont check`: prints all complaints about scenario files.
 
-use super::{CliError, print_line};
+use super::{CliError, print_line, station};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use typodont_lesson::{self as lesson, ExerciseWarning, scenario_files};
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Scenario files, or folders that contain them
+    /// Scenario files, or folders that contain them; or the file of a station, which ends in .toml
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Output format of the problems found
@@ -49,7 +49,8 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         let files = scenario_files(path)?;
         checked += files.len();
         for file in files {
-            match check(&file) {
+            let is_station = file.extension().is_some_and(|extension| extension == "toml");
+            match if is_station { station::check(&file) } else { check(&file) } {
                 Ok(unfair) => warnings.extend(unfair),
                 Err(complaints) => found.extend(complaints),
             }

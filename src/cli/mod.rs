@@ -47,6 +47,7 @@ mod secret_file;
 #[cfg(feature = "school")]
 mod school;
 mod score;
+mod station;
 mod verification;
 mod verify;
 #[cfg(feature = "integrations")]
@@ -72,6 +73,9 @@ use typodont_lesson::LessonError;
 #[derive(Parser)]
 #[command(version, after_help = "Without a command, the desktop program opens.")]
 struct Arguments {
+    /// File of the station with which the window opens; without it the system's, then the user's, if there is one
+    #[arg(long, value_name = "FILE")]
+    station: Option<PathBuf>,
     #[command(subcommand)]
     command: Option<CliCommand>,
 }
@@ -82,7 +86,7 @@ enum CliCommand {
     Run(run::Arguments),
     /// Run the five shipped exercises with a scripted operator and write their reports
     Demo(demo::Arguments),
-    /// Check scenario files and folders, and list every problem with its file, line and column
+    /// Check scenario files and folders, and the file of a station, and list every problem with its file, line and column
     Check(check::Arguments),
     /// Print the JSON Schema of scenarios, for editors
     Schema,
@@ -98,6 +102,8 @@ enum CliCommand {
     Devices(IgnoredArguments),
     /// Look at what a session needs of this machine, and say what is missing and what to do about it
     Doctor(doctor::Arguments),
+    /// Look after a station of a school: its exercises, its sessions, the code of its supervisor
+    Station(station::Arguments),
     /// Join a session on another computer as the instructor, with a second device
     #[cfg(feature = "devices")]
     Assist(assist::Arguments),
@@ -268,7 +274,8 @@ impl CliError {
 /// Parses the arguments, carries out the command, and prints its error.
 pub fn main() -> ExitCode {
     survive_file_size_limit();
-    match execute(Arguments::parse().command) {
+    let Arguments { station, command } = Arguments::parse();
+    match execute(station.as_deref(), command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.report();
@@ -288,11 +295,15 @@ fn survive_file_size_limit() {
 }
 
 /// Carries out a command; without one, opens the window.
-fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
+fn execute(station: Option<&Path>, command: Option<CliCommand>) -> Result<(), CliError> {
+    if let (Some(_), Some(_)) = (station, &command) {
+        return Err(CliError::misuse(
+            "--station without a command opens the window; with a command, write it after the command's name",
+        ));
+    }
     match command {
         #[cfg(feature = "desktop")]
-        None => load_templates()
-            .and_then(|templates| open_window(app::AppOptions::at_exercise_list(default_output_folder(), templates))),
+        None => open_at_exercise_list(station),
         #[cfg(not(feature = "desktop"))]
         None => Err(missing_part::error("the window", "desktop")),
         Some(CliCommand::Run(arguments)) => run::run(&arguments),
@@ -306,6 +317,7 @@ fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
         #[cfg(not(feature = "devices"))]
         Some(CliCommand::Devices(_)) => Err(missing_part::error("typodont devices", "devices")),
         Some(CliCommand::Doctor(arguments)) => doctor::run(&arguments),
+        Some(CliCommand::Station(arguments)) => station::run(&arguments),
         #[cfg(feature = "devices")]
         Some(CliCommand::Assist(arguments)) => assist::run(&arguments),
         #[cfg(not(feature = "devices"))]
@@ -339,7 +351,7 @@ fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
         #[cfg(not(feature = "school"))]
         Some(CliCommand::School(_)) => Err(missing_part::error("typodont school", "school")),
         #[cfg(feature = "school")]
-        Some(CliCommand::Sync(arguments)) => school::sync::run(&arguments),
+        Some(CliCommand::Sync(arguments)) => school::sync::run(arguments),
         #[cfg(not(feature = "school"))]
         Some(CliCommand::Sync(_)) => Err(missing_part::error("typodont sync", "school")),
         #[cfg(feature = "school")]
@@ -359,6 +371,19 @@ fn execute(command: Option<CliCommand>) -> Result<(), CliError> {
         Some(CliCommand::Bench(arguments)) => bench::run(&arguments),
         #[cfg(feature = "manuals")]
         Some(CliCommand::Manuals(arguments)) => manuals::run(&arguments),
+    }
+}
+
+/// Opens the window at the list of exercises: that of the station, if this machine has one.
+#[cfg(feature = "desktop")]
+fn open_at_exercise_list(station: Option<&Path>) -> Result<(), CliError> {
+    let templates = load_templates()?;
+    match station::find(station)? {
+        Some(station) => {
+            let options = app::AppOptions::at_exercise_list(station.session_folder(), templates);
+            station::open_window(station, options)
+        }
+        None => open_window(app::AppOptions::at_exercise_list(default_output_folder(), templates)),
     }
 }
 

@@ -6,6 +6,7 @@ use super::link_key::{self, TypedKey};
 use super::live;
 #[cfg(not(all(feature = "desktop", feature = "devices")))]
 use super::missing_part;
+use super::station::{self, Station};
 use super::{CliError, SESSIONS, print_line, secret_file};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -27,6 +28,8 @@ const MOUSE: &str = "mouse";
 
 /// Name of the simulated device that a scripted operator moves.
 const SCRIPTED: &str = "scripted";
+
+const OUT_HELP: &str = "Folder for the bundle; without it the station's, or reports/sessions";
 
 #[derive(Args)]
 pub struct Arguments {
@@ -80,9 +83,11 @@ pub struct Arguments {
     /// Participant code of the trainee; never a name
     #[arg(long, value_name = "CODE", default_value = "", value_parser = participant)]
     participant: String,
-    /// Folder for the bundle
-    #[arg(long, value_name = "DIR", default_value = SESSIONS)]
-    out: PathBuf,
+    #[arg(long, value_name = "DIR", help = OUT_HELP)]
+    out: Option<PathBuf>,
+    /// File of the station; without it the system's, then the user's, if there is one
+    #[arg(long, value_name = "FILE")]
+    station: Option<PathBuf>,
     /// Begin at once, without showing the instructions
     #[arg(long, conflicts_with = "headless")]
     begin: bool,
@@ -177,10 +182,15 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 }
 
 fn run_exercise(arguments: &Arguments, exercise: &Path) -> Result<(), CliError> {
-    super::check_output_folder(&arguments.out)?;
+    let station = station::find(arguments.station.as_deref())?;
+    let own_folder = station.as_ref().and_then(|station| station.sessions.clone());
+    let out = arguments.out.clone().or(own_folder).unwrap_or_else(|| SESSIONS.into());
+    // With one kind of separator, also on Windows.
+    let out: PathBuf = out.components().collect();
+    super::check_output_folder(&out)?;
     let is_scripted = arguments.device == SCRIPTED;
     if !arguments.headless && (is_scripted || arguments.device == MOUSE) {
-        return open_in_window(arguments, exercise);
+        return open_in_window(arguments, exercise, out, station);
     }
     let library = lesson::library_for(exercise);
     let mut scenario = lesson::read_scenario(exercise, ResolveMode::MakeWorkpiece)?;
@@ -212,7 +222,7 @@ fn run_exercise(arguments: &Arguments, exercise: &Path) -> Result<(), CliError> 
             (None, None) => SeedSource::System,
         },
         participant: &arguments.participant,
-        out: &arguments.out,
+        out: &out,
         digests,
     };
     print_line(run_session(run)?.display())
@@ -235,14 +245,19 @@ fn open_devices(_: &Arguments) -> Result<SessionDriver, CliError> {
 
 /// Complains that this build has no window.
 #[cfg(not(feature = "desktop"))]
-fn open_in_window(_: &Arguments, _: &Path) -> Result<(), CliError> {
+fn open_in_window(_: &Arguments, _: &Path, _: PathBuf, _: Option<Station>) -> Result<(), CliError> {
     Err(missing_part::error("the window; without it, give --headless", "desktop"))
 }
 
 /// Opens the exercise in the window of the desktop application.
 #[cfg(feature = "desktop")]
-fn open_in_window(arguments: &Arguments, exercise: &Path) -> Result<(), CliError> {
-    super::open_window(typodont_app::AppOptions {
+fn open_in_window(
+    arguments: &Arguments,
+    exercise: &Path,
+    out: PathBuf,
+    station: Option<Station>,
+) -> Result<(), CliError> {
+    let options = typodont_app::AppOptions {
         exercise: Some(exercise.to_path_buf()),
         tooth: read_tooth_scan(arguments)?,
         second: second_hand_source(arguments)?,
@@ -252,10 +267,15 @@ fn open_in_window(arguments: &Arguments, exercise: &Path) -> Result<(), CliError
         seed: arguments.seed,
         seed_code: read_code(arguments.seed_sealed.as_deref())?,
         participant: arguments.participant.clone(),
-        out: arguments.out.clone(),
+        out,
         templates: super::load_templates()?,
         frame_delay: arguments.slow_picture_ms.map(std::time::Duration::from_millis),
-    })
+        station: None,
+    };
+    match station {
+        Some(station) => station::open_window(station, options),
+        None => super::open_window(options),
+    }
 }
 
 /// Source and role of the second hand; `None` if none joins.

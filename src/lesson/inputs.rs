@@ -37,7 +37,9 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
         let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
         name.ends_with(".json") && !name.ends_with(".schema.json")
     };
-    let mut files: Vec<PathBuf> = entries.filter_map(|e| Some(e.ok()?.path())).filter(is_scenario).collect();
+    // With one kind of separator, also on Windows.
+    let paths = entries.filter_map(|e| Some(e.ok()?.path().components().collect()));
+    let mut files: Vec<PathBuf> = paths.filter(is_scenario).collect();
     files.sort_by_cached_key(|path| natural_key(path));
     match files.is_empty() {
         true => Err(wrong("no-scenarios: the folder contains no scenario (*.json)".to_string())),

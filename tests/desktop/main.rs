@@ -5,4 +5,6 @@ mod support;
 #[cfg(all(unix, not(target_os = "macos")))]
 mod author_window;
 #[cfg(all(unix, not(target_os = "macos")))]
+mod kiosk;
+#[cfg(all(unix, not(target_os = "macos")))]
 mod window;

@@ -320,3 +320,20 @@ fn a_library_of_a_vendor_that_lacks_functions_is_too_old() {
     let output = doctor(&home).env("LD_LIBRARY_PATH", &home).output().unwrap();
     finds(&output, "other-device", "warning", "openhaptics: cannot load", "too old");
 }
+
+#[test]
+fn a_wrong_station_and_old_exercises_are_found() {
+    let home = folder("doctor-station");
+    fs::create_dir(home.join("course")).unwrap();
+    fs::write(home.join("course/1.json"), "{}").unwrap();
+    let station = home.join("station.toml");
+    let doctor = || doctor(&home).args(["--station", "station.toml"]).output().unwrap();
+    fs::write(&station, "devise = 'mouse'\n").unwrap();
+    finds(&doctor(), "station", "missing", "station.toml:1:1: unknown-key", "typodont check");
+    let course = home.join("course");
+    fs::write(&station, format!("mode = 'kiosk'\nexercises = '{}'\n", course.display())).unwrap();
+    finds(&doctor(), "station", "warning", "no-code", "typodont station code");
+    finds(&doctor(), "exercises", "warning", "1 files of the school's exercises differ", "typodont station sync");
+    fs::remove_dir_all(course).unwrap();
+    finds(&doctor(), "exercises", "warning", "cannot be compared", "connect the drive");
+}

@@ -12,4 +12,5 @@ mod near_zones;
 mod operators;
 mod restoring;
 mod schema;
+mod station;
 mod visibility;

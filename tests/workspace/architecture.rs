@@ -173,6 +173,7 @@ fn the_network_is_used_only_where_the_text_says() {
         "cli/school/connection.rs",
         "cli/school/metrics.rs",
         "cli/school/store.rs",
+        "cli/station/exercise_server.rs",
         "integrations/lrs.rs",
         "integrations/tls_roots.rs",
         "school/http_client.rs",

@@ -9,9 +9,11 @@ mod finding;
 mod machine_checks;
 mod remedies;
 mod session_folder;
+mod station_checks;
 #[cfg(feature = "desktop")]
 mod window_checks;
 
+use super::station::Station;
 use super::{CliError, print_line};
 use clap::Args;
 use finding::{Finding, FindingStatus};
@@ -20,12 +22,15 @@ use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Device that the station uses, as in `typodont run`; without it that of the settings
+    /// Device that the machine uses, as in `typodont run`; without it that of the station or of the settings
     #[arg(long, value_name = "NAME[:WHICH]")]
     device: Option<String>,
-    /// Folder in which sessions are stored; without it that of the window
+    /// Folder in which sessions are stored; without it that of the station or of the window
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// File of the station; without it the system's, then the user's, if there is one
+    #[arg(long, value_name = "FILE")]
+    station: Option<PathBuf>,
     /// Print the findings as JSON
     #[arg(long)]
     json: bool,
@@ -69,7 +74,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 
 /// Findings of all checks, in the order in which a session meets their subjects.
 fn findings(arguments: &Arguments) -> Result<Vec<Finding>, CliError> {
-    let mut findings = Vec::new();
+    let (station, mut findings) = station_checks::findings(arguments.station.as_deref());
     #[cfg(feature = "desktop")]
     let settings = typodont_app::readiness::review_settings();
     #[cfg(feature = "desktop")]
@@ -77,7 +82,11 @@ fn findings(arguments: &Arguments) -> Result<Vec<Finding>, CliError> {
     #[cfg(all(feature = "devices", not(feature = "desktop")))]
     let device_of_settings = "mouse";
     #[cfg(feature = "devices")]
-    let device = device_checks::choose(arguments.device.as_deref().unwrap_or(device_of_settings))?;
+    let device_of_station = station.as_ref().and_then(|station| station.device.as_deref());
+    #[cfg(feature = "devices")]
+    let chosen = arguments.device.as_deref().or(device_of_station).unwrap_or(device_of_settings);
+    #[cfg(feature = "devices")]
+    let device = device_checks::choose(chosen)?;
     #[cfg(feature = "desktop")]
     findings.extend(window_checks::findings(&settings));
     #[cfg(not(feature = "desktop"))]
@@ -87,7 +96,8 @@ fn findings(arguments: &Arguments) -> Result<Vec<Finding>, CliError> {
     #[cfg(not(feature = "devices"))]
     findings.push(Finding::not_included("device", "devices", "devices"));
     findings.push(machine_checks::processors());
-    let folder = arguments.out.clone().unwrap_or_else(super::default_output_folder);
+    let own_folder = || station.as_ref().map_or_else(super::default_output_folder, Station::session_folder);
+    let folder = arguments.out.clone().unwrap_or_else(own_folder);
     findings.push(machine_checks::clock(&folder));
     findings.extend(session_folder::findings(&folder));
     Ok(findings)

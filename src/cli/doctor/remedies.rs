@@ -38,6 +38,8 @@ pub enum StationFault {
     InterruptedSession,
     WrongSettings,
     NoExercises,
+    WrongStation,
+    OldExercises,
 }
 
 impl StationFault {
@@ -134,6 +136,12 @@ impl StationFault {
             (StationFault::WrongSettings, _) => {
                 "correct or delete the file that is named, or choose the value again in the window's settings (F2)"
             }
+            (StationFault::WrongStation, _) => {
+                "correct the file that is named; `typodont check FILE` shows every mistake at its place"
+            }
+            (StationFault::OldExercises, _) => {
+                "run `typodont station sync`; if that fails, connect the drive or the network, or ask the server's administrator"
+            }
             (StationFault::NoExercises, _) => {
                 "connect the drive or the network folder, or enter another folder in the window's list of exercises"
             }
@@ -145,7 +153,7 @@ impl StationFault {
 mod tests {
     use super::*;
 
-    const FAULTS: [StationFault; 15] = [
+    const FAULTS: [StationFault; 17] = [
         StationFault::NoDisplay,
         StationFault::NoGraphics,
         StationFault::SoftwareGraphics,
@@ -161,6 +169,8 @@ mod tests {
         StationFault::InterruptedSession,
         StationFault::WrongSettings,
         StationFault::NoExercises,
+        StationFault::WrongStation,
+        StationFault::OldExercises,
     ];
 
     #[test]

@@ -6,7 +6,7 @@ use super::retry::Transient;
 use super::store::{ObjectStoreHandle, StoreArguments, StoreError};
 use super::store_marker;
 use crate::cli::progress::progress_bar;
-use crate::cli::{CliError, print_line, verification};
+use crate::cli::{CliError, print_line, station, verification};
 use clap::Args;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeSet;
@@ -26,9 +26,9 @@ use typodont_school::{ArchiveError, BundleArchive};
 pub struct Arguments {
     /// Folder that contains bundles, at any depth
     folder: PathBuf,
-    /// Class to which the sessions belong
+    /// Class to which the sessions belong; without it that of the station's file
     #[arg(long, value_name = "NAME")]
-    class: String,
+    class: Option<String>,
     #[command(flatten)]
     at: DatabaseArguments,
     #[command(flatten)]
@@ -86,7 +86,25 @@ struct LocalBundle {
     session: SessionFile,
 }
 
-pub fn run(arguments: &Arguments) -> Result<(), CliError> {
+impl Arguments {
+    /// Takes the class from the station's file if none is given.
+    fn with_class_of_station(mut self) -> Result<Arguments, CliError> {
+        if self.class.is_none() {
+            self.class = station::find(None)?.and_then(|station| station.class);
+        }
+        match self.class {
+            Some(_) => Ok(self),
+            None => Err(CliError::misuse("--class is required: the machine has no station file that names a class")),
+        }
+    }
+
+    fn class(&self) -> &str {
+        self.class.as_deref().unwrap_or_default()
+    }
+}
+
+pub fn run(arguments: Arguments) -> Result<(), CliError> {
+    let arguments = &arguments.with_class_of_station()?;
     let Arguments { folder, at, store, stay, .. } = arguments;
     if !folder.is_dir() {
         return Err(CliError::wrong(format!("{}: missing-folder: the folder does not exist", folder.display())));
@@ -111,7 +129,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
                     print_line(words)?;
                 }
             }
-            Some(SyncError::UnknownClass) => return Err(unknown_class_error(&arguments.class)),
+            Some(SyncError::UnknownClass) => return Err(unknown_class_error(arguments.class())),
             Some(SyncError::WrongStore(failure)) if !stay => return Err(failure),
             Some(SyncError::Database(DbError::Rejected(error))) => return Err(DbError::Rejected(error).into()),
             Some(SyncError::Database(away)) if !stay => return Err(offline_error(away.into(), &words)),
@@ -170,7 +188,7 @@ fn sync_once(
     };
     let found = find_local_bundles(&arguments.folder, &mut complain);
     let station = connection.query_with_retry(records::login_name)?;
-    if !connection.query_with_retry(|client| records::has_class(client, &arguments.class))? {
+    if !connection.query_with_retry(|client| records::has_class(client, arguments.class()))? {
         return Err(SyncError::UnknownClass);
     }
     store_marker::verify_or_create(connection, store)?;
@@ -298,7 +316,7 @@ fn upload_session(
     }
     let bundle = found.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let finished = NewSession {
-        class: &arguments.class,
+        class: arguments.class(),
         bundle: &bundle,
         session: &found.session,
         session_json: &text,
