@@ -4,6 +4,7 @@
 mod support;
 mod damaged_recordings;
 mod example;
+mod compatibility;
 mod golden;
 mod killed;
 #[cfg(target_os = "linux")]
