@@ -10,13 +10,12 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use typodont_formats::diagnostic::SourceText;
 
 /// File with the digests of all others, as `sha256sum` writes it.
 pub const DIGEST_FILE: &str = "SHA256SUMS";
 
 /// Maximum number of files of a course, and of folders in one another.
-const FILES_MAX: usize = 2000;
+pub const FILES_MAX: usize = 2000;
 const DEPTH_MAX: usize = 8;
 
 /// Digests in hexadecimal, by the path of the file with `/` between its parts.
@@ -136,37 +135,8 @@ pub fn digest_of(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Reads the lines of [`DIGEST_FILE`].
-///
-/// # Errors
-/// The first line that is not a digest and a path inside the folder.
-pub fn parse_digests(source: &SourceText) -> Result<Digests, String> {
-    let mut digests = Digests::new();
-    for (number, line) in source.text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
-        let parsed = line.split_once("  ").or_else(|| line.split_once(" *"));
-        let Some((digest, path)) = parsed.filter(|(digest, path)| is_digest(digest) && is_inside(path)) else {
-            return Err(format!(
-                "{}:{}: wrong-line: expected a SHA-256 digest, two spaces and a path inside the folder, as `sha256sum * > \
-                 {DIGEST_FILE}` writes them",
-                source.name,
-                number + 1
-            ));
-        };
-        digests.insert(path.strip_prefix("./").unwrap_or(path).to_string(), digest.to_lowercase());
-    }
-    match digests.len() {
-        0 => Err(format!("{}: no-files: the list of digests is empty", source.name)),
-        1..=FILES_MAX => Ok(digests),
-        count => Err(format!("{}: too-many: {count} files; a course may have {FILES_MAX}", source.name)),
-    }
-}
-
-fn is_digest(text: &str) -> bool {
-    text.len() == 64 && text.bytes().all(|letter| letter.is_ascii_hexdigit())
-}
-
 /// True for a path that leads to a file inside its folder on every system.
-fn is_inside(path: &str) -> bool {
+pub fn is_inside(path: &str) -> bool {
     let path = path.strip_prefix("./").unwrap_or(path);
     let is_plain = |part: &str| {
         !part.is_empty()
@@ -309,22 +279,5 @@ mod tests {
         folders.update().unwrap();
         assert!(update(&Forged, &folders.0.join("copy")).unwrap_err().contains("wrong-digest"));
         assert_eq!(folders.copied("1.json").as_deref(), Some("one"));
-    }
-
-    #[test]
-    fn a_list_of_digests_names_only_files_inside_its_folder() {
-        let digest = digest_of(b"");
-        let check = |line: &str, is_valid: bool| {
-            let source = SourceText::new("SHA256SUMS", format!("{digest}  first.json\n{line}\n"));
-            assert_eq!(parse_digests(&source).is_ok(), is_valid, "{line}");
-        };
-        check(&format!("{digest}  sub/1.json"), true);
-        check(&format!("{digest} *1.json"), true);
-        check(&format!("{digest}  ./1.json"), true);
-        check("", true);
-        for path in ["../1.json", "/etc/passwd", "a/../../b", r"..\b", "C:b", "a//b", ".hidden", "a%2e", ""] {
-            check(&format!("{digest}  {path}"), false);
-        }
-        check("<html>", false);
     }
 }

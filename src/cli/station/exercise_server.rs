@@ -1,6 +1,6 @@
 //! Exercises on a web server: a folder with the list of its digests.
 
-use super::exercise_copy::{DIGEST_FILE, Digests, ExerciseFiles, parse_digests};
+use super::exercise_copy::{DIGEST_FILE, Digests, ExerciseFiles, FILES_MAX, is_inside};
 use std::time::Duration;
 use typodont_formats::diagnostic::SourceText;
 use ureq::Agent;
@@ -58,5 +58,57 @@ impl ExerciseFiles for ExerciseServer {
 
     fn bytes(&self, path: &str) -> Result<Vec<u8>, String> {
         self.get(path)
+    }
+}
+
+/// Reads the lines of [`DIGEST_FILE`].
+///
+/// # Errors
+/// The first line that is not a digest and a path inside the folder.
+fn parse_digests(source: &SourceText) -> Result<Digests, String> {
+    let mut digests = Digests::new();
+    for (number, line) in source.text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
+        let parsed = line.split_once("  ").or_else(|| line.split_once(" *"));
+        let Some((digest, path)) = parsed.filter(|(digest, path)| is_digest(digest) && is_inside(path)) else {
+            return Err(format!(
+                "{}:{}: wrong-line: expected a SHA-256 digest, two spaces and a path inside the folder, as `sha256sum * > \
+                 {DIGEST_FILE}` writes them",
+                source.name,
+                number + 1
+            ));
+        };
+        digests.insert(path.strip_prefix("./").unwrap_or(path).to_string(), digest.to_lowercase());
+    }
+    match digests.len() {
+        0 => Err(format!("{}: no-files: the list of digests is empty", source.name)),
+        1..=FILES_MAX => Ok(digests),
+        count => Err(format!("{}: too-many: {count} files; a course may have {FILES_MAX}", source.name)),
+    }
+}
+
+fn is_digest(text: &str) -> bool {
+    text.len() == 64 && text.bytes().all(|letter| letter.is_ascii_hexdigit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::exercise_copy::digest_of;
+    use super::*;
+
+    #[test]
+    fn a_list_of_digests_names_only_files_inside_its_folder() {
+        let digest = digest_of(b"");
+        let check = |line: &str, is_valid: bool| {
+            let source = SourceText::new("SHA256SUMS", format!("{digest}  first.json\n{line}\n"));
+            assert_eq!(parse_digests(&source).is_ok(), is_valid, "{line}");
+        };
+        check(&format!("{digest}  sub/1.json"), true);
+        check(&format!("{digest} *1.json"), true);
+        check(&format!("{digest}  ./1.json"), true);
+        check("", true);
+        for path in ["../1.json", "/etc/passwd", "a/../../b", r"..\b", "C:b", "a//b", ".hidden", "a%2e", ""] {
+            check(&format!("{digest}  {path}"), false);
+        }
+        check("<html>", false);
     }
 }

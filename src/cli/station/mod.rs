@@ -108,6 +108,7 @@ impl Station {
     }
 
     /// Folder in which the window finds the school's exercises: the copy.
+    #[cfg(feature = "desktop")]
     pub fn exercise_folder(&self) -> Option<PathBuf> {
         self.exercises.as_ref().and_then(|_| copy_folder())
     }
