@@ -140,7 +140,8 @@ impl StationFault {
                 "correct the file that is named; `typodont check FILE` shows every mistake at its place"
             }
             (StationFault::OldExercises, _) => {
-                "run `typodont station sync`; if that fails, connect the drive or the network, or ask the server's administrator"
+                "run `typodont station sync`; if it fails, connect the network or the disk that holds the exercises, or ask the \
+                 server's administrator"
             }
             (StationFault::NoExercises, _) => {
                 "connect the drive or the network folder, or enter another folder in the window's list of exercises"
