@@ -37,3 +37,69 @@ impl LessonBackend for InlineLesson {
         self.run.is_some()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lesson_backend::{InputDevice, LessonCommand, LessonConfig, LessonEvent};
+    use std::collections::BTreeMap;
+    use std::sync::Arc;
+    use std::time::{Duration, Instant};
+    use typodont_exercise::scenario;
+    use typodont_exercise::scenario::ResolveMode;
+    use typodont_exercise::session::Input;
+    use typodont_formats::Library;
+    use typodont_formats::diagnostic::SourceText;
+    use typodont_lesson::SessionSeed;
+    use typodont_report::Templates;
+    use typodont_report::bundle::{BundleFolder, VerificationOutcome, verify};
+
+    #[test]
+    fn a_lesson_within_frames_makes_a_bundle_in_memory_that_holds() {
+        // Aim: a page without threads and folders gives the same evidence. Method: a lesson with coarse voxels, advanced as
+        // frames do, is ended by its trainee after the first tick; nothing is done before the screen could say so.
+        let text =
+            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.2");
+        let source = SourceText::new("coarse.json", text);
+        let scenario = scenario::resolve(source, &Library::shipped(), ResolveMode::MakeWorkpiece).unwrap();
+        let config = LessonConfig {
+            scenario: Arc::new(scenario),
+            seed: SessionSeed::given(1),
+            participant: "P01".into(),
+            out: None,
+            templates: Templates::shipped(),
+            started: jiff::Timestamp::UNIX_EPOCH,
+            input_device: InputDevice::Mouse,
+            second: None,
+            digests: BTreeMap::new(),
+            wake: Arc::new(|| ()),
+        };
+        let (mut client, run) = LessonRun::new(config, typodont_audio::sound_channel().0);
+        let mut lesson = InlineLesson::new(run);
+        for _ in 0..FRAMES_BEFORE_LONG_STEP {
+            lesson.advance();
+            assert!(client.next_event().is_none(), "a long step that no screen has announced");
+        }
+        let begun = Instant::now();
+        let (mut is_aborted, mut bundle) = (false, None);
+        while lesson.needs_frames() {
+            assert!(begun.elapsed() < Duration::from_secs(300), "the lesson does not end");
+            lesson.advance();
+            if client.snapshot().is_some() && !is_aborted {
+                is_aborted = client.send(LessonCommand::Input(Input::Abort));
+            }
+            while let Some(event) = client.next_event() {
+                match event {
+                    LessonEvent::Finished(finished) => bundle = Some(finished),
+                    LessonEvent::Failed(why) => panic!("{why}"),
+                    _ => {}
+                }
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        let bundle = bundle.expect("the lesson has a bundle");
+        assert!(matches!(bundle, BundleFolder::InMemory { .. }));
+        let verification = verify(&bundle, &[Templates::shipped()]).unwrap();
+        assert_eq!(verification.outcome(), VerificationOutcome::Verified, "{:?}", verification.complaints);
+    }
+}

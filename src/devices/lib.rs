@@ -56,6 +56,8 @@ mod shared_library;
 pub mod spacemouse;
 #[cfg(not(target_family = "wasm"))]
 mod stream;
+// Without a relay, only the life time of a force is needed.
+#[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod force_slot;
 #[cfg(not(target_family = "wasm"))]
 mod report_filter;

@@ -8,3 +8,5 @@ mod author_window;
 mod kiosk;
 #[cfg(all(unix, not(target_os = "macos")))]
 mod window;
+#[cfg(all(unix, not(target_os = "macos")))]
+mod page;

@@ -135,7 +135,7 @@ fn asking_each_time(place: &Path) -> PathBuf {
 }
 
 /// Centre of the decay of an exercise for a seed, world space, mm.
-fn lesion_in_world(exercise: &str, seed: u64) -> Vec3 {
+pub fn lesion_in_world(exercise: &str, seed: u64) -> Vec3 {
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(exercise)).unwrap();
     let scenario =
         scenario::resolve(SourceText::new(exercise, text), &Library::shipped(), ResolveMode::MakeWorkpiece).unwrap();
