@@ -15,7 +15,7 @@ const session = JSON.parse(fs.readFileSync(sessionFile));
 const grade = session.grade;
 const percent = Math.round(10000 * grade.points / grade.max_points) / 100;
 const LEARNER = 'student@school.example';
-const CODE = 'student_40school.example';
+const CODE = 'student_40_school.example';
 const ACTOR = { objectType: 'Agent', account: { homePage: 'https://school.example', name: LEARNER } };
 const REGISTRATION = '2f1c8a52-6d0b-4c46-9ce1-7e0a3c1f5a10';
 const ACTIVITY = 'https://school.example/unit/1';
@@ -77,6 +77,10 @@ async function cmi5(request, response, url, body) {
     return response.end();
   }
   const key = `${url.pathname} ${url.searchParams.get('stateId') || url.searchParams.get('profileId')}`;
+  if (request.method === 'PUT' && options.losesDocuments) {
+    response.statusCode = 404;
+    return response.end();
+  }
   if (request.method === 'PUT') documents.set(key, body);
   response.statusCode = request.method === 'PUT' ? 204 : documents.has(key) ? 200 : 404;
   response.end(request.method === 'PUT' ? undefined : documents.get(key));
@@ -217,9 +221,12 @@ const server = http.createServer((request, response) => {
     same(await launch.evaluate(() => document.documentElement.lang), 'tr', 'the language that the learner prefers');
     same((await finish(launch)).get('participant'), CODE, 'the participant');
     same(await state(launch), 'delivered', 'the state after a result');
-    await page.goto('about:blank');
-    for (let i = 0; i < 50 && !statements.some(s => /terminated$/.test(s.verb.id)); i++) await new Promise(done => setTimeout(done, 100));
-    same(statements.map(s => s.verb.id.split('/').pop()), ['initialized', grade.passed ? 'passed' : 'failed', 'completed', 'terminated'], 'the statements');
+    const verbsAfterLeaving = async () => {
+      await page.goto('about:blank');
+      for (let i = 0; i < 50 && !statements.some(s => /terminated$/.test(s.verb.id)); i++) await new Promise(done => setTimeout(done, 100));
+      return statements.map(s => s.verb.id.split('/').pop());
+    };
+    same(await verbsAfterLeaving(), ['initialized', grade.passed ? 'passed' : 'failed', 'completed', 'terminated'], 'the statements');
     for (const statement of statements) {
       same([statement.actor, statement.object.id, statement.context.registration], [ACTOR, ACTIVITY, REGISTRATION], 'who, what and where of a statement');
       claim(statement.context.contextActivities.category.some(c => c.id.endsWith('categories/cmi5')), 'a statement lacks the category cmi5');
@@ -231,10 +238,24 @@ const server = http.createServer((request, response) => {
     // The token is given once: a second launch with it is refused, and the exercise works all the same.
     launch = await open(address, {});
     same(await state(launch), 'refused', 'the state after a used token');
-    tokens = 0;
-    launchMode('Review');
-    launch = await open(address, {});
+    /** Opens the exercise again in the same registration, with a new token. */
+    const again = async (mode, some) => {
+      tokens = 0;
+      statements.length = 0;
+      launchMode(mode);
+      return open(address, some);
+    };
+    launch = await again('Review', {});
     claim((await launch.locator('#review').innerText()).includes(`${percent} %`), 'the review lacks the result');
+    same(await verbsAfterLeaving(), ['initialized', 'terminated'], 'the statements of a review');
+    // "Passed" and "completed" may be stated once in a registration, however many sessions it has.
+    launch = await again('Normal', {});
+    await finish(launch);
+    same(await verbsAfterLeaving(), ['initialized', ...grade.passed ? [] : ['failed'], 'terminated'], 'the statements of a second session');
+    // A platform that loses what it is given has not received the result.
+    launch = await again('Normal', { losesDocuments: true });
+    await finish(launch);
+    same(await state(launch), 'failed', 'the state after a document that is not kept');
   }
 
   await browser.close();

@@ -29,8 +29,11 @@ export class Cmi5 {
     this.actor = JSON.parse(launch.actor);
     this.began = Date.now();
     this.isOpen = false;
-    /** Verbs that may be stated once in a session. */
+    /** Verbs of this session. */
     this.stated = new Set();
+    /** Verbs of the registration, by this session and earlier ones, that may be stated once in it. */
+    this.registered = new Set();
+    this.kept = null;
   }
 
   /** The connection that this page's address describes; null if it describes none. */
@@ -46,7 +49,8 @@ export class Cmi5 {
     const headers = { Authorization: `Basic ${this.token}`, 'X-Experience-API-Version': '1.0.3' };
     if (body !== undefined) headers['Content-Type'] = 'application/json';
     const response = await fetch(url, { method, headers, body: body === undefined ? undefined : JSON.stringify(body), keepalive: isLast });
-    if (!response.ok && response.status !== 404) throw new Error(`${method} ${path}: ${response.status} ${(await response.text()).slice(0, 200)}`);
+    const isAbsent = method === 'GET' && response.status === 404;
+    if (!response.ok && !isAbsent) throw new Error(`${method} ${path}: ${response.status} ${(await response.text()).slice(0, 200)}`);
     return response;
   }
 
@@ -69,12 +73,14 @@ export class Cmi5 {
     if (!this.data) throw new Error('LMS.LaunchData');
     const preferences = await this.document('agents/profile', { agent: this.launch.actor, profileId: 'cmi5LearnerPreferences' }).catch(() => null);
     const kept = await this.document('activities/state', this.state(STATE));
+    this.kept = kept && typeof kept === 'object' ? kept : null;
+    if (Array.isArray(this.kept?.stated)) this.kept.stated.forEach(verb => this.registered.add(verb));
     await this.say('initialized', {}, []);
     this.isOpen = true;
     const learner = this.actor.account ? this.actor.account.name : this.actor.name || '';
     return {
       learner, language: (preferences && preferences.languagePreference || '').split(',')[0],
-      isReview: this.data.launchMode === 'Review', isBrowse: this.data.launchMode === 'Browse', kept: unpacked(JSON.stringify(kept)),
+      isReview: this.data.launchMode === 'Review', isBrowse: this.data.launchMode === 'Browse', kept: unpacked(JSON.stringify(this.kept)),
     };
   }
 
@@ -96,19 +102,33 @@ export class Cmi5 {
     this.stated.add(verb);
   }
 
-  /** Delivers a result. A verb that the standard allows once in a session is stated once; what is kept is always the newest. */
+  /** States a verb that the standard allows once in a registration, and keeps that it was stated for the launches to come. */
+  async sayOnce(verb, result) {
+    await this.say(verb, result, ['moveon']);
+    this.registered.add(verb);
+    await this.keep(this.kept);
+  }
+
+  /** Keeps a document for the launches to come, with the verbs that none of them may state again. */
+  async keep(content) {
+    this.kept = { ...content, stated: [...this.registered] };
+    await this.request('PUT', 'activities/state', this.state(STATE), this.kept);
+  }
+
+  /** Delivers a result. A verb that the standard allows once in a registration is stated once; what is kept is always the newest. */
   async deliver(result) {
     if (this.data.launchMode && this.data.launchMode !== 'Normal') return;
     const time = duration(result.seconds);
     const extensions = { [`${EXTENSION}bundle-sha256`]: result.sha256, [`${EXTENSION}items`]: result.items };
     const score = result.percent === null ? {} : { score: { scaled: Math.round(result.percent * 100) / 10000, raw: result.percent, min: 0, max: 100 } };
-    const verb = result.passed ? 'passed' : 'failed';
-    // After "passed", neither verb may follow in the same registration; each is allowed once in a session.
-    if (result.passed !== null && !this.stated.has('passed') && !this.stated.has(verb)) {
-      await this.say(verb, { ...score, success: result.passed, duration: time, extensions }, ['moveon']);
+    const judged = { ...score, success: result.passed, duration: time, extensions };
+    // After "passed", neither verb may follow in the same registration; "failed" may be stated once in each session before it.
+    if (result.passed !== null && !this.registered.has('passed')) {
+      if (result.passed) await this.sayOnce('passed', judged);
+      else if (!this.stated.has('failed')) await this.say('failed', judged, ['moveon']);
     }
-    if (result.finished && !this.stated.has('completed')) await this.say('completed', { completion: true, duration: time }, ['moveon']);
-    await this.request('PUT', 'activities/state', this.state(STATE), JSON.parse(packed(result, KEPT_MAX)));
+    if (result.finished && !this.registered.has('completed')) await this.sayOnce('completed', { completion: true, duration: time });
+    await this.keep(JSON.parse(packed(result, KEPT_MAX)));
   }
 
   /** Closes the connection; may be called while the page is being left, and more than once. */

@@ -131,6 +131,8 @@ async function main() {
   } catch (error) {
     refusal = error.message;
   }
+  // A launch that only looks at a result ends, too.
+  if (platform && !refusal) window.addEventListener('pagehide', () => platform.end());
   speak(opened.language || parameters.get('language'));
   if (opened.isReview) {
     show('connected');
@@ -142,7 +144,6 @@ async function main() {
   else show(opened.isBrowse ? 'browse' : 'connected');
   const isDelivering = platform && !refusal && !opened.isBrowse;
   listen(course, isDelivering ? platform : null, opened.kept);
-  if (platform && !refusal) window.addEventListener('pagehide', () => platform.end());
   openExercise(course, opened.learner);
 }
 

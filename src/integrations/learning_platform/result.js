@@ -66,10 +66,11 @@ export function unpacked(text) {
 }
 
 /**
- * A participant code from the learner's name in the platform: characters that a code may not have become `_` and their number in
- * hexadecimal, so that two learners never share a code unless their names agree in the first characters of a very long one.
+ * A participant code from the learner's name in the platform: characters that a code may not have become their number in
+ * hexadecimal between two `_`, so that two learners never share a code unless their names agree in the first characters of a very long
+ * one.
  */
 export function participantCode(learner) {
-  const escaped = Array.from(learner, c => /[A-Za-z0-9.-]/.test(c) ? c : '_' + c.codePointAt(0).toString(16).padStart(2, '0'));
+  const escaped = Array.from(learner, c => /[A-Za-z0-9.-]/.test(c) ? c : `_${c.codePointAt(0).toString(16)}_`);
   return escaped.join('').slice(0, 64);
 }

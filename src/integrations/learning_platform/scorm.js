@@ -155,7 +155,7 @@ export class Scorm {
       this.offer(`${place}.weighting`, item.max);
       this.offer(`${place}.${response}`, item.points);
       this.offer(`${place}.result`, item.points);
-      if (this.version === '2004') this.offer(`${place}.description`, item.title.slice(0, 250));
+      if (this.version === '2004') this.offer(`${place}.description`, (item.title || item.metric).slice(0, 250));
       this.interactions += 1;
     }
   }
