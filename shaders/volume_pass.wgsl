@@ -1,8 +1,9 @@
 // Direct volume rendering: colours and opacities by density, blended along each ray. Compiled after view.wgsl and
 // tooth.wgsl. CPU twin: src/render/cpu/volume_pass.rs.
 
-// Depth buffer of the scene drawn so far.
-@group(2) @binding(0) var scene_depth: texture_depth_2d;
+// Depth buffer of the scene drawn so far. WebGL 2 reads single texels of depths only by a sampler.
+@group(2) @binding(0) var scene_depth: texture_2d<f32>;
+@group(2) @binding(1) var nearest_sampler: sampler;
 
 // Opacity at which nothing behind is visible.
 const OPAQUE: f32 = 0.99;
@@ -69,7 +70,8 @@ fn volume_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let way = ray(pixel.xy);
     let start = (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
     let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
-    let behind = depth_of(textureLoad(scene_depth, vec2i(pixel.xy), 0));
+    let at = pixel.xy / vec2f(textureDimensions(scene_depth));
+    let behind = depth_of(textureSampleLevel(scene_depth, nearest_sampler, at, 0.0).r);
     let blended = blend(start, along, tooth.low.w / length(way), behind);
     if blended.first < 0.0 {
         discard;

@@ -8,6 +8,7 @@ pub const SOURCE: &str = include_str!("../../shaders/volume_pass.wgsl");
 pub struct VolumePass {
     pub pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
+    nearest_sampler: wgpu::Sampler,
 }
 
 impl VolumePass {
@@ -18,8 +19,11 @@ impl VolumePass {
         tooth: &wgpu::BindGroupLayout,
     ) -> VolumePass {
         let module = passes::shader_module(device, "volume_pass", &passes::full_source(SOURCE));
-        let depth = resources::texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
-        let layout = resources::layout(device, "scene depth", &[depth]);
+        let numbers = wgpu::TextureSampleType::Float { filterable: false };
+        let depth = resources::texture(numbers, wgpu::TextureViewDimension::D2);
+        let nearest = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
+        let layout = resources::layout(device, "scene depth", &[depth, nearest]);
+        let nearest_sampler = device.create_sampler(&wgpu::SamplerDescriptor::default());
         let pass = PipelineDesc {
             label: "volume_pass",
             module: &module,
@@ -32,11 +36,12 @@ impl VolumePass {
             format,
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         };
-        VolumePass { pipeline: pass.build(device), layout }
+        VolumePass { pipeline: pass.build(device), layout, nearest_sampler }
     }
 
     /// The depths that end the rays.
     pub fn group(&self, device: &wgpu::Device, depth: &wgpu::TextureView) -> wgpu::BindGroup {
-        resources::group(device, &self.layout, [wgpu::BindingResource::TextureView(depth)])
+        let sampler = wgpu::BindingResource::Sampler(&self.nearest_sampler);
+        resources::group(device, &self.layout, [wgpu::BindingResource::TextureView(depth), sampler])
     }
 }
