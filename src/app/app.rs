@@ -31,10 +31,11 @@ use typodont_author::new_exercise;
 use typodont_exercise::scenario::{QuestionnaireTime, Scenario};
 use typodont_exercise::session::Input;
 use typodont_formats::Library;
-use typodont_formats::diagnostic::headlines;
+use typodont_formats::diagnostic::{Diagnostic, headlines};
 use typodont_lesson as lesson;
 use typodont_lesson::SessionSeed;
 use typodont_report::FirstResult;
+use typodont_report::bundle::BundleFolder;
 
 pub struct App {
     options: AppOptions,
@@ -96,26 +97,35 @@ const IDLE_FRAME_INTERVAL: Duration = Duration::from_secs(1);
 const BUSY_TIME: f64 = 2.0;
 
 impl App {
-    pub fn new(context: &eframe::CreationContext, options: AppOptions) -> App {
+    pub fn new(context: &eframe::CreationContext, mut options: AppOptions) -> App {
         let ctx = &context.egui_ctx;
         let (mut settings, languages, mut complaints) = settings::load_with_languages();
         if let Some(station) = &options.station {
             settings = station.settings(settings);
             complaints.extend(station.complaint.clone());
         }
-        let (replacements, broken) = wav_files::read_folder(&sounds_folder());
+        let is_known = |code: &String| languages.iter().any(|words| words.code == *code);
+        if let Some(code) = options.language.take().filter(is_known) {
+            settings.language = code;
+        }
+        let (replacements, broken) = read_sounds();
         complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
         theme::apply(ctx, &settings);
-        let mut exercise_list = ExerciseList::load(&settings.exercises);
+        let is_given = options.given.is_some();
+        let mut exercise_list = match options.given.take() {
+            Some(given) => ExerciseList::only(given),
+            None => ExerciseList::load(&settings.exercises),
+        };
         let mut screen = Screen::ExerciseList;
         if let Some(path) = &options.exercise {
             exercise_list.add_and_select(path);
             if let Some(scan) = &options.tooth {
                 exercise_list.replace_teeth(scan);
             }
-            if exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
-                screen = Screen::Briefing;
-            }
+        }
+        let is_one_selected = is_given || options.exercise.is_some();
+        if is_one_selected && exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
+            screen = Screen::Briefing;
         }
         let begins = options.begins_at_once;
         let history = SessionHistory::read(&options.out, options.templates.clone(), repaint_waker(ctx));
@@ -184,8 +194,10 @@ impl App {
         self.poll_kiosk(ctx);
         for completion in &mut self.completions {
             completion.poll();
-            if let Some(Err(why)) = &completion.state().outcome {
-                self.complaints.push(why.clone());
+            match &completion.state().outcome {
+                Some(Ok(bundle)) => finish_bundle(&self.options, bundle),
+                Some(Err(why)) => self.complaints.push(why.clone()),
+                None => {}
             }
         }
         self.completions.retain(|completion| completion.state().outcome.is_none());
@@ -199,7 +211,12 @@ impl App {
                 completion.poll();
                 self.poll_interrupted();
             }
-            Screen::Results(results) => results.poll(ctx),
+            Screen::Results(results) if results.is_pending() => {
+                results.poll(ctx);
+                if let BundleState::Finished(bundle) = &results.state {
+                    finish_bundle(&self.options, bundle);
+                }
+            }
             _ => {}
         }
     }
@@ -277,7 +294,7 @@ impl App {
 
     fn show_results(&mut self, first: FirstResult, completion: Completion, has_retry: bool) {
         if self.test_run_origin.is_none() {
-            self.history.add(&first.session);
+            self.complaints.extend(self.history.add(&first.session));
         }
         let has_report = self.options.kiosk().is_none();
         self.screen = Screen::Results(Box::new(LessonResults::new(first, completion, has_retry, has_report)));
@@ -299,8 +316,12 @@ impl App {
         }
     }
 
-    /// Leaves the results; a bundle that is still being made is completed in the background.
+    /// Leaves the results; a bundle that is still being made is completed in the background. A page keeps no bundle: one
+    /// that was not saved is saved now.
     fn leave_results(&mut self) {
+        if platform::IS_PAGE && matches!(&self.screen, Screen::Results(results) if !results.is_downloaded) {
+            self.download_bundle();
+        }
         if let Screen::Results(results) = std::mem::replace(&mut self.screen, Screen::ExerciseList)
             && let BundleState::Pending(completion) = results.state
         {
@@ -421,11 +442,21 @@ impl App {
 
     /// Gives the bundle of the results to the user as one file.
     fn download_bundle(&mut self) {
-        if let Screen::Results(results) = &self.screen
+        if let Screen::Results(results) = &mut self.screen
             && let BundleState::Finished(bundle) = &results.state
-            && let Some(complaint) = platform::download(bundle)
         {
-            self.complaints.push(complaint);
+            let complaint = platform::download(bundle);
+            results.is_downloaded = complaint.is_none();
+            self.complaints.extend(complaint);
+        }
+    }
+
+    /// True if work would be lost with a page that is closed now.
+    fn has_unsaved_work(&self) -> bool {
+        match &self.screen {
+            Screen::Lesson(_) | Screen::Completion(_) => true,
+            Screen::Results(results) => !results.is_downloaded,
+            _ => !self.completions.is_empty(),
         }
     }
 
@@ -854,6 +885,13 @@ fn log_editor(log: &mut StateLog, editor: &EditorState) {
     log.record("screen", "author");
 }
 
+/// Tells of a bundle that has just been finished.
+fn finish_bundle(options: &AppOptions, bundle: &BundleFolder) {
+    if let Some(listener) = &options.on_bundle {
+        listener(bundle);
+    }
+}
+
 /// A function that makes the window draw a new frame; callable from another thread.
 fn repaint_waker(ctx: &egui::Context) -> Box<dyn Fn() + Send + Sync> {
     let ctx = ctx.clone();
@@ -956,6 +994,14 @@ fn capture_pointer(lesson: &mut LessonState, is_held: bool) {
     }
 }
 
+/// The school's own sounds, and the files that are not sounds. A page has no folder for them.
+fn read_sounds() -> (Replacements, Vec<Diagnostic>) {
+    match platform::IS_PAGE {
+        true => Default::default(),
+        false => wav_files::read_folder(&sounds_folder()),
+    }
+}
+
 /// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the settings folder.
 fn sounds_folder() -> PathBuf {
     let beside = PathBuf::from("content/sounds");
@@ -986,6 +1032,7 @@ impl eframe::App for App {
             self.execute(command, &ctx);
         }
         self.save_settings(&ctx);
+        platform::set_unsaved_work(self.has_unsaved_work());
         self.had_focus = ctx.memory(|memory| memory.focused().is_some());
         self.frame_count += 1;
         self.state_log.record("frames", self.frame_count);

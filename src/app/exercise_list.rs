@@ -1,5 +1,6 @@
 //! The exercise list: every exercise that can be selected.
 
+use super::GivenExercise;
 use super::command::AppCommand;
 use super::editor;
 use super::i18n::Translations;
@@ -105,6 +106,22 @@ impl ExerciseList {
             }
         }
         list
+    }
+
+    /// A list of one exercise only.
+    pub fn only(given: GivenExercise) -> ExerciseList {
+        let GivenExercise { source, library } = given;
+        let name = source.name.clone();
+        let read = scenario::resolve(source, &library, ResolveMode::ReadScans);
+        let scenario = read.map(Arc::new).map_err(|found| headlines(&found));
+        let exercise = Exercise { name, path: None, library, scenario, digests: BTreeMap::new() };
+        ExerciseList {
+            exercises: vec![exercise],
+            selected: 0,
+            scroll_to_selected: false,
+            folder: String::new(),
+            complaint: None,
+        }
     }
 
     /// Adds files, except those that are copies of an exercise that the list has already.

@@ -67,15 +67,34 @@ use app::App;
 #[cfg(not(target_family = "wasm"))]
 use eframe::egui;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 use typodont_devices::servo::SecondHandRole;
+use typodont_formats::Library;
+use typodont_formats::diagnostic::SourceText;
 use typodont_lesson::{ToothScan, second_hand};
 use typodont_report::Templates;
+use typodont_report::bundle::BundleFolder;
+
+/// An exercise from elsewhere than a folder: the page is opened with one by a learning platform.
+pub struct GivenExercise {
+    pub source: Arc<SourceText>,
+    /// Finds the files that the exercise names.
+    pub library: Library,
+}
+
+/// Receiver of each bundle when it is finished.
+pub type BundleListener = Box<dyn Fn(&BundleFolder)>;
 
 /// Options with which the window opens.
 pub struct AppOptions {
     /// The exercise that is selected first; without one the exercise list is shown.
     pub exercise: Option<PathBuf>,
+    /// The only exercise that is offered, in place of those shipped.
+    pub given: Option<GivenExercise>,
+    /// Code of the language, in place of that of the settings, if there are texts in it.
+    pub language: Option<String>,
+    pub on_bundle: Option<BundleListener>,
     /// A scan that replaces the teeth of that exercise.
     pub tooth: Option<ToothScan>,
     /// Source and role of a second hand that may join every lesson.
@@ -112,6 +131,9 @@ impl AppOptions {
         let (exercise, seed, seed_code, frame_delay) = (None, None, None, None);
         AppOptions {
             exercise,
+            given: None,
+            language: None,
+            on_bundle: None,
             tooth: None,
             second: None,
             begins_at_once: false,

@@ -23,6 +23,8 @@ pub struct LessonResults {
     pub has_retry: bool,
     /// True if the report may be opened in the browser.
     pub has_report: bool,
+    /// True once the user has saved the bundle, in a page.
+    pub is_downloaded: bool,
 }
 
 /// State of the bundle of a result.
@@ -39,7 +41,14 @@ const MAPS: [&str; 2] = ["map-occlusal", "after-occlusal"];
 impl LessonResults {
     /// The result of a session whose bundle is still being made.
     pub fn new(first: FirstResult, completion: Completion, has_retry: bool, has_report: bool) -> LessonResults {
-        LessonResults { first, state: BundleState::Pending(completion), maps: Vec::new(), has_retry, has_report }
+        LessonResults {
+            first,
+            state: BundleState::Pending(completion),
+            maps: Vec::new(),
+            has_retry,
+            has_report,
+            is_downloaded: false,
+        }
     }
 
     /// Takes over the steps of the completion, and loads the maps at its end.

@@ -1,5 +1,7 @@
-//! Earlier sessions of this computer, read on a thread of its own.
+//! Earlier sessions of this computer, read on a thread of its own; of a page, those that the browser keeps.
 
+use super::platform;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};
 use typodont_exercise::scenario::Scenario;
@@ -13,6 +15,35 @@ pub struct SessionHistory {
     reader: Option<Receiver<SessionFolder>>,
 }
 
+/// Results as a page keeps them; bundles are kept by the user who downloads them.
+#[derive(Serialize, Deserialize)]
+struct KeptHistory {
+    version: u32,
+    attempts: Vec<KeptAttempt>,
+}
+
+/// A result as a page keeps it.
+#[derive(Serialize, Deserialize)]
+struct KeptAttempt(#[serde(with = "AttemptFields")] Attempt);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Attempt")]
+struct AttemptFields {
+    scenario_id: String,
+    participant: String,
+    started: String,
+    points: Option<(f64, f64)>,
+    passed: bool,
+    finished: bool,
+    contact_s: f64,
+    rated: Option<String>,
+}
+
+const KEPT_VERSION: u32 = 1;
+
+/// Maximum number of results that a page keeps: fewer than 200 kB, of the 5 MB that browsers grant at least.
+const KEPT_MAX: usize = 500;
+
 /// Results of one person at one exercise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AttemptSummary {
@@ -25,9 +56,20 @@ pub struct AttemptSummary {
     pub is_passed: bool,
 }
 
+/// Results that the page has kept; none if they cannot be read.
+fn kept_attempts() -> Vec<Attempt> {
+    let kept = platform::read_history().and_then(|text| serde_json::from_str::<KeptHistory>(&text).ok());
+    kept.filter(|kept| kept.version == KEPT_VERSION)
+        .map_or_else(Vec::new, |kept| kept.attempts.into_iter().map(|one| one.0).collect())
+}
+
 impl SessionHistory {
     /// Begins to read a folder. `wake` is called when it has been read.
     pub fn read(folder: &Path, templates: Templates, wake: Box<dyn Fn() + Send>) -> SessionHistory {
+        if platform::IS_PAGE {
+            let sessions = SessionFolder { attempts: kept_attempts(), ..SessionFolder::default() };
+            return SessionHistory { sessions, reader: None };
+        }
         let (sender, reader) = mpsc::channel();
         let folder: PathBuf = folder.to_path_buf();
         let started = std::thread::Builder::new().name("session-history".into()).spawn(move || {
@@ -50,9 +92,16 @@ impl SessionHistory {
         self.reader.is_none()
     }
 
-    /// Adds a session that has just ended.
-    pub fn add(&mut self, session: &SessionFile) {
+    /// Adds a session that has just ended; returns a complaint if a page cannot keep it.
+    pub fn add(&mut self, session: &SessionFile) -> Option<String> {
         self.sessions.attempts.extend(Attempt::of(session));
+        if !platform::IS_PAGE {
+            return None;
+        }
+        let attempts = &self.sessions.attempts;
+        let newest = attempts[attempts.len().saturating_sub(KEPT_MAX)..].iter().cloned().map(KeptAttempt).collect();
+        let text = serde_json::to_string(&KeptHistory { version: KEPT_VERSION, attempts: newest }).ok()?;
+        platform::write_history(&text).map(|why| format!("unwritable-history: {why}; the shelf forgets this result"))
     }
 
     /// The oldest interrupted session.

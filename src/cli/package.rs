@@ -102,10 +102,11 @@ fn read_exercise(path: &Path) -> Result<CourseExercise, CliError> {
     let written = json::read::<ScenarioFile>(source)?.value;
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("exercise.json").to_string();
     let shipped = Library::shipped();
-    let own = scenario.files.keys().map(String::as_str).filter(|name| shipped.bytes(name).is_err());
+    let models = scenario.instruments.iter().filter_map(|instrument| instrument.mesh.clone());
+    let named = written.named_files().into_iter().chain(models).filter(|name| shipped.bytes(name).is_err());
     let mut files = BTreeMap::from([(name.clone(), scenario.text.as_bytes().to_vec())]);
-    for name in own.chain(written.scene.scans()) {
-        files.insert(name.to_string(), library.bytes(name)?.to_vec());
+    for name in named {
+        files.insert(name.clone(), library.bytes(&name)?.to_vec());
     }
     Ok(CourseExercise {
         id: scenario.id.clone(),

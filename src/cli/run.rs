@@ -262,15 +262,12 @@ fn open_in_window(
         tooth: read_tooth_scan(arguments)?,
         second: second_hand_source(arguments)?,
         begins_at_once: arguments.begin,
-        editor_mode: None,
         device: (arguments.device == MOUSE).then(|| MOUSE.into()),
         seed: arguments.seed,
         seed_code: read_code(arguments.seed_sealed.as_deref())?,
         participant: arguments.participant.clone(),
-        out,
-        templates: super::load_templates()?,
         frame_delay: arguments.slow_picture_ms.map(std::time::Duration::from_millis),
-        station: None,
+        ..typodont_app::AppOptions::at_exercise_list(out, super::load_templates()?)
     };
     match station {
         Some(station) => station::open_window(station, options),

@@ -1,8 +1,10 @@
 //! The program as a page: `scripts/web` builds it for a browser, beside the files of `src/web/page`.
 //!
-//! Takes the page's canvas. Gives the exercise list in it. Never talks to a server: sessions stay in the page until their
-//! bundle is downloaded.
+//! Takes the page's canvas and address. Gives the exercise list, or the exercise that the address names. Never sends
+//! anything to a server: sessions stay in the page until their bundle is downloaded.
 
+#[cfg(target_family = "wasm")]
+mod launch;
 #[cfg(target_family = "wasm")]
 mod page;
 

@@ -1,28 +1,38 @@
 // Goes through a lesson in the page as a trainee does, with a real mouse, from the shelf to a downloaded bundle.
 //
-//     node page.js PLAYWRIGHT-CORE CHROMIUM PAGE PICTURES BUNDLE.zip webgl|webgpu
+//     node page.js PLAYWRIGHT-CORE CHROMIUM PAGE PICTURES BUNDLE.zip webgl|webgpu EXERCISE
 //
-// Serves the folder PAGE itself. Prints `seed N` once the exercise has begun, and reads the place of the caries, `x y z` in mm,
-// from its input. Then prints what it measured as JSON. Exits with 1 and a line per claim that does not hold.
+// Serves the folder PAGE itself. Exercise 5-grinding is worked until caries is removed: `seed N` is printed once it has begun, and the
+// place of the caries, `x y z` in mm, is read from the input. In others the instrument is moved and pressed in every stage. Prints what
+// was measured as JSON. Exits with 1 and a line per claim that does not hold.
 
 const fs = require('fs');
 const http = require('http');
 const path = require('path');
 const readline = require('readline');
 
-const [playwright, executablePath, folder, pictures, zip, adapter] = process.argv.slice(2);
+const [playwright, executablePath, folder, pictures, zip, adapter, exercise] = process.argv.slice(2);
 const { chromium } = require(playwright);
 
 const PATIENCE = 180000;
+const started = Date.now();
 const wrong = [];
-const claim = (holds, what) => { if (!holds) wrong.push(what); };
+/** Prints at once, so that a test that waits in vain says why. */
+const tell = what => console.error(`${((Date.now() - started) / 1000).toFixed(1)} s: ${what}`);
+const complain = what => { wrong.push(what); tell(what); };
+const claim = (holds, what) => { if (!holds) complain(what); };
 
 const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm', '.png': 'image/png' };
 const server = http.createServer((request, response) => {
   const name = new URL(request.url, 'http://page').pathname.replace(/^\/$/, '/index.html');
   const file = path.join(folder, path.normalize(name));
   if (!fs.existsSync(file)) return response.writeHead(404).end();
-  response.writeHead(200, { 'content-type': TYPES[path.extname(file)] || 'application/octet-stream' }).end(fs.readFileSync(file));
+  // The headers that docs/it.md asks a school's server for.
+  response.writeHead(200, {
+    'content-type': TYPES[path.extname(file)] || 'application/octet-stream',
+    'cache-control': /-[0-9a-f]{12}\.(js|wasm)$/.test(file) ? 'public, max-age=31536000, immutable' : 'no-cache',
+    'content-security-policy': "frame-ancestors 'self'", 'x-content-type-options': 'nosniff', 'referrer-policy': 'no-referrer',
+  }).end(fs.readFileSync(file));
 });
 
 const ADAPTERS = {
@@ -59,22 +69,24 @@ const inView = ([x, y, z]) => {
   const address = `http://127.0.0.1:${server.address().port}/`;
   const browser = await chromium.launch({ executablePath, args: ['--no-sandbox', ...ADAPTERS[adapter]] });
   const context = await browser.newContext({ viewport: { width: 1280, height: 780 }, locale: 'en-GB', acceptDownloads: true });
-  await context.route(url => !url.href.startsWith(address) && !/^(data|blob):/.test(url.protocol), route => { wrong.push(`asked for ${route.request().url()}`); route.abort(); });
+  await context.route(url => !url.href.startsWith(address) && !/^(data|blob):/.test(url.protocol), route => { complain(`asked for ${route.request().url()}`); route.abort(); });
   const page = await context.newPage();
   page.on('console', message => {
     const line = message.text();
     if (line.startsWith('typodont: ')) {
       const [, topic, value] = line.match(/^typodont: (\S+) ?(.*)$/s);
+      if (topic === 'screen' && value !== state[topic]) tell(`screen ${value}`);
       state[topic] = value;
       heard();
     } else if (message.type() === 'error') {
-      wrong.push(`logged: ${line}`);
+      complain(`logged: ${line}`);
     }
   });
-  page.on('pageerror', error => wrong.push(`thrown: ${error.message}`));
-  page.on('dialog', dialog => { wrong.push(`a dialog: ${dialog.message()}`); dialog.dismiss(); });
+  page.on('pageerror', error => complain(`thrown: ${error.stack || error.message}`));
+  page.on('crash', () => complain('the page crashed'));
+  page.on('dialog', dialog => { complain(`a dialog: ${dialog.message()}`); dialog.dismiss(); });
   await page.addInitScript(() => localStorage.setItem('typodont.settings', '{ "introduction_first": false }'));
-  const picture = name => page.screenshot({ path: path.join(pictures, `page-${adapter}-${name}.png`) });
+  const picture = name => page.screenshot({ path: path.join(pictures, `page-${adapter}-${exercise}-${name}.png`) });
   const press = async (key, topic, value) => { await page.keyboard.press(key); await until(topic, now => now === value); };
   const click = async mark => {
     const at = (await until('marks', marks => marks.includes(`${mark}=`))).match(new RegExp(`${mark.replace('.', '\\.')}=(\\d+),(\\d+)`));
@@ -88,7 +100,11 @@ const inView = ([x, y, z]) => {
   await page.mouse.move(640, 400);
   await picture('1-shelf');
   claim((await page.$('#status')) === null, 'the status is removed once the program draws');
-  for (const chosen of ['2-decay', '3-detection', '4-diagnosis', '5-grinding']) await press('ArrowDown', 'chosen', chosen);
+  while (state.chosen !== exercise) {
+    const before = state.chosen;
+    await page.keyboard.press('ArrowDown');
+    await until('chosen', chosen => chosen !== before);
+  }
   await click('shelf.open');
   await until('screen', screen => screen === 'briefing');
   await picture('2-briefing');
@@ -98,8 +114,6 @@ const inView = ([x, y, z]) => {
   await until('hand', () => true);
   const made_ms = Date.now() - making;
   await until('clock', clock => clock === 'stopped');
-  console.log(`seed ${state.seed}`);
-  const goal = numbers(await new Promise(done => readline.createInterface({ input: process.stdin }).once('line', done)));
   await picture('3-task');
   await press('o', 'pointer', 'held');
 
@@ -122,27 +136,53 @@ const inView = ([x, y, z]) => {
       await move(pixels(right), pixels(-up));
     }
   };
-  await pointAt(goal);
-  const cutting = Date.now();
-  const [ticks, frames] = [Number(state.ticks), Number(state.frames)];
-  for (let round = 0; round < 40 && Number(state.cleared) < 10; round += 1) {
-    const angle = 0.8 * round;
-    await pointAt([goal[0] + 0.6 * Math.cos(angle), goal[1], goal[2] + 0.6 * Math.sin(angle)]);
-    await page.mouse.down();
-    await page.waitForTimeout(1500);
-    if (round === 1) await picture('4-cutting');
-    await page.mouse.up();
-  }
-  const cutting_s = (Date.now() - cutting) / 1000;
-  const pace = { ticks_per_s: (Number(state.ticks) - ticks) / cutting_s, frames_per_s: (Number(state.frames) - frames) / cutting_s };
-  claim(Number(state.cleared) >= 10, `${state.cleared} % of the caries is removed`);
+  /** Ticks and frames since an earlier moment, per second. */
+  const paceSince = ([at, ticks, frames]) => {
+    const seconds = (Date.now() - at) / 1000;
+    return { ticks_per_s: (Number(state.ticks) - ticks) / seconds, frames_per_s: (Number(state.frames) - frames) / seconds };
+  };
+  const now = () => [Date.now(), Number(state.ticks), Number(state.frames)];
+
+  const grind = async () => {
+    console.log(`seed ${state.seed}`);
+    const goal = numbers(await new Promise(done => readline.createInterface({ input: process.stdin }).once('line', done)));
+    await pointAt(goal);
+    const cutting = now();
+    for (let round = 0; round < 40 && Number(state.cleared) < 10; round += 1) {
+      const angle = 0.8 * round;
+      await pointAt([goal[0] + 0.6 * Math.cos(angle), goal[1], goal[2] + 0.6 * Math.sin(angle)]);
+      await page.mouse.down();
+      await page.waitForTimeout(1500);
+      if (round === 1) await picture('4-cutting');
+      await page.mouse.up();
+    }
+    claim(Number(state.cleared) >= 10, `${state.cleared} % of the caries is removed`);
+    return paceSince(cutting);
+  };
+  const touch = async () => {
+    const touching = now();
+    for (let round = 0; round < 6; round += 1) {
+      await move(20 * Math.cos(round), 20 * Math.sin(round));
+      await page.mouse.down();
+      await page.waitForTimeout(700);
+      await page.mouse.up();
+    }
+    return paceSince(touching);
+  };
+  const pace = exercise === '5-grinding' ? await grind() : await touch();
   const late = state.late;
   await press('Escape', 'pointer', 'free');
-  await picture('5-cut');
-  await press('Control+Enter', 'asked', 'finish');
-  const ended = Date.now();
-  await page.keyboard.press('Enter');
+  await picture('5-worked');
+  let ended;
+  while (state.screen === 'practice') {
+    await press('Control+Enter', 'asked', 'finish');
+    ended = Date.now();
+    await page.keyboard.press('Enter');
+    await Promise.race([until('asked', asked => asked === 'nothing'), until('screen', screen => screen !== 'practice')]);
+    await page.waitForTimeout(500);
+  }
   await until('screen', screen => screen === 'results');
+  const scored_ms = Date.now() - ended;
   await until('bundle', () => true);
   const completed_ms = Date.now() - ended;
   await page.waitForTimeout(1000);
@@ -159,9 +199,9 @@ const inView = ([x, y, z]) => {
   await page.keyboard.press('r');
   const report = await opening;
   await report.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: PATIENCE });
-  await report.screenshot({ path: path.join(pictures, `page-${adapter}-7-report.png`) });
+  await report.screenshot({ path: path.join(pictures, `page-${adapter}-${exercise}-7-report.png`) });
   await browser.close();
   server.close();
-  console.log(JSON.stringify({ adapter, shown_ms, made_ms, completed_ms, late, ...pace }));
+  console.log(JSON.stringify({ adapter, exercise, shown_ms, made_ms, scored_ms, completed_ms, late, ...pace }));
   if (wrong.length) throw new Error(wrong.join('\n'));
 })().catch(error => { console.error(error.stack || error); process.exit(1); });

@@ -145,3 +145,25 @@ fn a_cmi5_launch_states_the_result_to_the_record_store() {
     assert!(output.status.success(), "{told}");
     assert!(ralph.kept().len() >= 4, "the record store keeps {:?}", ralph.kept());
 }
+
+#[test]
+#[ignore = "long: needs the page that scripts/web builds"]
+fn a_platform_receives_the_result_of_a_lesson_in_the_page() {
+    // Aim: what a learner hands in is what the gradebook names. Method: the program's page in a package, played by
+    // scorm-again; the saved bundle has the digest that the platform was told, and holds.
+    let Some([playwright, chromium]) = browser() else { return };
+    let Some(again) = tools::named_by("TYPODONT_SCORM_AGAIN", "scorm-again") else { return };
+    let page = root().join("target/web");
+    if !page.join("index.html").is_file() {
+        return tools::skip("target/web has no page (scripts/web)");
+    }
+    let folder = folder("package_played");
+    let archive = folder.join("package.zip");
+    let made = package(&["scorm"], &["scenarios/5-grinding.json"], &page, &archive);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let bundle = folder.join("bundle.zip");
+    let mut node = Command::new("node");
+    node.arg(root().join("tests/browser/packaged_page.js")).args([&playwright, &chromium]);
+    passes(node.arg(&again).arg(unpack(&archive)).arg(&bundle));
+    passes(Command::new(env!("CARGO_BIN_EXE_typodont")).arg("verify").arg(&bundle));
+}

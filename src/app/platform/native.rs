@@ -31,6 +31,9 @@ pub fn report_url(bundle: &BundleFolder) -> Option<String> {
     url::Url::from_file_path(path).ok().map(String::from)
 }
 
+/// A window asks before it closes, and bundles are in folders.
+pub fn set_unsaved_work(_: bool) {}
+
 /// Bundles are in folders here: there is nothing to download.
 pub fn download(_: &BundleFolder) -> Option<String> {
     None
@@ -55,6 +58,16 @@ pub fn write_settings(text: &str) -> Option<String> {
     let path = settings_file()?;
     let folder = path.parent()?;
     fs::create_dir_all(folder).and_then(|()| fs::write(&path, text)).err().map(|e| e.to_string())
+}
+
+/// Sessions are in folders here, and their results are read from there.
+pub fn read_history() -> Option<String> {
+    None
+}
+
+/// Keeps nothing: see [`read_history`].
+pub fn write_history(_: &str) -> Option<String> {
+    None
 }
 
 /// Locale of the user, from the system's environment variables.

@@ -11,6 +11,9 @@ pub const IS_PAGE: bool = true;
 /// Key of the settings in the page's own storage.
 const SETTINGS_KEY: &str = "typodont.settings";
 
+/// Key of the results of earlier sessions in the page's own storage.
+const HISTORY_KEY: &str = "typodont.history";
+
 /// Part of the page's address after the `?` that asks for the state log in the browser's console.
 const LOG_QUERY: &str = "state-log";
 
@@ -27,6 +30,18 @@ pub fn documents_folder() -> Option<PathBuf> {
 /// URL of a bundle's report, which lives as long as the page.
 pub fn report_url(bundle: &BundleFolder) -> Option<String> {
     object_url(&bundle.read(REPORT_FILE).ok()?, "text/html;charset=utf-8").ok()
+}
+
+/// Lets the page ask, before it is left, whether work is to be lost (`page/start.js` in the crate `web`).
+pub fn set_unsaved_work(is_unsaved: bool) {
+    const MARK: &str = "data-unsaved";
+    let root = web_sys::window().and_then(|window| window.document()).and_then(|document| document.document_element());
+    let Some(root) = root else { return };
+    let _ = match is_unsaved {
+        true if root.has_attribute(MARK) => Ok(()),
+        true => root.set_attribute(MARK, ""),
+        false => root.remove_attribute(MARK),
+    };
 }
 
 /// Lets the browser save a bundle as one ZIP file; returns a complaint if that fails.
@@ -68,12 +83,30 @@ pub fn settings_place() -> String {
 
 /// Text of the settings; `None` if none are kept, or if the browser keeps nothing for this page.
 pub fn read_settings() -> Option<String> {
-    storage()?.get_item(SETTINGS_KEY).ok().flatten()
+    read(SETTINGS_KEY)
 }
 
 /// Keeps the text of the settings; returns the reason if that fails.
 pub fn write_settings(text: &str) -> Option<String> {
-    let kept = storage().map(|storage| storage.set_item(SETTINGS_KEY, text));
+    write(SETTINGS_KEY, text)
+}
+
+/// Text of the results of earlier sessions; `None` if none are kept.
+pub fn read_history() -> Option<String> {
+    read(HISTORY_KEY)
+}
+
+/// Keeps the text of the results; returns the reason if that fails.
+pub fn write_history(text: &str) -> Option<String> {
+    write(HISTORY_KEY, text)
+}
+
+fn read(key: &str) -> Option<String> {
+    storage()?.get_item(key).ok().flatten()
+}
+
+fn write(key: &str, text: &str) -> Option<String> {
+    let kept = storage().map(|storage| storage.set_item(key, text));
     (!matches!(kept, Some(Ok(())))).then(|| "the browser keeps nothing for this page".to_string())
 }
 

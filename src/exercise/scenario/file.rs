@@ -8,11 +8,12 @@ pub use super::cavity_file::*;
 pub use super::decay_file::*;
 pub use super::periodontium_file::*;
 
+use super::questionnaire::Questionnaire;
 use crate::catalog::TissueEntry;
 use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// An exercise: its scene, the tasks set to the trainee, and the scoring.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -86,6 +87,24 @@ pub struct ScenarioFile {
     /// Time at which the questionnaire is asked.
     #[serde(default)]
     pub questionnaire_time: Option<QuestionnaireTime>,
+}
+
+impl ScenarioFile {
+    /// Names of all files that the exercise itself names, in order, without those that its instrument file names.
+    pub fn named_files(&self) -> BTreeSet<String> {
+        let questionnaire = self.questionnaire.as_deref().map(Questionnaire::file_name);
+        let labels = self.zones.iter().filter_map(|zone| match &zone.region {
+            RegionFile::Labels(labels) => Some(labels.file.clone()),
+            _ => None,
+        });
+        let guidance = self.stages.iter().filter_map(|stage| match stage.guidance.as_ref()? {
+            GuidanceFile::Path(path) => Some(path.file.clone()),
+            GuidanceFile::Forces(forces) => Some(forces.file.clone()),
+        });
+        let scans = self.scene.scans().map(str::to_string);
+        let own = self.instrument_file.clone().into_iter().chain(questionnaire);
+        own.chain(scans).chain(labels).chain(guidance).collect()
+    }
 }
 
 /// Time at which a questionnaire is asked.

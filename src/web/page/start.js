@@ -1,7 +1,8 @@
 // Loads the program. Whatever prevents that is shown in the page's status.
 import init from "./typodont-web.js";
 
-const language = navigator.language.startsWith("tr") ? "tr" : "en";
+const asked = new URLSearchParams(location.search).get("language") || navigator.language;
+const language = asked.startsWith("tr") ? "tr" : "en";
 document.documentElement.lang = language;
 for (const text of document.querySelectorAll("#status [lang]")) {
   text.hidden = text.lang !== language;
@@ -10,4 +11,9 @@ for (const text of document.querySelectorAll("#status [lang]")) {
 init({ module_or_path: new URL("typodont-web_bg.wasm", import.meta.url) }).catch((error) => {
   document.getElementById("status")?.classList.add("failed");
   document.getElementById("reason").textContent = String(error);
+});
+
+// The program marks the page while a session or an unsaved bundle would be lost with it.
+addEventListener("beforeunload", (event) => {
+  if (document.documentElement.hasAttribute("data-unsaved")) event.preventDefault();
 });
