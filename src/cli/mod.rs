@@ -137,9 +137,7 @@ enum CliCommand {
     #[command(hide = true, disable_help_flag = true)]
     Xapi(IgnoredArguments),
     /// Put exercises and the web page into one archive that a learning platform plays and marks
-    // Hidden until the web page announces its results to the package's launch page.
     #[cfg(feature = "integrations")]
-    #[command(hide = true)]
     Package(package::Arguments),
     #[cfg(not(feature = "integrations"))]
     #[command(hide = true, disable_help_flag = true)]
