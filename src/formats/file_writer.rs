@@ -17,12 +17,9 @@ const NAMES_MAX: u32 = 100;
 /// The system's error; nothing is left beside the file then.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let (temporary, mut file) = create_beside(path)?;
-    let written = file.write_all(bytes).and_then(|()| {
-        if let Ok(meta) = fs::metadata(path) {
-            file.set_permissions(meta.permissions())?;
-        }
-        file.sync_all()
-    });
+    // The permissions come first: nobody may read in the temporary file what they may not read in the one it replaces.
+    let permitted = fs::metadata(path).map_or(Ok(()), |meta| file.set_permissions(meta.permissions()));
+    let written = permitted.and_then(|()| file.write_all(bytes)).and_then(|()| file.sync_all());
     // Some systems do not rename an open file.
     drop(file);
     let renamed = written.and_then(|()| fs::rename(&temporary, path));
@@ -35,15 +32,27 @@ pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
 
 /// Creates a temporary file in the folder of `path`. Its name is hidden, and no other program has it.
 fn create_beside(path: &Path) -> io::Result<(PathBuf, File)> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut number = 0;
     loop {
-        let temporary = path.with_file_name(format!(".{name}.{number}.new"));
+        let temporary = temporary_path(path, number);
         match File::create_new(&temporary) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists && number < NAMES_MAX => number += 1,
             created => return created.map(|file| (temporary, file)),
         }
     }
+}
+
+/// Removes the temporary files of a [`write_atomically`] that was killed. No other program may write the file meanwhile.
+pub fn remove_unfinished(path: &Path) {
+    for number in 0..=NAMES_MAX {
+        let _ = fs::remove_file(temporary_path(path, number));
+    }
+}
+
+/// Returns one of the names under which [`write_atomically`] writes a file first.
+fn temporary_path(path: &Path, number: u32) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{number}.new"))
 }
 
 /// Writes a file and syncs it to the disk.
@@ -92,6 +101,35 @@ mod tests {
             }
         });
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "nothing is left beside it");
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn what_a_killed_program_left_is_removed_and_nothing_else() {
+        let folder = folder("killed");
+        let path = folder.join("recording.mcap");
+        write_atomically(&path, b"whole").unwrap();
+        fs::write(folder.join("other"), b"another file").unwrap();
+        for _ in 0..3 {
+            create_beside(&path).unwrap();
+        }
+        remove_unfinished(&path);
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 2);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_keeps_its_permissions_when_it_is_replaced() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = folder("permissions");
+        let path = folder.join("key");
+        fs::write(&path, b"old").unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o400)).unwrap();
+        write_atomically(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o400);
         fs::remove_dir_all(&folder).unwrap();
     }
 

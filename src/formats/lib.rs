@@ -34,5 +34,5 @@ pub mod csv_tables;
 pub mod import;
 pub mod zip;
 
-pub use file_writer::{sync_folder, write_atomically, write_synced};
+pub use file_writer::{remove_unfinished, sync_folder, write_atomically, write_synced};
 pub use library::{Library, decode_text, read_file, read_text, write_failure};

@@ -83,6 +83,10 @@ pub fn read(bytes: &[u8]) -> Result<BTreeMap<String, Vec<u8>>, ZipError> {
             return Err(ZipError(format!("the name {name:?} leads out of the folder")));
         }
         let entry = archive.get_entry(header.wayfinder()).map_err(unreadable)?;
+        // Programs that read an archive from its start would unpack the file under its other name.
+        if entry.local_header().file_path().as_bytes() != name.as_bytes() {
+            return Err(ZipError(format!("{name} has another name before its content")));
+        }
         let decoder: Box<dyn Read + '_> = match header.compression_method() {
             CompressionMethod::STORE => Box::new(entry.data()),
             CompressionMethod::DEFLATE => Box::new(DeflateDecoder::new(entry.data())),
@@ -156,6 +160,10 @@ mod tests {
         for name in [b"../b", b"/b/c", b"a/.."] {
             assert!(read(&renamed(name)).is_err(), "{name:?}");
         }
+        let first = whole.windows(4).position(|bytes| bytes == b"aa/b").unwrap();
+        let mut local_only = whole.clone();
+        local_only[first..first + 4].copy_from_slice(b"cc/b");
+        assert!(read(&local_only).unwrap_err().to_string().contains("another name"));
         let many = (0..=FILES_MAX).map(|n| (n.to_string(), &b""[..]));
         assert!(read(&write(many).unwrap()).unwrap_err().to_string().contains("more than 1000 files"));
     }

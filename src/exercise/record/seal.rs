@@ -9,7 +9,7 @@
 //! Anybody who knows the code before the session ends can compute the draws, and so can anybody who guesses it. The code
 //! is therefore stretched by Argon2id, which takes memory and time for every guess, on any hardware.
 
-use super::file::RecordingHeadFile;
+use super::file::{RecordingHeadFile, VERSION};
 use crate::scenario::hex;
 use argon2::{Algorithm, Argon2, Params, Version};
 use mcap::MAGIC;
@@ -22,10 +22,13 @@ pub(super) const SEED: &str = "seed";
 
 /// Cost of a guess: 64 MiB, three passes, one lane; a tenth of a second to half a second once per session (RFC 9106,
 /// section 4, second recommendation, with one lane in place of four). A changed cost changes all seeds, and with them what
-/// `finish` needs of a session that was cut off: it belongs to [`super::VERSION`].
+/// `finish` needs of a session that was cut off: it belongs to [`VERSION`].
 const MEMORY_KIB: u32 = 64 << 10;
 const PASSES: u32 = 3;
 const LANES: u32 = 1;
+
+/// First version of recordings whose seeds are derived in this way.
+const VERSION_MIN: u32 = 3;
 
 /// Fewest characters of an examiner's code.
 pub const CODE_MIN: usize = 12;
@@ -67,12 +70,20 @@ fn session_digest(purpose: &str, participant: &str, started: &str, scenario_sha2
 /// Returns a recording of a session that was cut off, with its sealed seed revealed by the examiner's code.
 ///
 /// # Errors
-/// Returns a message if the bytes are not a recording, if its seed is not sealed, or if the code is another one.
+/// Returns a message if the bytes are not a recording, if its seed is not sealed, if its version is not one that
+/// this program unseals, or if the code is another one.
 pub fn reveal(recording: &[u8], code: &str) -> Result<Vec<u8>, String> {
     let (head, is_revealed) = head(recording)?;
     let Some(expected) = head.seed_sha256.as_deref().filter(|_| !is_revealed) else {
         return Err("the seed of this session is not sealed; finish it without a code".to_string());
     };
+    if !(VERSION_MIN..=VERSION).contains(&head.version) {
+        return Err(format!(
+            "its recording has version {}, and this program unseals versions {VERSION_MIN} to {VERSION}; finish the session with \
+             the program that recorded it, typodont {}",
+            head.version, head.typodont_version
+        ));
+    }
     let seed = sealed_seed(code, &head.participant, &head.started, &head.scenario_sha256);
     if commitment(&head, seed) != expected {
         return Err("this is not the code with which the session was sealed".to_string());

@@ -1,27 +1,21 @@
 //! XML text from elements.
 
-/// Element with its attributes in order, and its content.
+/// Element with its attributes in order, and its text or its children.
 pub struct Element {
     name: &'static str,
     attributes: Vec<(&'static str, String)>,
-    content: Vec<Content>,
-}
-
-enum Content {
-    Element(Element),
-    Text(String),
+    text: Option<String>,
+    children: Vec<Element>,
 }
 
 impl Element {
     pub fn new(name: &'static str) -> Element {
-        Element { name, attributes: Vec::new(), content: Vec::new() }
+        Element { name, attributes: Vec::new(), text: None, children: Vec::new() }
     }
 
     /// Element that contains only text.
     pub fn with_text(name: &'static str, text: &str) -> Element {
-        let mut element = Element::new(name);
-        element.content.push(Content::Text(text.to_string()));
-        element
+        Element { text: Some(text.to_string()), ..Element::new(name) }
     }
 
     pub fn attribute(mut self, name: &'static str, value: impl Into<String>) -> Element {
@@ -30,12 +24,12 @@ impl Element {
     }
 
     pub fn child(mut self, child: Element) -> Element {
-        self.content.push(Content::Element(child));
+        self.children.push(child);
         self
     }
 
     pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Element {
-        self.content.extend(children.into_iter().map(Content::Element));
+        self.children.extend(children);
         self
     }
 
@@ -52,19 +46,14 @@ impl Element {
         for (name, value) in &self.attributes {
             *text += &format!(" {name}=\"{}\"", escape(value));
         }
-        match self.content.as_slice() {
-            [] => *text += "/>\n",
-            [Content::Text(only)] => *text += &format!(">{}</{}>\n", escape(only), self.name),
-            several => {
-                *text += ">\n";
-                for content in several {
-                    match content {
-                        Content::Element(element) => element.write(text, depth + 1),
-                        Content::Text(part) => *text += &format!("{indent}  {}\n", escape(part)),
-                    }
-                }
-                *text += &format!("{indent}</{}>\n", self.name);
-            }
+        if let Some(only) = &self.text {
+            *text += &format!(">{}</{}>\n", escape(only), self.name);
+        } else if self.children.is_empty() {
+            *text += "/>\n";
+        } else {
+            *text += ">\n";
+            self.children.iter().for_each(|child| child.write(text, depth + 1));
+            *text += &format!("{indent}</{}>\n", self.name);
         }
     }
 }

@@ -16,7 +16,7 @@ use typodont_exercise::record;
 use typodont_exercise::record::{Recorder, RecorderError, Recording, RecordingError, RecordingHeadFile, ReplayCheck};
 use typodont_exercise::scenario::{Scenario, Workpiece};
 use typodont_exercise::score;
-use typodont_formats::{sync_folder, write_atomically, write_synced};
+use typodont_formats::{remove_unfinished, sync_folder, write_atomically, write_synced};
 
 /// Name of the file that a running session keeps locked in its folder.
 const LOCK_FILE: &str = "session.lock";
@@ -400,6 +400,7 @@ impl PartialFolder {
             let why = format!("{name}: {}", typodont_formats::write_failure(e));
             BundleError { remedy: Remedy::Finish, ..BundleError::new(&partial, why) }
         };
+        remove_unfinished(&partial.join(record::FILE_NAME));
         fs::create_dir_all(partial.join(VIEWS)).map_err(|e| unwritten(VIEWS, &e))?;
         for (name, bytes) in files {
             write_synced(&partial.join(&name), &bytes).map_err(|e| unwritten(&name, &e))?;

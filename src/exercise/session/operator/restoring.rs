@@ -59,12 +59,12 @@ impl Operator {
         let after = filling.last.map_or(0, |last| last + 1);
         let next = (0..count).map(|i| (after + i) % count).find(|&i| is_low(&filling.places[i]));
         let Some(next) = next.filter(|_| filling.presses < filling.file.presses) else { return };
-        let place = filling.places[next].clone();
+        let PressPoint { contour, height, .. } = filling.places[next];
         // Filling placed beside the point may be higher, and the rim of the face would meet it.
         let reach = 2.0 * filling.radius + TOUCH_HEIGHT;
-        let beside = filling.places.iter().filter(|p| p.contour.truncate().distance(place.contour.truncate()) < reach);
-        let height = beside.map(|p| p.height).fold(place.height, f32::max);
-        let moves = self.press_down(place.contour, height, filling.file.press_n, filling.file.hold_s);
+        let beside = filling.places.iter().filter(|p| p.contour.truncate().distance(contour.truncate()) < reach);
+        let height = beside.map(|p| p.height).fold(height, f32::max);
+        let moves = self.press_down(contour, height, filling.file.press_n, filling.file.hold_s);
         (filling.last, filling.presses) = (Some(next), filling.presses + 1);
         self.do_next(moves.into_iter().map(OperatorTask::Move).chain([OperatorTask::Fill(filling)]));
     }
