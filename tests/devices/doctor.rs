@@ -335,5 +335,5 @@ fn a_wrong_station_and_old_exercises_are_found() {
     finds(&doctor(), "station", "warning", "no-code", "typodont station code");
     finds(&doctor(), "exercises", "warning", "1 files of the school's exercises differ", "typodont station sync");
     fs::remove_dir_all(course).unwrap();
-    finds(&doctor(), "exercises", "warning", "cannot be compared", "connect the drive");
+    finds(&doctor(), "exercises", "warning", "cannot be compared", "connect the network");
 }

@@ -321,7 +321,7 @@ fn an_interrupted_session_can_be_finished_but_not_passed() {
     let size = bytes.len();
     let mut flipped = bytes.clone();
     flipped[inside_a_chunk(&bytes, size * 9 / 10)] ^= 1;
-    let with_zeros = [&bytes[..size * 95 / 100], &[0; 4096]].concat();
+    let with_zeros = [&bytes[..inside_a_chunk(&bytes, size * 95 / 100)], &[0; 4096]].concat();
     for (name, recording, words) in [
         ("cut_off", &bytes[..size * 97 / 100], "cut off before its end: what followed"),
         ("cut_zeros", &with_zeros, "s were lost"),
