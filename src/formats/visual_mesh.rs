@@ -8,10 +8,13 @@ use crate::diagnostic::Diagnostic;
 use crate::limits::DISPLAY_TRIANGLES_MAX;
 use crate::obj;
 use base64::Engine;
-use gltf_json as json;
-use json::accessor::{ComponentType, Type};
-use json::mesh::{Mode, Semantic};
-use json::validation::Checked;
+use glam::{Affine3A, Mat4};
+use gltf::accessor::{DataType, Dimensions, Item, Iter};
+use gltf::buffer::Source;
+use gltf::json::validation::Validate;
+use gltf::mesh::{Mode, Semantic};
+use gltf::scene::Transform;
+use gltf::{Accessor, Gltf, Node};
 use typodont_core::frame::{Quat, Vec3};
 use typodont_core::mesh::Mesh;
 
@@ -84,16 +87,10 @@ pub(super) fn triangles_of_gltf(
     triangles_max: usize,
     fetch: impl Fn(&str) -> Result<Vec<u8>, Diagnostic>,
 ) -> Result<Mesh, String> {
-    let (text, blob) = if bytes.starts_with(b"glTF") { chunks(bytes)? } else { (bytes, None) };
-    let root = json::Root::from_slice(text).map_err(|e| format!("this is not a glTF 2.0 file: {e}"))?;
-    if let Some(unknown) = root.extensions_required.iter().find(|name| !is_ignorable(name)) {
-        let shown: String = unknown.chars().filter(|c| !c.is_control()).take(60).collect();
-        return Err(format!("the glTF file requires the extension \"{shown}\", which is not supported"));
-    }
-    let buffers = root.buffers.iter().map(|buffer| match (&buffer.uri, blob) {
-        (None, Some(blob)) => Ok(blob.to_vec()),
-        (None, None) => Err("a buffer of the glTF file has no data".to_string()),
-        (Some(uri), _) => match uri.strip_prefix("data:") {
+    let Gltf { document, mut blob } = parse_gltf(bytes)?;
+    let buffers = document.buffers().map(|buffer| match buffer.source() {
+        Source::Bin => blob.take().ok_or_else(|| "a buffer of the glTF file has no data".to_string()),
+        Source::Uri(uri) => match uri.strip_prefix("data:") {
             Some(inline) => {
                 let (_, coded) = inline.split_once("base64,").ok_or("a buffer of the glTF file is not in base64")?;
                 let decoded = base64::engine::general_purpose::STANDARD.decode(coded);
@@ -102,16 +99,62 @@ pub(super) fn triangles_of_gltf(
             None => fetch(uri).map_err(|e| format!("the glTF file's \"{uri}\": {}", e.message)),
         },
     });
-    let file = GltfFile { buffers: buffers.collect::<Result<_, _>>()?, root: &root };
-    let mut walk = Walk { mesh: Mesh::default(), is_visited: vec![false; root.nodes.len()], triangles_max };
-    let scene = root.scene.map_or(0, |scene| scene.value());
-    match root.scenes.get(scene) {
-        Some(scene) => {
-            scene.nodes.iter().try_for_each(|node| file.node(node.value(), NodeTransform::IDENTITY, 0, &mut walk))?
-        }
-        None => (0..root.meshes.len()).try_for_each(|number| file.add(number, &NodeTransform::IDENTITY, &mut walk))?,
+    let buffers: Vec<Vec<u8>> = buffers.collect::<Result<_, _>>()?;
+    let is_visited = vec![false; document.nodes().len()];
+    let mut walk = Walk { buffers: &buffers, mesh: Mesh::default(), is_visited, triangles_max };
+    match document.default_scene().or_else(|| document.scenes().next()) {
+        Some(scene) => scene.nodes().try_for_each(|node| walk.visit(&node, Affine3A::IDENTITY, 0))?,
+        None => document.meshes().try_for_each(|mesh| walk.add(&mesh, Affine3A::IDENTITY))?,
     }
     Ok(walk.mesh)
+}
+
+/// Parses and validates a glTF file, so that every reference in it leads to something.
+fn parse_gltf(bytes: &[u8]) -> Result<Gltf, String> {
+    if bytes.starts_with(b"glTF") {
+        // The crate subtracts the length of the header from the length that the header declares.
+        let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
+        match (word(4), word(8)) {
+            (Some(2), Some(length)) if length >= 12 => {}
+            (Some(2) | None, _) => return Err("the glTF file is cut off".into()),
+            _ => return Err("the glTF file is not of version 2".into()),
+        }
+    }
+    let file = Gltf::from_slice_without_validation(bytes).map_err(|error| match error {
+        gltf::Error::Binary(error) => format!("the glTF file is cut off or damaged: {error}"),
+        error => format!("this is not a glTF 2.0 file: {error}"),
+    })?;
+    let root = file.document.as_json();
+    if let Some(unknown) = root.extensions_required.iter().find(|name| !is_ignorable(name)) {
+        let shown: String = unknown.chars().filter(|c| !c.is_control()).take(60).collect();
+        return Err(format!("the glTF file requires the extension \"{shown}\", which is not supported"));
+    }
+    // The crate's own validation follows the reference of positions before it checks it.
+    let mut attributes = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|part| part.attributes.values());
+    if attributes.any(|accessor| accessor.value() >= root.accessors.len()) {
+        return Err("a mesh of the glTF file refers to missing data".into());
+    }
+    let mut first = None;
+    root.validate(root, gltf::json::Path::new, &mut |path, error| {
+        let place = path().to_string();
+        // Bounds are never used, and some programs leave them out. Missing data are reported with their likely cause
+        // when they are read. Ignorable extensions were judged above.
+        let is_ignored = match error {
+            gltf::json::validation::Error::Missing => {
+                [".min", ".max", ".bufferView"].iter().any(|end| place.ends_with(end))
+            }
+            gltf::json::validation::Error::Unsupported => place.starts_with("extensionsRequired"),
+            _ => false,
+        };
+        if !is_ignored {
+            let place = place.chars().filter(|c| !c.is_control()).take(100).collect::<String>();
+            first.get_or_insert_with(|| format!("this is not a valid glTF 2.0 file: {place}: {error}"));
+        }
+    });
+    match first {
+        Some(what) => Err(what),
+        None => Ok(file),
+    }
 }
 
 /// Returns true for a required extension that changes only materials, textures or lights, which are never read.
@@ -120,36 +163,9 @@ fn is_ignorable(extension: &str) -> bool {
     ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"].iter().any(|kind| extension.starts_with(kind))
 }
 
-/// Returns the two parts of a binary glTF file: its JSON text, and its binary data if there are any.
-fn chunks(bytes: &[u8]) -> Result<(&[u8], Option<&[u8]>), String> {
-    let cut_off = || "the glTF file is cut off".to_string();
-    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
-    if word(4).ok_or_else(cut_off)? != 2 {
-        return Err("the glTF file is not of version 2".into());
-    }
-    let chunk = |at: usize| {
-        let length = word(at)? as usize;
-        Some((bytes.get(at + 4..at + 8)?, bytes.get(at + 8..(at + 8).checked_add(length)?)?))
-    };
-    let (kind, text) = chunk(12).ok_or_else(cut_off)?;
-    if kind != b"JSON" {
-        return Err("the glTF file does not begin with its JSON text".into());
-    }
-    let next = 20 + text.len();
-    if next >= bytes.len() {
-        return Ok((text, None));
-    }
-    let (kind, blob) = chunk(next).ok_or_else(cut_off)?;
-    Ok((text, (kind == b"BIN\0").then_some(blob)))
-}
-
-struct GltfFile<'a> {
-    root: &'a json::Root,
-    buffers: Vec<Vec<u8>>,
-}
-
 /// State of the traversal of a scene's nodes.
-struct Walk {
+struct Walk<'a> {
+    buffers: &'a [Vec<u8>],
     mesh: Mesh,
     /// For each node. glTF requires a strict tree; a node that is visited twice is a cycle, or work that doubles at
     /// every level.
@@ -158,49 +174,48 @@ struct Walk {
     triangles_max: usize,
 }
 
-impl GltfFile<'_> {
-    fn node(&self, number: usize, parent: NodeTransform, depth: usize, walk: &mut Walk) -> Result<(), String> {
-        let node = self.root.nodes.get(number).ok_or("the glTF file refers to a missing node")?;
-        if std::mem::replace(&mut walk.is_visited[number], true) {
+impl Walk<'_> {
+    fn visit(&mut self, node: &Node, parent: Affine3A, depth: usize) -> Result<(), String> {
+        let number = node.index();
+        if std::mem::replace(&mut self.is_visited[number], true) {
             return Err(format!("node {number} of the glTF file has two parents or is its own parent"));
         }
         if depth > DEPTH_MAX {
             return Err(format!("the glTF file's nodes are nested more than {DEPTH_MAX} deep"));
         }
-        let here = parent.then(&NodeTransform::of(node));
-        if let Some(number) = node.mesh {
-            self.add(number.value(), &here, walk)?;
+        let here = parent * node_transform(node);
+        if let Some(mesh) = node.mesh() {
+            self.add(&mesh, here)?;
         }
-        let children = node.children.iter().flatten();
-        children.into_iter().try_for_each(|child| self.node(child.value(), here, depth + 1, walk))
+        node.children().try_for_each(|child| self.visit(&child, here, depth + 1))
     }
 
-    fn add(&self, number: usize, here: &NodeTransform, walk: &mut Walk) -> Result<(), String> {
-        let found = self.root.meshes.get(number).ok_or("the glTF file refers to a missing mesh")?;
-        let mesh = &mut walk.mesh;
-        for part in found.primitives.iter().filter(|p| p.mode == Checked::Valid(Mode::Triangles)) {
-            if mesh.triangles.len() > walk.triangles_max {
+    fn add(&mut self, added: &gltf::Mesh, here: Affine3A) -> Result<(), String> {
+        for part in added.primitives().filter(|part| part.mode() == Mode::Triangles) {
+            if self.mesh.triangles.len() > self.triangles_max {
                 return Ok(());
             }
-            let of = |wanted| part.attributes.get(&Checked::Valid(wanted)).map(|accessor| accessor.value());
-            let places = self.vectors(of(Semantic::Positions).ok_or("a part of the glTF file has no positions")?)?;
-            let corners: Vec<u32> = match part.indices {
-                Some(accessor) => self.indices(accessor.value())?,
+            let of = |wanted| part.get(&wanted);
+            let positions = of(Semantic::Positions).ok_or("a part of the glTF file has no positions")?;
+            let places = self.vectors(&positions)?;
+            let corners: Vec<u32> = match part.indices() {
+                Some(accessor) => self.corners(&accessor)?,
                 None => (0..places.len() as u32).collect(),
             };
-            let is_mirrored = here.determinant() < 0.0;
+            let is_mirrored = here.matrix3.determinant() < 0.0;
             let turned = |[a, b, c]: [u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
             let triangles: Vec<[u32; 3]> = corners.chunks_exact(3).map(|t| turned([t[0], t[1], t[2]])).collect();
             if triangles.iter().flatten().any(|&i| i as usize >= places.len()) {
                 return Err("a triangle of the glTF file refers to a missing corner".into());
             }
-            let places: Vec<Vec3> = places.into_iter().map(|p| here.transform_point(p)).collect();
-            let normals = match of(Semantic::Normals).map(|n| self.vectors(n)).transpose()? {
+            let places: Vec<Vec3> = places.into_iter().map(|p| here.transform_point3(p)).collect();
+            let normals = match of(Semantic::Normals).map(|n| self.vectors(&n)).transpose()? {
                 Some(normals) if normals.len() == places.len() => {
-                    normals.into_iter().map(|n| here.transform_normal(n)).collect()
+                    normals.into_iter().map(|n| transform_normal(&here, n)).collect()
                 }
                 _ => obj::normals_of(&places, &triangles),
             };
+            let mesh = &mut self.mesh;
             let first = mesh.positions.len() as u32;
             mesh.triangles.extend(triangles.iter().map(|t| t.map(|i| first + i)));
             mesh.positions.extend(places);
@@ -209,103 +224,61 @@ impl GltfFile<'_> {
         Ok(())
     }
 
-    fn vectors(&self, accessor: usize) -> Result<Vec<Vec3>, String> {
-        let (kind, items) = self.items(accessor, Type::Vec3)?;
-        if kind != ComponentType::F32 {
-            return Err("positions and normals of the glTF file are not floating-point numbers".into());
+    fn vectors(&self, accessor: &Accessor) -> Result<Vec<Vec3>, String> {
+        if accessor.dimensions() != Dimensions::Vec3 || accessor.data_type() != DataType::F32 {
+            return Err("positions and normals of the glTF file are not three floating-point numbers each".into());
         }
-        let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-        Ok(items.map(|b| Vec3::new(number(b), number(&b[4..]), number(&b[8..]))).collect())
+        Ok(self.items::<[f32; 3]>(accessor)?.map(Vec3::from).collect())
     }
 
-    fn indices(&self, accessor: usize) -> Result<Vec<u32>, String> {
-        let (kind, items) = self.items(accessor, Type::Scalar)?;
-        match kind {
-            ComponentType::U8 => Ok(items.map(|b| u32::from(b[0])).collect()),
-            ComponentType::U16 => Ok(items.map(|b| u32::from(u16::from_le_bytes([b[0], b[1]]))).collect()),
-            ComponentType::U32 => Ok(items.map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()),
+    fn corners(&self, accessor: &Accessor) -> Result<Vec<u32>, String> {
+        match (accessor.dimensions(), accessor.data_type()) {
+            (Dimensions::Scalar, DataType::U8) => Ok(self.items::<u8>(accessor)?.map(u32::from).collect()),
+            (Dimensions::Scalar, DataType::U16) => Ok(self.items::<u16>(accessor)?.map(u32::from).collect()),
+            (Dimensions::Scalar, DataType::U32) => Ok(self.items::<u32>(accessor)?.collect()),
             _ => Err("the glTF file's corner indices are not whole numbers".into()),
         }
     }
 
-    /// Returns the bytes of each item of an accessor, without the padding between items.
-    fn items(&self, accessor: usize, wanted: Type) -> Result<(ComponentType, impl Iterator<Item = &[u8]>), String> {
-        let missing = || "the glTF file refers to missing data".to_string();
-        let found = self.root.accessors.get(accessor).ok_or_else(missing)?;
-        if found.sparse.is_some() {
+    /// Returns the items of an accessor. The crate's reader trusts counts and strides, so they are checked here.
+    fn items<T: Item + Copy>(&self, accessor: &Accessor) -> Result<impl Iterator<Item = T>, String> {
+        if accessor.sparse().is_some() {
             return Err("the glTF file uses sparse accessors, which are not supported".into());
         }
-        let (Checked::Valid(kind), Checked::Valid(shape)) = (found.component_type, found.type_) else {
-            return Err(missing());
+        let view = accessor.view().ok_or("the glTF file stores its data in an unsupported way (compressed?)")?;
+        let size = accessor.size();
+        let stride = view.stride().unwrap_or(size);
+        if stride < size {
+            return Err(format!("items of {size} bytes overlap in the glTF file: their stride is {stride} bytes"));
+        }
+        let Some(last) = accessor.count().checked_sub(1) else { return Ok(None.into_iter().flatten()) };
+        let end = last.checked_mul(stride).and_then(|l| l.checked_add(size)?.checked_add(accessor.offset()));
+        let end_of_view = view.offset().checked_add(view.length());
+        let available = self.buffers.get(view.buffer().index()).map_or(0, Vec::len);
+        let is_inside = end.is_some_and(|end| end <= view.length()) && end_of_view.is_some_and(|end| end <= available);
+        let items = match is_inside {
+            true => Iter::new(accessor.clone(), |buffer| self.buffers.get(buffer.index()).map(Vec::as_slice)),
+            false => None,
         };
-        if shape != wanted {
-            return Err("an accessor of the glTF file does not have the shape of positions or corner indices".into());
-        }
-        let view = found.buffer_view.and_then(|view| self.root.buffer_views.get(view.value()));
-        let view = view.ok_or("the glTF file stores its data in an unsupported way (compressed?)")?;
-        let buffer = self.buffers.get(view.buffer.value()).ok_or_else(missing)?;
-        let size = kind.0.size() * shape.multiplicity();
-        let stride = view.byte_stride.map_or(size, |s| s.0.max(size));
-        let offset = |offset: &Option<json::validation::USize64>| offset.map_or(0, |o| o.0);
-        let start = offset(&view.byte_offset).checked_add(offset(&found.byte_offset));
-        let start = start.and_then(|start| usize::try_from(start).ok()).ok_or_else(missing)?;
-        let count = usize::try_from(found.count.0).map_err(|_| missing())?;
-        let length =
-            count.saturating_sub(1).checked_mul(stride).and_then(|l| l.checked_add(size)).ok_or_else(missing)?;
-        let length = if count == 0 { 0 } else { length };
-        let bytes =
-            start.checked_add(length).and_then(|end| buffer.get(start..end)).ok_or("the glTF file is cut off")?;
-        Ok((kind.0, bytes.chunks(stride).map(move |item| &item[..size])))
+        items.map(|items| Some(items).into_iter().flatten()).ok_or_else(|| "the glTF file is cut off".to_string())
     }
 }
 
-/// A transform as in glTF: the columns of a matrix and an offset.
-#[derive(Clone, Copy)]
-struct NodeTransform {
-    columns: [Vec3; 3],
-    offset: Vec3,
+fn node_transform(node: &Node) -> Affine3A {
+    match node.transform() {
+        Transform::Matrix { matrix } => Affine3A::from_mat4(Mat4::from_cols_array_2d(&matrix)),
+        Transform::Decomposed { translation, rotation, scale } => {
+            let rotation = Quat::from_array(rotation).normalize();
+            Affine3A::from_scale_rotation_translation(scale.into(), rotation, translation.into())
+        }
+    }
 }
 
-impl NodeTransform {
-    const IDENTITY: NodeTransform = NodeTransform { columns: Vec3::AXES, offset: Vec3::ZERO };
-
-    fn of(node: &json::Node) -> NodeTransform {
-        if let Some(m) = node.matrix {
-            let column = |c: usize| Vec3::new(m[4 * c], m[4 * c + 1], m[4 * c + 2]);
-            return NodeTransform { columns: [column(0), column(1), column(2)], offset: column(3) };
-        }
-        let rotation = node.rotation.map_or(Quat::IDENTITY, |q| Quat::from_array(q.0).normalize());
-        let scale = Vec3::from(node.scale.unwrap_or([1.0; 3]));
-        let columns = [0, 1, 2].map(|a| rotation * (Vec3::AXES[a] * scale[a]));
-        NodeTransform { columns, offset: Vec3::from(node.translation.unwrap_or_default()) }
-    }
-
-    fn transform_vector(&self, v: Vec3) -> Vec3 {
-        self.columns[0] * v.x + self.columns[1] * v.y + self.columns[2] * v.z
-    }
-
-    fn transform_point(&self, p: Vec3) -> Vec3 {
-        self.transform_vector(p) + self.offset
-    }
-
-    fn then(&self, inner: &NodeTransform) -> NodeTransform {
-        NodeTransform {
-            columns: inner.columns.map(|c| self.transform_vector(c)),
-            offset: self.transform_point(inner.offset),
-        }
-    }
-
-    fn determinant(&self) -> f32 {
-        let [x, y, z] = self.columns;
-        x.cross(y).dot(z)
-    }
-
-    /// Transforms by the cofactors of the columns, so that a normal stays perpendicular under any scaling.
-    fn transform_normal(&self, n: Vec3) -> Vec3 {
-        let [x, y, z] = self.columns;
-        let turned = y.cross(z) * n.x + z.cross(x) * n.y + x.cross(y) * n.z;
-        (turned * self.determinant().signum()).normalize_or(Vec3::Z)
-    }
+/// Transforms by the cofactors of the columns, so that a normal stays perpendicular under any scaling.
+fn transform_normal(here: &Affine3A, normal: Vec3) -> Vec3 {
+    let [x, y, z] = [here.matrix3.x_axis, here.matrix3.y_axis, here.matrix3.z_axis].map(Vec3::from);
+    let turned = y.cross(z) * normal.x + z.cross(x) * normal.y + x.cross(y) * normal.z;
+    (turned * here.matrix3.determinant().signum()).normalize_or(Vec3::Z)
 }
 
 #[cfg(test)]
@@ -376,18 +349,24 @@ mod tests {
         check("a.glb", b"glTF\x02\0\0\0\xff\0\0\0\xff\xff\xff\xffJSON{", Err("cut off"));
         check("a.glb", b"glTF\x01\0\0\0", Err("version 2"));
         check("a.glb", b"glTF", Err("cut off"));
+        broken("\"POSITION\":0", "\"POSITION\":2", "refers to missing data");
+        check("a.glb", b"glTF\x02\0\0\0\x01\0\0\0", Err("cut off"));
         broken("\"byteLength\":24", "\"byteLength\":24,\"byteOffset\":4000", "not a glTF 2.0 file");
         broken("\"count\":12", "\"count\":1200", "cut off");
         broken("\"count\":12", "\"count\":0", "no triangles");
         broken("\"count\":4,", "\"count\":2,", "missing corner");
-        broken("\"mesh\":0", "\"mesh\":7", "missing mesh");
+        broken("\"mesh\":0", "\"mesh\":7", "nodes[1].mesh: Index out of bounds");
+        broken("\"byteLength\":24", "\"byteLength\":24,\"byteStride\":1", "not a valid glTF 2.0 file");
+        broken("\"buffer\":0,\"byteLength\":48", "\"buffer\":3,\"byteLength\":48", "buffer: Index out of bounds");
+        broken("\"byteLength\":48", "\"byteLength\":18446744073709551615", "cut off");
+        broken("\"count\":4,", "\"count\":18446744073709551615,", "cut off");
         broken("\"children\":[1]", "\"children\":[0]", "two parents");
-        broken("\"POSITION\":0", "\"POSITION\":1", "does not have the shape");
-        broken("\"POSITION\":0", "\"NORMAL\":0", "no positions");
+        broken("\"POSITION\":0", "\"POSITION\":1", "three floating-point numbers");
+        broken("\"POSITION\":0", "\"NORMAL\":0", "[\"POSITION\"]: Missing data");
         broken(";base64,", ";base64,%", "not in base64");
         broken("data:application/octet-stream;base64,", "away.bin?", "away.bin");
         broken("\"bufferView\":1,", "", "compressed");
-        broken("5123", "5126", "cut off");
+        broken("5123", "5126", "not whole numbers");
         let requires =
             |name: &str| gltf().replace("\"scene\":0", &format!("\"extensionsRequired\":[\"{name}\"],\"scene\":0"));
         for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization", "ACME_odd"] {
