@@ -59,5 +59,7 @@ fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) ve
 
 @fragment
 fn background_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
-    return vec4f(screen(mix(view.background_top.rgb, view.background_bottom.rgb, pixel.y / view.size.y)), 1.0);
+    let from_middle = (pixel.xy / view.size.xy - 0.5) * 2.0;
+    let share = 0.5 * dot(from_middle, from_middle);
+    return vec4f(screen(mix(view.background_middle.rgb, view.background_edge.rgb, share)), 1.0);
 }

@@ -305,13 +305,13 @@ impl Renderer {
     ) {
         let view = view::view_uniform(scene, eye, eye_target.size, self.format.is_srgb());
         self.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&view));
-        let Background { top, bottom } = scene.background;
-        let [r, g, b] = top.map(f64::from);
+        let Background { middle, edge } = scene.background;
+        let [r, g, b] = middle.map(f64::from);
         let clear = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
         let mut pass = begin_pass(encoder, colour, clear, Some((&eye_target.depth, wgpu::LoadOp::Clear(1.0))));
         pass.set_bind_group(0, group, &[]);
         // Clearing suffices for a single colour, except that an sRGB target takes the clear colour as linear light.
-        if top != bottom || self.format.is_srgb() {
+        if middle != edge || self.format.is_srgb() {
             pass.set_pipeline(&self.surface_pass.background);
             pass.draw(0..3, 0..1);
         }

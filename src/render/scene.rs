@@ -38,7 +38,7 @@ impl RenderScene<'_> {
             translucent_particles: &[],
             mirror: None,
             lights: Lights::default(),
-            background: Background { top: [0.80, 0.85, 0.88], bottom: [0.60, 0.66, 0.70] },
+            background: Background::default(),
             is_antialiased: false,
         }
     }
@@ -95,8 +95,8 @@ impl LabelPalette {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Appearance {
     pub colour: Rgb,
-    /// Share of a lamp's light that a wet or polished surface reflects, 0 to 1: dull caries 0.02, wet enamel 0.25,
-    /// steel 0.6.
+    /// Square root of the share of light that the surface mirrors straight back, 0 to 1: a film of saliva has 0.14 (its
+    /// refractive index is 1.33), enamel under it 0.2, steel 0.6. A duller surface is also a rougher one.
     pub gloss: f32,
 }
 
@@ -160,7 +160,8 @@ pub struct Lamp {
     /// Share of full light on a surface that faces the lamp; 0 is off.
     pub strength: f32,
     pub colour: Rgb,
-    /// Extent to which the light reaches past the terminator (wrap lighting), 0 to 1.
+    /// Extent to which the light reaches past the terminator on a white tissue, as a cosine, 0 to 1: light enters,
+    /// scatters and leaves elsewhere. Less on a darker one, by each colour's reflectance.
     pub wrap: f32,
 }
 
@@ -169,31 +170,38 @@ impl Lamp {
 
     /// Returns the operating light, above the patient's chest and to the upper left of the trainee.
     pub fn chair() -> Lamp {
-        Lamp { position: Vec3::new(-350.0, 480.0, 420.0), strength: 0.62, colour: [1.0, 0.98, 0.94], wrap: 0.2 }
+        Lamp { position: Vec3::new(-350.0, 480.0, 420.0), strength: 0.72, colour: [1.0, 0.98, 0.94], wrap: 0.15 }
     }
 
     /// Returns a head lamp at the position of an eye, world space.
     pub fn head(eye: Vec3) -> Lamp {
-        Lamp { position: eye, strength: 0.22, colour: [0.96, 0.98, 1.0], wrap: 0.1 }
+        Lamp { position: eye, strength: 0.30, colour: [0.96, 0.98, 1.0], wrap: 0.15 }
     }
 }
 
 impl Default for Lights {
     /// The operating light without a head lamp.
     fn default() -> Lights {
-        Lights { ambient: 0.34, chair: Lamp::chair(), head: Lamp::OFF }
+        Lights { ambient: 0.24, chair: Lamp::chair(), head: Lamp::OFF }
     }
 }
 
-/// Background: a vertical gradient from the top of the image to its bottom.
+/// Background: fades from the middle of the image to its corners.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Background {
-    pub top: Rgb,
-    pub bottom: Rgb,
+    pub middle: Rgb,
+    pub edge: Rgb,
 }
 
 impl Background {
     pub fn plain(colour: Rgb) -> Background {
-        Background { top: colour, bottom: colour }
+        Background { middle: colour, edge: colour }
+    }
+}
+
+impl Default for Background {
+    /// The depth of a mouth: red, dark, and out of focus.
+    fn default() -> Background {
+        Background { middle: [0.27, 0.155, 0.145], edge: [0.07, 0.04, 0.04] }
     }
 }

@@ -24,8 +24,8 @@ pub mod gpu {
         pub ahead: [f32; 4],
         pub window: [f32; 4],
         pub size: [f32; 4],
-        pub background_top: [f32; 4],
-        pub background_bottom: [f32; 4],
+        pub background_middle: [f32; 4],
+        pub background_edge: [f32; 4],
         pub ambient: [f32; 4],
         pub lamps: [LampUniform; 2],
     }
@@ -51,8 +51,8 @@ pub fn view_uniform(scene: &RenderScene, eye: &Eye, [width, height]: [u32; 2], i
         ahead: eye.forward.extend(0.0).to_array(),
         window: [eye.window.left, eye.window.right, eye.window.bottom, eye.window.top],
         size: [width as f32, height as f32, if is_srgb { 1.0 } else { 0.0 }, 0.0],
-        background_top: opaque(scene.background.top),
-        background_bottom: opaque(scene.background.bottom),
+        background_middle: opaque(scene.background.middle),
+        background_edge: opaque(scene.background.edge),
         ambient: [scene.lights.ambient, 0.0, 0.0, 0.0],
         lamps: [lamp_uniform(&scene.lights.chair), lamp_uniform(&scene.lights.head)],
     }

@@ -2,6 +2,7 @@
 
 #[path = "../support/mod.rs"]
 mod support;
+mod fixed_scenes;
 mod render;
 mod scene;
 mod scenes;

@@ -123,12 +123,13 @@ struct Pixel {
 
 impl Framebuffer {
     fn with_background(background: &Background, width: u32, height: u32) -> Framebuffer {
-        let mut pixels = vec![Pixel { colour: background.top, depth: 1.0 }; (width * height) as usize];
-        for (y, row) in pixels.chunks_mut(width as usize).enumerate() {
-            let share = (y as f32 + 0.5) / height as f32;
-            let colour =
-                std::array::from_fn(|c| background.top[c] + (background.bottom[c] - background.top[c]) * share);
-            row.fill(Pixel { colour, depth: 1.0 });
+        let mut pixels = vec![Pixel { colour: background.middle, depth: 1.0 }; (width * height) as usize];
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            let across = 2.0 * ((i as u32 % width) as f32 + 0.5) / width as f32 - 1.0;
+            let down = 2.0 * ((i as u32 / width) as f32 + 0.5) / height as f32 - 1.0;
+            let share = 0.5 * (across * across + down * down);
+            pixel.colour =
+                std::array::from_fn(|c| background.middle[c] + (background.edge[c] - background.middle[c]) * share);
         }
         Framebuffer { width, height, pixels }
     }
