@@ -11,7 +11,7 @@ struct Tooth {
     low: vec4f,
     // w: share of the colour that lamps shade in blending.
     high: vec4f,
-    // Voxel spacing, mm.
+    // Voxel spacing, mm; w: 1 for a radiograph.
     spacing: vec4f,
     // Colour and gloss by label.
     palette: array<vec4f, 256>,
@@ -25,7 +25,7 @@ struct Tooth {
 @group(1) @binding(3) var empty: texture_3d<u32>;
 // Mean density of cubes.
 @group(1) @binding(4) var hollow: texture_3d<f32>;
-// Colour and opacity after one step, by density and label.
+// By density and label: colour and opacity after one step; for a radiograph attenuation in red and green.
 @group(1) @binding(5) var transfer: texture_2d<f32>;
 
 const BRICK: f32 = 8.0;

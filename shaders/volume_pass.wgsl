@@ -65,6 +65,52 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
     return blended;
 }
 
+// Attenuation of the highest value of a table, per mm, in 65535 parts.
+const MOST_ATTENUATION: f32 = 20.0;
+// Optical depth shown as white, and the brightness up to which the film is linear.
+const WHITE_DEPTH: f32 = 3.0;
+const FILM_LINEAR_UP_TO: f32 = 0.76;
+// Colour of a lit film.
+const FILM: vec3f = vec3f(0.94, 0.97, 1.0);
+
+// Line integral of the attenuation along a ray, without unit, up to the end of the scene.
+fn optical_depth(start: vec3f, along: vec3f, pace: f32, behind: f32) -> f32 {
+    let ends = span(start, along);
+    let end = min(ends.y, behind);
+    var number = ceil(max(ends.x, view.position.w) / pace);
+    var z = number * pace;
+    var sum = 0.0;
+    while z < end {
+        let at = start + along * z;
+        let known = textureLoad(empty, vec3i(brick_of(at)), 0).r;
+        let is_even = known == EVEN;
+        let steps = f32(select(known, 0u, is_even));
+        var out = z + way_out(at, along, brick_of(at), steps);
+        if steps > 0.0 {
+            number = max(ceil(out / pace), number + 1.0);
+            z = number * pace;
+            continue;
+        }
+        out = min(out, end);
+        let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
+        while z < out {
+            let found = floor(entry(start + along * z).rg * 255.0 + 0.5);
+            sum += (found.x * 256.0 + found.y) * samples;
+            number += samples;
+            z = number * pace;
+        }
+    }
+    return sum * (MOST_ATTENUATION / 65535.0) * tooth.low.w;
+}
+
+// Brightness of the film: linear in optical depth, then compressed.
+fn film(depth: f32) -> f32 {
+    let linear = depth / WHITE_DEPTH;
+    let left = 1.0 - FILM_LINEAR_UP_TO;
+    let compressed = 1.0 - left * left / (linear + left - FILM_LINEAR_UP_TO);
+    return select(linear, compressed, linear > FILM_LINEAR_UP_TO);
+}
+
 @fragment
 fn volume_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let way = ray(pixel.xy);
@@ -72,6 +118,10 @@ fn volume_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
     let at = pixel.xy / vec2f(textureDimensions(scene_depth));
     let behind = depth_of(textureSampleLevel(scene_depth, nearest_sampler, at, 0.0).r);
+    if tooth.spacing.w > 0.0 {
+        let white = film(optical_depth(start, along, tooth.low.w / length(way), behind));
+        return vec4f(screen(FILM) * white, white);
+    }
     let blended = blend(start, along, tooth.low.w / length(way), behind);
     if blended.first < 0.0 {
         discard;

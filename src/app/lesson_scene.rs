@@ -74,7 +74,7 @@ impl LessonScene {
         let built = LessonScene {
             histogram: OnceCell::new(),
             transfer_function: TransferFunctionDraft::new(TransferFunction::tissue(&palette)),
-            presets: TransferFunctionPresets::new(tissues, &palette),
+            presets: TransferFunctionPresets::new(tissues, &palette, is_decay_shown),
             volume,
             palette,
             surroundings: match &mouth {
@@ -99,7 +99,7 @@ impl LessonScene {
     /// Sets the colours of the tissues anew, with or without visible decay.
     pub fn colour(&mut self, tissues: &TissueTable, is_decay_shown: bool) {
         self.palette = scene::tissue_palette(tissues, is_decay_shown);
-        self.presets = TransferFunctionPresets::new(tissues, &self.palette);
+        self.presets = TransferFunctionPresets::new(tissues, &self.palette, is_decay_shown);
         self.appearance_count += 1;
     }
 
@@ -143,12 +143,14 @@ struct TransferFunctionPresets {
 }
 
 impl TransferFunctionPresets {
-    fn new(tissues: &TissueTable, palette: &LabelPalette) -> TransferFunctionPresets {
+    fn new(tissues: &TissueTable, palette: &LabelPalette, is_decay_shown: bool) -> TransferFunctionPresets {
         let decay: Vec<Label> =
             tissues.entries().iter().filter(|e| e.role == TissueRole::Decay).map(|e| e.label()).collect();
         TransferFunctionPresets {
             tissue: Arc::new(TransferFunction::tissue(palette)),
-            x_ray: Arc::new(TransferFunction::x_ray()),
+            x_ray: Arc::new(TransferFunction::radiograph(|label| {
+                scene::x_ray_attenuation(tissues, label, is_decay_shown)
+            })),
             decay: Arc::new(TransferFunction::highlighting(&decay, palette)),
         }
     }

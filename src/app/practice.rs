@@ -2,6 +2,7 @@
 
 use super::command::{AppCommand, PracticeCommand};
 use super::i18n::Translations;
+use super::lesson_scene::DisplayMode;
 use super::lesson_state::LessonState;
 use super::settings::Settings;
 use super::snapshot::{InstrumentPose, LessonSnapshot};
@@ -11,7 +12,9 @@ use super::{controls_guide, periodontal_chart, questions, section_view, theme, t
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_exercise::catalog::TissueRole;
-use typodont_render::{Changes, Eye, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance};
+use typodont_render::{
+    Background, Changes, Eye, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
+};
 use typodont_scene as scene;
 use typodont_scene::particles::ParticleField;
 
@@ -363,8 +366,10 @@ fn draw_view(
     let is_pointer = lesson.has_mouse();
     let Some(lesson_scene) = &mut lesson.scene else { return Ok(None) };
     let changed = lesson_scene.volume.take_dirty();
-    let mut solids = lesson_scene.surroundings.clone();
-    solids.extend(lesson_scene.ejector.clone());
+    let is_radiograph = mode == DisplayMode::Xray;
+    // On the film neither gingiva nor neighbours cover the tooth; the instrument stays.
+    let mut solids = if is_radiograph { Vec::new() } else { lesson_scene.surroundings.clone() };
+    solids.extend(lesson_scene.ejector.clone().filter(|_| !is_radiograph));
     if let Some(field) = &mut lesson_scene.particles {
         field.sort_for_view(&viewpoint);
     }
@@ -403,6 +408,7 @@ fn draw_view(
         translucent_particles: lesson_scene.particles.as_ref().map(ParticleField::translucent).unwrap_or_default(),
         mirror,
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+        background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
         is_antialiased: settings.is_smooth(viewport.has_graphics()),
         ..RenderScene::empty()
     };

@@ -193,9 +193,10 @@ impl ToothTextures {
 
     /// Writes the pose and the appearance of the tooth for this image.
     pub fn write_uniform(&mut self, queue: &wgpu::Queue, tooth: &VolumeInstance) {
-        let mut light = 0.0;
+        let (mut light, mut is_radiograph) = (0.0, 0.0);
         if let RenderMode::Volume(function) = &tooth.mode {
             light = function.shading;
+            is_radiograph = if function.is_radiograph { 1.0 } else { 0.0 };
             let is_known = self.function.as_ref().is_some_and(|known| **known == **function);
             if !is_known {
                 let tables = function.per_step(integration_step(tooth.volume));
@@ -214,7 +215,7 @@ impl ToothTextures {
             dims: Vec3::from(grid.dims.map(|n| n as f32)).extend(edge).to_array(),
             low: low.extend(integration_step(tooth.volume)).to_array(),
             high: high.extend(light).to_array(),
-            spacing: grid.spacing.extend(0.0).to_array(),
+            spacing: grid.spacing.extend(is_radiograph).to_array(),
             palette: colours(tooth.palette),
         };
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));

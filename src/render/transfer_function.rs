@@ -17,7 +17,12 @@ pub struct TransferFunction {
     pub opacity_unit: f32,
     /// Share of the colour that lamps shade, 0 to 1: 0 for an X-ray.
     pub shading: f32,
+    /// True for a radiograph: the tables hold attenuation instead of colours, in red and green, and rays add it up.
+    pub(super) is_radiograph: bool,
 }
+
+/// Attenuation of the highest value of a radiograph's table, per mm, in 65535 parts: more than that of amalgam.
+pub(super) const MOST_ATTENUATION: f32 = 20.0;
 
 /// The way after which the presets' opacities hold, mm: about a voxel of a usual tooth.
 const DEFAULT_OPACITY_UNIT: f32 = 0.15;
@@ -25,7 +30,7 @@ const DEFAULT_OPACITY_UNIT: f32 = 0.15;
 impl TransferFunction {
     /// One table for all labels.
     pub fn single_table(table: TransferTable, opacity_unit: f32, shading: f32) -> TransferFunction {
-        TransferFunction { tables: vec![table], table_of_label: [0; 256], opacity_unit, shading }
+        TransferFunction { tables: vec![table], table_of_label: [0; 256], opacity_unit, shading, is_radiograph: false }
     }
 
     /// Gives labels a table of their own.
@@ -93,7 +98,32 @@ impl TransferFunction {
         })
     }
 
-    /// As on an X-ray film: denser tissue is whiter, without shading.
+    /// A radiograph: the film is as bright as the line integral of the attenuation, per mm, of each label (Beer's law), in
+    /// proportion to the density where a voxel is partly filled.
+    pub fn radiograph(attenuation_per_mm: impl Fn(Label) -> f32) -> TransferFunction {
+        let film = |label: Label| -> TransferTable {
+            let full = (attenuation_per_mm(label) / MOST_ATTENUATION).clamp(0.0, 1.0) * 65535.0;
+            std::array::from_fn(|density| {
+                let value = (full * density as f32 / 255.0 + 0.5) as u16;
+                let [high, low] = value.to_be_bytes();
+                // What attenuates is not empty.
+                [high, low, 0, if value > 0 { u8::MAX } else { 0 }]
+            })
+        };
+        let mut made = TransferFunction::single_table(film(Label(0)), DEFAULT_OPACITY_UNIT, 0.0);
+        made.is_radiograph = true;
+        // Labels that attenuate alike share a table: there are fewer tables than labels.
+        for label in (1..=255).map(Label) {
+            let table = film(label);
+            match made.tables.iter().position(|known| *known == table) {
+                Some(known) => made.table_of_label[usize::from(label.0)] = known as u8,
+                None => made = made.with_table([label], table),
+            }
+        }
+        made
+    }
+
+    /// Denser tissue is whiter, without shading: a beginning for functions that are drawn by hand.
     pub fn x_ray() -> TransferFunction {
         TransferFunction::single_table(table([0.92, 0.96, 1.0], |d| 0.035 * d * d), DEFAULT_OPACITY_UNIT, 0.0)
     }

@@ -92,9 +92,10 @@ fn prepare(volume: &mut Volume, workpiece: &Workpiece) {
     let lesion = &workpiece.lesions[0];
     let top = workpiece.teeth[0].crown_high.z;
     let floor = lesion.centre.z - lesion.radii.map_or(2.2, |r| 0.5 * r.z);
-    let levels = ((top - floor) / 0.4).ceil() as u32;
+    let levels = ((top - floor) / 0.2).ceil() as u32;
     for level in 0..=levels {
-        let z = floor + 0.4 * level as f32;
+        let z = floor + 0.2 * level as f32;
+        carve(volume, Vec3::new(lesion.centre.x, lesion.centre.y, z), RADIUS);
         for turn in 0..10u32 {
             let (sin, cos) = (turn as f32 * std::f32::consts::TAU / 10.0).sin_cos();
             carve(volume, Vec3::new(lesion.centre.x + 0.8 * cos, lesion.centre.y + 1.1 * sin, z), RADIUS);

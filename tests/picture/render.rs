@@ -354,7 +354,7 @@ fn specks_are_where_they_are_as_large_as_they_are_and_hidden_by_what_is_before_t
             let place = Pose::at(Vec3::new(-5.0, 2.0, block_at));
             let scene = RenderScene {
                 solids: vec![MeshInstance::plain(block(Vec3::new(4.0, 4.0, 0.5)), place, blue)],
-                lights: Lights { ambient: 1.0, chair: Lamp::OFF, head: Lamp::OFF },
+                lights: Lights { ambient: 0.7, chair: Lamp::OFF, head: Lamp::OFF },
                 background: Background::plain([0.0; 3]),
                 opaque_particles: grains,
                 translucent_particles: drops,

@@ -162,6 +162,11 @@ pub fn stories<'a>(
     };
     let with_stereo = |layout, story: Story<'a>| Story { stereo: Some(Stereo { layout, eye_distance: 4.0 }), ..story };
     let x_ray = || RenderMode::Volume(Arc::new(TransferFunction::x_ray()));
+    let film = || {
+        RenderMode::Volume(Arc::new(TransferFunction::radiograph(|label| {
+            [0.0, 0.28, 0.17, 0.03, 0.09][usize::from(label.0.min(4))]
+        })))
+    };
     let decay = || RenderMode::Volume(Arc::new(TransferFunction::highlighting(&[CARIES], palette)));
     let head_lit = |mut story: Story<'a>| {
         story.scene.lights.head = Lamp::head(story.viewpoint.position);
@@ -212,6 +217,7 @@ pub fn stories<'a>(
         head_lit(story("iso-in-scene", RenderMode::Iso, &solids, whole)),
         story("volume-tissue", tissue(palette), &[], near),
         story("volume-in-scene", tissue(palette), &solids, whole),
+        story("volume-radiograph", film(), &solids[..1], whole),
         story("volume-x-ray", x_ray(), &solids[..1], whole),
         with_stereo(StereoLayout::SideBySide, story("volume-decay-side-by-side", decay(), &[], whole)),
         with_stereo(StereoLayout::Anaglyph, story("iso-anaglyph", RenderMode::Iso, &solids, near)),
