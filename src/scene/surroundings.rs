@@ -1,6 +1,6 @@
 //! Solids around the tooth, drawn as they are touched.
 
-use super::jaw::compute_normals;
+use super::jaw::{compute_normals, smooth_normals};
 use super::palette::GLOSS;
 use std::sync::Arc;
 use typodont_core::frame::Vec3;
@@ -16,6 +16,9 @@ const SPACING: f32 = 0.4;
 
 /// The same for gingiva with a modelled margin.
 const GUM_SPACING: f32 = 0.25;
+
+/// Means of normals over neighbouring corners: neither facets nor steps of the samples show.
+const SMOOTHING: usize = 3;
 
 /// Depth to which the gingiva is lowered at its ends, and the distance over which it is lowered, mm.
 const DIVE: f32 = 1.0;
@@ -69,6 +72,7 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
         let mut mesh = obstacle.mesh();
         mesh.positions.iter_mut().for_each(|p| *p = shape.tooth_from_collider * *p);
         compute_normals(&mut mesh);
+        smooth_normals(&mut mesh, SMOOTHING);
         return mesh;
     }
     if let (ColliderGeometry::Sdf(field), Some(gum)) = (&shape.geometry, &workpiece.periodontium) {
@@ -82,9 +86,10 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
             DIVE * share * share * (3.0 - 2.0 * share)
         };
         let gum_field = SdfGrid::from_fn(grid, Compliance::default(), |p| gum.gum_sdf_visual(p) + dive(p));
-        return surface::extract(&Volume::from_distance(grid, 2.0 * GUM_SPACING, |p| {
-            (gum_field.distance(p), Label(1))
-        }));
+        let mut mesh =
+            surface::extract(&Volume::from_distance(grid, 2.0 * GUM_SPACING, |p| (gum_field.distance(p), Label(1))));
+        smooth_normals(&mut mesh, SMOOTHING);
+        return mesh;
     }
     let grid = Grid::covering(low, high, Vec3::splat(SPACING), 3);
     surface::extract(&Volume::from_distance(grid, 2.0 * SPACING, |p| (shape.distance(p), Label(1))))

@@ -60,10 +60,27 @@ pub fn compute_normals(mesh: &mut Mesh) {
     mesh.normals.iter_mut().for_each(|n| *n = n.normalize_or(Vec3::Z));
 }
 
+/// Normals as a mean over the corners around each, so often: a surface whose triangles are larger than a pixel shows no
+/// facets and no creases.
+pub fn smooth_normals(mesh: &mut Mesh, passes: usize) {
+    for _ in 0..passes {
+        let mut sums = mesh.normals.clone();
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|i| mesh.normals[i as usize]);
+            for (&i, others) in triangle.iter().zip([b + c, c + a, a + b]) {
+                // Each edge belongs to two triangles.
+                sums[i as usize] += 0.5 * others;
+            }
+        }
+        mesh.normals = sums.into_iter().map(|sum| sum.normalize_or(Vec3::Z)).collect();
+    }
+}
+
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm.
 pub fn crown(model: &ToothModel) -> ColouredMesh {
     let volume = grow(&model.form, cropped_above(grid_of_spacing(&model.form, SPACING), -ROOT_LENGTH), &TISSUES);
-    let mesh = surface::extract(&volume);
+    let mut mesh = surface::extract(&volume);
+    smooth_normals(&mut mesh, 1);
     let vertex_colours = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
     ColouredMesh { mesh, vertex_colours }
 }

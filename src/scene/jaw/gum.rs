@@ -4,7 +4,7 @@
 //! middle of each tooth, high between two teeth.
 
 use super::arch::{HalfArch, ToothSeat};
-use super::crown::{ColouredMesh, compute_normals};
+use super::crown::{ColouredMesh, compute_normals, smooth_normals};
 use super::teeth::ToothModel;
 use typodont_anatomy::periodontium::{ProbingSite, SiteLengths};
 use typodont_core::frame::Vec3;
@@ -19,6 +19,9 @@ pub enum Jaw {
 
 /// Distance between columns along the arch, mm: a papilla is some 3 mm wide.
 const COLUMN: f32 = 0.9;
+
+/// Means of normals over neighbouring places: creases between columns fade, the margin stays.
+const SMOOTHING: usize = 4;
 
 /// Length of the tuberosity or retromolar pad behind the last molar, mm.
 const PAD: f32 = 8.0;
@@ -269,6 +272,7 @@ fn closed_sheet(columns: &[Vec<(Vec3, Rgb)>]) -> ColouredMesh {
     };
     strip(&|c, r| (c * rows + r) as u32, columns.len(), rows);
     compute_normals(&mut made.mesh);
+    smooth_normals(&mut made.mesh, SMOOTHING);
     // On the midline both halves end alike.
     for c in 0..columns.len() {
         let normal = &mut made.mesh.normals[c * rows + rows - 1];

@@ -10,7 +10,7 @@ mod teeth;
 
 use self::arch::{HalfArch, ToothSeat};
 use self::crown::ColouredMesh;
-pub(super) use self::crown::compute_normals;
+pub(super) use self::crown::{compute_normals, smooth_normals};
 use self::gum::HalfJaw;
 pub use self::gum::Jaw;
 use self::teeth::ToothModel;
