@@ -410,7 +410,6 @@ fn draw_view(
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
         background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
         is_antialiased: settings.is_smooth(viewport.has_graphics()),
-        ..RenderScene::empty()
     };
     let mut drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, settings.stereo(), size);
     if let Some(second_eye) = settings.second_eye()
