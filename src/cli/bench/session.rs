@@ -73,11 +73,16 @@ fn record_session(tooth: Volume) -> Result<Recording, String> {
     Recording::read(&file.0).map_err(|e| e.to_string())
 }
 
-/// Makes an operator pass over the decay repeatedly, without end.
+/// Makes an operator pass over the decay repeatedly, without end: no rule confirms its stage, and each begins again when
+/// all is done, however soon the operator's hand is through.
 fn keep_cutting(operator: &mut OperatorFile) {
-    for action in operator.rules.iter_mut().flat_map(|rule| &mut rule.actions) {
-        if let ActionFile::Cut(cut) = action {
-            (cut.passes, cut.until_cleared_pct) = (50, 100.0);
+    for rule in &mut operator.rules {
+        rule.repeat = true;
+        rule.actions.retain(|action| !matches!(action, ActionFile::Confirm));
+        for action in &mut rule.actions {
+            if let ActionFile::Cut(cut) = action {
+                (cut.passes, cut.until_cleared_pct) = (50, 100.0);
+            }
         }
     }
 }
@@ -118,4 +123,23 @@ fn peak_of_this_process() -> Result<f64, String> {
     let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     let kib = peak.and_then(|l| l.trim().trim_end_matches("kB").trim().parse::<f64>().ok());
     kib.map(|kib| kib / 1024.0).ok_or_else(|| "the system does not report the peak memory of a process".to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_measured_hand_never_finishes_of_itself() {
+        // Aim: the measured session lasts as long as the exercise lets it, however good the operator becomes. Method: the
+        // rules of the careful operator, which confirms each stage when it is done.
+        let confirms = |operator: &OperatorFile| {
+            operator.rules.iter().flat_map(|rule| &rule.actions).any(|action| matches!(action, ActionFile::Confirm))
+        };
+        let mut operator = careful_operator().unwrap();
+        assert!(confirms(&operator));
+        keep_cutting(&mut operator);
+        assert!(!confirms(&operator));
+        assert!(operator.rules.iter().all(|rule| rule.repeat));
+    }
 }
