@@ -29,8 +29,8 @@ impl CrownContour {
     pub fn of(form: &ToothForm) -> CrownContour {
         let shape = ToothSdf::new(form, 0.0);
         let (low, high) = (FROM * form.sizes.crown, TO * form.sizes.crown);
-        let [least, most] = shape.bounds();
-        let reach = least.abs().max(most.abs()).max_element() * 1.5;
+        let bounds = shape.bounds();
+        let reach = bounds.low.abs().max(bounds.high.abs()).max_element() * 1.5;
         let ring = |i: usize| {
             let z = low + (high - low) * i as f32 / (HEIGHTS - 1) as f32;
             let slice = shape.at_height(z);
@@ -86,14 +86,14 @@ fn direction(step: usize) -> Vec3 {
 mod tests {
     use super::*;
     use crate::teeth;
+    use typodont_core::aabb::Aabb;
 
     #[test]
     fn a_girth_is_as_wide_as_its_tooth() {
         for fdi in [11, 13, 16, 31, 36] {
             let form = teeth::tooth(fdi).unwrap();
             let girth = CrownContour::of(&form);
-            let [low, high] =
-                girth.points().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], p| [l.min(p), h.max(p)]);
+            let Aabb { low, high } = Aabb::around(girth.points());
             let sizes = form.sizes;
             assert!((high.y - low.y - sizes.mesiodistal[0]).abs() < 0.25, "{fdi}: {} mesiodistally", high.y - low.y);
             assert!((high.x - low.x - sizes.buccolingual[0]).abs() < 0.35, "{fdi}: {} buccolingually", high.x - low.x);

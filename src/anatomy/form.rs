@@ -154,7 +154,7 @@ pub struct Enamel {
     pub side: f32,
     /// Height at which the thickness on the sides is full, as a share of the crown.
     pub full_at: f32,
-    /// Share of the depth of furrows in the crown's sides by which the underlying dentine is also lowered.
+    /// Share of a side furrow's depth that the dentine surface follows: 0 for smooth dentine, 1 for a furrow of equal depth.
     pub follows: f32,
 }
 

@@ -5,6 +5,7 @@ use crate::blend::mix;
 use crate::form::ToothForm;
 use crate::occlusal_surface::HeightSample;
 use crate::tooth_sdf::{SdfColumn, SdfLevel, SurfaceDistances, ToothSdf};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel;
 use typodont_core::volume::{Density, Grid, Label, Volume, density_at_distance};
@@ -40,7 +41,7 @@ const THINNEST: f32 = 1.75;
 
 /// Returns the smallest grid of a spacing (mm) that contains a tooth of this form.
 pub fn grid_of_spacing(form: &ToothForm, spacing: f32) -> Grid {
-    let [low, high] = ToothSdf::new(form, 0.0).bounds();
+    let Aabb { low, high } = ToothSdf::new(form, 0.0).bounds();
     let grid = Grid::covering(low, high, Vec3::splat(spacing), MARGIN);
     // A mirror image on the mirrored grid has the same voxels in reverse order.
     if form.is_mirrored { mirrored(grid) } else { grid }
@@ -49,7 +50,7 @@ pub fn grid_of_spacing(form: &ToothForm, spacing: f32) -> Grid {
 /// Returns the finest grid of the given dimensions (voxels) that contains a tooth of this form, with the tooth at its
 /// centre.
 pub fn grid_fitting(form: &ToothForm, dims: [u32; 3]) -> Grid {
-    let [low, high] = bounds(form);
+    let Aabb { low, high } = bounds(form);
     let steps = Vec3::from(dims.map(|n| n.saturating_sub(2 * MARGIN + 1).max(1) as f32));
     let spacing = ((high - low) / steps).max_element();
     let centred = Grid::centred(dims, Vec3::splat(spacing));
@@ -69,12 +70,12 @@ pub fn grow(form: &ToothForm, grid: Grid, tissues: &TissueLabels) -> Volume {
     Volume::new(grid, band, density, label, tissues.dentine)
 }
 
-/// Returns the corners of a box around a form's tooth, tooth space, mm.
-fn bounds(form: &ToothForm) -> [Vec3; 2] {
-    let [low, high] = ToothSdf::new(form, 0.0).bounds();
+/// Returns a box around a form's tooth, tooth space, mm.
+fn bounds(form: &ToothForm) -> Aabb {
+    let bounds = ToothSdf::new(form, 0.0).bounds();
     match form.is_mirrored {
-        true => [low.with_y(-high.y), high.with_y(-low.y)],
-        false => [low, high],
+        true => Aabb::new(bounds.low.with_y(-bounds.high.y), bounds.high.with_y(-bounds.low.y)),
+        false => bounds,
     }
 }
 
@@ -131,7 +132,7 @@ impl NodeGrid {
     /// Returns every column of nodes, x fastest.
     fn columns(&self, shape: &ToothSdf) -> Vec<SdfColumn> {
         let [nx, ny] = self.count;
-        let [low, high] = shape.bounds();
+        let Aabb { low, high } = shape.bounds();
         let matters = |[x, y]: [f32; 2]| x > low.x - 1.0 && x < high.x + 1.0 && y > low.y - 1.0 && y < high.y + 1.0;
         let ground: Vec<HeightSample> = (0..nx * ny)
             .map(|n| self.place(n % nx, n / nx))

@@ -237,6 +237,7 @@ mod tests {
     use super::*;
     use crate::{grid_fitting, grow};
     use typodont_core::frame::Vec3;
+    use typodont_core::volume::CellBox;
     use typodont_core::volume::components::Components;
     use typodont_core::volume::{Grid, Label, distance};
 
@@ -388,7 +389,7 @@ mod tests {
         let grid = grid_fitting(&LOWER_FIRST, [120, 100, 161]);
         let fitted = grow(&LOWER_FIRST, grid, &TISSUES);
         let own = lower_first(grid.spacing.x, &TISSUES);
-        let [low, high] = fitted.bounding_box().unwrap();
+        let CellBox { low, high } = fitted.bounding_box().unwrap();
         assert!((0..3).all(|a| low[a] > 0 && high[a] + 1 < grid.dims[a]), "{low:?} {high:?}");
         for tissue in [TISSUES.enamel, TISSUES.dentine, TISSUES.pulp] {
             let ratio = fitted.count(tissue) as f64 / own.count(tissue) as f64;

@@ -4,6 +4,7 @@
 //! so that a probe that is walked along the gingiva meets no step.
 
 use std::f32::consts::PI;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Grid, ISO, Label, Volume, distance};
 
@@ -95,8 +96,8 @@ const AZIMUTH_STEPS: usize = 72;
 #[derive(Clone, Debug)]
 pub struct Periodontium {
     pub pockets: Pockets,
-    /// Corners of the bounding box of the crown.
-    crown: [Vec3; 2],
+    /// Bounding box of the crown.
+    crown: Aabb,
     /// +1 if y is distal, -1 if it is mesial.
     distal: f32,
     /// Height of the cemento-enamel junction by step around the tooth.
@@ -111,8 +112,8 @@ pub struct Periodontium {
 pub struct ToothContext<'a> {
     pub volume: &'a Volume,
     pub enamel: Label,
-    /// Corners of the bounding box of the crown, tooth space, mm.
-    pub crown: [Vec3; 2],
+    /// Bounding box of the crown, tooth space, mm.
+    pub crown: Aabb,
     /// +1 if y is distal, -1 if it is mesial.
     pub distal: f32,
 }
@@ -133,7 +134,7 @@ impl Periodontium {
         let [low, high] = heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], (margin, floor)| {
             [low.min(floor), high.max(margin)]
         });
-        let (from, to) = (crown[0].with_z(low - 1.0), crown[1].with_z(high + ABOVE));
+        let (from, to) = (crown.low.with_z(low - 1.0), crown.high.with_z(high + ABOVE));
         let beside = Vec3::new(BESIDE, BESIDE, 0.0);
         made.grid = Grid::covering(from - beside, to + beside, Vec3::splat(SPACING), 1);
         made.tooth_distances = distances_to_tooth(volume, &made.grid);
@@ -160,8 +161,7 @@ impl Periodontium {
     }
 
     fn middle_and_half(&self) -> (Vec3, Vec3) {
-        let [low, high] = self.crown;
-        ((0.5 * (low + high)).with_z(0.0), (0.5 * (high - low)).with_z(1.0))
+        (self.crown.centre().with_z(0.0), self.crown.half_size().with_z(1.0))
     }
 
     /// Returns the height of the cemento-enamel junction.
@@ -203,7 +203,7 @@ impl Periodontium {
     /// Returns the signed distance from the tooth's surface to a point, mm; negative inside. It is accurate to 0.05 mm
     /// beside the gingiva; elsewhere it does not exceed the true distance.
     pub fn distance_to_tooth(&self, point: Vec3) -> f32 {
-        let [low, high] = self.grid.extent();
+        let Aabb { low, high } = self.grid.extent();
         let inside = point.clamp(low, high);
         self.grid.trilinear(&self.tooth_distances, inside) + point.distance(inside)
     }
@@ -305,8 +305,8 @@ fn between_sites(values: &SiteLengths, azimuth: f32) -> f32 {
 fn neckline(tooth: &ToothContext) -> [f32; AZIMUTH_STEPS] {
     /// Number of steps on either side over which heights are averaged.
     const AROUND: i32 = 4;
-    let ToothContext { volume, enamel, crown: [low, high], distal } = *tooth;
-    let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+    let ToothContext { volume, enamel, crown, distal } = *tooth;
+    let (middle, half) = (crown.centre(), crown.half_size());
     let grid = volume.grid();
     let mut lowest = [f32::INFINITY; AZIMUTH_STEPS];
     for (index, _) in volume.tissues().enumerate().filter(|(_, label)| *label == enamel) {
@@ -319,7 +319,7 @@ fn neckline(tooth: &ToothContext) -> [f32; AZIMUTH_STEPS] {
     // A side without enamel takes the mean height of the other sides.
     let known = lowest.iter().copied().filter(|z| z.is_finite());
     let (sum, count) = known.fold((0.0, 0u32), |(sum, count), z| (sum + z, count + 1));
-    let mean = if count > 0 { sum / count as f32 } else { low.z };
+    let mean = if count > 0 { sum / count as f32 } else { crown.low.z };
     lowest.iter_mut().filter(|z| !z.is_finite()).for_each(|z| *z = mean);
     std::array::from_fn(|i| {
         let near = (-AROUND..=AROUND).map(|by| lowest[(i as i32 + by).rem_euclid(AZIMUTH_STEPS as i32) as usize]);
@@ -352,16 +352,13 @@ mod tests {
 
     const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
-    fn tooth(fdi: u8) -> (Volume, [Vec3; 2]) {
+    fn tooth(fdi: u8) -> (Volume, Aabb) {
         let form = teeth::tooth(fdi).unwrap();
         let volume = grow(&form, grid_of_spacing(&form, 0.2), &TISSUES);
         let grid = *volume.grid();
         let enamel = volume.tissues().enumerate().filter(|(_, l)| *l == TISSUES.enamel);
-        let [low, high] = enamel.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], (i, _)| {
-            let at = grid.centre(grid.cell(i));
-            [low.min(at), high.max(at)]
-        });
-        (volume, [low, high])
+        let crown = Aabb::around(enamel.map(|(i, _)| grid.centre(grid.cell(i))));
+        (volume, crown)
     }
 
     #[test]

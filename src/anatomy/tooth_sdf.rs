@@ -10,6 +10,7 @@ use crate::form::{Sizes, ToothForm};
 use crate::loft::{Loft, LoftSection};
 use crate::occlusal_surface::{HeightSample, OcclusalSurface};
 use crate::pulp::{Pulp, PulpSection};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 
 /// A tooth in mm, tooth space.
@@ -25,8 +26,7 @@ pub(super) struct ToothSdf {
     /// Minimum thickness of enamel, mm: a grid cannot represent a thinner edge.
     thinnest: f32,
     pulp: Pulp,
-    low: Vec3,
-    high: Vec3,
+    bounds: Aabb,
 }
 
 /// Values that depend on the height alone.
@@ -96,7 +96,6 @@ impl ToothSdf {
         let lofts: Vec<Loft> = roots.iter().map(|root| Loft::new(root, *sides, neck)).collect();
         let body = Loft::new(body, *sides, crown);
         let tips: Vec<[f32; 3]> = relief.cusps.iter().map(|cusp| crown(cusp.tip)).collect();
-        let [low, high] = bounds(form);
         ToothSdf {
             sizes: *sizes,
             occlusal: OcclusalSurface::new(relief, *aged, crown),
@@ -107,8 +106,7 @@ impl ToothSdf {
             pulp: Pulp::new(form, if lofts.is_empty() { std::slice::from_ref(&body) } else { &lofts }, neck, &tips),
             body,
             roots: lofts,
-            low,
-            high,
+            bounds: bounds(form),
         }
     }
 
@@ -175,9 +173,9 @@ impl ToothSdf {
         mix(self.enamel.fissure + (1.0 - FOLLOWS) * self.fissure, self.enamel.cusp, share * share)
     }
 
-    /// Returns the corners of a box around the tooth, mm.
-    pub(super) fn bounds(&self) -> [Vec3; 2] {
-        [self.low, self.high]
+    /// Returns a box around the tooth, mm.
+    pub(super) fn bounds(&self) -> Aabb {
+        self.bounds
     }
 }
 
@@ -195,20 +193,19 @@ fn neck_mm(sizes: &Sizes, [x, y, z]: [f32; 3]) -> [f32; 3] {
     [x * 0.5 * sizes.buccolingual[1], y * 0.5 * sizes.mesiodistal[1], z * length]
 }
 
-fn bounds(form: &ToothForm) -> [Vec3; 2] {
-    let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
+fn bounds(form: &ToothForm) -> Aabb {
+    let mut bounds = Aabb::EMPTY;
     let mut hold = |limb: &form::LoftForm, mm: &dyn Fn([f32; 3]) -> [f32; 3]| {
         for outline in limb.sections {
             let widest = outline.taper.map(|t| 1.0 + t.abs());
             for side in [0, 1] {
                 let corner = mm([outline.x[side] * widest[0], outline.y[side] * widest[1], outline.z]);
-                low = low.min(Vec3::from(corner));
-                high = high.max(Vec3::from(corner));
+                bounds = bounds.with(Vec3::from(corner));
             }
         }
     };
     hold(&form.body, &|p| crown_mm(&form.sizes, p));
     form.roots.iter().for_each(|root| hold(root, &|p| neck_mm(&form.sizes, p)));
-    high.z = high.z.min(form.sizes.crown);
-    [low, high]
+    bounds.high.z = bounds.high.z.min(form.sizes.crown);
+    bounds
 }

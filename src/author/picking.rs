@@ -30,7 +30,7 @@ pub fn surface_location(tooth: &ToothBounds, point_in_tooth: Vec3, outward: Vec3
     // The list is not empty.
     let (surface, _, axes) =
         candidates.into_iter().max_by(|a, b| facing(a).total_cmp(&facing(b))).unwrap_or(candidates[0]);
-    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let middle = tooth.crown.centre();
     let from_middle = point_in_tooth - middle;
     SurfaceLocation { surface, offset: axes.map(|axis| (from_middle.dot(axis) * 10.0).round() / 10.0) }
 }
@@ -65,8 +65,8 @@ mod tests {
             let distal = place.distal();
             let rays = [
                 (Vec3::new(1.5, 1.0, 40.0), Vec3::NEG_Z, SurfaceFile::O),
-                (Vec3::new(40.0, 1.0, place.crown_high.z - 3.0), Vec3::NEG_X, SurfaceFile::B),
-                (distal * 40.0 + Vec3::Z * (place.crown_high.z - 3.0), -distal, SurfaceFile::D),
+                (Vec3::new(40.0, 1.0, place.crown.high.z - 3.0), Vec3::NEG_X, SurfaceFile::B),
+                (distal * 40.0 + Vec3::Z * (place.crown.high.z - 3.0), -distal, SurfaceFile::D),
             ];
             for (from, along, surface) in rays {
                 let (point, outward) = made.volume.raycast(from, along).unwrap();

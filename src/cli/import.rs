@@ -7,8 +7,9 @@ use glam::DVec3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::{CellBox, Label, Volume};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario;
 use typodont_exercise::tooth_import;
@@ -269,7 +270,7 @@ fn from_scan(path: &Path, arguments: &Arguments, table: &TissueTable) -> Result<
     }
     let names = label_names(&image, arguments, table).map_err(|what| volume_error(path, &what))?;
     let wanted = CropOptions {
-        crop: crop_box(arguments).map(|corners| corners.map(|corner| corner.as_dvec3())),
+        crop: crop_box(arguments).map(|crop| [crop.low.as_dvec3(), crop.high.as_dvec3()]),
         resample: arguments.resample.map(as_typed_f64),
         holds_labels: names.is_some(),
     };
@@ -303,7 +304,7 @@ fn reaches_border(volume: &Volume, mut scanned: [u32; 3]) -> bool {
     /// Voxels by which a volume is extended on a side that tissue touches; fewer where tissue only comes near.
     const ROOM: u32 = 3;
     let mut dims = volume.grid().dims;
-    let is_full = |[low, high]: [[u32; 3]; 2]| (0..3).any(|axis| low[axis] == 0 || high[axis] + 1 == dims[axis]);
+    let is_full = |CellBox { low, high }: CellBox| (0..3).any(|axis| low[axis] == 0 || high[axis] + 1 == dims[axis]);
     let is_at_brim = volume.bounding_box().is_some_and(is_full);
     // The crown was turned upwards: axes may have been exchanged.
     dims.sort_unstable();
@@ -325,13 +326,13 @@ fn as_typed_f64(value: f32) -> f64 {
 }
 
 /// The box to which the scan is cropped, mm; `None` if it is not cropped.
-fn crop_box(arguments: &Arguments) -> Option<[Vec3; 2]> {
+fn crop_box(arguments: &Arguments) -> Option<Aabb> {
     match (arguments.crop, arguments.at) {
         (Some([x0, x1, y0, y1, z0, z1]), _) => {
             let (a, b) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
-            Some([a.min(b), a.max(b)])
+            Some(Aabb::around([a, b]))
         }
-        (None, Some(at)) => Some([Vec3::from(at) - arguments.around, Vec3::from(at) + arguments.around]),
+        (None, Some(at)) => Some(Aabb::around([Vec3::from(at)]).grown(Vec3::splat(arguments.around))),
         (None, None) => None,
     }
 }
@@ -396,7 +397,7 @@ fn volume_error(path: &Path, what: &impl fmt::Display) -> CliError {
 /// Size and tissues in a line each, so that a wrong spacing or a wrong threshold is noticed at once.
 fn describe(tooth: &Volume, table: &TissueTable) -> String {
     let grid = tooth.grid();
-    let size = tooth.bounding_box().map_or([0.0; 3], |[low, high]| (grid.centre(high) - grid.centre(low)).to_array());
+    let size = tooth.bounding_box().map_or([0.0; 3], |cells| grid.extent_of(&cells).size().to_array());
     let mut lines = vec![format!("{:.1} × {:.1} × {:.1} mm", size[0], size[1], size[2])];
     let mut counts = [0u64; 256];
     tooth.tissues().for_each(|label| counts[usize::from(label.0)] += 1);

@@ -23,6 +23,7 @@
 
 pub mod tick;
 pub mod frame;
+pub mod aabb;
 pub mod mesh;
 pub mod image;
 pub mod mailbox;

@@ -15,6 +15,7 @@ use gltf::json::validation::Validate;
 use gltf::mesh::{Mode, Semantic};
 use gltf::scene::Transform;
 use gltf::{Accessor, Gltf, Node};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Quat, Vec3};
 use typodont_core::mesh::Mesh;
 
@@ -61,9 +62,7 @@ pub fn read(library: &Library, name: &str) -> Result<Mesh, Diagnostic> {
     if mesh.positions.iter().any(|p| !p.is_finite()) {
         return Err(wrong("a coordinate is not a finite number".into(), export));
     }
-    let [low, high] =
-        mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
-    let extent = (high - low).max_element();
+    let extent = Aabb::around(mesh.positions.iter().copied()).size().max_element();
     if !EXTENT.contains(&extent) {
         let help = "one unit of the file must be a millimetre, with the working end's tip at the origin and the shaft towards +z";
         return Err(wrong(format!("the mesh's longest side is {extent} mm"), help));

@@ -118,8 +118,9 @@ pub use tooth::Uploads;
 pub use transfer_function::{TransferFunction, TransferTable};
 pub use typodont_core::image::RgbaImage;
 
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{BRICK, Volume};
+use typodont_core::volume::{BRICK, CellBox, Volume};
 
 /// The WGSL source of a shader, and the structs that it shares with Rust: name in WGSL and size in bytes.
 #[cfg(feature = "gpu")]
@@ -159,13 +160,13 @@ pub fn shaders() -> Vec<Shader> {
 
 /// Returns the box in which rays are traced, in voxel coordinates: whole bricks around all matter. Because the box is
 /// aligned to bricks, a ray enters a brick at the same point and takes the same steps whatever was cut elsewhere.
-fn bounds_of_matter(volume: &Volume) -> [Vec3; 2] {
-    let Some([low, high]) = volume.bounding_box() else { return [Vec3::ZERO, Vec3::ZERO] };
+fn bounds_of_matter(volume: &Volume) -> Aabb {
+    let Some(CellBox { low, high }) = volume.bounding_box() else { return Aabb::default() };
     let first = low.map(|v| v.saturating_sub(1) / BRICK * BRICK);
     // Interpolation extends matter at the border by one voxel beyond the grid.
     let low = first.map(|v| if v == 0 { -1.0 } else { v as f32 });
     let last = std::array::from_fn(|a| ((high[a] / BRICK + 1) * BRICK).min(volume.grid().dims[a]) as f32);
-    [Vec3::from(low), Vec3::from(last)]
+    Aabb::new(Vec3::from(low), Vec3::from(last))
 }
 
 /// Returns the integration step of direct volume rendering, mm: the smallest voxel spacing, so that no voxel is

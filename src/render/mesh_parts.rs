@@ -3,6 +3,7 @@
 
 use super::eye::Eye;
 use core::ops::Range;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::mesh::Mesh;
 
@@ -28,7 +29,7 @@ struct MeshPart {
 
 impl MeshParts {
     pub fn new(mesh: &Mesh) -> MeshParts {
-        let (low, high) = bounds(mesh.positions.iter().copied());
+        let Aabb { low, high } = Aabb::around(mesh.positions.iter().copied());
         let scale = Vec3::splat((1 << GRID_BITS) as f32 - 1.0) / (high - low).max(Vec3::splat(1e-6));
         let corners = |triangle: [u32; 3]| triangle.map(|i| mesh.positions[i as usize]);
         let order = |triangle: &[u32; 3]| {
@@ -42,10 +43,10 @@ impl MeshParts {
         let parts = triangles
             .chunks(TRIANGLES_PER_PART)
             .map(|part| {
-                let (low, high) = bounds(part.iter().flat_map(|triangle| corners(*triangle)));
+                let bounds = Aabb::around(part.iter().flat_map(|triangle| corners(*triangle)));
                 let range = first..first + part.len() as u32;
                 first = range.end;
-                MeshPart { triangles: range, middle: 0.5 * (low + high), radius: 0.5 * low.distance(high) }
+                MeshPart { triangles: range, middle: bounds.centre(), radius: bounds.half_size().length() }
             })
             .collect();
         MeshParts { triangles, parts }
@@ -62,11 +63,6 @@ impl MeshParts {
         }
         runs
     }
-}
-
-/// Lowest and highest coordinates.
-fn bounds(points: impl Iterator<Item = Vec3>) -> (Vec3, Vec3) {
-    points.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
 }
 
 /// Place of a cell on a curve that fills space: its coordinates' bits in turn.

@@ -6,6 +6,7 @@ use super::scene::{Changes, LabelPalette, RenderMode, VolumeInstance};
 use super::transfer_function::TransferFunction;
 use super::{bounds_of_matter, integration_step, resources};
 use std::sync::Arc;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::volume::{BRICK, Volume};
 
@@ -47,7 +48,7 @@ pub struct Uploads {
 pub struct ToothTextures {
     dims: [u32; 3],
     /// Box around all matter at the time of the upload, in voxel coordinates. Carving only empties it.
-    bounds: [Vec3; 2],
+    bounds: Aabb,
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
     function: Option<Arc<TransferFunction>>,
@@ -207,7 +208,7 @@ impl ToothTextures {
         }
         let grid = tooth.volume.grid();
         let edge = self.occlusion.cube_voxels() as f32;
-        let [low, high] = self.bounds;
+        let Aabb { low, high } = self.bounds;
         let uniform = gpu::ToothUniform {
             world_from_voxel: resources::columns(tooth.world_from_tooth, grid.spacing, grid.origin),
             voxel_from_world: voxel_from_world(tooth),
@@ -235,16 +236,16 @@ fn voxel_from_world(tooth: &VolumeInstance) -> [[f32; 4]; 4] {
 }
 
 /// Returns the box of matter, extended by changed bricks with matter outside it: a restoration may be placed there.
-fn extended_bounds([low, high]: [Vec3; 2], volume: &Volume, changed: &[usize]) -> [Vec3; 2] {
+fn extended_bounds(bounds: Aabb, volume: &Volume, changed: &[usize]) -> Aabb {
     let occupied = changed
         .iter()
         .map(|&b| volume.bricks().corner(b))
         .filter(|c| volume.bricks().is_occupied(c.map(|v| v / BRICK)));
-    occupied.fold([low, high], |[low, high], corner| {
+    occupied.fold(bounds, |bounds, corner| {
         let first = Vec3::from(corner.map(|v| v as f32));
         let last =
             Vec3::from(std::array::from_fn::<f32, 3, _>(|a| (corner[a] + BRICK).min(volume.grid().dims[a]) as f32));
-        [low.min(first - 1.0), high.max(last)]
+        bounds.union(Aabb::new(first - 1.0, last))
     })
 }
 

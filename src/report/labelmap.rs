@@ -1,6 +1,6 @@
 //! Label maps that other programs open: tissues before and after, and the performance map.
 
-use typodont_core::volume::{Grid, Volume};
+use typodont_core::volume::{CellBox, Grid, Volume};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::score::{Verdict, VoxelRemovals};
 use typodont_formats::nrrd;
@@ -54,17 +54,13 @@ fn encode(grid: &Grid, labels: Vec<u8>, segments: Vec<NamedSegment>) -> Result<V
 /// When the file cannot be encoded.
 pub fn removal_times(grid: &Grid, falls: &VoxelRemovals) -> Result<Vec<u8>, String> {
     let removed_cells = || falls.iter().map(|(voxel, _)| grid.cell(voxel));
-    let (low, high) = removed_cells().fold(([u32::MAX; 3], [0; 3]), |(low, high): ([u32; 3], [u32; 3]), cell| {
-        (std::array::from_fn(|a| low[a].min(cell[a])), std::array::from_fn(|a| high[a].max(cell[a])))
-    });
     // If no voxel was removed, the image has one voxel with NaN.
-    let (low, high) = if low[0] == u32::MAX { ([0; 3], [0; 3]) } else { (low, high) };
-    let dims = std::array::from_fn(|a| high[a] - low[a] + 1);
-    let part = Grid { dims, spacing: grid.spacing, origin: grid.centre(low) };
+    let cells = CellBox::around(removed_cells()).unwrap_or_default();
+    let part = grid.part(&cells);
     let mut seconds = vec![f32::NAN; part.len()];
     for (voxel, fall) in falls.iter() {
         let cell = grid.cell(voxel);
-        seconds[part.index(std::array::from_fn(|a| cell[a] - low[a]))] = fall.at.seconds() as f32;
+        seconds[part.index(std::array::from_fn(|a| cell[a] - cells.low[a]))] = fall.at.seconds() as f32;
     }
     let geometry = Geometry::of(&part, CoordinateSystem::LeftPosteriorSuperior);
     let keys = vec![

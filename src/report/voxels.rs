@@ -8,7 +8,7 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use serde::Serialize;
 use std::io::Write;
-use typodont_core::volume::{Grid, Volume};
+use typodont_core::volume::{CellBox, Grid, Volume};
 use typodont_exercise::score::Scored;
 
 /// Most voxels that a page carries: a molar at 0.067 mm, and what a browser unpacks within a second. Of a finer volume every
@@ -149,10 +149,7 @@ impl StridedBox {
     /// All matter of a volume with some air around; `None` of an empty one.
     fn of(volume: &Volume, stride: u32) -> Option<StridedBox> {
         let whole = *volume.grid();
-        let [low, high] = volume.bounding_box()?;
-        let margin = AIR_MARGIN * stride;
-        let first = low.map(|v| v.saturating_sub(margin));
-        let last: [u32; 3] = std::array::from_fn(|a| (high[a] + margin).min(whole.dims[a] - 1));
+        let CellBox { low: first, high: last } = volume.bounding_box()?.grown_within(&whole, AIR_MARGIN * stride);
         Some(StridedBox {
             grid: whole,
             first,

@@ -3,6 +3,7 @@
 use super::jaw::{compute_normals, smooth_normals};
 use super::palette::GLOSS;
 use std::sync::Arc;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Collider, ColliderGeometry, Compliance, SdfGrid};
@@ -52,20 +53,15 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
 /// A shape's surface in tooth space.
 fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
     let middle = shape.tooth_from_collider.position;
-    let [low, high] = match &shape.geometry {
-        ColliderGeometry::Ball { radius } => [middle - *radius, middle + *radius],
+    let within = |reach: Vec3| Aabb::around([middle]).grown(reach);
+    let Aabb { low, high } = match &shape.geometry {
+        ColliderGeometry::Ball { radius } => within(Vec3::splat(*radius)),
         // However it is turned.
-        ColliderGeometry::RoundBox { half, .. } if is_upright(shape) => [middle - *half, middle + *half],
-        ColliderGeometry::RoundBox { half, .. } => [middle - half.length(), middle + half.length()],
-        ColliderGeometry::Capsule { half_length, radius } => {
-            [middle - (half_length + radius), middle + (half_length + radius)]
-        }
+        ColliderGeometry::RoundBox { half, .. } if is_upright(shape) => within(*half),
+        ColliderGeometry::RoundBox { half, .. } => within(Vec3::splat(half.length())),
+        ColliderGeometry::Capsule { half_length, radius } => within(Vec3::splat(half_length + radius)),
         ColliderGeometry::Sdf(field) => field.extent(),
-        ColliderGeometry::Mesh(_) => {
-            let low = workpiece.teeth.iter().map(|t| t.low).fold(Vec3::INFINITY, Vec3::min);
-            let high = workpiece.teeth.iter().map(|t| t.high).fold(Vec3::NEG_INFINITY, Vec3::max);
-            [low - REACH, high + REACH]
-        }
+        ColliderGeometry::Mesh(_) => workpiece.bounds().grown(Vec3::splat(REACH)),
     };
     if let (ColliderGeometry::Mesh(obstacle), Some(_)) = (&shape.geometry, &workpiece.periodontium) {
         // A neighbour that was grown is as fine as it needs to be.
@@ -77,7 +73,7 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
     }
     if let (ColliderGeometry::Sdf(field), Some(gum)) = (&shape.geometry, &workpiece.periodontium) {
         // As the eye sees it: lying on the tooth. A probe finds it a little off.
-        let [low, high] = field.extent();
+        let Aabb { low, high } = field.extent();
         let grid = Grid::covering(low, high, Vec3::splat(GUM_SPACING), 1);
         // At its ends along the arch and below, the gingiva is lowered under the jaw's own, which is a little deeper.
         let dive = |p: Vec3| {

@@ -45,27 +45,20 @@ const QUADRANT_MIDDLE: [f32; 2] = [18.0, 20.0];
 ///
 /// From above, the user's side of the tooth is at the picture's lower edge.
 pub fn tooth_view(workpiece: &Workpiece, side: ToothSide) -> Orbit {
-    let [low, high] = crowns(workpiece);
-    let middle = workpiece.world_from_tooth * (0.5 * (low + high));
+    let crowns = workpiece.crown_bounds();
+    let middle = workpiece.world_from_tooth * crowns.centre();
     let distal = workpiece.teeth.first().map_or(Vec3::Y, ToothBounds::distal);
-    let radius = 0.5 * CROWN_ROOM * (high - low).max_element();
+    let radius = 0.5 * CROWN_ROOM * crowns.size().max_element();
     orbit_toward(middle, radius, workpiece.world_from_tooth.rotate(side.toward_eye(distal)))
-}
-
-/// Corners of the box around all crowns, tooth space.
-fn crowns(workpiece: &Workpiece) -> [Vec3; 2] {
-    let low = workpiece.teeth.iter().map(|t| t.crown_low).fold(Vec3::INFINITY, Vec3::min);
-    let high = workpiece.teeth.iter().map(|t| t.crown_high).fold(Vec3::NEG_INFINITY, Vec3::max);
-    [low, high]
 }
 
 /// The usual view at work: from the user's side and from above, the teeth worked on with a neighbour on each side.
 pub fn work_view(workpiece: &Workpiece) -> Orbit {
     /// Of what stands beside the crowns, mm.
     const BESIDE: f32 = 6.0;
-    let [low, high] = crowns(workpiece);
-    let middle = workpiece.world_from_tooth * (0.5 * (low + high));
-    let radius = 0.5 * (high - low).max_element() + BESIDE;
+    let crowns = workpiece.crown_bounds();
+    let middle = workpiece.world_from_tooth * crowns.centre();
+    let radius = 0.5 * crowns.size().max_element() + BESIDE;
     Orbit { azimuth: 0.25, elevation: 0.75, ..Orbit::around(middle, radius) }
 }
 

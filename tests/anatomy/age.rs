@@ -155,7 +155,7 @@ fn an_author_has_the_mouth_look_its_age() {
     println!("at 70 the margin of 36 has gone back by {gone:.2?} mm");
     assert!((gone.iter().sum::<f32>() / 6.0 - 0.9).abs() < 0.15, "{gone:?}");
     assert!(gone[1] > gone[0] + 0.3, "most on the cheek's side: {gone:?}");
-    let height = |workpiece: &Workpiece| workpiece.teeth[0].crown_high.z;
+    let height = |workpiece: &Workpiece| workpiece.teeth[0].crown.high.z;
     assert!(height(&plain) - height(&old) > 0.5);
     let ours = exercise(patient, r#"{ "recession_mm": { "B": -0.8 } }"#).unwrap();
     assert!(

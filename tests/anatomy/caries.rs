@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use typodont_anatomy::caries;
 use typodont_anatomy::caries::{LesionDepth, LesionEntry, LesionSpec, LesionVoxel, SurfacePatch};
 use typodont_anatomy::{TissueLabels, grid_of_spacing, grow, lower_first_molar, teeth};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Label, Volume, distance};
 use typodont_exercise::scenario;
@@ -51,7 +52,7 @@ fn is_one_piece(volume: &Volume, decayed: &[LesionVoxel]) -> bool {
 fn a_fissure_lesion_goes_as_deep_as_it_is_said_and_is_widest_under_the_enamel() {
     let volume = tooth();
     let groove = caries::nearest_groove(&volume, Vec3::ZERO, 4.0, 2.0, |_| true).expect("a molar has a central groove");
-    let (low, high) = groove.extent();
+    let Aabb { low, high } = groove.extent();
     println!("groove: {} places, {low} to {high}", groove.line().len());
     // It branches: each arm is half as long.
     let from_above = |p: &Vec3| p.truncate().length();
@@ -92,7 +93,7 @@ fn a_fissure_lesion_goes_as_deep_as_it_is_said_and_is_widest_under_the_enamel() 
 #[test]
 fn a_lesion_through_a_smooth_surface_narrows_and_then_spreads() {
     let volume = tooth();
-    let [_, high] = volume.grid().extent();
+    let high = volume.grid().extent().high;
     let inward = Vec3::NEG_Y;
     let from = Vec3::new(0.0, high.y, 3.5);
     let step = (0..400).map(|i| from + inward * (i as f32 * 0.05));
@@ -122,7 +123,7 @@ fn a_lesion_near_a_marginal_ridge_goes_to_the_dentine_and_not_along_the_enamel()
     for (fdi, heights) in [(36, [2.5, 4.5]), (37, [3.5, 4.5])] {
         let form = &teeth::tooth(fdi).unwrap();
         let volume = grow(form, grid_of_spacing(form, 0.15), &TISSUES);
-        let [_, high] = volume.grid().extent();
+        let high = volume.grid().extent().high;
         for height in heights {
             let inward = Vec3::NEG_Y;
             let from = Vec3::new(0.0, high.y, height);

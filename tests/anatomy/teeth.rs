@@ -241,14 +241,13 @@ fn any_tooth_can_be_worked_on_in_its_own_gap() {
         let workpiece = exercise(fdi).unwrap();
         let place = &workpiece.teeth[0];
         let [_, teeth, ..] = &exercise_mouth(&workpiece).one_jaw()[..] else { panic!("gum and teeth") };
-        let lesion = workpiece.lesions[0].centre - 0.5 * (place.crown_low + place.crown_high);
+        let lesion = workpiece.lesions[0].centre - place.crown.centre();
         assert!(lesion.dot(place.distal()) < -1.0, "{fdi}: the decay lies at {lesion}");
         // In arch space, with x toward one side and y back, the midline is at x = 0: mesial decay is nearer to it or to the
         // front than the tooth's middle.
         let tooth_from_jaw = workpiece.world_from_tooth.inverse() * teeth.world_from_solid;
         let to_jaw = tooth_from_jaw.inverse();
-        let [middle, decay] =
-            [0.5 * (place.crown_low + place.crown_high), workpiece.lesions[0].centre].map(|p| to_jaw * p);
+        let [middle, decay] = [place.crown.centre(), workpiece.lesions[0].centre].map(|p| to_jaw * p);
         let toward_midline = middle.x.abs() - decay.x.abs() + middle.y - decay.y;
         assert!(toward_midline > 0.5, "{fdi}: {middle} {decay}");
         // Side of the jaw: in arch space, +x is the patient's left in the lower jaw and the right in the upper jaw.
@@ -260,7 +259,7 @@ fn any_tooth_can_be_worked_on_in_its_own_gap() {
         let grid = workpiece.volume.grid();
         let from_air = distance::to_set(grid, |voxel| workpiece.volume.tissue(voxel) == Label::AIR);
         let corners = teeth.mesh.positions.iter().map(|p| tooth_from_jaw * *p);
-        let above_gum = place.crown_low.z + 0.4 * (place.crown_high.z - place.crown_low.z);
+        let above_gum = place.crown.low.z + 0.4 * (place.crown.high.z - place.crown.low.z);
         let crowns = corners.filter(|p| p.z > above_gum).filter_map(|p| grid.nearest(p));
         let deepest = crowns.map(|cell| from_air[grid.index(cell)]).fold(0.0, f32::max);
         println!("{fdi}: drawn neighbours reach {deepest:.2} mm into its crown");

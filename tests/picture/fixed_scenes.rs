@@ -90,7 +90,7 @@ impl FixedCase {
 fn prepare(volume: &mut Volume, workpiece: &Workpiece) {
     const RADIUS: f32 = 0.7;
     let lesion = &workpiece.lesions[0];
-    let top = workpiece.teeth[0].crown_high.z;
+    let top = workpiece.teeth[0].crown.high.z;
     let floor = lesion.centre.z - lesion.radii.map_or(2.2, |r| 0.5 * r.z);
     let levels = ((top - floor) / 0.2).ceil() as u32;
     for level in 0..=levels {

@@ -129,8 +129,7 @@ fn a_mouth_mirror_shows_the_far_side_of_the_tooth() {
     let palette = tissue_palette(&scenario.tissues, true);
     let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
     let viewpoint = Orbit { azimuth: 0.1, elevation: 0.5, distance: 95.0, ..work_view(&workpiece) }.viewpoint();
-    let tooth_middle =
-        workpiece.world_from_tooth * (0.5 * (workpiece.teeth[0].crown_low + workpiece.teeth[0].crown_high));
+    let tooth_middle = workpiece.world_from_tooth * (workpiece.teeth[0].crown.centre());
     let place = tooth_middle + Vec3::new(0.0, 11.0, -17.0);
     let halfway = (tooth_middle - place).normalize() + (viewpoint.position - place).normalize();
     let draw = |face: Vec3, name: &str| {
@@ -164,7 +163,7 @@ fn each_side_of_the_tooth_is_looked_at_squarely() {
     // Aim: a button that says "mesial" shows the mesial side, filling the picture.
     let (_, workpiece) = exercise("5-grinding.json");
     let place = &workpiece.teeth[0];
-    let middle = 0.5 * (place.crown_low + place.crown_high);
+    let middle = place.crown.centre();
     for side in ToothSide::ALL {
         let viewpoint = tooth_view(&workpiece, side).viewpoint();
         let eye_in_tooth = workpiece.world_from_tooth.inverse() * viewpoint.position;
@@ -180,7 +179,7 @@ fn each_side_of_the_tooth_is_looked_at_squarely() {
         let eye = viewpoint.eye(1.0);
         for corner in 0..8u32 {
             let share = Vec3::from([0, 1, 2].map(|a| (corner >> a & 1) as f32));
-            let point = workpiece.world_from_tooth * (place.crown_low + (place.crown_high - place.crown_low) * share);
+            let point = workpiece.world_from_tooth * (place.crown.low + place.crown.size() * share);
             let ([x, y], _) = eye.project(point);
             assert!((-0.1..1.1).contains(&x) && (-0.1..1.1).contains(&y), "{side:?}: {x} {y}");
         }
@@ -196,11 +195,11 @@ fn the_gap_fits_the_carved_tooth() {
     workpiece.surroundings.clear();
     for fdi in [15, 25, 34, 36, 37, 46, 48] {
         workpiece.teeth[0].fdi = fdi;
-        let ToothBounds { crown_low, crown_high, .. } = workpiece.teeth[0];
+        let ToothBounds { crown, .. } = workpiece.teeth[0];
         let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
         let [_, teeth] = &mouth.one_jaw()[..] else { panic!("gum and teeth") };
         let tooth_from_jaw = workpiece.world_from_tooth.inverse() * teeth.world_from_solid;
-        let inside = |point: Vec3| (point - crown_low).min(crown_high - point).min_element();
+        let inside = |point: Vec3| (point - crown.low).min(crown.high - point).min_element();
         let corners: Vec<Vec3> = teeth.mesh.positions.iter().map(|p| tooth_from_jaw * *p).collect();
         let deepest = corners.iter().map(|p| inside(*p)).fold(f32::NEG_INFINITY, f32::max);
         assert!((-0.6..1.0).contains(&deepest), "{fdi}: a neighbour {deepest} mm inside");
@@ -215,12 +214,12 @@ fn gum_is_drawn_where_it_is_felt() {
     let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
     let gum_label = scenario.tissues.by_name("gingiva").unwrap().label();
     let felt = workpiece.surroundings.iter().find(|shape| shape.label == gum_label).unwrap();
-    let ToothBounds { crown_low, crown_high, .. } = workpiece.teeth[0];
+    let ToothBounds { crown, .. } = workpiece.teeth[0];
     let solids = mouth.one_jaw();
     let tooth_from_gum = workpiece.world_from_tooth.inverse() * solids[0].world_from_solid;
     let near = solids[0].mesh.positions.iter().map(|p| tooth_from_gum * *p).filter(|p| {
-        let aside = (*p - p.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
-        aside.length() < 5.0 && p.z > crown_low.z - 5.0
+        let aside = (*p - p.clamp(crown.low, crown.high)) * Vec3::new(1.0, 1.0, 0.0);
+        aside.length() < 5.0 && p.z > crown.low.z - 5.0
     });
     let off: Vec<f32> = near.map(|p| felt.distance(p).abs()).collect();
     assert!(off.len() > 200, "{} places", off.len());
@@ -239,13 +238,13 @@ fn under_gum_that_is_a_mesh_the_drawn_gum_does_not_show() {
     let mesh = surface::extract(&Volume::from_distance(grid, 1.2, |p| (usual.distance(p), gum_label)));
     let form = ColliderGeometry::Mesh(Arc::new(ClosedMesh::new(&mesh).unwrap()));
     workpiece.surroundings = vec![Collider { label: gum_label, tooth_from_collider: Pose::IDENTITY, geometry: form }];
-    let ToothBounds { crown_low, crown_high, .. } = workpiece.teeth[0];
+    let ToothBounds { crown, .. } = workpiece.teeth[0];
     let solids = Mouth::around(&workpiece, &scenario.tissues).unwrap().one_jaw();
     assert_eq!(solids.len(), 2 + 1, "gum, teeth, and the mesh itself");
     let tooth_from_gum = workpiece.world_from_tooth.inverse() * solids[0].world_from_solid;
     let near = solids[0].mesh.positions.iter().map(|p| tooth_from_gum * *p).filter(|p| {
-        let aside = (*p - p.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
-        aside.length() < 5.0 && p.z > crown_low.z - 5.0
+        let aside = (*p - p.clamp(crown.low, crown.high)) * Vec3::new(1.0, 1.0, 0.0);
+        aside.length() < 5.0 && p.z > crown.low.z - 5.0
     });
     let highest = near.map(|p| workpiece.surroundings[0].distance(p)).fold(f32::NEG_INFINITY, f32::max);
     assert!((-0.6..-0.2).contains(&highest), "{highest} mm");

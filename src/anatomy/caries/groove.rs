@@ -1,6 +1,7 @@
 //! Grooves of an occlusal surface as an instrument finds them: places that a ball rolling over the surface cannot
 //! reach.
 
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{ISO, Volume};
 
@@ -29,9 +30,9 @@ impl Groove {
         &self.line
     }
 
-    /// Returns the corners of the groove's bounding box.
-    pub fn extent(&self) -> (Vec3, Vec3) {
-        self.line.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)))
+    /// Returns the groove's bounding box.
+    pub fn extent(&self) -> Aabb {
+        Aabb::around(self.line.iter().copied())
     }
 
     /// Returns points of the bottom that are at least `apart` mm from each other, such that every other point is nearer
@@ -108,7 +109,7 @@ struct HeightMap {
 impl HeightMap {
     fn around(volume: &Volume, place: Vec3, reach: f32, holds: impl Fn(Vec3) -> bool) -> HeightMap {
         let grid = volume.grid();
-        let [low, high] = grid.extent();
+        let Aabb { low, high } = grid.extent();
         let reach = Vec3::new(reach, reach, 0.0);
         let [xs, ys, zs] = grid.cells_within((place - reach).with_z(low.z), (place + reach).with_z(high.z));
         let top_of = |x: u32, y: u32| {

@@ -9,6 +9,7 @@ mod groove;
 pub use groove::{Groove, nearest_groove};
 
 use crate::TissueLabels;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Grid, Label, Volume, distance};
 
@@ -129,7 +130,7 @@ impl<'a> LesionGrid<'a> {
         let (low, high) = match &lesion.entry {
             LesionEntry::Groove(groove) => {
                 let reach = Vec3::new(1.0, 1.0, 0.0) * (lesion.spread + AROUND) + Vec3::Z * AROUND;
-                let (low, high) = groove.extent();
+                let Aabb { low, high } = groove.extent();
                 (low - reach - Vec3::Z * DEPTH, high + reach)
             }
             LesionEntry::Smooth(SurfacePatch { at, inward, half, .. }) => {

@@ -100,7 +100,7 @@ impl PreviewState {
         let teeth: Vec<u8> = build.workpiece.teeth.iter().map(|tooth| tooth.fdi).collect();
         if teeth != self.teeth {
             self.orbit = scene::work_view(&build.workpiece).zoomed(0.8);
-            let middle = build.workpiece.teeth.first().map(|tooth| 0.5 * (tooth.crown_low + tooth.crown_high));
+            let middle = build.workpiece.teeth.first().map(|tooth| tooth.crown.centre());
             self.slice_point =
                 build.workpiece.lesions.first().map(|lesion| lesion.centre).or(middle).unwrap_or_default();
             self.teeth = teeth;

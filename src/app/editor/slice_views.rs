@@ -50,18 +50,14 @@ fn slice_ui(
     let (side, axis, key) = SLICES[which];
     let name = ui.add(egui::Label::new(egui::RichText::new(words.get(key)).size(13.0).strong()).truncate());
     let Some(build) = &editor.build else { return };
-    let [low, high] = {
-        let teeth = &build.workpiece.teeth;
-        let low = teeth.iter().map(|t| t.low).fold(Vec3::INFINITY, Vec3::min);
-        [low, teeth.iter().map(|t| t.high).fold(Vec3::NEG_INFINITY, Vec3::max)]
-    };
+    let bounds = build.workpiece.bounds();
     let (rect, view) = ui.allocate_exact_size(size, Sense::click_and_drag());
     view.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, words.get(key)));
     anchor(ui, format!("cut:{axis}"), rect);
     let scale = ui.pixels_per_point();
     let pixels = [rect.width(), rect.height()].map(|points| (points * scale).round().max(8.0) as u32);
     let shot = ImagePlane {
-        camera: OrthographicCamera::framing_box(side, low, high, pixels[0] as f32 / pixels[1] as f32),
+        camera: OrthographicCamera::framing_box(side, &bounds, pixels[0] as f32 / pixels[1] as f32),
         width: pixels[0],
         height: pixels[1],
     };
@@ -75,13 +71,13 @@ fn slice_ui(
         && let Some(at) = view.interact_pointer_pos()
     {
         let at = (at - rect.min) * scale;
-        let mut point = shot.unproject(at.x, at.y).clamp(low, high);
+        let mut point = bounds.nearest(shot.unproject(at.x, at.y));
         point[axis] = editor.preview.slice_point[axis];
         commands.push(AppCommand::Editor(EditorCommand::MoveSlices(point)));
     }
     let mut position = editor.preview.slice_point[axis];
     ui.spacing_mut().slider_width = (size.x - 66.0).max(20.0);
-    let slider = egui::Slider::new(&mut position, low[axis]..=high[axis]).fixed_decimals(1).suffix(" mm");
+    let slider = egui::Slider::new(&mut position, bounds.low[axis]..=bounds.high[axis]).fixed_decimals(1).suffix(" mm");
     // Adding 0.0 avoids "-0.0".
     let slider = slider.custom_formatter(|mm, _| format!("{:.1}", (mm * 10.0).round() / 10.0 + 0.0));
     ui.spacing_mut().interact_size.x = 50.0;

@@ -119,11 +119,11 @@ fn frames(tooth: &Volume) -> Result<FrameTimings, String> {
         LabelPalette::from_colours(|label| table.by_label(label).map_or([0.5; 3], |tissue| tissue.rgb()), 0.2);
     let function = Arc::new(TransferFunction::tissue(&palette));
     let grid = tooth.grid();
-    let [low, high] = tooth.bounding_box().unwrap_or_default().map(|cell| grid.centre(cell));
+    let bounds = grid.extent_of(&tooth.bounding_box().unwrap_or_default());
     let upright = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
-    let orbit = Orbit::around(upright * (0.5 * (low + high)), 0.5 * (high - low).length());
+    let orbit = Orbit::around(upright * bounds.centre(), bounds.half_size().length());
     let mut failed = None;
-    let middle = upright * (0.5 * (low + high));
+    let middle = upright * bounds.centre();
     let (grains, drops) = (particle_ball(middle, 2000, 1.0), particle_ball(middle, 800, 0.3));
     let mut times = |shown: RenderMode, is_smooth: bool, specks: [&[Particle]; 2]| {
         let mut view = orbit;

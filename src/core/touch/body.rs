@@ -4,6 +4,7 @@
 //! coordinates are in handle space: +z along the shaft toward the hand, the origin at the tip of the device.
 
 use super::profile::{Profile, ProfilePoint, ProfileSample};
+use crate::aabb::Aabb;
 use crate::frame::Vec3;
 use crate::volume::{Grid, ISO, Volume, distance, surface};
 use std::f32::consts::{PI, TAU};
@@ -151,7 +152,7 @@ impl Body {
     /// makes contact.
     pub fn with_shaft(volume: &Volume, shank: Shank) -> Body {
         let Body { head, surface_points: mut shell, .. } = Body::of_volume(volume);
-        let [low, high] = volume.grid().extent();
+        let Aabb { low, high } = volume.grid().extent();
         let foot = ProfilePoint { r: 0.5 * shank.neck, z: 0.5 * (low.z + high.z) };
         let shaft = Profile::shank(foot, ProfilePoint { r: 0.5 * shank.diameter, z: shank.begins }, shank.ends);
         let spacing = SHANK_SPACING_FACTOR
@@ -208,7 +209,7 @@ impl Body {
         match &self.head {
             HeadGeometry::Revolved { profile, .. } => (profile.radius(), profile.span()),
             HeadGeometry::Voxels(field) => {
-                let [low, high] = field.grid.extent();
+                let Aabb { low, high } = field.grid.extent();
                 let aside = low.abs().max(high.abs());
                 (ProfilePoint::of(aside).r, [low.z, high.z])
             }
@@ -221,7 +222,7 @@ impl Body {
             HeadGeometry::Revolved { profile, .. } => profile.radius(),
             HeadGeometry::Voxels(field) => {
                 // Narrowest half-width of the grid, less the margin by which the grid exceeds the shape.
-                let [low, high] = field.grid.extent();
+                let Aabb { low, high } = field.grid.extent();
                 let margin = 4.0 * field.grid.spacing.max_element();
                 (high.x.min(high.y).min(-low.x).min(-low.y) - margin).max(0.0)
             }
@@ -351,7 +352,7 @@ impl HeadSdf {
 
     /// Trilinear interpolation; beyond the grid the distance to the grid is added.
     fn distance(&self, point_in_handle: Vec3) -> f32 {
-        let [low, high] = self.grid.extent();
+        let Aabb { low, high } = self.grid.extent();
         let inside = point_in_handle.clamp(low, high);
         self.grid.trilinear(&self.distances, inside) + inside.distance(point_in_handle)
     }

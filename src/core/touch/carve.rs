@@ -14,6 +14,7 @@ use super::contact_spring::ContactForce;
 use super::instrument::Instrument;
 use super::material::Materials;
 use super::wear::{WearRate, WorkBudget};
+use crate::aabb::Aabb;
 use crate::frame::{Quat, Vec3};
 use crate::tick::TICK_S;
 use crate::volume::{Density, Edit, Label, Volume, Voxel, density_at_distance};
@@ -287,7 +288,7 @@ impl Carver {
     ) -> Option<u32> {
         let (grid, band) = (*volume.grid(), volume.half_band());
         let cylinder = SweptCylinder::of(body, increment, increment.run_out + band);
-        let [low, high] = cylinder.extent();
+        let Aabb { low, high } = cylinder.extent();
         let [xs, ys, zs] = grid.cells_within(low, high);
         if xs.is_empty() {
             return None;
@@ -473,11 +474,11 @@ impl SweptCylinder {
         SweptCylinder { middle, axis, radius: radius + margin, half_length: 0.5 * (high - low) + margin }
     }
 
-    /// Lowest and highest corner of the bounding box.
-    fn extent(&self) -> [Vec3; 2] {
+    /// Bounding box.
+    fn extent(&self) -> Aabb {
         let aside = |along: f32| self.half_length * along.abs() + self.radius * (1.0 - along * along).max(0.0).sqrt();
         let half = Vec3::new(aside(self.axis.x), aside(self.axis.y), aside(self.axis.z));
-        [self.middle - half, self.middle + half]
+        Aabb::new(self.middle - half, self.middle + half)
     }
 
     /// Entry and exit of a line along x through `from`, as signed distances from that point.

@@ -2,6 +2,7 @@
 
 use super::closed_mesh::{ClosedMesh, MeshContact};
 use super::sdf_grid::SdfGrid;
+use crate::aabb::Aabb;
 use crate::frame::{Pose, Vec3};
 use crate::volume::{Label, Volume};
 use std::sync::Arc;
@@ -146,7 +147,7 @@ impl CollisionScene {
     /// The same for the volume alone.
     pub(super) fn clear_radius_of_volume(&self, point_in_tooth: Vec3) -> f32 {
         let grid = self.volume.grid();
-        let [low, high] = grid.extent();
+        let Aabb { low, high } = grid.extent();
         let nearest_inside = point_in_tooth.clamp(low, high);
         let outside_squared = nearest_inside.distance_squared(point_in_tooth);
         if outside_squared > 0.0 {

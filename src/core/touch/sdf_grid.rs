@@ -1,5 +1,6 @@
 //! Shape sampled as signed distances on a grid: gum with a sulcus, and other shapes without a formula.
 
+use crate::aabb::Aabb;
 use crate::frame::Vec3;
 use crate::volume::Grid;
 
@@ -36,7 +37,7 @@ impl SdfGrid {
     /// Samples a signed distance, mm, at every point of a grid. A shape that extends beyond the grid is cut off at
     /// its border.
     pub fn from_fn(grid: Grid, compliance: Compliance, mut at: impl FnMut(Vec3) -> f32) -> SdfGrid {
-        let [low, high] = grid.extent();
+        let Aabb { low, high } = grid.extent();
         let distances = grid.cells().map(|cell| {
             let point = grid.centre(cell);
             let beyond = (low - point).max(point - high).max_element() + grid.spacing.max_element();
@@ -51,7 +52,7 @@ impl SdfGrid {
         self.steepness
     }
 
-    pub fn extent(&self) -> [Vec3; 2] {
+    pub fn extent(&self) -> Aabb {
         self.grid.extent()
     }
 
@@ -62,7 +63,7 @@ impl SdfGrid {
 
     /// Signed distance, mm; negative inside. Outside the grid it is a lower bound.
     pub fn distance(&self, point: Vec3) -> f32 {
-        let [low, high] = self.grid.extent();
+        let Aabb { low, high } = self.grid.extent();
         let nearest = point.clamp(low, high);
         let inside = self.grid.trilinear(&self.distances, nearest);
         let outside = nearest.distance(point);

@@ -3,7 +3,7 @@
 //! They make queries in empty space cheap: one look-up shows that a tool is far from matter, whatever the size of the
 //! volume.
 
-use crate::volume::{Density, Grid};
+use crate::volume::{CellBox, Density, Grid};
 
 /// Voxels along one edge of a brick.
 pub const BRICK: u32 = 8;
@@ -138,29 +138,27 @@ impl Bricks {
         })
     }
 
-    pub(super) fn bounding_box(&self, grid: &Grid, density: &[Density]) -> Option<[[u32; 3]; 2]> {
-        let (mut low, mut high) = ([u32::MAX; 3], [0; 3]);
+    pub(super) fn bounding_box(&self, grid: &Grid, density: &[Density]) -> Option<CellBox> {
+        let mut found: Option<CellBox> = None;
         for brick in (0..self.len()).filter(|&b| self.occupied[b] > 0) {
             let corner = self.corner(brick);
             let end: [u32; 3] = std::array::from_fn(|a| (corner[a] + BRICK).min(grid.dims[a]));
-            let known = (0..3).all(|a| low[a] <= corner[a] && end[a] - 1 <= high[a]);
-            if known {
+            let whole = CellBox { low: corner, high: end.map(|v| v - 1) };
+            if found.is_some_and(|known| known.contains(&whole)) {
                 continue;
             }
             for z in corner[2]..end[2] {
                 for y in corner[1]..end[1] {
                     for x in corner[0]..end[0] {
                         if density[grid.index([x, y, z])] > Density::EMPTY {
-                            for (axis, v) in [x, y, z].into_iter().enumerate() {
-                                low[axis] = low[axis].min(v);
-                                high[axis] = high[axis].max(v);
-                            }
+                            let cell = [x, y, z];
+                            found = Some(found.map_or(CellBox { low: cell, high: cell }, |known| known.with(cell)));
                         }
                     }
                 }
             }
         }
-        (low[0] != u32::MAX).then_some([low, high])
+        found
     }
 }
 

@@ -1,5 +1,7 @@
 //! Regular grid of a volume: its dimensions, spacing and position in tooth space.
 
+use super::CellBox;
+use crate::aabb::Aabb;
 use crate::frame::Vec3;
 
 /// Regular grid of voxels. Voxel `[i, j, k]` has its centre at `origin + [i, j, k] * spacing` in tooth space.
@@ -83,9 +85,19 @@ impl Grid {
         ])
     }
 
-    /// Lowest and highest voxel centres in tooth space, mm.
-    pub fn extent(&self) -> [Vec3; 2] {
-        [self.origin, self.centre(self.dims.map(|n| n.saturating_sub(1)))]
+    /// Box around the voxel centres, tooth space, mm.
+    pub fn extent(&self) -> Aabb {
+        Aabb::new(self.origin, self.centre(self.dims.map(|n| n.saturating_sub(1))))
+    }
+
+    /// Box around the centres of the voxels of a box, tooth space, mm.
+    pub fn extent_of(&self, cells: &CellBox) -> Aabb {
+        Aabb::new(self.centre(cells.low), self.centre(cells.high))
+    }
+
+    /// Grid of a box of voxels.
+    pub fn part(&self, cells: &CellBox) -> Grid {
+        Grid { dims: cells.dims(), spacing: self.spacing, origin: self.centre(cells.low) }
     }
 
     /// Index ranges of the voxels whose centres lie within a box in tooth space, clipped to the grid.
@@ -143,7 +155,7 @@ mod tests {
         let cell = [3, 4, 5];
         assert_eq!(grid.nearest(grid.centre(cell)), Some(cell));
         assert_eq!(grid.nearest(grid.origin - grid.spacing), None);
-        let [low, high] = grid.extent();
+        let Aabb { low, high } = grid.extent();
         assert!(low.x <= -1.0 && high.y >= 3.0);
     }
 

@@ -4,6 +4,7 @@
 //! through ordered [`Edit`]s. Never knows the name of a tissue, a device or a file.
 
 mod bricks;
+mod cell_box;
 pub mod components;
 pub mod distance;
 mod edit;
@@ -15,10 +16,12 @@ pub mod surface;
 pub mod subgrid;
 
 pub use bricks::{BRICK, Bricks};
+pub use cell_box::CellBox;
 pub use edit::Edit;
 pub use grid::Grid;
 pub use sample::RAY_LENGTH_MAX;
 
+use crate::aabb::Aabb;
 use crate::frame::Vec3;
 
 /// Number of a tissue; its meaning is defined by a label table.
@@ -237,8 +240,13 @@ impl Volume {
     }
 
     /// Smallest box of voxel indices (both ends inclusive) that contains all matter; `None` for an empty volume.
-    pub fn bounding_box(&self) -> Option<[[u32; 3]; 2]> {
+    pub fn bounding_box(&self) -> Option<CellBox> {
         self.bricks.bounding_box(&self.grid, &self.density)
+    }
+
+    /// Box around the centres of all voxels with matter, tooth space, mm; of an empty volume, that of its grid.
+    pub fn extent(&self) -> Aabb {
+        self.bounding_box().map_or(self.grid.extent(), |cells| self.grid.extent_of(&cells))
     }
 }
 
@@ -314,7 +322,7 @@ mod tests {
     #[test]
     fn the_tight_box_holds_all_matter_and_no_more() {
         let volume = phantom::ball([40, 50, 60], Vec3::new(0.2, 0.2, 0.2), 2.0);
-        let [low, high] = volume.bounding_box().unwrap();
+        let CellBox { low, high } = volume.bounding_box().unwrap();
         let solid = |i: [u32; 3]| volume.voxel(volume.grid().index(i)).density > Density::EMPTY;
         for [x, y, z] in volume.grid().cells() {
             if solid([x, y, z]) {

@@ -1,5 +1,6 @@
 //! Density between voxel centres: trilinear values, and gradients smooth enough for haptics.
 
+use crate::aabb::Aabb;
 use crate::frame::Vec3;
 use crate::volume::{Density, ISO, Volume};
 
@@ -11,7 +12,7 @@ impl Volume {
     /// unit vector.
     pub fn raycast(&self, from: Vec3, along: Vec3) -> Option<(Vec3, Vec3)> {
         let step = 0.5 * self.grid().spacing.min_element();
-        let [low, high] = self.grid().extent();
+        let Aabb { low, high } = self.grid().extent();
         // The search begins at the point at which the ray enters the grid.
         let (a, b) = ((low - from) / along, (high - from) / along);
         let enters = a.min(b).max_element().max(0.0);

@@ -1,13 +1,43 @@
-//! Sub-box of a grid for local work; it may extend beyond the border of the grid.
+//! Parts of a grid for local work, so that it takes time in proportion to what is worked on and not to the whole.
 
 use crate::frame::Vec3;
-use crate::volume::{Density, Grid, Label};
+use crate::volume::{CellBox, Density, Grid, Label};
+
+/// Box of voxels of a grid, with its own array indices.
+#[derive(Clone, Copy, Debug)]
+pub struct SubGrid {
+    whole: Grid,
+    low: [u32; 3],
+    pub grid: Grid,
+}
+
+impl SubGrid {
+    /// Returns the smallest box around the `wanted` voxels, with a margin in voxels that ends at the border of the
+    /// grid; `None` if there are none.
+    pub fn around(whole: &Grid, margin: u32, wanted: impl Iterator<Item = usize>) -> Option<SubGrid> {
+        let cells = CellBox::around(wanted.map(|index| whole.cell(index)))?.grown_within(whole, margin);
+        Some(SubGrid { whole: *whole, low: cells.low, grid: whole.part(&cells) })
+    }
+
+    /// Returns the index in the whole grid of a voxel of the box.
+    pub fn whole_index(&self, index: usize) -> usize {
+        let cell = self.grid.cell(index);
+        self.whole.index(std::array::from_fn(|a| cell[a] + self.low[a]))
+    }
+
+    /// Returns the index in the box of a voxel of the whole grid; `None` outside the box.
+    pub fn index_of(&self, whole_index: usize) -> Option<usize> {
+        let cell = self.whole.cell(whole_index);
+        let is_inside = |a: usize| cell[a] >= self.low[a] && cell[a] - self.low[a] < self.grid.dims[a];
+        (0..3).all(is_inside).then(|| self.grid.index(std::array::from_fn(|a| cell[a] - self.low[a])))
+    }
+}
 
 /// Empty voxels kept around the requested box, for sampling and surfaces.
 const SURFACE_MARGIN: u32 = 3;
 
-/// Box of voxels of a grid, padded with empty voxels beyond its border.
-pub struct SubGrid {
+/// Box of voxels of a grid that is padded with empty voxels and may extend beyond the border of the grid.
+pub struct PaddedGrid {
     /// Grid of the box.
     pub grid: Grid,
     whole: Grid,
@@ -17,14 +47,14 @@ pub struct SubGrid {
     extra_margin: [u32; 3],
 }
 
-impl SubGrid {
-    /// Creates the box of the voxels from `low` to `high`, with room for the surface and `extra_margin` voxels on
+impl PaddedGrid {
+    /// Creates the grid of a box of voxels, with room for the surface and `extra_margin` voxels on
     /// every side.
-    pub fn around(whole: &Grid, low: [u32; 3], high: [u32; 3], extra_margin: [u32; 3]) -> SubGrid {
+    pub fn around(whole: &Grid, cells: &CellBox, extra_margin: [u32; 3]) -> PaddedGrid {
         let margin = extra_margin.map(|n| SURFACE_MARGIN + n);
-        let offset = std::array::from_fn(|axis| i64::from(low[axis]) - i64::from(margin[axis]));
-        let dims = std::array::from_fn(|axis| high[axis] - low[axis] + 1 + 2 * margin[axis]);
-        SubGrid { grid: shifted(whole, offset, dims), whole: *whole, offset, extra_margin }
+        let offset = std::array::from_fn(|axis| i64::from(cells.low[axis]) - i64::from(margin[axis]));
+        let dims = std::array::from_fn(|axis| cells.dims()[axis] + 2 * margin[axis]);
+        PaddedGrid { grid: shifted(whole, offset, dims), whole: *whole, offset, extra_margin }
     }
 
     /// Extracts the box from one value per voxel of the whole grid; voxels beyond its border are `empty`.
@@ -82,7 +112,7 @@ mod tests {
         // Aim: a voxel keeps its position in space through crop and paste. Method: a box over one corner of a grid.
         let whole = Grid::centred([7, 6, 5], Vec3::new(0.5, 0.25, 1.0));
         let values: Vec<usize> = (1..=whole.len()).collect();
-        let window = SubGrid::around(&whole, [1, 2, 1], [3, 4, 4], [2; 3]);
+        let window = PaddedGrid::around(&whole, &CellBox { low: [1, 2, 1], high: [3, 4, 4] }, [2; 3]);
         let cut = window.crop(values, 0);
         let label: Vec<Label> = cut.iter().map(|&v| Label(v as u8)).collect();
         let (grid, _, label) = window.paste(vec![Density::FULL; label.len()], label);

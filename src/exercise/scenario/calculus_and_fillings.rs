@@ -82,7 +82,7 @@ pub(super) fn apply_old_filling(
 ) -> Option<Volume> {
     let grid = *volume.grid();
     let [nx, ny, nz] = grid.dims;
-    let crown = 0.5 * (place.crown_low + place.crown_high);
+    let crown = place.crown.centre();
     let middle = crown + Vec3::X * filling.offset[0] + place.distal() * filling.offset[1];
     let half = [0.5 * filling.size[0], 0.5 * filling.size[1]];
     let is_solid: Vec<bool> = volume.densities().iter().map(|d| d.is_solid()).collect();
@@ -97,7 +97,7 @@ pub(super) fn apply_old_filling(
         let Some(top) = tops[(y * nx + x) as usize].filter(|_| !is_beside) else { return label };
         let below = (top as f32 - z as f32) * grid.spacing.z;
         let is_hard = matches!(tissues.role(label), Some(TissueRole::Sound | TissueRole::Decay | TissueRole::Material));
-        let is_hit = below <= filling.depth && at.z > place.crown_low.z && is_hard;
+        let is_hit = below <= filling.depth && at.z > place.crown.low.z && is_hard;
         count += usize::from(is_hit && is_solid[index]);
         if is_hit { filling.label } else { label }
     });

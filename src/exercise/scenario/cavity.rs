@@ -111,7 +111,7 @@ impl PreparedCavity {
         /// Extent beyond the crown, mm.
         const BEYOND: f32 = 2.0;
         let outward = place.distal().y * if proximal.is_distal { 1.0 } else { -1.0 };
-        let rim = if outward > 0.0 { place.crown_high.y } else { place.crown_low.y };
+        let rim = if outward > 0.0 { place.crown.high.y } else { place.crown.low.y };
         let (axial, open) = (rim - outward * proximal.axial, rim + outward * BEYOND);
         CavitySolid {
             middle: Vec3::new(surface.x, 0.5 * (axial + open), surface.z - proximal.depth),

@@ -54,7 +54,7 @@ impl EntrySite {
         /// the surface.
         const INTO_QUADRANT: f32 = 0.42;
         const BY_CHANCE: f32 = 0.4;
-        let (middle, half) = (0.5 * (place.crown_low + place.crown_high), 0.5 * (place.crown_high - place.crown_low));
+        let (middle, half) = (place.crown.centre(), place.crown.half_size());
         let distal = place.distal();
         let (inward, u, v) = match decay.surface {
             SurfaceFile::O => (Vec3::NEG_Z, Vec3::X, distal),

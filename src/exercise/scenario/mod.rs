@@ -36,6 +36,7 @@ use file::{AngleClassFile, SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_anatomy::caries::LesionDepth;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::touch::{CarvingParameters, Collider, Guidance, MaterialScales, Vibration};
 use typodont_core::volume::{Label, Volume};
@@ -268,12 +269,12 @@ pub enum ZoneRegion {
 }
 
 impl ZoneRegion {
-    /// Returns the corners of the smallest box around a geometric region, tooth space, mm; `None` for a region defined
+    /// Returns the smallest box around a geometric region, tooth space, mm; `None` for a region defined
     /// by tissues or a label map.
-    pub fn bounding_box(&self) -> Option<[Vec3; 2]> {
+    pub fn bounding_box(&self) -> Option<Aabb> {
         let around = |a: [f32; 3], b: [f32; 3], radius: f32| {
             let (a, b) = (Vec3::from(a), Vec3::from(b));
-            [a.min(b) - radius, a.max(b) + radius]
+            Aabb::around([a, b]).grown(Vec3::splat(radius))
         };
         match self {
             ZoneRegion::Sphere { centre, radius } => Some(around(*centre, *centre, *radius)),

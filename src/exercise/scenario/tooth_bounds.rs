@@ -2,6 +2,7 @@
 
 use super::{SceneLayout, distal};
 use crate::catalog::TissueTable;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::Label;
 
@@ -10,12 +11,10 @@ use typodont_core::volume::Label;
 pub struct ToothBounds {
     pub id: String,
     pub fdi: u8,
-    /// Corners of the bounding box of the whole tooth.
-    pub low: Vec3,
-    pub high: Vec3,
-    /// Corners of the bounding box of the crown (the enamel).
-    pub crown_low: Vec3,
-    pub crown_high: Vec3,
+    /// Bounding box of the whole tooth.
+    pub whole: Aabb,
+    /// Bounding box of the crown (the enamel).
+    pub crown: Aabb,
 }
 
 impl ToothBounds {
@@ -26,7 +25,7 @@ impl ToothBounds {
 
     /// Returns the quadrant (1–4, as seen from above) of a point in tooth space on a tooth.
     pub fn quadrant(&self, point_in_tooth: Vec3) -> u8 {
-        let from_middle = point_in_tooth - 0.5 * (self.crown_low + self.crown_high);
+        let from_middle = point_in_tooth - self.crown.centre();
         match (from_middle.x > 0.0, from_middle.y > 0.0) {
             (true, true) => 1,
             (true, false) => 2,

@@ -13,6 +13,7 @@ use crate::catalog::TissueTable;
 use std::fmt;
 use std::sync::Arc;
 use typodont_anatomy::periodontium::{Periodontium, Pockets, ToothContext};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider, Compliance, SdfGrid};
@@ -194,7 +195,7 @@ impl Workpiece {
         }
         let gum = scenario.scene.pockets.map(|pockets| periodontium(&volume, &teeth[0], pockets, &scenario.tissues));
         if let Some(gum) = &gum {
-            let beyond = teeth[0].low.z - gum.lowest_floor();
+            let beyond = teeth[0].whole.low.z - gum.lowest_floor();
             if beyond > 0.0 {
                 return Err(WorkpieceError::PocketTooDeep { tenths: (10.0 * beyond).ceil() as u32 });
             }
@@ -204,10 +205,8 @@ impl Workpiece {
             (SceneLayout::Jaw, None) => surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues),
             (SceneLayout::Single | SceneLayout::Pair { .. }, _) => Vec::new(),
         };
-        let low = teeth.iter().map(|t| t.crown_low).reduce(Vec3::min).unwrap_or_default();
-        let high = teeth.iter().map(|t| t.crown_high).reduce(Vec3::max).unwrap_or_default();
-        let world_from_tooth =
-            world_from_tooth_above(Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), high.z));
+        let crowns = union(teeth.iter().map(|tooth| tooth.crown));
+        let world_from_tooth = world_from_tooth_above(crowns.centre().with_z(crowns.high.z));
         let periodontium = gum.map(Arc::new);
         let drawn = Workpiece::draw(scenario, &lesions, seed);
         let arch = scenario.scene.arch.clone();
@@ -228,6 +227,16 @@ impl Workpiece {
             true => self.lesions.get((*self.drawn.get(stage)?)?),
             false => self.lesions.iter().find(|lesion| lesion.id == id),
         }
+    }
+
+    /// Returns the bounding box of all teeth, tooth space, mm; without teeth the origin.
+    pub fn bounds(&self) -> Aabb {
+        union(self.teeth.iter().map(|tooth| tooth.whole))
+    }
+
+    /// Returns the bounding box of all crowns, tooth space, mm; without teeth the origin.
+    pub fn crown_bounds(&self) -> Aabb {
+        union(self.teeth.iter().map(|tooth| tooth.crown))
     }
 
     /// Unit vector toward distal of the first tooth, tooth space.
@@ -259,6 +268,10 @@ fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, Work
     }
 }
 
+fn union(boxes: impl Iterator<Item = Aabb>) -> Aabb {
+    boxes.reduce(Aabb::union).unwrap_or_default()
+}
+
 fn bounds_of(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable) -> Option<ToothBounds> {
     bounds_within(tooth, volume, tissues, PairHalf::All)
 }
@@ -266,8 +279,8 @@ fn bounds_of(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable) -> Optio
 fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, side: PairHalf) -> Option<ToothBounds> {
     let enamel = anatomy_tissues(tissues).enamel;
     let grid = volume.grid();
-    let mut whole = PointBounds::EMPTY;
-    let mut crown = PointBounds::EMPTY;
+    let mut whole = Aabb::EMPTY;
+    let mut crown = Aabb::EMPTY;
     let [nx, ny, nz] = grid.dims;
     for [y, z] in (0..nz).flat_map(|z| (0..ny).map(move |y| [y, z])) {
         let centre = |x: u32| grid.centre([x, y, z]);
@@ -277,35 +290,17 @@ fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, side
         // The ends of each row are sufficient to determine the bounds.
         let first = grid.index([0, y, z]);
         let tissue = |x: u32| volume.tissue(first + x as usize);
-        let ends = |bounds: &mut PointBounds, is_meant: &dyn Fn(Label) -> bool| {
+        let ends = |bounds: &mut Aabb, is_meant: &dyn Fn(Label) -> bool| {
             if let Some(low) = (0..nx).find(|&x| is_meant(tissue(x))) {
                 let high = (low..nx).rfind(|&x| is_meant(tissue(x))).unwrap_or(low);
-                bounds.add(centre(low));
-                bounds.add(centre(high));
+                *bounds = bounds.with(centre(low)).with(centre(high));
             }
         };
         ends(&mut whole, &|label| label != Label::AIR);
         ends(&mut crown, &|label| label == enamel);
     }
-    let PointBounds { low, high } = whole;
-    let (crown_low, crown_high) = (crown.low, crown.high);
-    let place = ToothBounds { id: tooth.id.clone(), fdi: tooth.fdi, low, high, crown_low, crown_high };
-    crown_low.cmple(crown_high).all().then_some(place)
-}
-
-#[derive(Clone, Copy)]
-struct PointBounds {
-    low: Vec3,
-    high: Vec3,
-}
-
-impl PointBounds {
-    const EMPTY: PointBounds = PointBounds { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
-
-    fn add(&mut self, point: Vec3) {
-        self.low = self.low.min(point);
-        self.high = self.high.max(point);
-    }
+    let place = ToothBounds { id: tooth.id.clone(), fdi: tooth.fdi, whole, crown };
+    (!crown.is_empty()).then_some(place)
 }
 
 /// Combines two teeth in one volume, the first on the left (y > 0). Each tooth is placed so that its `whole` form
@@ -318,16 +313,19 @@ fn side_by_side(teeth: &[Volume], whole: &[Volume], gap: f32) -> Result<Volume, 
     // Each tooth is moved by whole voxels, so that its densities need no resampling.
     let mut moves = Vec::new();
     for (index, tooth) in whole.iter().enumerate() {
-        let [low, high] = tight_extent(tooth);
-        let middle = 0.5 * (low + high);
-        let aside = if index == 0 { 0.5 * gap - low.y } else { -0.5 * gap - high.y };
+        let extent = tooth.extent();
+        let middle = extent.centre();
+        let aside = if index == 0 { 0.5 * gap - extent.low.y } else { -0.5 * gap - extent.high.y };
         let wanted = Vec3::new(-middle.x, aside, 0.0);
         let origin = tooth.grid().origin;
         // The grids coincide if both origins are a whole number of voxels from zero.
         moves.push(((origin + wanted) / spacing).round() * spacing - origin);
     }
-    let low = whole.iter().zip(&moves).map(|(t, m)| tight_extent(t)[0] + *m).fold(Vec3::INFINITY, Vec3::min);
-    let high = whole.iter().zip(&moves).map(|(t, m)| tight_extent(t)[1] + *m).fold(Vec3::NEG_INFINITY, Vec3::max);
+    let moved = |(tooth, shift): (&Volume, &Vec3)| {
+        let extent = tooth.extent();
+        Aabb::new(extent.low + *shift, extent.high + *shift)
+    };
+    let Aabb { low, high } = whole.iter().zip(&moves).map(moved).fold(Aabb::EMPTY, Aabb::union);
     let low = (low / spacing).round() * spacing;
     let grid = Grid::covering(low, high, spacing, 4);
     let voxels = grid.dims.iter().map(|&n| u64::from(n)).product();
@@ -348,13 +346,6 @@ fn side_by_side(teeth: &[Volume], whole: &[Volume], gap: f32) -> Result<Volume, 
     Ok(Volume::new(grid, teeth[0].half_band(), density, label, Label(1)))
 }
 
-fn tight_extent(volume: &Volume) -> [Vec3; 2] {
-    match volume.bounding_box() {
-        Some([low, high]) => [volume.grid().centre(low), volume.grid().centre(high)],
-        None => volume.grid().extent(),
-    }
-}
-
 /// Distance between neighbouring crowns, mm: in contact, except for the clearance that the run-out of a bur needs.
 const CONTACT_GAP: f32 = 0.05;
 
@@ -368,8 +359,8 @@ fn surroundings(
     /// Rounding of a crown, mm.
     const ROUNDING: f32 = 1.8;
     let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
-    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
-    let (neck, top) = (tooth.crown_low.z, tooth.crown_high.z);
+    let middle = tooth.crown.centre();
+    let (neck, top) = (tooth.crown.low.z, tooth.crown.high.z);
     // Across and along the arch, mm.
     let own = sizes(tooth.fdi).map_or([10.5, 11.0], |s| [s.buccolingual[0], s.mesiodistal[0]]);
     let neighbour = |fdi: u8, toward: Vec3| {
@@ -379,8 +370,8 @@ fn surroundings(
         let sizes = sizes(fdi)?;
         let half = Vec3::new(0.5 * sizes.buccolingual[0], 0.5 * sizes.mesiodistal[0], 4.5);
         let side = match toward.y < 0.0 {
-            true => tooth.crown_low.y - CONTACT_GAP - half.y,
-            false => tooth.crown_high.y + CONTACT_GAP + half.y,
+            true => tooth.crown.low.y - CONTACT_GAP - half.y,
+            false => tooth.crown.high.y + CONTACT_GAP + half.y,
         };
         Some(Collider {
             label: label("neighbour"),
@@ -425,13 +416,13 @@ fn anatomical_neighbour(
     let grid = Grid { dims: [nx, ny, nz - cut], origin, ..whole };
     let labels = typodont_anatomy::TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
     let mesh = surface::extract(&typodont_anatomy::grow(&form, grid, &labels));
-    let extent = mesh.positions.iter().fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[l, h], p| [l.min(*p), h.max(*p)]);
-    let middle = 0.5 * (tooth.crown_low + tooth.crown_high);
+    let extent = Aabb::around(mesh.positions.iter().copied());
+    let middle = tooth.crown.centre();
     let along = match toward.y < 0.0 {
-        true => tooth.crown_low.y - CONTACT_GAP - extent[1].y,
-        false => tooth.crown_high.y + CONTACT_GAP - extent[0].y,
+        true => tooth.crown.low.y - CONTACT_GAP - extent.high.y,
+        false => tooth.crown.high.y + CONTACT_GAP - extent.low.y,
     };
-    let place = Vec3::new(middle.x, along, tooth.crown_high.z - 0.3 - extent[1].z);
+    let place = Vec3::new(middle.x, along, tooth.crown.high.z - 0.3 - extent.high.z);
     let form = touch::ColliderGeometry::Mesh(Arc::new(ClosedMesh::new(&mesh)?));
     Some(Collider { label, tooth_from_collider: Pose::at(place), geometry: form })
 }
@@ -449,7 +440,7 @@ fn gum_with_pockets(
     const ACROSS: f32 = 2.0;
     /// Distance between samples, mm: a margin is rounded by half a millimetre.
     const SPACING: f32 = 0.2;
-    let (low, high) = (tooth.crown_low, tooth.crown_high);
+    let (low, high) = (tooth.crown.low, tooth.crown.high);
     let beside = Vec3::new(ACROSS, ALONG, 0.0);
     let (from, to) =
         ((low - beside).with_z(periodontium.lowest_floor() - 2.5), (high + beside).with_z(low.z + GUM_HIGH));
@@ -490,8 +481,7 @@ const ATTACHMENT_COMPLIANCE: Compliance = Compliance { from_force: 0.25, per_new
 
 fn periodontium(volume: &Volume, place: &ToothBounds, pockets: Pockets, tissues: &TissueTable) -> Periodontium {
     let enamel = anatomy_tissues(tissues).enamel;
-    let tooth_context =
-        ToothContext { volume, enamel, crown: [place.crown_low, place.crown_high], distal: place.distal().y };
+    let tooth_context = ToothContext { volume, enamel, crown: place.crown, distal: place.distal().y };
     Periodontium::around(&tooth_context, pockets)
 }
 

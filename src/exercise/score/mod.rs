@@ -6,7 +6,6 @@
 mod voxel_set;
 mod charting;
 mod contact_spell;
-mod cropped_grid;
 mod voxel_removals;
 mod grade;
 mod idle;
@@ -23,7 +22,6 @@ mod zones;
 
 pub use charting::{ProbingReading, SiteResult};
 pub use contact_spell::ContactSpell;
-pub use cropped_grid::CroppedGrid;
 pub use error_episodes::{EpisodeKind, ErrorEpisode, error_episodes};
 pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
 pub use idle::{idle_grade, trainee_grade};

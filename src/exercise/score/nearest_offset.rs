@@ -1,7 +1,7 @@
 //! Distance and anatomical direction of voxels from the nearest voxel of a set.
 
-use super::cropped_grid::CroppedGrid;
 use typodont_core::frame::Vec3;
+use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{Grid, distance};
 
 /// Direction from the tissue to be removed, or from the cavity.
@@ -45,7 +45,7 @@ impl AnatomicalDirection {
 
 /// The nearest voxel of a set, for the voxels within a box around all voxels in question.
 pub struct NearestOffsets {
-    near: Option<(CroppedGrid, Vec<f32>, Vec<u32>)>,
+    near: Option<(SubGrid, Vec<f32>, Vec<u32>)>,
     /// Unit vector toward distal, tooth space.
     distal: Vec3,
 }
@@ -58,7 +58,7 @@ impl NearestOffsets {
         is_in: impl Fn(usize) -> bool,
         is_asked: impl Fn(usize) -> bool,
     ) -> NearestOffsets {
-        let crop = CroppedGrid::around(grid, 1, (0..grid.len()).filter(|&v| is_in(v) || is_asked(v)));
+        let crop = SubGrid::around(grid, 1, (0..grid.len()).filter(|&v| is_in(v) || is_asked(v)));
         let near = crop.map(|crop| {
             let (distances, nearest) = distance::to_nearest(&crop.grid, |i| is_in(crop.whole_index(i)));
             (crop, distances, nearest)

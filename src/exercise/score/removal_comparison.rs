@@ -1,12 +1,12 @@
 //! The comparison of the removed tissue with the tissue to be removed.
 
-use super::cropped_grid::CroppedGrid;
 use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
 use super::zones::ZoneVoxels;
 use crate::catalog::TissueRole;
 use crate::record::Replay;
 use crate::scenario::file::ZoneRole;
 use crate::scenario::{Scenario, Zone};
+use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{Grid, Label, Volume, distance};
 
 /// Distances that differ by less are equal, mm: the same distance along other axes differs by rounding errors.
@@ -144,7 +144,7 @@ impl RemovalComparison {
         choose: fn(f32, f32) -> f32,
         removals: &VoxelRemovals,
     ) -> Option<VoxelDistance> {
-        let crop = CroppedGrid::around(&self.grid, 0, self.indices(|s| of(s) || from(s)))?;
+        let crop = SubGrid::around(&self.grid, 0, self.indices(|s| of(s) || from(s)))?;
         let distances = distance::to_set(&crop.grid, |i| from(self.flags[crop.whole_index(i)]));
         let all = distances.iter().enumerate().filter(|(_, d)| d.is_finite());
         let all = all.map(|(index, &mm)| (mm, crop.whole_index(index))).filter(|&(_, voxel)| of(self.flags[voxel]));
@@ -157,7 +157,7 @@ impl RemovalComparison {
     /// Returns the distances between the borders of R and T in both directions, mm, in ascending order; `None` if
     /// either is empty.
     pub fn outline_distances(&self) -> Option<Vec<f32>> {
-        let crop = CroppedGrid::around(&self.grid, 1, self.indices(|s| s.removed() || s.target()))?;
+        let crop = SubGrid::around(&self.grid, 1, self.indices(|s| s.removed() || s.target()))?;
         let at = |i: usize| self.flags[crop.whole_index(i)];
         let is_border = |i: usize, holds: &dyn Fn(VoxelFlags) -> bool| {
             // A voxel on the border of the box has neighbours outside, which belong to no set.
@@ -208,7 +208,7 @@ impl RemovalComparison {
         let spacing = self.grid.spacing.max_element();
         let reach = radius + 0.5 * spacing;
         let margin = (2.0 * reach / self.grid.spacing.min_element()).ceil() as u32 + 1;
-        let crop = CroppedGrid::around(&self.grid, margin, self.indices(|s| s.decay()))?;
+        let crop = SubGrid::around(&self.grid, margin, self.indices(|s| s.decay()))?;
         let is_other = |voxel: usize| initial.tissue(voxel) != Label::AIR && !self.flags[voxel].decay();
         let to_other = distance::to_set(&crop.grid, |i| is_other(crop.whole_index(i)));
         let to_centre = distance::to_set(&crop.grid, |i| to_other[i] >= reach);
@@ -256,7 +256,7 @@ impl RemovalCounts {
 
 /// Distance to the vulnerable tissue or to a zone of a volume, up to a maximum distance.
 pub struct ProximityField {
-    crop: Option<CroppedGrid>,
+    crop: Option<SubGrid>,
     distances: Vec<f32>,
     within: f32,
 }
@@ -275,7 +275,7 @@ impl ProximityField {
 
     fn around(grid: &Grid, within: f32, is_in: impl Fn(usize) -> bool) -> ProximityField {
         let margin = (within / grid.spacing.min_element()).ceil() as u32 + 1;
-        let crop = CroppedGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_in(i)));
+        let crop = SubGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_in(i)));
         let distances = match &crop {
             Some(crop) => distance::to_set(&crop.grid, |i| is_in(crop.whole_index(i))),
             None => Vec::new(),

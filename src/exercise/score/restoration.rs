@@ -3,10 +3,10 @@
 //! Takes the tooth before its cavity was cut, at the start and at the end. Gives the quality of the filling: the
 //! distance of its surface from the contour, overhangs, deficits and voids.
 
-use super::cropped_grid::CroppedGrid;
 use super::voxel_set::VoxelSet;
 use crate::scenario::Workpiece;
 use typodont_core::frame::Vec3;
+use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{ISO, Volume, surface};
 
 /// Maximum distance along the contour's normal at which the surface is searched for, mm: more than the depth of any
@@ -87,7 +87,7 @@ fn enclosed_air(end: &Volume, is_cavity: &impl Fn(usize) -> bool) -> VoxelSet {
     let grid = end.grid();
     let is_air = |voxel: usize| !end.densities()[voxel].is_solid();
     let mut is_enclosed = vec![false; grid.len()];
-    if let Some(crop) = CroppedGrid::around(grid, 1, (0..grid.len()).filter(|&v| is_cavity(v) && is_air(v))) {
+    if let Some(crop) = SubGrid::around(grid, 1, (0..grid.len()).filter(|&v| is_cavity(v) && is_air(v))) {
         // The outside is reached from the border of the box and from all air that was never tooth; the remaining air is
         // enclosed.
         let mut is_open = vec![false; crop.grid.len()];

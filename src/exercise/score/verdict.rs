@@ -1,11 +1,11 @@
 //! A verdict on every voxel.
 
-use super::cropped_grid::CroppedGrid;
 use super::removal_comparison::RemovalComparison;
 use super::restoration::Restoration;
 use crate::record::Replay;
 use crate::scenario::Scenario;
 use crate::scenario::file::ZoneRole;
+use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{Label, distance};
 
 /// Verdict on a voxel. The numbers are those of `performance.seg.nrrd`.
@@ -182,7 +182,7 @@ fn of_air(replay: &Replay, restoration: &Restoration, voxel: usize) -> Verdict {
 fn harmless<'a>(scenario: &'a Scenario, shape: &'a RemovalComparison) -> impl Fn(usize) -> bool + 'a {
     let margin = (scenario.measures.leeway / shape.grid.spacing.min_element()).ceil() as u32 + 1;
     let indices = (0..shape.grid.len()).filter(|&i| shape.flags[i].wanted());
-    let near = CroppedGrid::around(&shape.grid, margin, indices).map(|crop| {
+    let near = SubGrid::around(&shape.grid, margin, indices).map(|crop| {
         let distances = distance::to_set(&crop.grid, |i| shape.flags[crop.whole_index(i)].wanted());
         (crop, distances)
     });

@@ -1,11 +1,11 @@
 //! The voxels of zones.
 
-use super::cropped_grid::CroppedGrid;
 use super::voxel_set::VoxelSet;
 use crate::catalog::TissueRole;
 use crate::scenario::file::ZoneRole;
 use crate::scenario::{Scenario, Workpiece, Zone, ZoneRegion};
 use typodont_core::frame::Vec3;
+use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{Grid, Label, Volume, distance};
 
 /// A zone as it is judged.
@@ -92,7 +92,7 @@ fn around(initial: &Volume, label: Label, within: f32) -> VoxelSet {
     let grid = initial.grid();
     let is_label = |i: usize| initial.tissue(i) == label;
     let margin = (within / grid.spacing.min_element()).ceil() as u32 + 1;
-    let Some(crop) = CroppedGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_label(i))) else {
+    let Some(crop) = SubGrid::around(grid, margin, (0..grid.len()).filter(|&i| is_label(i))) else {
         return initial.tissues().map(|_| false).collect();
     };
     let distance = distance::to_set(&crop.grid, |i| is_label(crop.whole_index(i)));

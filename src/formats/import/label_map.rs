@@ -2,8 +2,8 @@
 
 use typodont_core::volume::redistance;
 use typodont_core::volume::redistance::signed_distance_from_field;
-use typodont_core::volume::subgrid::SubGrid;
-use typodont_core::volume::{Grid, Label, Volume, density_at_distance, distance};
+use typodont_core::volume::subgrid::PaddedGrid;
+use typodont_core::volume::{CellBox, Grid, Label, Volume, density_at_distance, distance};
 
 /// Number of smoothing passes: after six, the voxel steps no longer show in the surface normals.
 const ROUNDS: usize = 6;
@@ -20,8 +20,8 @@ const SPARE: [u32; 3] = [1; 3];
 /// The grid stays that of the map; it grows by a few voxels only where matter lies at its border. Returns `None` for
 /// an empty map.
 pub fn volume_from_label_map(grid: &Grid, label: Vec<Label>) -> Option<Volume> {
-    let [low, high] = drawn_box(grid, &label)?;
-    let window = SubGrid::around(grid, low, high, SPARE);
+    let drawn = grid.cells().zip(&label).filter(|(_, l)| **l != Label::AIR).map(|(cell, _)| cell);
+    let window = PaddedGrid::around(grid, &CellBox::around(drawn)?, SPARE);
     let label = window.crop(label, Label::AIR);
     let grid = &window.grid;
     let default_label = label.iter().copied().find(|&l| l != Label::AIR)?;
@@ -41,13 +41,6 @@ pub fn volume_from_label_map(grid: &Grid, label: Vec<Label>) -> Option<Volume> {
     let density = signed_distance.into_iter().map(|distance| density_at_distance(distance, band)).collect();
     let (grid, density, label) = window.paste(density, label);
     Some(Volume::new(grid, band, density, label, default_label))
-}
-
-fn drawn_box(grid: &Grid, label: &[Label]) -> Option<[[u32; 3]; 2]> {
-    let mut drawn = grid.cells().zip(label).filter(|(_, l)| **l != Label::AIR).map(|(cell, _)| cell);
-    let first = drawn.next()?;
-    let join = |a: [u32; 3], b: [u32; 3], choose: fn(u32, u32) -> u32| std::array::from_fn(|i| choose(a[i], b[i]));
-    Some(drawn.fold([first; 2], |[low, high], cell| [join(low, cell, u32::min), join(high, cell, u32::max)]))
 }
 
 #[cfg(test)]

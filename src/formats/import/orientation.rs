@@ -1,6 +1,7 @@
 //! Setting a scanned tooth upright by permuting axes, which resamples nothing.
 
 use typodont_anatomy::TissueLabels;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Density, Grid, Label, Volume};
 
@@ -54,7 +55,7 @@ pub fn crown_from_root(grid: &Grid, tissue: impl Fn(usize) -> Label, enamel: Lab
 
 /// Returns the middle of the crown's bounding box along x and y and its lowest voxel along z, mm.
 pub fn crown_foot(grid: &Grid, is_crown: impl Fn(usize) -> bool) -> Vec3 {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let mut crown = Aabb::EMPTY;
     let [nx, ny, _] = grid.dims;
     // Row by row: only the first and the last crown voxel of a row can touch the box.
     for row in 0..(grid.len() / nx as usize) as u32 {
@@ -62,12 +63,12 @@ pub fn crown_foot(grid: &Grid, is_crown: impl Fn(usize) -> bool) -> Vec3 {
         let of_crown = |x: &u32| is_crown(start + *x as usize);
         if let Some((first, last)) = (0..nx).find(of_crown).zip((0..nx).rfind(of_crown)) {
             let ends = [first, last].map(|x| grid.centre([x, row % ny, row / ny]));
-            (low, high) = (low.min(ends[0]), high.max(ends[1]));
+            crown = crown.with(ends[0]).with(ends[1]);
         }
     }
-    match low.is_finite() {
-        true => Vec3::new(0.5 * (low.x + high.x), 0.5 * (low.y + high.y), low.z),
-        false => Vec3::ZERO,
+    match crown.is_empty() {
+        true => Vec3::ZERO,
+        false => crown.centre().with_z(crown.low.z),
     }
 }
 

@@ -6,6 +6,7 @@ use crate::bounds_of_matter;
 use crate::empty_space;
 use crate::empty_space::EmptySpaceMap;
 use crate::scene::{Appearance, LabelPalette, VolumeInstance};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::volume::{BRICK, Volume};
 
@@ -42,7 +43,7 @@ impl<'a> VolumeSampler<'a> {
         occlusion: &'a OcclusionVolume,
     ) -> VolumeSampler<'a> {
         let VolumeInstance { volume, world_from_tooth, palette, .. } = *tooth;
-        let [low, high] = bounds_of_matter(volume);
+        let Aabb { low, high } = bounds_of_matter(volume);
         VolumeSampler { volume, palette, world_from_tooth, empty_space, occlusion, low, high }
     }
 

@@ -171,13 +171,14 @@ fn distance([x, y]: [f32; 2], [ax, ay]: [f32; 2], [bx, by]: [f32; 2]) -> f32 {
 mod tests {
     use super::*;
     use crate::raycast::{OrthographicCamera, ViewSide};
+    use typodont_core::aabb::Aabb;
 
     #[test]
     fn the_scale_bar_is_as_long_as_it_says() {
         // Aim: 24 mm of view on 480 pixels: 5 mm are 100 pixels. Method: the ink in the bar's row.
         let camera = OrthographicCamera {
             half_height: 12.0,
-            ..OrthographicCamera::framing_box(ViewSide::Buccal, Vec3::ZERO, Vec3::ONE, 1.0)
+            ..OrthographicCamera::framing_box(ViewSide::Buccal, &Aabb::new(Vec3::ZERO, Vec3::ONE), 1.0)
         };
         let shot = ImagePlane { camera, width: 480, height: 480 };
         let mut picture = PixelBuffer::filled(480, 480, PAPER);

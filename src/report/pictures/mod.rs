@@ -19,6 +19,7 @@ use crate::raycast;
 use crate::raycast::{ImagePlane, OrthographicCamera, PixelBuffer, ViewSide};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::par_map;
 use typodont_core::volume::{Volume, surface};
@@ -198,14 +199,14 @@ fn merged_matter(scored: &Scored) -> Option<Volume> {
 fn crown_image_plane(side: ViewSide, tooth: &ToothBounds) -> ImagePlane {
     /// Length of the roots shown, mm.
     const ROOTS: f32 = 3.0;
-    let low = tooth.low.max(Vec3::new(f32::NEG_INFINITY, f32::NEG_INFINITY, tooth.crown_low.z - ROOTS));
-    let camera = OrthographicCamera::framing_box(side, low, tooth.high, 1.0);
+    let low = tooth.whole.low.max(Vec3::new(f32::NEG_INFINITY, f32::NEG_INFINITY, tooth.crown.low.z - ROOTS));
+    let camera = OrthographicCamera::framing_box(side, &Aabb::new(low, tooth.whole.high), 1.0);
     ImagePlane { camera, width: SIZE, height: SIZE }
 }
 
 /// The tooth whose crown is nearest to a point.
 fn nearest_tooth(teeth: &[ToothBounds], point_in_tooth: Vec3) -> &ToothBounds {
-    let distance = |t: &&ToothBounds| point_in_tooth.distance(point_in_tooth.clamp(t.crown_low, t.crown_high));
+    let distance = |t: &&ToothBounds| point_in_tooth.distance(t.crown.nearest(point_in_tooth));
     teeth.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a workpiece has a tooth")
 }
 
@@ -222,7 +223,7 @@ fn centre_of_work(scored: &Scored) -> Vec3 {
         }
     }
     match count {
-        0 => 0.5 * (workpiece.teeth[0].crown_low + workpiece.teeth[0].crown_high),
+        0 => workpiece.teeth[0].crown.centre(),
         count => (sum / f64::from(count)).as_vec3(),
     }
 }

@@ -26,7 +26,7 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, first_view: &Rgba
     let palette = TissueColours::of(&scenario.tissues);
     let decay = decay_volume(scenario, &workpiece.volume);
     let tooth = &workpiece.teeth[0];
-    let middle = workpiece.lesions.first().map_or(0.5 * (tooth.crown_low + tooth.crown_high), |l| l.centre);
+    let middle = workpiece.lesions.first().map_or(tooth.crown.centre(), |l| l.centre);
     let from = |side: ViewSide| {
         let shot = ImagePlane {
             camera: OrthographicCamera::framing_volume(side, &workpiece.volume, 1.0),
@@ -59,7 +59,7 @@ fn decay_volume(scenario: &Scenario, volume: &Volume) -> Option<Volume> {
 /// The side of the tooth to which a point is nearest.
 fn nearest_side(workpiece: &Workpiece, point_in_tooth: Vec3) -> ViewSide {
     let tooth = nearest_tooth(&workpiece.teeth, point_in_tooth);
-    let (low, high) = (point_in_tooth - tooth.crown_low, tooth.crown_high - point_in_tooth);
+    let (low, high) = (point_in_tooth - tooth.crown.low, tooth.crown.high - point_in_tooth);
     let sides =
         [(ViewSide::Buccal, high.x), (ViewSide::Lingual, low.x), (ViewSide::Mesial, low.y), (ViewSide::Distal, high.y)];
     sides.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(ViewSide::Buccal, |(side, _)| side)

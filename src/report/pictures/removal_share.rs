@@ -7,6 +7,7 @@ use crate::raycast;
 use crate::raycast::{ImagePlane, OrthographicCamera, ViewSide};
 use std::collections::BTreeMap;
 use std::path::Path;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Grid, Label, Volume, surface};
 use typodont_exercise::tooth_import;
@@ -60,10 +61,10 @@ pub fn draw_removal_share(
     };
     let half = surface::volume_of_mask(grid, |v| share[v] >= 0.5, Label(1));
     let decay = decay.and_then(|d| surface::volume_of_mask(volume.grid(), |v| volume.tissue(v) == d, d));
-    let (low, high) = focus_box(&volume, grid);
+    let focus = focus_box(&volume, grid);
     let middle = weighted_centre(grid, share);
     let shot =
-        |side| ImagePlane { camera: OrthographicCamera::framing_box(side, low, high, 1.0), width: SIZE, height: SIZE };
+        |side| ImagePlane { camera: OrthographicCamera::framing_box(side, &focus, 1.0), width: SIZE, height: SIZE };
 
     let above = shot(ViewSide::Occlusal);
     let mut drawn = vec![("occlusal", "Occlusal view", raycast::render_iso(&volume, &above, colour), above)];
@@ -96,12 +97,10 @@ fn band_colour(share: f32) -> Option<[f32; 3]> {
 }
 
 /// The box to show: the removed matter with a margin, but nothing beyond the tooth.
-fn focus_box(volume: &Volume, grid: &Grid) -> (Vec3, Vec3) {
-    let [low, high] = grid.extent();
-    let [first, last] =
-        volume.bounding_box().map_or(grid.extent(), |[a, b]| [volume.grid().centre(a), volume.grid().centre(b)]);
-    let (low, high) = ((low - FOCUS_MARGIN).max(first), (high + FOCUS_MARGIN).min(last));
-    (low.min(high), high.max(low))
+fn focus_box(volume: &Volume, grid: &Grid) -> Aabb {
+    let removed = grid.extent().grown(Vec3::splat(FOCUS_MARGIN));
+    let tooth = volume.bounding_box().map_or(grid.extent(), |cells| volume.grid().extent_of(&cells));
+    Aabb::around([removed.low.max(tooth.low), removed.high.min(tooth.high)])
 }
 
 /// Centre of the removed matter, each voxel weighted by its share.
@@ -110,6 +109,5 @@ fn weighted_centre(grid: &Grid, share: &[f32]) -> Vec3 {
     let (sum, weight) = weighed.fold((glam::DVec3::ZERO, 0.0), |(sum, weight), (voxel, &s)| {
         (sum + grid.centre(grid.cell(voxel)).as_dvec3() * f64::from(s), weight + f64::from(s))
     });
-    let [low, high] = grid.extent();
-    if weight > 0.0 { (sum / weight).as_vec3() } else { 0.5 * (low + high) }
+    if weight > 0.0 { (sum / weight).as_vec3() } else { grid.extent().centre() }
 }

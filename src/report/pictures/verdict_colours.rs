@@ -1,8 +1,9 @@
 //! Colours of tissues, and of surfaces by the verdict on the work done there.
 
+use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{Label, distance};
 use typodont_exercise::catalog::TissueTable;
-use typodont_exercise::score::{CroppedGrid, Scored, Verdict};
+use typodont_exercise::score::{Scored, Verdict};
 
 /// The colours of the tissue table, ready to look up.
 pub struct TissueColours([[f32; 3]; 256]);
@@ -28,12 +29,12 @@ impl TissueColours {
 pub struct VerdictColours<'a> {
     scored: &'a Scored,
     /// Around the removed voxels: for each voxel the distance, mm, to the nearest removed one, and that voxel's index.
-    removed_surroundings: Option<(CroppedGrid, Vec<f32>, Vec<u32>)>,
+    removed_surroundings: Option<(SubGrid, Vec<f32>, Vec<u32>)>,
     /// Largest distance, mm, at which a wall takes the colour of the removed matter that it bounded.
     max_distance: f32,
 }
 
-/// The same distance in voxels: a wall's own voxels touch removed ones, if only at a corner.
+/// Value of `max_distance` in voxel widths. It must reach a wall voxel that touches a removed voxel only at a corner.
 const REACH_VOXELS: f32 = 2.4;
 
 /// The last part of the reach, over which the colour fades, so that a cavity's rim shows no stairs.
@@ -46,7 +47,7 @@ impl<'a> VerdictColours<'a> {
         // Missing parts of a filling show on the walls around them, as removed matter does.
         let is_missing = |v: usize| matches!(scored.verdicts[v], Verdict::Underfilled | Verdict::Void);
         let is_removed = |v: usize| before.tissue(v) != Label::AIR && after.tissue(v) == Label::AIR || is_missing(v);
-        let crop = CroppedGrid::around(grid, 3, (0..grid.len()).filter(|&v| is_removed(v)));
+        let crop = SubGrid::around(grid, 3, (0..grid.len()).filter(|&v| is_removed(v)));
         let removed_surroundings = crop.map(|crop| {
             let (distances, nearest) = distance::to_nearest(&crop.grid, |i| is_removed(crop.whole_index(i)));
             (crop, distances, nearest)

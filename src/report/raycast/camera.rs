@@ -1,5 +1,6 @@
 //! Orthographic cameras that view a tooth from one of its sides.
 
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::Volume;
 
@@ -50,21 +51,16 @@ const MARGIN: f32 = 0.06;
 impl OrthographicCamera {
     /// Sees all matter of a volume from a side; `ratio` is the picture's width by its height.
     pub fn framing_volume(side: ViewSide, volume: &Volume, ratio: f32) -> OrthographicCamera {
-        let grid = volume.grid();
-        let [low, high] = match volume.bounding_box() {
-            Some([low, high]) => [grid.centre(low), grid.centre(high)],
-            None => grid.extent(),
-        };
-        OrthographicCamera::framing_box(side, low, high, ratio)
+        OrthographicCamera::framing_box(side, &volume.extent(), ratio)
     }
 
     /// Sees all of a box in tooth space from a side.
-    pub fn framing_box(side: ViewSide, low: Vec3, high: Vec3, ratio: f32) -> OrthographicCamera {
+    pub fn framing_box(side: ViewSide, bounds: &Aabb, ratio: f32) -> OrthographicCamera {
         let [right, up] = side.right_and_up();
-        let size = high - low;
+        let size = bounds.size();
         let (width, height) = (size.dot(right).abs(), size.dot(up).abs());
         let half_height = 0.5 * height.max(width / ratio) / (1.0 - 2.0 * MARGIN);
-        OrthographicCamera { middle: 0.5 * (low + high), right, up, half_height }
+        OrthographicCamera { middle: bounds.centre(), right, up, half_height }
     }
 
     /// The same camera, or one that sees the plane of a section so that mesial is on the left: an upright section from its
@@ -120,7 +116,11 @@ mod tests {
     fn each_side_is_seen_from_where_its_name_says() {
         let from = [Vec3::Z, Vec3::X, Vec3::NEG_X, Vec3::NEG_Y, Vec3::Y, Vec3::NEG_Z];
         for (side, from) in ViewSide::ALL.into_iter().zip(from) {
-            assert_eq!(OrthographicCamera::framing_box(side, Vec3::ZERO, Vec3::ONE, 1.0).back(), from, "{side:?}");
+            assert_eq!(
+                OrthographicCamera::framing_box(side, &Aabb::new(Vec3::ZERO, Vec3::ONE), 1.0).back(),
+                from,
+                "{side:?}"
+            );
         }
     }
 
@@ -128,7 +128,8 @@ mod tests {
     fn sections_that_show_mesial_have_it_on_the_left() {
         for distal in [Vec3::Y, Vec3::NEG_Y] {
             for side in [ViewSide::Mesial, ViewSide::Buccal, ViewSide::Occlusal] {
-                let camera = OrthographicCamera::framing_box(side, Vec3::ZERO, Vec3::ONE, 1.0).with_mesial_left(distal);
+                let camera = OrthographicCamera::framing_box(side, &Aabb::new(Vec3::ZERO, Vec3::ONE), 1.0)
+                    .with_mesial_left(distal);
                 let expected = if side == ViewSide::Mesial { 0.0 } else { 1.0 };
                 assert_eq!(camera.right.dot(distal), expected, "{side:?}");
                 // An upright section has the crown up; a level one is seen from above.
@@ -139,12 +140,12 @@ mod tests {
 
     #[test]
     fn a_framed_box_lies_within_the_picture_whatever_its_shape() {
-        let (low, high) = (Vec3::new(-4.0, -5.0, -13.0), Vec3::new(5.0, 6.0, 7.0));
+        let bounds = Aabb::new(Vec3::new(-4.0, -5.0, -13.0), Vec3::new(5.0, 6.0, 7.0));
         for side in ViewSide::ALL {
             for (width, height) in [(480, 480), (640, 360), (200, 500)] {
-                let camera = OrthographicCamera::framing_box(side, low, high, width as f32 / height as f32);
+                let camera = OrthographicCamera::framing_box(side, &bounds, width as f32 / height as f32);
                 let shot = ImagePlane { camera, width, height };
-                for corner in [low, high] {
+                for corner in [bounds.low, bounds.high] {
                     let [x, y] = shot.project(corner);
                     assert!(x > 0.0 && x < width as f32 && y > 0.0 && y < height as f32, "{side:?} {x} {y}");
                     let point = shot.unproject(x, y);

@@ -2,7 +2,7 @@
 
 use crate::raycast::{Hit, OrthographicCamera};
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{BRICK, Density, ISO, Volume};
+use typodont_core::volume::{BRICK, CellBox, Density, ISO, Volume};
 
 /// Step within a surface, in voxels: even a single voxel is solid for longer than that.
 const STEP: f32 = 0.8;
@@ -39,7 +39,8 @@ pub struct RayMarcher<'a> {
 impl<'a> RayMarcher<'a> {
     pub fn new(volume: &'a Volume, camera: OrthographicCamera) -> RayMarcher<'a> {
         let spacing = volume.grid().spacing;
-        let [low, high] = volume.bounding_box().unwrap_or([[0; 3], [0; 3]]).map(|c| Vec3::from(c.map(|v| v as f32)));
+        let CellBox { low, high } = volume.bounding_box().unwrap_or_default();
+        let [low, high] = [low, high].map(|cell| Vec3::from(cell.map(|v| v as f32)));
         let along = -camera.back() / spacing;
         let pace = along.abs().max_element();
         let (low, high) = (low - 1.0, high + 1.0);

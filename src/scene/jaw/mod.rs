@@ -124,8 +124,8 @@ impl Mouth {
         let near = JawArch::new(jaw, Some((tooth, number)), plan);
         let other = JawArch::new(jaw.other(), None, plan);
         let seat = near.carved.half.seats[number - 1];
-        let top = 0.5 * (tooth.crown_low + tooth.crown_high);
-        let anchor = Vec3::new(top.x, top.y, tooth.crown_low.z);
+        let top = tooth.crown.centre();
+        let anchor = Vec3::new(top.x, top.y, tooth.crown.low.z);
         let sign = teeth_by_number::distal_sign(tooth.fdi);
         let near_from_tooth = mirrored_pose(seat.arch_from_tooth(), sign) * Pose::at(-anchor);
         let gums = tissues.by_name("gingiva").map(|e| e.label());
@@ -371,7 +371,7 @@ fn mirrored_pose(pose: Pose, sign: f32) -> Pose {
 fn fitted_model(model: &ToothModel, tooth: &ToothBounds) -> ToothModel {
     /// Room between the carved crown and its neighbours on each side, mm.
     const CONTACT: f32 = 0.05;
-    let size = tooth.crown_high - tooth.crown_low;
+    let size = tooth.crown.size();
     let share = |of: [f32; 2], now: f32| [now, now * of[1] / of[0]];
     let sizes = Sizes {
         crown: size.z,
@@ -434,10 +434,10 @@ impl TouchedGeometry<'_> {
         let Some(gum) = self.shapes.iter().find(|shape| Some(shape.label) == self.gum_label) else {
             return point_in_arch;
         };
-        let ToothBounds { crown_low, crown_high, .. } = *self.tooth;
+        let ToothBounds { crown, .. } = *self.tooth;
         let mut point = self.near_from_tooth.inverse() * point_in_arch;
-        let aside = (point - point.clamp(crown_low, crown_high)) * Vec3::new(1.0, 1.0, 0.0);
-        let deep = crown_low.z - point.z;
+        let aside = (point - point.clamp(crown.low, crown.high)) * Vec3::new(1.0, 1.0, 0.0);
+        let deep = crown.low.z - point.z;
         let as_felt = if self.tooth.fdi % 10 <= 3 { TOUCH_BLEND_IN_FRONT } else { TOUCH_BLEND };
         let near = (1.0 - smoothstep(aside.length(), as_felt)) * (1.0 - smoothstep(deep, DEEP));
         // Distance queries to a mesh are slow.

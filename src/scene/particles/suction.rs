@@ -3,6 +3,7 @@
 use crate::instrument::revolve;
 use std::f32::consts::PI;
 use std::sync::Arc;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_exercise::scenario::Workpiece;
 use typodont_render::{Appearance, MeshInstance};
@@ -50,8 +51,7 @@ pub fn saliva_ejector(workpiece: &Workpiece) -> (MeshInstance, Vec3) {
     /// Direction of the tube out of the mouth, world space: to the front, up and away from the trainee.
     const TUBE_DIRECTION: Vec3 = Vec3::new(0.80, 0.42, -0.42);
     const PLASTIC: Appearance = Appearance { colour: [0.84, 0.89, 0.90], gloss: 0.35 };
-    let low = workpiece.teeth.iter().map(|t| t.crown_low).fold(Vec3::INFINITY, Vec3::min);
-    let high = workpiece.teeth.iter().map(|t| t.crown_high).fold(Vec3::NEG_INFINITY, Vec3::max);
+    let Aabb { low, high } = workpiece.crown_bounds();
     let in_tooth = Vec3::new(high.x + ASIDE, 0.5 * (low.y + high.y), low.z + OVER);
     let inlet = workpiece.world_from_tooth * in_tooth;
     // A rounded tip, open in its middle.

@@ -13,12 +13,12 @@ pub use mask::{of_mask, volume_of_mask};
 
 use crate::frame::Vec3;
 use crate::mesh::Mesh;
-use crate::volume::{BRICK, Density, Grid, Volume};
+use crate::volume::{BRICK, CellBox, Density, Grid, Volume};
 use cases::{CASES, CELL_EDGES, CellEdge, CubeCase, EdgeIndex};
 
 /// Extracts the whole surface.
 pub fn extract(volume: &Volume) -> Mesh {
-    let Some([low, high]) = volume.bounding_box() else { return Mesh::default() };
+    let Some(CellBox { low, high }) = volume.bounding_box() else { return Mesh::default() };
     let cells = CellRange { low: low.map(|v| v as i32 - 1), end: high.map(|v| v as i32 + 1) };
     extract_cells(DensityGrid { grid: volume.grid(), densities: volume.densities() }, cells)
 }

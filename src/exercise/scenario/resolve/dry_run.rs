@@ -5,6 +5,7 @@ use crate::catalog::TissueRole;
 use crate::scenario::file::ScenarioFile;
 use crate::scenario::workpiece::WorkpieceError;
 use crate::scenario::{DecayPlace, Scenario, Workpiece};
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::touch::Guidance;
 use typodont_core::volume::Label;
@@ -119,36 +120,36 @@ fn find_decay_cut_away(
 
 /// Reports zones that contain no part of any tooth, since they would have no effect without the author's knowledge.
 fn find_zones_outside(scenario: &Scenario, workpiece: &Workpiece, source_map: &SourceMap, found: &mut Vec<Diagnostic>) {
-    let [low, high] = corners(workpiece);
+    let teeth = workpiece.bounds();
     for (index, zone) in scenario.zones.iter().enumerate() {
-        let is_outside = |[from, to]: [Vec3; 2]| from.cmpgt(high).any() || to.cmplt(low).any();
-        if zone.region.bounding_box().is_some_and(is_outside) {
+        if zone.region.bounding_box().is_some_and(|bounds| !bounds.overlaps(&teeth)) {
             let message = format!("the zone \"{}\" is outside the tooth", zone.id);
-            let help = format!("the tooth extends from {low:.1} to {high:.1} mm along x (buccal), y, z (occlusal)");
-            found.push(source_map.complain(&format!("/zones/{index}/region"), "empty-region", message, Some(help)));
+            found.push(source_map.complain(
+                &format!("/zones/{index}/region"),
+                "empty-region",
+                message,
+                Some(extent_text(&teeth)),
+            ));
         }
     }
 }
 
 /// Reports paths far from every tooth, which are probably written in another space or another unit.
 fn find_paths_away(scenario: &Scenario, workpiece: &Workpiece, source_map: &SourceMap, found: &mut Vec<Diagnostic>) {
-    let [low, high] = corners(workpiece);
-    let is_near = |p: &Vec3| p.distance(p.clamp(low, high)) <= PATH_AWAY;
+    let teeth = workpiece.bounds();
+    let is_near = |p: &Vec3| p.distance(teeth.nearest(*p)) <= PATH_AWAY;
     for (index, stage) in scenario.stages.iter().enumerate() {
         if let Some(Guidance::Path(fixture)) = stage.guidance.and_then(|g| scenario.guidances.get(g))
             && !fixture.path.points().iter().any(is_near)
         {
             let message = format!("the whole path is more than {PATH_AWAY} mm away from the tooth");
-            let help = format!("the tooth extends from {low:.1} to {high:.1} mm along x (buccal), y, z (occlusal)");
             let path = format!("/stages/{}/guidance/path/file", scenario.written_stage(index));
-            found.push(source_map.complain(&path, "wrong-place", message, Some(help)));
+            found.push(source_map.complain(&path, "wrong-place", message, Some(extent_text(&teeth))));
         }
     }
 }
 
-/// Returns the corners of the bounding box of all teeth, tooth space, mm.
-fn corners(workpiece: &Workpiece) -> [Vec3; 2] {
-    let low = workpiece.teeth.iter().map(|t| t.low).reduce(Vec3::min).unwrap_or_default();
-    let high = workpiece.teeth.iter().map(|t| t.high).reduce(Vec3::max).unwrap_or_default();
-    [low, high]
+fn extent_text(teeth: &Aabb) -> String {
+    let Aabb { low, high } = teeth;
+    format!("the tooth extends from {low:.1} to {high:.1} mm along x (buccal), y, z (occlusal)")
 }

@@ -53,7 +53,7 @@ impl Operator {
             .filter(|e| e.role == TissueRole::Deposit)
             .map(|e| e.label())
             .collect();
-        let lowest = self.workpiece.teeth.first()?.low.z;
+        let lowest = self.workpiece.teeth.first()?.whole.low.z;
         SulcusPath::at(site, gum, &self.workpiece.volume, &deposits, lowest, off)
     }
 

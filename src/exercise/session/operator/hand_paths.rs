@@ -55,7 +55,7 @@ impl Operator {
             PlaceFile::Site => self.random_site().map_or(0, |lesion| lesion.tooth),
             PlaceFile::Crown | PlaceFile::Quadrant(_) => 0,
         };
-        let (low, high) = (teeth[tooth].crown_low, teeth[tooth].crown_high);
+        let (low, high) = (teeth[tooth].crown.low, teeth[tooth].crown.high);
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let over = match place {
             PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(middle, |l| l.centre),
@@ -95,7 +95,7 @@ impl Operator {
 
     /// Returns the height of the highest crown, tooth space, mm.
     pub(super) fn top(&self) -> f32 {
-        self.workpiece.teeth.iter().map(|t| t.crown_high.z).fold(f32::NEG_INFINITY, f32::max)
+        self.workpiece.teeth.iter().map(|t| t.crown.high.z).fold(f32::NEG_INFINITY, f32::max)
     }
 
     /// Plans a move straight up to travelling height from the hand's position at that time.

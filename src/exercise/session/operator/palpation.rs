@@ -38,7 +38,7 @@ impl Operator {
         for tooth in self.workpiece.clone().teeth.iter() {
             for line in 0..follow.lines {
                 let across = spread(line, follow.lines);
-                let path = self.line_over(tooth.crown_low, tooth.crown_high, across, radius);
+                let path = self.line_over(tooth.crown.low, tooth.crown.high, across, radius);
                 let Some(&start) = path.first() else { continue };
                 self.travel_to(start + Vec3::Z * TOUCH_HEIGHT);
                 let path = path.into_iter().map(|p| self.in_world(p)).collect();
@@ -72,14 +72,13 @@ impl Operator {
         /// Share of the crown's width that is probed; beyond it the surface is too steep to press on.
         const PROBED: f32 = 0.62;
         for (index, tooth) in self.workpiece.clone().teeth.iter().enumerate() {
-            let (middle, half) =
-                (0.5 * (tooth.crown_low + tooth.crown_high), 0.5 * (tooth.crown_high - tooth.crown_low));
+            let (middle, half) = (tooth.crown.centre(), tooth.crown.half_size());
             for i in 0..probe.side {
                 for j in 0..probe.side {
                     // Alternating direction keeps the hand's paths short.
                     let j = if i % 2 == 0 { j } else { probe.side - 1 - j };
                     let (u, v) = (spread(i, probe.side) * PROBED, spread(j, probe.side) * PROBED);
-                    let at = self.surface_at(middle.x + half.x * u, middle.y + half.y * v, tooth.crown_high.z);
+                    let at = self.surface_at(middle.x + half.x * u, middle.y + half.y * v, tooth.crown.high.z);
                     if let Some((surface, normal)) = at {
                         self.tap(index, surface, normal, radius, probe);
                     }

@@ -16,8 +16,8 @@ use typodont_anatomy::TissueLabels;
 use typodont_core::volume::components::Components;
 use typodont_core::volume::redistance;
 use typodont_core::volume::redistance::signed_distance_from_field;
-use typodont_core::volume::subgrid::SubGrid;
-use typodont_core::volume::{Grid, Label, Volume, density_at_distance};
+use typodont_core::volume::subgrid::PaddedGrid;
+use typodont_core::volume::{CellBox, Grid, Label, Volume, density_at_distance};
 
 /// Maximum ratio of a voxel's longest side to its shortest. Clinical scans have up to 10.
 const FLATNESS_MAX: f32 = 20.0;
@@ -114,7 +114,7 @@ pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &TissueLabels) -> Result<
 
 /// The part of a scan that contains the tooth, and the tissue of each of its voxels.
 struct ClassifiedScan {
-    window: SubGrid,
+    window: PaddedGrid,
     levels: GreyLevels,
     /// Values of the window, without NaN.
     values: Vec<f32>,
@@ -148,11 +148,12 @@ fn label_of(matter: TissueClass, tissues: &TissueLabels) -> Label {
 }
 
 /// Returns the part of the grid around the largest solid piece, with a margin for the following steps.
-fn window_of_tooth(grid: &Grid, values: &[f32], solid_threshold: f32) -> Result<SubGrid, SegmentationError> {
+fn window_of_tooth(grid: &Grid, values: &[f32], solid_threshold: f32) -> Result<PaddedGrid, SegmentationError> {
     let pieces = Components::of(grid, |i| values[i] >= solid_threshold);
     let (tooth, _) = pieces.largest().ok_or(SegmentationError::NoBody)?;
-    let [low, high] = box_around(grid, |i| pieces.at(i) == Some(tooth));
-    let length = (grid.centre(high) - grid.centre(low) + grid.spacing).max_element();
+    let of_tooth = grid.cells().enumerate().filter(|(index, _)| pieces.at(*index) == Some(tooth));
+    let cells = CellBox::around(of_tooth.map(|(_, cell)| cell)).ok_or(SegmentationError::NoBody)?;
+    let length = (grid.extent_of(&cells).size() + grid.spacing).max_element();
     // Thin slices are ordinary; beyond this ratio a header is wrong, and distances in voxels lose their meaning.
     let flatness = grid.spacing.max_element() / grid.spacing.min_element();
     if flatness > FLATNESS_MAX {
@@ -164,21 +165,7 @@ fn window_of_tooth(grid: &Grid, values: &[f32], solid_threshold: f32) -> Result<
     // One more, so that the corner of the window stays outside the voxels that bridging seals.
     let bridge = pulp_chamber::bridge(grid);
     let spare = grid.spacing.to_array().map(|step| (bridge / step).ceil() as u32 + 1);
-    Ok(SubGrid::around(grid, low, high, spare))
-}
-
-/// Returns the lowest and highest cell of a set that is not empty.
-fn box_around(grid: &Grid, is_in: impl Fn(usize) -> bool) -> [[u32; 3]; 2] {
-    let mut found = [[u32::MAX; 3], [0; 3]];
-    for (index, cell) in grid.cells().enumerate() {
-        if is_in(index) {
-            for axis in 0..3 {
-                found[0][axis] = found[0][axis].min(cell[axis]);
-                found[1][axis] = found[1][axis].max(cell[axis]);
-            }
-        }
-    }
-    found
+    Ok(PaddedGrid::around(grid, &cells, spare))
 }
 
 /// Marks the hard tissue of the tooth; all of it is dentine at this step.

@@ -3,7 +3,7 @@
 use super::*;
 use typodont_anatomy::lower_first_molar::lower_first;
 use typodont_core::frame::Vec3;
-use typodont_core::volume::Density;
+use typodont_core::volume::{CellBox, Density};
 
 const ENAMEL: Label = Label(4);
 const DENTINE: Label = Label(2);
@@ -159,7 +159,7 @@ fn a_scan_that_truncates_the_tooth_is_padded() {
     let below = nz / 3;
     let cut = Grid { dims: [nx, ny, nz - below], ..*tooth.grid() };
     let found = segment(&cut, values[(nx * ny * below) as usize..].to_vec(), &TISSUES).unwrap();
-    let [low, high] = found.bounding_box().unwrap();
+    let CellBox { low, high } = found.bounding_box().unwrap();
     for axis in 0..3 {
         assert!(low[axis] >= 2 && high[axis] + 2 < found.grid().dims[axis], "{low:?} {high:?}");
     }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::solid::Triangle;
 
@@ -175,7 +176,7 @@ impl CheckedMesh {
         if corners.is_empty() {
             return Err(VoxelizeError::Empty);
         }
-        let [low, high] = bounds(positions.iter().copied());
+        let Aabb { low, high } = Aabb::around(positions.iter().copied());
         let length = (high - low).max_element();
         if !LENGTH.contains(&length) {
             return Err(VoxelizeError::Size(length));
@@ -191,10 +192,6 @@ impl CheckedMesh {
     pub fn triangles(&self, piece: usize) -> Vec<Triangle> {
         self.pieces[piece].iter().map(|t| t.map(|corner| self.positions[corner as usize])).collect()
     }
-}
-
-pub(super) fn bounds(points: impl Iterator<Item = Vec3>) -> [Vec3; 2] {
-    points.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
 }
 
 /// Merges identical positions and returns the triangles as indices; triangles that degenerate by this are left out.

@@ -10,8 +10,9 @@ pub use mesh_check::{UNITS, VoxelizeError};
 
 use crate::import::orientation;
 use crate::limits::{AXIS_MAX, VOXELS_MAX};
-use mesh_check::{CheckedMesh, bounds};
+use mesh_check::CheckedMesh;
 use typodont_anatomy::TissueLabels;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::components::Components;
 use typodont_core::volume::redistance;
@@ -142,7 +143,7 @@ pub struct Voxelized {
 
 /// Voxelizes parts at a spacing in mm. Parts are ordered from outside in: where two overlap, the later one wins.
 ///
-/// `crop` is the lowest and highest corner of the wanted part, mm. If there is enamel, the crown is turned up along z
+/// `crop` is the box of the wanted part, mm. If there is enamel, the crown is turned up along z
 /// as for a scan.
 ///
 /// # Errors
@@ -150,7 +151,7 @@ pub struct Voxelized {
 pub fn voxelize(
     parts: &[TissueSurface],
     spacing: f32,
-    crop: Option<[Vec3; 2]>,
+    crop: Option<Aabb>,
     tissues: &TissueLabels,
 ) -> Result<Voxelized, VoxelizeError> {
     let grid = grid_around(parts, spacing, crop)?;
@@ -187,14 +188,14 @@ pub fn voxelize(
     Ok(Voxelized { volume, notes })
 }
 
-fn grid_around(parts: &[TissueSurface], spacing: f32, crop: Option<[Vec3; 2]>) -> Result<Grid, VoxelizeError> {
-    let [mut low, mut high] = bounds(parts.iter().flat_map(|part| part.triangles.iter().flatten().copied()));
-    if let Some([from, to]) = crop {
-        let whole = [low, high];
-        [low, high] = [low.max(from), high.min(to)];
-        if !low.cmplt(high).all() {
-            return Err(VoxelizeError::Outside { low: whole[0], high: whole[1] });
-        }
+fn grid_around(parts: &[TissueSurface], spacing: f32, crop: Option<Aabb>) -> Result<Grid, VoxelizeError> {
+    let whole = Aabb::around(parts.iter().flat_map(|part| part.triangles.iter().flatten().copied()));
+    let Aabb { low, high } = match crop {
+        Some(crop) => Aabb::new(whole.low.max(crop.low), whole.high.min(crop.high)),
+        None => whole,
+    };
+    if crop.is_some() && !low.cmplt(high).all() {
+        return Err(VoxelizeError::Outside { low: whole.low, high: whole.high });
     }
     let counts = (high - low) / spacing + 2.0 * MARGIN as f32 + 2.0;
     let voxels = f64::from(counts.x) * f64::from(counts.y) * f64::from(counts.z);

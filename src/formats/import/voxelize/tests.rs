@@ -156,7 +156,7 @@ fn surfaces_that_cross_themselves_double_edges_or_use_another_unit_are_refused_w
     let whole = tissue_surface(Label(1), &scaled(10.0)).unwrap();
     let too_fine = voxelize(std::slice::from_ref(&whole), 0.01, None, &TISSUES).unwrap_err().to_string();
     assert!(too_fine.contains("too many") && too_fine.contains("--spacing-mm"), "{too_fine}");
-    let away = Some([Vec3::splat(100.0), Vec3::splat(120.0)]);
+    let away = Some(Aabb::new(Vec3::splat(100.0), Vec3::splat(120.0)));
     assert!(voxelize(&[whole], 0.2, away, &TISSUES).unwrap_err().to_string().contains("extends from"));
     // A strip that closes on itself after half a twist.
     let strip: Vec<Triangle> = (0..40)
