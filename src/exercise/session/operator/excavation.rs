@@ -45,10 +45,10 @@ impl Excavation {
         let half = 0.5 * grid.spacing.x.max(grid.spacing.y);
         let inside: Vec<f32> =
             distance::to_set(&flat, |i| columns[i].is_none()).into_iter().map(|d| (d - half).max(0.0)).collect();
-        let widest = inside.iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, &b| a.max(b));
-        // Decay narrower than the bur is cut along its centre line.
-        let least = (self.radius - self.margin).min(0.8 * widest);
-        let tracks = self.tracks(grid, |index| columns[index].filter(|_| inside[index] >= least));
+        // Where the decay is narrower than the bur, it is cut along its centre line: a narrow arm of a wide lesion too.
+        let fit = self.radius - self.margin;
+        let is_track = |i: usize| inside[i] >= fit || inside[i] >= 0.8 * widest_near(&flat, &inside, i, self.radius);
+        let tracks = self.tracks(grid, |index| columns[index].filter(|_| is_track(index)));
         let floor_of = |column: &DecayColumn| column.floor + self.below - self.margin;
         let high = tracks.iter().map(|(_, c)| c.top).fold(f32::NEG_INFINITY, f32::max);
         let low = tracks.iter().map(|(_, c)| floor_of(c)).fold(f32::INFINITY, f32::min);
@@ -81,6 +81,24 @@ impl Excavation {
         }
         tracks
     }
+}
+
+/// Returns the greatest value among the cells within a distance (mm) of a cell of a flat grid, the infinite left out.
+fn widest_near(flat: &Grid, inside: &[f32], cell: usize, distance: f32) -> f32 {
+    let [x, y, _] = flat.cell(cell);
+    let reach = [flat.spacing.x, flat.spacing.y].map(|spacing| (distance / spacing) as u32);
+    let span = |at: u32, reach: u32, count: u32| at.saturating_sub(reach)..(at + reach + 1).min(count);
+    let middle = flat.centre([x, y, 0]);
+    let mut widest = 0.0_f32;
+    for j in span(y, reach[1], flat.dims[1]) {
+        for i in span(x, reach[0], flat.dims[0]) {
+            let value = inside[flat.index([i, j, 0])];
+            if value.is_finite() && flat.centre([i, j, 0]).distance(middle) <= distance {
+                widest = widest.max(value);
+            }
+        }
+    }
+    widest
 }
 
 /// Returns a grid with its cells divided to at most [`FINEST_TRACK`].
@@ -123,6 +141,7 @@ fn columns(volume: &Volume, fine: &Grid, is_decay: impl Fn(Vec3, Label) -> bool)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use typodont_core::aabb::Aabb;
 
     #[test]
     fn a_path_reaches_the_same_walls_in_coarse_voxels() {
@@ -134,12 +153,32 @@ mod tests {
             let volume = Volume::from_distance(grid, 1.5 * spacing, |p| (p.z - 1.0, Label(1)));
             let excavation = Excavation { radius: 0.4, below: 0.4, pitch: 0.2, margin: 0.0 };
             let path = excavation.path(&volume, |p, _| p.x.abs() < 0.6 && p.y.abs() < 2.0 && p.z > -1.0);
-            path.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)))
+            Aabb::around(path)
         };
-        let ((low, high), (coarse_low, coarse_high)) = (extent(0.1), extent(0.25));
-        assert!((low - coarse_low).abs().max_element() < 0.11, "{low} {coarse_low}");
-        assert!((high - coarse_high).abs().truncate().max_element() < 0.11, "{high} {coarse_high}");
-        assert!(coarse_high.x - coarse_low.x > 0.25, "tracks along both walls: {coarse_low} {coarse_high}");
+        let (fine, coarse) = (extent(0.1), extent(0.25));
+        assert!((fine.low - coarse.low).abs().max_element() < 0.11, "{fine:?} {coarse:?}");
+        assert!((fine.high - coarse.high).abs().truncate().max_element() < 0.11, "{fine:?} {coarse:?}");
+        assert!(coarse.size().x > 0.25, "tracks along both walls: {coarse:?}");
+    }
+
+    #[test]
+    fn a_narrow_arm_of_a_wide_lesion_is_cut_along_its_centre_line() {
+        // Aim: decay narrower than the bur is reached although the bur fits into the rest of the lesion, and only along
+        // its middle. Method: a box of 3 mm × 3 mm with an arm 0.6 mm wide, and a bur 1 mm wide.
+        let decay = Label(4);
+        let grid = Grid::centred([100, 80, 40], Vec3::splat(0.1));
+        let is_in = |p: Vec3| {
+            let (body, arm) = (p.x < 0.0 && p.x > -3.0 && p.y.abs() < 1.5, p.x >= 0.0 && p.x < 3.0 && p.y.abs() < 0.3);
+            (body || arm) && p.z > 0.0
+        };
+        let volume = Volume::from_distance(grid, 0.15, |p| (p.z - 1.0, if is_in(p) { decay } else { Label(1) }));
+        let excavation = Excavation { radius: 0.5, below: 0.5, pitch: 0.2, margin: 0.0 };
+        let path = excavation.path(&volume, |_, label| label == decay);
+        let in_arm: Vec<_> = path.iter().filter(|p| p.x > 0.6).collect();
+        let farthest = in_arm.iter().map(|p| p.x).fold(f32::NEG_INFINITY, f32::max);
+        assert!(farthest > 2.5, "along the whole arm: {farthest}");
+        assert!(in_arm.iter().all(|p| p.y.abs() < 0.11), "along its middle");
+        assert!(path.iter().all(|p| p.x > 0.6 || p.y.abs() < 1.05), "inside the body's walls");
     }
 
     #[test]
@@ -152,7 +191,7 @@ mod tests {
         let volume = Volume::from_distance(grid, 0.15, |p| (p.z - 1.0, if is_in(p) { decay } else { Label(1) }));
         let excavation = Excavation { radius: 0.5, below: 0.5, pitch: 0.3, margin: 0.0 };
         let path = excavation.path(&volume, |_, label| label == decay);
-        let (low, high) = path.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(l, h), p| (l.min(*p), h.max(*p)));
+        let Aabb { low, high } = Aabb::around(path.iter().copied());
         assert!((low.z - (-1.0 + 0.5)).abs() < 0.11, "down to the floor: {low}");
         assert!(low.x >= -1.55 && high.x <= 1.55 && low.y >= -1.05 && high.y <= 1.05, "inside the walls: {low} {high}");
         assert!(low.x < -1.1 && high.x > 1.1 && low.y < -0.6 && high.y > 0.6, "out to the walls: {low} {high}");
