@@ -61,7 +61,10 @@ impl fmt::Display for LessonError {
                 write!(f, "no-randomness: the operating system gives no random numbers: {why}; give a seed")
             }
             LessonError::ShortCode { least } => {
-                write!(f, "short-code: the examiner's code must have at least {least} characters, or it can be guessed")
+                write!(
+                    f,
+                    "short-code: the examiner's code must have at least {least} characters; a shorter one could be guessed"
+                )
             }
             LessonError::NotSealable { scenario } => write!(
                 f,

@@ -12,7 +12,7 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// A number with as many decimals as its size deserves.
+/// A number with one decimal from 100, two from 1, and three below.
 pub fn number(value: f64) -> String {
     let decimals = match value.abs() {
         v if v >= 100.0 => 1,
@@ -48,6 +48,15 @@ pub fn points(points: f64, pass_points: f64) -> String {
         |text: &String| text.parse::<f64>().is_ok_and(|shown| (shown < pass_points) == (points < pass_points));
     let told = (0..6).map(text).find(is_told).unwrap_or_else(|| plain_number(points));
     if told == "-0" { "0".into() } else { told }
+}
+
+/// Points of one criterion: two digits, or as many as it takes that lost points are not shown as none, nor few as none.
+pub fn item_points(points: f64, max_points: f64) -> String {
+    let is_told = |text: &String| {
+        text.parse::<f64>()
+            .is_ok_and(|shown| (shown < max_points) == (points < max_points) && (shown > 0.0) == (points > 0.0))
+    };
+    (2..8).map(|digits| significant(points, digits)).find(is_told).unwrap_or_else(|| plain_number(points))
 }
 
 /// Significant digits of a measure: lengths, forces, volumes and times carry two, since a voxel is a tenth of a
@@ -140,6 +149,15 @@ pub fn measure_title(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn points_that_were_lost_are_never_shown_as_full() {
+        for (value, of, text) in [(9.96, 10.0, "9.96"), (99.7, 100.0, "99.7"), (10.0, 10.0, "10"), (69.6, 100.0, "70")]
+        {
+            assert_eq!(item_points(value, of), text, "{value} of {of}");
+        }
+        assert_eq!([item_points(0.0, 10.0), item_points(0.0004, 10.0)], ["0", "0.0004"]);
+    }
 
     #[test]
     fn no_more_digits_are_shown_than_a_measure_has() {

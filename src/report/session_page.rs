@@ -435,7 +435,7 @@ impl ReportLocalizer<'_> {
             spot: self.evidence_place(&item.metric),
             full_at: written(item.full_at),
             zero_at: written(item.zero_at),
-            points: display_format::significant(item.points, 2),
+            points: display_format::item_points(item.points, item.max_points),
             max_points: display_format::plain_number(item.max_points),
             percent: (100.0 * item.points / item.max_points).round().clamp(0.0, 100.0) as u32,
         }
@@ -456,7 +456,7 @@ impl ReportLocalizer<'_> {
         let has_target = scenario.has_target();
         let rubric_metrics: Vec<&Metric> = scenario.rubric.iter().flat_map(Rubric::metrics).collect();
         let is_shown =
-            |m: &&score::Measure| has_target || !m.metric.info.is_of_target() || rubric_metrics.contains(&&m.metric);
+            |m: &&score::Measure| has_target || !m.metric.info.is_of_target || rubric_metrics.contains(&&m.metric);
         let line = |m: &score::Measure| {
             let name = m.metric.name();
             ReportMeasure {

@@ -16,6 +16,7 @@ use typodont_core::statistics;
 use typodont_core::tick::Tick;
 use typodont_core::volume::{Edit, Label};
 use typodont_exercise::record::Recording;
+use typodont_exercise::scenario::metric_id::TrialMetric;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece, resolve};
 use typodont_exercise::score::TrialSummary;
 use typodont_exercise::session::{
@@ -96,19 +97,18 @@ fn whoever_guesses_has_an_expected_result_of_zero() {
         };
         let sessions: Vec<TrialSummary> = (1..=SEEDS).map(session).collect();
         assert!(sessions.iter().all(|s| s.unanswered == 0), "{id}: every guess is accepted after contact");
-        for name in ["detect_corrected_pct", "detect_level_corrected"] {
-            let scale = if name.ends_with("_pct") { 1.0 } else { 100.0 };
-            let values: Vec<f64> = sessions.iter().filter_map(|s| s.measure(name)).map(|v| v * scale).collect();
+        for (metric, scale) in [(TrialMetric::Corrected, 1.0), (TrialMetric::LevelCorrected, 100.0)] {
+            let values: Vec<f64> = sessions.iter().filter_map(|s| s.measure(metric)).map(|v| v * scale).collect();
             let Some(found) = statistics::describe(&values) else { continue };
             let error = found.sd.unwrap() / (SEEDS as f64).sqrt();
-            println!("{id} {name}: mean {:.1}, standard error {error:.1}", found.mean);
-            assert!(error < 8.0, "{id} {name}: standard error {error}");
-            assert!(found.mean.abs() < 3.0 * error, "{id} {name}: mean {} ± {error}", found.mean);
+            println!("{id} {metric:?}: mean {:.1}, standard error {error:.1}", found.mean);
+            assert!(error < 8.0, "{id} {metric:?}: standard error {error}");
+            assert!(found.mean.abs() < 3.0 * error, "{id} {metric:?}: mean {} ± {error}", found.mean);
         }
         // Wilson's interval of 95 % contains the truth, which is 0, in about that share of the sessions.
         let covers = |s: &&TrialSummary| {
-            s.measure("detect_corrected_low_pct").unwrap() <= 0.0
-                && s.measure("detect_corrected_high_pct").unwrap() >= 0.0
+            s.measure(TrialMetric::CorrectedLow).unwrap() <= 0.0
+                && s.measure(TrialMetric::CorrectedHigh).unwrap() >= 0.0
         };
         let covered = sessions.iter().filter(covers).count();
         assert!(covered as u64 >= SEEDS * 8 / 10, "{id}: the interval contains 0 in {covered} of {SEEDS} sessions");

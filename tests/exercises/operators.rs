@@ -333,7 +333,7 @@ fn operators_page(results: &OperatorResults) -> (String, Vec<String>) {
     let mut page = format!(
         "# Scripted operators in all graded exercises\n\nMean points, in brackets the least and the greatest, and the number of \
          sessions that were passed. The operators are\nthose of `content/operators/`; `idle` touches nothing and confirms every \
-         stage. Made on {day} from {commit}, scorer\nversion {SCORER_VERSION}, by\n\n    TYPODONT_SEEDS=10 TYPODONT_SPACINGS=0.1,0.25 \
+         stage. Made on {day} from {commit}, scoring\nversion {SCORER_VERSION}, by\n\n    TYPODONT_SEEDS=10 TYPODONT_SPACINGS=0.1,0.25 \
          TYPODONT_OPERATORS_PAGE=docs/operators.md \\\n    cargo test --release --all-features --test exercises points_of_all -- \
          --ignored\n"
     );

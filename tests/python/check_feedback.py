@@ -41,7 +41,7 @@ BLADES = {"spoon_excavator", "carver"}
 
 WALLS = {
     "on the buccal wall": "buccal", "on the lingual wall": "lingual", "on the mesial wall": "mesial",
-    "on the distal wall": "distal", "towards the occlusal surface": "occlusal", "on the cavity floor": "apical",
+    "on the distal wall": "distal", "on the occlusal side": "occlusal", "on the cavity floor": "apical",
 }
 
 

@@ -12,6 +12,7 @@ use std::path::Path;
 use std::process::Command;
 use typodont_exercise::record;
 use typodont_exercise::record::{Recording, ReplayCheck};
+use typodont_exercise::scenario::metric::{PLAIN, RequiredFeature};
 use typodont_exercise::score;
 use typodont_report::SessionFile;
 
@@ -29,6 +30,12 @@ fn golden_recordings_replay_and_score_unchanged() {
             serde_json::from_str(&std::fs::read_to_string(format!("{version}.json")).unwrap()).unwrap();
         let now: Value = serde_json::from_str(&SessionFile::of(&recording, &scored).to_json()).unwrap();
         assert_eq!(now["metrics"], expected["metrics"], "{version}");
+        // A formula that forgets its value looks like a measure without one. What requires no more than caries has a
+        // value in each of these recordings.
+        let is_always = |feature: &RequiredFeature| *feature == RequiredFeature::Decay;
+        for about in PLAIN.iter().filter(|about| about.required_features.iter().all(is_always)) {
+            assert!(!now["metrics"][about.name].is_null(), "{version}: {} has no value", about.name);
+        }
         assert_eq!(now["grade"]["points"], expected["points"], "{version}");
         assert_eq!(now["grade"]["hard_fails"], expected["hard_fails"], "{version}");
     }

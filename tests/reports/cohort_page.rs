@@ -52,9 +52,9 @@ fn sessions_of_other_teeth_voxel_sizes_and_scorers_are_kept_apart() {
     }
     let page = std::fs::read_to_string(&html).unwrap();
     for named in [
-        "tooth 36 (model aaaaaa), voxel size 0.1 mm, scorer version 2",
+        "tooth 36 (model aaaaaa), voxel size 0.1 mm, scoring version 2",
         "tooth 36, voxel size 0.25 mm",
-        "tooth 46, voxel size 0.1 mm, scorer version 3",
+        "tooth 46, voxel size 0.1 mm, scoring version 3",
     ] {
         assert!(page.contains(named) && said.contains(named), "{named}\n{said}");
     }

@@ -91,7 +91,7 @@ fn two_scripted_raters_agree_as_python_says() {
     assert_eq!(about[0]["pairs"].as_array().unwrap().len(), 3, "the raters, and each with the machine: {about}");
     assert_eq!((&about[0]["item"], &about[0]["works"]), (&Value::Null, &json!(WORKS)));
     let html = fs::read_to_string(&page).unwrap();
-    for expected in ["Agreement of examiners", "Dr. Öz – automatic grade", "Points near the pass mark", "Contrasting"]
+    for expected in ["Inter-examiner agreement", "Dr. Öz – automatic grade", "Points near the pass mark", "Contrasting"]
     {
         assert!(html.contains(expected), "{expected}");
     }

@@ -2,6 +2,10 @@
 //!
 //! The names are a contract (`session.json`); the values are computed in `score`, from a recording alone.
 
+use super::metric_id::{
+    ChartMetric, FillingMetric, MetricId, ProcessMetric, RemovalDepthMetric, RemovedVolumeMetric, StageMetric,
+    TrialMetric, VisibilityMetric, ZoneMetric,
+};
 use std::fmt;
 
 /// Direction in which a measure improves.
@@ -16,6 +20,7 @@ pub enum Better {
 /// Description of a measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MetricInfo {
+    pub id: MetricId,
     pub name: &'static str,
     pub title: &'static str,
     /// Unit shown after the value; empty for counts and ratios.
@@ -24,6 +29,10 @@ pub struct MetricInfo {
     /// Formula, with its rule for empty sets. R is the set of removed voxels, D the decay at the start, T the target
     /// zone.
     pub formula: &'static str,
+    /// Features without which the measure has no value, in the order in which they are checked.
+    pub required_features: &'static [RequiredFeature],
+    /// True for a measure that has no meaning without tissue to be removed.
+    pub is_of_target: bool,
 }
 
 /// A measure of the table, with its argument if it takes one.
@@ -39,25 +48,6 @@ pub enum MetricArgument {
     Zone(String),
     ToleranceMm(f32),
 }
-
-/// Measures that have no meaning without tissue to be removed: by their rules for empty sets, they would then report a
-/// good result.
-const OF_TARGET: [&str; 14] = [
-    "decay_cleared_pct",
-    "accessible_decay_cleared_pct",
-    "healthy_per_decay_pct",
-    "efficiency_pct_s",
-    "dice",
-    "jaccard",
-    "precision",
-    "recall",
-    "hausdorff_mm",
-    "hausdorff95_mm",
-    "overcut_depth_max_mm",
-    "undercut_depth_max_mm",
-    "surface_within_tol",
-    "time_to_clear_s",
-];
 
 /// Feature of an exercise without which a measure has no value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,181 +73,217 @@ pub enum RequiredFeature {
     Calculus,
 }
 
-/// Features that measures require, in the order in which they are checked. [`OF_FILLINGS`], [`OF_DRAWS`] and
-/// [`CHARTING`] require one each, unless they are in this table.
-const REQUIRED_FEATURES: &[(&str, &[RequiredFeature])] = &[
-    ("decay_cleared_pct", &[RequiredFeature::Decay]),
-    ("accessible_decay_cleared_pct", &[RequiredFeature::Decay]),
-    ("healthy_per_decay_pct", &[RequiredFeature::Decay]),
-    ("efficiency_pct_s", &[RequiredFeature::Decay]),
-    ("detect_tooth", &[RequiredFeature::ToothQuestion]),
-    ("detect_level", &[RequiredFeature::ToothQuestion, RequiredFeature::StiffnessSteps]),
-    ("detect_level_time_s", &[RequiredFeature::ToothQuestion]),
-    ("detect_quadrant", &[RequiredFeature::QuadrantQuestion]),
-    ("detect_quadrant_time_s", &[RequiredFeature::QuadrantQuestion]),
-    ("detect_level_corrected", &[RequiredFeature::Draw, RequiredFeature::StiffnessSteps]),
-    ("questions_right_pct", &[RequiredFeature::JudgedQuestion]),
-    ("calculus_found_pct", &[RequiredFeature::CalculusChart, RequiredFeature::Calculus]),
-    ("calculus_false_alarms", &[RequiredFeature::CalculusChart]),
-];
-
 impl MetricInfo {
     /// Returns true for a measure of force or speed near a zone.
     pub fn is_near_zone(&self) -> bool {
-        self.takes_zone() && self.name != "zone_removed_pct"
+        matches!(self.id, MetricId::Zone(ZoneMetric::MaxForceNear | ZoneMetric::MaxSpeedNear))
     }
 
     /// Returns true for a measure whose argument is a zone.
     pub fn takes_zone(&self) -> bool {
-        OF_ZONES.contains(&self.name)
+        matches!(self.id, MetricId::Zone(_))
     }
 
-    pub fn is_of_target(&self) -> bool {
-        OF_TARGET.contains(&self.name)
+    /// Adds the features that an exercise must have for this measure, in the order in which they are checked.
+    const fn requires(self, required_features: &'static [RequiredFeature]) -> MetricInfo {
+        MetricInfo { required_features, ..self }
     }
 
-    /// Returns the features that an exercise must have for this measure, in the order in which they are checked.
-    pub fn required_features(&self) -> &'static [RequiredFeature] {
-        let is_of = |table: &[MetricInfo]| table.iter().any(|about| about.name == self.name);
-        match REQUIRED_FEATURES.iter().find(|(name, _)| *name == self.name) {
-            Some((_, features)) => features,
-            None if is_of(OF_DRAWS) => &[RequiredFeature::Draw],
-            None if is_of(CHARTING) => &[RequiredFeature::DepthChart],
-            None if is_of(OF_FILLINGS) => &[RequiredFeature::Filling],
-            None => &[],
-        }
+    /// Marks a measure that has no meaning without tissue to be removed: by its rule for empty sets, it would then
+    /// report a good result.
+    const fn of_target(self) -> MetricInfo {
+        MetricInfo { is_of_target: true, ..self }
     }
 }
 
 use Better::{Higher, Lower, Neither};
 
 const fn info(
+    id: MetricId,
     name: &'static str,
     title: &'static str,
     unit: &'static str,
     better: Better,
     formula: &'static str,
 ) -> MetricInfo {
-    MetricInfo { name, title, unit, better, formula }
+    MetricInfo { id, name, title, unit, better, formula, required_features: &[], is_of_target: false }
 }
 
 /// Measures without an argument, in the order of reports.
 pub const PLAIN: &[MetricInfo] = &[
-    info("decay_cleared_pct", "Caries removed", "%", Higher, "100·|R∩D| / |D|; no value without caries"),
     info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::DecayCleared),
+        "decay_cleared_pct",
+        "Caries removed",
+        "%",
+        Higher,
+        "100·|R∩D| / |D|; no value without caries",
+    )
+    .requires(&[RequiredFeature::Decay])
+    .of_target(),
+    info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::AccessibleDecayCleared),
         "accessible_decay_cleared_pct",
         "Accessible caries removed",
         "%",
         Higher,
         "100·|R∩D′| / |D′|; D′ is the part of D that the smallest cutting instrument of the tray reaches, as a ball, \
          without cutting other tissue: corners between coarse voxels do not count; no value without caries",
-    ),
+    )
+    .requires(&[RequiredFeature::Decay])
+    .of_target(),
     info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::HealthyPerDecay),
         "healthy_per_decay_pct",
         "Sound tissue removed, relative to the caries",
         "%",
         Lower,
         "100·|R∖D| / |D|; the denominator is the caries at the start, so the value may exceed 100; no value \
          without caries",
-    ),
+    )
+    .requires(&[RequiredFeature::Decay])
+    .of_target(),
     info(
+        MetricId::Stage(StageMetric::CuttingStageTime),
         "time_to_clear_s",
         "Duration of the cutting stage",
         "s",
         Lower,
         "end − start of the last stage in which tooth or restoration is cut",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::Stage(StageMetric::ToothDetected),
         "detect_tooth",
         "Carious tooth identified",
         "",
         Higher,
         "1 if the tooth named has caries; 0 if another tooth or none was named; no value if not asked",
-    ),
+    )
+    .requires(&[RequiredFeature::ToothQuestion]),
     info(
+        MetricId::Stage(StageMetric::DetectionLevel),
         "detect_level",
         "Stiffness at which the caries was detected",
         "",
         Higher,
         "stiffness coefficient of the caries at the time of the answer; no value if not asked or not answered",
-    ),
+    )
+    .requires(&[RequiredFeature::ToothQuestion, RequiredFeature::StiffnessSteps]),
     info(
+        MetricId::Stage(StageMetric::ToothDetectionTime),
         "detect_level_time_s",
         "Time to identify the carious tooth",
         "s",
         Lower,
         "from the start of the stiffness step, or of the stage if there are no steps, to the answer; no value \
          if not answered",
-    ),
+    )
+    .requires(&[RequiredFeature::ToothQuestion]),
     info(
+        MetricId::Stage(StageMetric::QuadrantDetected),
         "detect_quadrant",
         "Carious quarter of the occlusal surface identified",
         "",
         Higher,
         "1 if the quarter named has caries; 0 if another quarter or none was named; no value if not asked",
-    ),
+    )
+    .requires(&[RequiredFeature::QuadrantQuestion]),
     info(
+        MetricId::Stage(StageMetric::QuadrantDetectionTime),
         "detect_quadrant_time_s",
         "Time to identify the carious quarter of the occlusal surface",
         "s",
         Lower,
         "from the start of the stage to the answer; no value if not answered",
-    ),
+    )
+    .requires(&[RequiredFeature::QuadrantQuestion]),
     info(
+        MetricId::Stage(StageMetric::QuestionsRight),
         "questions_right_pct",
         "Questions answered correctly",
         "%",
         Higher,
         "100·correct answers / questions with a correct answer, including those left unanswered; no value if there are \
         none",
-    ),
-    info("dice", "Overlap with the target (Dice)", "", Higher, "2·|R∩T| / (|R|+|T|); 1 if both are empty"),
-    info("jaccard", "Overlap with the target (Jaccard)", "", Higher, "|R∩T| / |R∪T|; 1 if both are empty"),
+    )
+    .requires(&[RequiredFeature::JudgedQuestion]),
     info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::Dice),
+        "dice",
+        "Overlap with the target (Dice)",
+        "",
+        Higher,
+        "2·|R∩T| / (|R|+|T|); 1 if both are empty",
+    )
+    .of_target(),
+    info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::Jaccard),
+        "jaccard",
+        "Overlap with the target (Jaccard)",
+        "",
+        Higher,
+        "|R∩T| / |R∪T|; 1 if both are empty",
+    )
+    .of_target(),
+    info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::Precision),
         "precision",
         "Proportion of the removed tissue within the target (precision)",
         "",
         Higher,
         "|R∩T| / |R|; if nothing was removed: 1 if T is empty, otherwise 0",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::Recall),
         "recall",
         "Proportion of the target removed (recall)",
         "",
         Higher,
         "|R∩T| / |T|; 1 if there \
          is no target",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::RemovalDepth(RemovalDepthMetric::Hausdorff),
         "hausdorff_mm",
         "Maximum distance between cavity and target (Hausdorff)",
         "mm",
         Lower,
         "symmetric, between the borders of R and T; no value if either is empty",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::RemovalDepth(RemovalDepthMetric::Hausdorff95),
         "hausdorff95_mm",
         "Distance between cavity and target, 95th percentile",
         "mm",
         Lower,
         "95th percentile of the distances of which hausdorff_mm is the greatest",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::RemovalDepth(RemovalDepthMetric::OvercutDepth),
         "overcut_depth_max_mm",
         "Deepest cut into sound tissue",
         "mm",
         Lower,
         "greatest distance of a removed sound voxel from D; 0 if none was removed; no value if some were \
          removed but there is no caries",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::RemovalDepth(RemovalDepthMetric::UndercutDepth),
         "undercut_depth_max_mm",
         "Maximum distance of remaining caries from the cavity",
         "mm",
         Lower,
         "greatest distance of a remaining carious voxel from R; 0 if none remains; no value if nothing was removed",
-    ),
+    )
+    .of_target(),
     info(
+        MetricId::RemovalDepth(RemovalDepthMetric::PulpExposed),
         "pulp_exposed",
         "Pulp exposed",
         "",
@@ -265,6 +291,7 @@ pub const PLAIN: &[MetricInfo] = &[
         "1 if a pulp voxel was removed or exposed by the removal of an adjacent voxel, otherwise 0",
     ),
     info(
+        MetricId::RemovalDepth(RemovalDepthMetric::RemainingDentineThickness),
         "remaining_dentine_thickness_min_mm",
         "Minimum remaining dentine thickness (cavity to pulp)",
         "mm",
@@ -272,6 +299,7 @@ pub const PLAIN: &[MetricInfo] = &[
         "smallest distance between R without pulp and the pulp; no value if either is empty",
     ),
     info(
+        MetricId::Process(ProcessMetric::MaxForce),
         "force_max_n",
         "Maximum force",
         "N",
@@ -279,6 +307,7 @@ pub const PLAIN: &[MetricInfo] = &[
         "greatest force on the device in contact, without guidance forces; 0 if never in contact",
     ),
     info(
+        MetricId::Process(ProcessMetric::MeanForce),
         "force_mean_n",
         "Mean force",
         "N",
@@ -286,6 +315,7 @@ pub const PLAIN: &[MetricInfo] = &[
         "mean force over the cycles in contact, without guidance forces; no value if never in contact",
     ),
     info(
+        MetricId::Process(ProcessMetric::MaxSpeed),
         "speed_max_mm_s",
         "Maximum speed in contact",
         "mm/s",
@@ -294,6 +324,7 @@ pub const PLAIN: &[MetricInfo] = &[
          never in contact",
     ),
     info(
+        MetricId::Process(ProcessMetric::MaxForceNearPulp),
         "force_max_near_pulp_n",
         "Maximum force near the pulp",
         "N",
@@ -301,6 +332,7 @@ pub const PLAIN: &[MetricInfo] = &[
         "within near_mm of the pulp at the start; 0 if never there",
     ),
     info(
+        MetricId::Process(ProcessMetric::MeanForceNearPulp),
         "force_mean_near_pulp_n",
         "Mean force near the pulp",
         "N",
@@ -308,23 +340,49 @@ pub const PLAIN: &[MetricInfo] = &[
         "within near_mm of the pulp at the start; 0 if never there",
     ),
     info(
+        MetricId::Process(ProcessMetric::MaxSpeedNearPulp),
         "speed_max_near_pulp_mm_s",
         "Maximum speed near the pulp",
         "mm/s",
         Lower,
         "within near_mm of the pulp at the start; 0 if never there",
     ),
-    info("path_length_mm", "Path length of the tip", "mm", Neither, "sum of the displacements of the tip over 20 ms"),
-    info("drilling_time_s", "Cutting time", "s", Neither, "time during which material was cut"),
-    info("contact_time_s", "Contact time", "s", Neither, "time during which anything was touched"),
     info(
+        MetricId::Process(ProcessMetric::PathLength),
+        "path_length_mm",
+        "Path length of the tip",
+        "mm",
+        Neither,
+        "sum of the displacements of the tip over 20 ms",
+    ),
+    info(
+        MetricId::Process(ProcessMetric::DrillingTime),
+        "drilling_time_s",
+        "Cutting time",
+        "s",
+        Neither,
+        "time during which material was cut",
+    ),
+    info(
+        MetricId::Process(ProcessMetric::ContactTime),
+        "contact_time_s",
+        "Contact time",
+        "s",
+        Neither,
+        "time during which anything was touched",
+    ),
+    info(
+        MetricId::RemovedVolume(RemovedVolumeMetric::Efficiency),
         "efficiency_pct_s",
         "Caries removed per second of cutting",
         "%/s",
         Higher,
         "decay_cleared_pct / drilling_time_s; no value if nothing was cut",
-    ),
+    )
+    .requires(&[RequiredFeature::Decay])
+    .of_target(),
     info(
+        MetricId::Process(ProcessMetric::Jerk),
         "jerk",
         "Smoothness (log dimensionless jerk)",
         "",
@@ -332,76 +390,114 @@ pub const PLAIN: &[MetricInfo] = &[
         "−ln(T⁵/L² · ∫|jerk|² dt) of the tip in contact, sampled at 50 Hz; no value for less than 1 s of contact",
     ),
     info(
+        MetricId::Process(ProcessMetric::SoftTissueDrilledTime),
         "soft_tissue_drilled_s",
-        "Time with the running bur on soft tissue",
+        "Time the rotating bur touched soft tissue",
         "s",
         Lower,
-        "time during which a running bur touched gingiva or other soft tissue",
+        "time during which a rotating bur touched gingiva or other soft tissue",
     ),
     info(
+        MetricId::Process(ProcessMetric::NeighbourDrilledTime),
         "neighbour_drilled_s",
-        "Time with the running bur on an adjacent tooth",
+        "Time the rotating bur touched an adjacent tooth",
         "s",
         Lower,
-        "time during which a running bur touched an adjacent tooth",
+        "time during which a rotating bur touched an adjacent tooth",
     ),
-    info("session_time_s", "Duration of the session", "s", Neither, "all stages together"),
+    info(
+        MetricId::Process(ProcessMetric::SessionTime),
+        "session_time_s",
+        "Duration of the session",
+        "s",
+        Neither,
+        "all stages together",
+    ),
 ];
 
 /// Measures of fillings, for exercises with a prepared cavity. C is the cavity, S the surface at the end, O the tooth's
 /// original contour.
 pub const OF_FILLINGS: &[MetricInfo] = &[
-    info("filled_pct", "Cavity filled with restorative material", "%", Higher, "100·|filled∩C| / |C|"),
     info(
+        MetricId::Filling(FillingMetric::Filled),
+        "filled_pct",
+        "Cavity filled with restorative material",
+        "%",
+        Higher,
+        "100·|filled∩C| / |C|",
+    )
+    .requires(&[RequiredFeature::Filling]),
+    info(
+        MetricId::Filling(FillingMetric::ContourMean),
         "contour_mean_mm",
         "Mean distance from the original contour",
         "mm",
         Lower,
         "mean distance of S from O along the normals of O, over the mouth of the cavity and wherever material \
          lies on the tooth",
-    ),
+    )
+    .requires(&[RequiredFeature::Filling]),
     info(
+        MetricId::Filling(FillingMetric::ContourP95),
         "contour_p95_mm",
         "Distance from the original contour, 95th percentile",
         "mm",
         Lower,
         "95th percentile of the distances of S from O whose mean is contour_mean_mm",
-    ),
+    )
+    .requires(&[RequiredFeature::Filling]),
     info(
+        MetricId::Filling(FillingMetric::ContourMax),
         "contour_max_mm",
         "Maximum distance from the original contour",
         "mm",
         Lower,
         "greatest of the distances of S from O whose mean is contour_mean_mm",
-    ),
+    )
+    .requires(&[RequiredFeature::Filling]),
     info(
+        MetricId::Filling(FillingMetric::OverhangMax),
         "overhang_max_mm",
-        "Maximum overhang",
+        "Maximum excess beyond the original contour",
         "mm",
         Lower,
         "greatest distance by which S lies outside O; 0 \
          if nowhere",
-    ),
+    )
+    .requires(&[RequiredFeature::Filling]),
     info(
+        MetricId::Filling(FillingMetric::DeficitMax),
         "deficit_max_mm",
         "Maximum deficiency",
         "mm",
         Lower,
         "greatest distance by which S lies inside O; 0 if nowhere",
-    ),
+    )
+    .requires(&[RequiredFeature::Filling]),
     info(
+        MetricId::Filling(FillingMetric::OverhangVolume),
         "overhang_mm3",
         "Restorative material outside the original contour",
         "mm³",
         Lower,
         "volume placed outside O, from voxel densities",
-    ),
-    info("void_mm3", "Voids in the restoration", "mm³", Lower, "volume of air in C enclosed by material on all sides"),
+    )
+    .requires(&[RequiredFeature::Filling]),
+    info(
+        MetricId::Filling(FillingMetric::VoidVolume),
+        "void_mm3",
+        "Voids in the restoration",
+        "mm³",
+        Lower,
+        "volume of air in C enclosed by material on all sides",
+    )
+    .requires(&[RequiredFeature::Filling]),
 ];
 
 /// Measures of trials in which the site of the caries is drawn, computed if an exercise has such trials.
 pub const OF_DRAWS: &[MetricInfo] = &[
     info(
+        MetricId::Trial(TrialMetric::Corrected),
         "detect_corrected_pct",
         "Caries located, corrected for chance",
         "%",
@@ -409,44 +505,62 @@ pub const OF_DRAWS: &[MetricInfo] = &[
         "100·(p − c) / (1 − c); p is the share of trials with a correct answer, c the share that guessing achieves on \
          average; a trial without an answer counts as c in p; 0 for guessing, negative for fewer correct answers than \
          guessing achieves",
-    ),
+    )
+    .requires(&[RequiredFeature::Draw]),
     info(
+        MetricId::Trial(TrialMetric::CorrectedLow),
         "detect_corrected_low_pct",
         "Caries located, corrected for chance: lower bound",
         "%",
         Higher,
         "lower bound of the 95 % interval (Wilson) of p, corrected for chance as the result is",
-    ),
+    )
+    .requires(&[RequiredFeature::Draw]),
     info(
+        MetricId::Trial(TrialMetric::CorrectedHigh),
         "detect_corrected_high_pct",
         "Caries located, corrected for chance: upper bound",
         "%",
         Higher,
         "upper bound of the 95 % interval (Wilson) of p, corrected for chance as the result is",
-    ),
-    info("detect_trials_right", "Trials with a correct answer", "", Higher, "number of trials with a correct answer"),
+    )
+    .requires(&[RequiredFeature::Draw]),
     info(
+        MetricId::Trial(TrialMetric::TrialsRight),
+        "detect_trials_right",
+        "Trials with a correct answer",
+        "",
+        Higher,
+        "number of trials with a correct answer",
+    )
+    .requires(&[RequiredFeature::Draw]),
+    info(
+        MetricId::Trial(TrialMetric::LevelCorrected),
         "detect_level_corrected",
         "Stiffness at which the caries was located, corrected for chance",
         "",
         Higher,
         "sum / number of trials; a correct answer adds the stiffness coefficient of the caries at its time, an \
          incorrect one subtracts that coefficient times c / (1 − c), with c as above; no value without stiffness steps",
-    ),
+    )
+    .requires(&[RequiredFeature::Draw, RequiredFeature::StiffnessSteps]),
     info(
+        MetricId::Trial(TrialMetric::AnswerTime),
         "detect_trial_time_s",
         "Mean time to an answer",
         "s",
         Lower,
         "mean time from the start of a trial to its answer, over all trials with an answer; no value if there is none",
-    ),
+    )
+    .requires(&[RequiredFeature::Draw]),
 ];
 
 /// Measures of visibility, computed if the trainee's view was recorded, as the window records it.
 pub const OF_VIEWS: &[MetricInfo] = &[
     info(
+        MetricId::Visibility(VisibilityMetric::UnseenShare),
         "unseen_cut_pct",
-        "Tissue cut out of sight",
+        "Tissue cut without direct or mirror vision",
         "%",
         Lower,
         "100·|H| / |R′|; R′ are the voxels removed while the view is known, H those of them that were hidden from the \
@@ -454,15 +568,17 @@ pub const OF_VIEWS: &[MetricInfo] = &[
          seen in a mirror either; what is within 0.5 mm of a voxel does not hide it; no value if nothing was cut or no view was recorded",
     ),
     info(
+        MetricId::Visibility(VisibilityMetric::UnseenVolume),
         "unseen_cut_mm3",
-        "Volume of tissue cut out of sight",
+        "Volume of tissue cut without direct or mirror vision",
         "mm³",
         Lower,
         "volume of H, as in unseen_cut_pct; no value if no view was recorded",
     ),
     info(
+        MetricId::Visibility(VisibilityMetric::UnseenSoundVolume),
         "unseen_sound_cut_mm3",
-        "Volume of sound tissue cut out of sight",
+        "Volume of sound tissue cut without direct or mirror vision",
         "mm³",
         Lower,
         "volume of the sound voxels of H, as in unseen_cut_pct; no value if no view was recorded",
@@ -471,66 +587,86 @@ pub const OF_VIEWS: &[MetricInfo] = &[
 
 /// Measures of a periodontal chart, computed if a stage asks for one. The sites are the six sites of the tooth.
 pub const CHARTING: &[MetricInfo] = &[
-    info("sites_read_pct", "Sites probed", "%", Higher, "100·sites with a reading / 6"),
     info(
+        MetricId::Chart(ChartMetric::SitesRead),
+        "sites_read_pct",
+        "Sites probed",
+        "%",
+        Higher,
+        "100·sites with a reading / 6",
+    )
+    .requires(&[RequiredFeature::DepthChart]),
+    info(
+        MetricId::Chart(ChartMetric::WithinOneMm),
         "probing_within_1mm_pct",
         "Readings within 1 mm",
         "%",
         Higher,
         "100·sites with |reading − true depth| ≤ 1 mm / 6; a site without a reading does not count",
-    ),
+    )
+    .requires(&[RequiredFeature::DepthChart]),
     info(
+        MetricId::Chart(ChartMetric::MeanError),
         "probing_error_mm",
         "Mean error of the readings",
         "mm",
         Lower,
         "mean of |reading − true depth| over the sites with a reading; no value without readings",
-    ),
+    )
+    .requires(&[RequiredFeature::DepthChart]),
     info(
+        MetricId::Chart(ChartMetric::MeanBias),
         "probing_bias_mm",
         "Mean over- or under-reading",
         "mm",
         Neither,
         "mean of reading − true depth over the sites with a reading; positive values are too deep; no value \
          without readings",
-    ),
+    )
+    .requires(&[RequiredFeature::DepthChart]),
     info(
+        MetricId::Chart(ChartMetric::MaxForce),
         "probing_force_max_n",
         "Maximum probing force",
         "N",
         Lower,
         "greatest force at the time of a reading; no value without readings",
-    ),
+    )
+    .requires(&[RequiredFeature::DepthChart]),
     info(
+        MetricId::Chart(ChartMetric::HighForceReadings),
         "probing_force_high",
         "Readings with excessive force",
         "",
         Lower,
         "readings at which the probe was pressed with more than 0.35 N (0.25 N is taught); no value without readings",
-    ),
+    )
+    .requires(&[RequiredFeature::DepthChart]),
     info(
+        MetricId::Chart(ChartMetric::CalculusFound),
         "calculus_found_pct",
         "Calculus detected",
         "%",
         Higher,
         "100·sites with calculus that were recorded / sites with calculus; no value without calculus or if not asked",
-    ),
+    )
+    .requires(&[RequiredFeature::CalculusChart, RequiredFeature::Calculus]),
     info(
+        MetricId::Chart(ChartMetric::CalculusFalseAlarms),
         "calculus_false_alarms",
         "Calculus recorded where there is none",
         "",
         Lower,
         "sites that were recorded but have no calculus; no value if not asked, or if there is calculus and no \
          site was recorded",
-    ),
+    )
+    .requires(&[RequiredFeature::CalculusChart]),
 ];
-
-/// Measures whose argument is a zone.
-const OF_ZONES: [&str; 3] = ["zone_removed_pct", "force_max_near_n", "speed_max_near_mm_s"];
 
 /// Measures with an argument in brackets.
 pub const WITH_ARGUMENT: &[MetricInfo] = &[
     info(
+        MetricId::Zone(ZoneMetric::Removed),
         "zone_removed_pct",
         "Zone removed",
         "%",
@@ -539,6 +675,7 @@ pub const WITH_ARGUMENT: &[MetricInfo] = &[
          the zone is empty",
     ),
     info(
+        MetricId::Zone(ZoneMetric::MaxForceNear),
         "force_max_near_n",
         "Maximum force near a zone",
         "N",
@@ -546,6 +683,7 @@ pub const WITH_ARGUMENT: &[MetricInfo] = &[
         "within near_mm of the zone at the start, without guidance forces; 0 if never there",
     ),
     info(
+        MetricId::Zone(ZoneMetric::MaxSpeedNear),
         "speed_max_near_mm_s",
         "Maximum speed near a zone",
         "mm/s",
@@ -553,12 +691,14 @@ pub const WITH_ARGUMENT: &[MetricInfo] = &[
         "within near_mm of the zone at the start, over intervals of 20 ms with any contact; 0 if never there",
     ),
     info(
+        MetricId::SurfaceWithinTolerance,
         "surface_within_tol",
         "Agreement of cavity and target surfaces",
         "",
         Higher,
         "proportion of the borders of R and T within the tolerance of each other; no value if either is empty",
-    ),
+    )
+    .of_target(),
 ];
 
 /// Reason for which a measure's name is not accepted.
@@ -650,6 +790,7 @@ pub fn names() -> impl Iterator<Item = &'static str> + Clone {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashSet;
 
     #[test]
     fn names_round_trip() {
@@ -659,6 +800,12 @@ mod tests {
         for about in without_argument() {
             assert!(Metric::parse(about.name).is_ok(), "{}", about.name);
         }
+    }
+
+    #[test]
+    fn every_measure_has_a_row_and_a_name_of_its_own() {
+        let (ids, names): (HashSet<_>, HashSet<_>) = all().map(|about| (about.id, about.name)).unzip();
+        assert_eq!([ids.len(), names.len()], [all().count(); 2]);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod calculus_and_fillings;
 pub mod file;
 mod lesion;
 pub mod metric;
+pub mod metric_id;
 mod questionnaire;
 mod resolve;
 mod schema;

@@ -1,6 +1,7 @@
 //! The comparison of a periodontal chart with the true values.
 
 use crate::record::{Recording, Replay};
+use crate::scenario::metric_id::ChartMetric;
 use crate::scenario::{Calculus, ProbingSite};
 use crate::session::ChartEntry;
 use typodont_core::tick::Tick;
@@ -64,8 +65,8 @@ pub fn chart(recording: &Recording, replay: &Replay) -> Option<Vec<SiteResult>> 
     Some(ProbingSite::ALL.into_iter().map(result).collect())
 }
 
-/// Computes one of the measures of [`crate::scenario::metric::CHARTING`]; `None` if it has no value.
-pub fn measure(name: &str, chart: &[SiteResult]) -> Option<f64> {
+/// Computes one of the measures of [`CHARTING`](crate::scenario::metric::CHARTING); `None` if it has no value.
+pub fn measure(metric: ChartMetric, chart: &[SiteResult]) -> Option<f64> {
     let share = |count: usize, of: usize| (of > 0).then(|| 100.0 * count as f64 / of as f64);
     let off: Vec<f64> = chart.iter().filter_map(|s| Some(f64::from(s.reading?.depth_mm) - s.true_depth)).collect();
     let forces = || chart.iter().filter_map(|s| Some(s.reading?.force));
@@ -75,25 +76,24 @@ pub fn measure(name: &str, chart: &[SiteResult]) -> Option<f64> {
     };
     let is_asked = chart.iter().any(|s| s.calculus_marked.is_some());
     let marked = |s: &&SiteResult| s.calculus_marked == Some(true);
-    match name {
-        "sites_read_pct" => share(off.len(), chart.len()),
-        "probing_within_1mm_pct" => share(off.iter().filter(|d| d.abs() <= DEPTH_TOLERANCE).count(), chart.len()),
-        "probing_error_mm" => mean(&mut off.iter().map(|d| d.abs())),
-        "probing_bias_mm" => mean(&mut off.iter().copied()),
-        "probing_force_max_n" => forces().reduce(f32::max).map(f64::from),
-        "probing_force_high" => {
+    match metric {
+        ChartMetric::SitesRead => share(off.len(), chart.len()),
+        ChartMetric::WithinOneMm => share(off.iter().filter(|d| d.abs() <= DEPTH_TOLERANCE).count(), chart.len()),
+        ChartMetric::MeanError => mean(&mut off.iter().map(|d| d.abs())),
+        ChartMetric::MeanBias => mean(&mut off.iter().copied()),
+        ChartMetric::MaxForce => forces().reduce(f32::max).map(f64::from),
+        ChartMetric::HighForceReadings => {
             forces().next().is_some().then(|| forces().filter(|force| *force > HIGH_FORCE).count() as f64)
         }
-        "calculus_found_pct" if is_asked => {
+        ChartMetric::CalculusFound => {
             let there = || chart.iter().filter(|s| s.has_calculus);
-            share(there().filter(marked).count(), there().count())
+            share(there().filter(marked).count(), there().count()).filter(|_| is_asked)
         }
         // If there is calculus and no site was marked, the trainee did not look for calculus.
-        "calculus_false_alarms" if is_asked => {
+        ChartMetric::CalculusFalseAlarms => {
             let was_looked_for = chart.iter().any(|s| marked(&s)) || !chart.iter().any(|s| s.has_calculus);
-            was_looked_for.then(|| chart.iter().filter(|s| !s.has_calculus).filter(marked).count() as f64)
+            (is_asked && was_looked_for).then(|| chart.iter().filter(|s| !s.has_calculus).filter(marked).count() as f64)
         }
-        _ => None,
     }
 }
 
@@ -123,26 +123,26 @@ mod tests {
             site(ProbingSite::Lingual, 2.0, None, false, false),
             site(ProbingSite::DistoLingual, 2.0, None, false, false),
         ];
-        let check = |name: &str, expected: f64| {
-            let found = measure(name, &chart).unwrap_or(f64::NAN);
-            assert!((found - expected).abs() < 1e-6, "{name}: {found}, not {expected}");
+        let check = |metric: ChartMetric, expected: f64| {
+            let found = measure(metric, &chart).unwrap_or(f64::NAN);
+            assert!((found - expected).abs() < 1e-6, "{metric:?}: {found}, not {expected}");
         };
-        check("sites_read_pct", 50.0);
-        check("probing_within_1mm_pct", 100.0 / 3.0);
-        check("probing_error_mm", 1.0);
-        check("probing_bias_mm", 1.0 / 3.0);
-        check("probing_force_max_n", f64::from(0.6f32));
-        check("probing_force_high", 1.0);
-        check("calculus_found_pct", 50.0);
-        check("calculus_false_alarms", 1.0);
+        check(ChartMetric::SitesRead, 50.0);
+        check(ChartMetric::WithinOneMm, 100.0 / 3.0);
+        check(ChartMetric::MeanError, 1.0);
+        check(ChartMetric::MeanBias, 1.0 / 3.0);
+        check(ChartMetric::MaxForce, f64::from(0.6f32));
+        check(ChartMetric::HighForceReadings, 1.0);
+        check(ChartMetric::CalculusFound, 50.0);
+        check(ChartMetric::CalculusFalseAlarms, 1.0);
         let unread: Vec<SiteResult> = chart.iter().map(|s| SiteResult { reading: None, ..*s }).collect();
-        for name in ["probing_error_mm", "probing_force_max_n", "probing_force_high"] {
-            assert_eq!(measure(name, &unread), None, "{name}: who reads nothing is not praised for it");
+        for metric in [ChartMetric::MeanError, ChartMetric::MaxForce, ChartMetric::HighForceReadings] {
+            assert_eq!(measure(metric, &unread), None, "{metric:?}: who reads nothing is not praised for it");
         }
         let unmarked: Vec<SiteResult> =
             chart.iter().map(|s| SiteResult { calculus_marked: Some(false), ..*s }).collect();
-        assert_eq!(measure("calculus_false_alarms", &unmarked), None, "nor who looks for nothing");
+        assert_eq!(measure(ChartMetric::CalculusFalseAlarms, &unmarked), None, "nor who looks for nothing");
         let clean: Vec<SiteResult> = unmarked.iter().map(|s| SiteResult { has_calculus: false, ..*s }).collect();
-        assert_eq!(measure("calculus_false_alarms", &clean), Some(0.0));
+        assert_eq!(measure(ChartMetric::CalculusFalseAlarms, &clean), Some(0.0));
     }
 }

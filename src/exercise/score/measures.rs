@@ -10,6 +10,10 @@ use crate::catalog::TissueRole;
 use crate::record::{Recording, Replay};
 use crate::scenario::file::ZoneRole;
 use crate::scenario::metric::{CHARTING, MetricArgument, OF_DRAWS, OF_FILLINGS, OF_VIEWS, PLAIN};
+use crate::scenario::metric_id::{
+    FillingMetric, MetricId, ProcessMetric, RemovalDepthMetric, RemovedVolumeMetric, StageMetric, TrialMetric,
+    VisibilityMetric, ZoneMetric,
+};
 use crate::scenario::{Metric, QuestionKind, Rubric};
 use crate::session::{AnswerRecord, StageResult};
 use typodont_core::frame::Vec3;
@@ -160,84 +164,81 @@ struct MeasureSource<'a> {
 
 impl MeasureSource<'_> {
     fn compute(&self, metric: &Metric) -> ComputedValue {
-        let name = metric.info.name;
-        match (name, &metric.argument) {
-            ("surface_within_tol", Some(MetricArgument::ToleranceMm(tolerance))) => {
+        match (metric.info.id, &metric.argument) {
+            (MetricId::Stage(of_stages), _) => self.of_stages(of_stages),
+            (MetricId::RemovedVolume(of_volume), _) => self.of_removed_volume(of_volume).into(),
+            (MetricId::RemovalDepth(of_depth), _) => self.of_removal_depth(of_depth),
+            (MetricId::Process(of_process), _) => self.of_process(of_process),
+            (MetricId::Visibility(of_visibility), _) => self.of_visibility(of_visibility),
+            (MetricId::Filling(filling), _) => {
+                self.restoration.map_or(ComputedValue::default(), |restoration| of_filling(restoration, filling))
+            }
+            (MetricId::Trial(trial), _) => self.of_trials(trial),
+            (MetricId::Chart(reading), _) => self.chart.and_then(|chart| charting::measure(reading, chart)).into(),
+            (MetricId::Zone(of_zone), Some(MetricArgument::Zone(id))) => self.of_zone(of_zone, id),
+            (MetricId::SurfaceWithinTolerance, Some(MetricArgument::ToleranceMm(tolerance))) => {
                 self.outline_share(*tolerance).into()
             }
-            ("zone_removed_pct", Some(MetricArgument::Zone(id))) => self.zone_removed_pct(id),
-            (_, Some(MetricArgument::Zone(id))) => match self.process.near_zones.get(id) {
-                Some(near) if name == "force_max_near_n" => highest_or_zero(near.force.highest),
-                Some(near) => highest_or_zero(near.speed.highest),
-                None => ComputedValue::default(),
-            },
-            _ => self
-                .of_stages(name)
-                .or_else(|| self.of_removed_volume(name))
-                .or_else(|| self.of_removal_depth(name))
-                .or_else(|| self.of_process(name))
-                .or_else(|| self.of_visibility(name))
-                .unwrap_or_else(|| self.of_filling_trials_or_chart(name)),
+            // `Metric::parse` gives each of these two its argument.
+            (MetricId::Zone(_) | MetricId::SurfaceWithinTolerance, _) => ComputedValue::default(),
         }
     }
 
-    /// Computes a measure of the stages and their questions; `None` for other measures.
-    fn of_stages(&self, name: &str) -> Option<ComputedValue> {
-        Some(match name {
-            "time_to_clear_s" => self.cutting_stage().map(|s| s.ended.seconds_since(s.started)).into(),
-            "detect_tooth" => self.answered_correctly(is_tooth).into(),
-            "detect_level" => {
+    /// Computes a measure of the stages and their questions.
+    fn of_stages(&self, metric: StageMetric) -> ComputedValue {
+        match metric {
+            StageMetric::CuttingStageTime => self.cutting_stage().map(|s| s.ended.seconds_since(s.started)).into(),
+            StageMetric::ToothDetected => self.answered_correctly(is_tooth).into(),
+            StageMetric::DetectionLevel => {
                 self.last_answer(is_tooth).and_then(|(_, g)| Some(f64::from(g.step?.0))).map(rounded).into()
             }
-            "detect_level_time_s" => {
+            StageMetric::ToothDetectionTime => {
                 let since =
                     |(stage, given): (&StageResult, &AnswerRecord)| given.step.map_or(stage.started, |(_, at)| at);
                 self.last_answer(is_tooth).map(|found| found.1.at.seconds_since(since(found))).into()
             }
-            "detect_quadrant" => self.answered_correctly(is_quadrant).into(),
-            "detect_quadrant_time_s" => {
+            StageMetric::QuadrantDetected => self.answered_correctly(is_quadrant).into(),
+            StageMetric::QuadrantDetectionTime => {
                 self.last_answer(is_quadrant).map(|(stage, given)| given.at.seconds_since(stage.started)).into()
             }
-            "questions_right_pct" => self.questions_right_pct().into(),
-            _ => return None,
-        })
+            StageMetric::QuestionsRight => self.questions_right_pct().into(),
+        }
     }
 
-    /// Computes a measure of the removed volume, from numbers of voxels; `None` for other measures.
-    fn of_removed_volume(&self, name: &str) -> Option<ComputedValue> {
+    /// Computes a measure of the removed volume, from numbers of voxels.
+    fn of_removed_volume(&self, metric: RemovedVolumeMetric) -> Option<f64> {
         let counts = &self.comparison.counts;
         let share = |part: usize, whole: usize| (whole > 0).then(|| part as f64 / whole as f64);
         let (removed, target, both) = (counts.removed, counts.target, counts.removed_target);
         let cleared_pct = || share(counts.removed_decay, counts.decay).map(|s| 100.0 * s);
-        Some(match name {
-            "decay_cleared_pct" => cleared_pct().into(),
-            "accessible_decay_cleared_pct" => {
+        match metric {
+            RemovedVolumeMetric::DecayCleared => cleared_pct(),
+            RemovedVolumeMetric::AccessibleDecayCleared => {
                 let cutting = self.recording.scenario.instruments.iter().filter(|i| i.cuts);
                 let radii = cutting.map(|i| i.to_instrument().head_radius());
                 let smallest = radii.reduce(f32::min).unwrap_or(0.0);
-                self.comparison.accessible_cleared_pct(&self.replay.workpiece.volume, smallest).into()
+                self.comparison.accessible_cleared_pct(&self.replay.workpiece.volume, smallest)
             }
-            "healthy_per_decay_pct" => share(counts.removed_other, counts.decay).map(|s| 100.0 * s).into(),
-            "efficiency_pct_s" => {
+            RemovedVolumeMetric::HealthyPerDecay => share(counts.removed_other, counts.decay).map(|s| 100.0 * s),
+            RemovedVolumeMetric::Efficiency => {
                 let drilling_ticks = self.process.drilling_ticks;
-                cleared_pct().filter(|_| drilling_ticks > 0).map(|c| c / seconds(drilling_ticks)).into()
+                cleared_pct().filter(|_| drilling_ticks > 0).map(|c| c / seconds(drilling_ticks))
             }
-            "dice" => share(2 * both, removed + target).unwrap_or(1.0).into(),
-            "jaccard" => share(both, removed + target - both).unwrap_or(1.0).into(),
-            "precision" => share(both, removed).unwrap_or(if target == 0 { 1.0 } else { 0.0 }).into(),
-            "recall" => share(both, target).unwrap_or(1.0).into(),
-            _ => return None,
-        })
+            RemovedVolumeMetric::Dice => share(2 * both, removed + target).or(Some(1.0)),
+            RemovedVolumeMetric::Jaccard => share(both, removed + target - both).or(Some(1.0)),
+            RemovedVolumeMetric::Precision => share(both, removed).or(Some(if target == 0 { 1.0 } else { 0.0 })),
+            RemovedVolumeMetric::Recall => share(both, target).or(Some(1.0)),
+        }
     }
 
-    /// Computes a measure of distances at the removed volume; `None` for other measures.
-    fn of_removal_depth(&self, name: &str) -> Option<ComputedValue> {
-        Some(match name {
-            "hausdorff_mm" => self.outline_percentile(1.0).into(),
-            "hausdorff95_mm" => self.outline_percentile(0.95).into(),
-            "overcut_depth_max_mm" => self.overcut(),
-            "undercut_depth_max_mm" => self.undercut(),
-            "pulp_exposed" => {
+    /// Computes a measure of distances at the removed volume.
+    fn of_removal_depth(&self, metric: RemovalDepthMetric) -> ComputedValue {
+        match metric {
+            RemovalDepthMetric::Hausdorff => self.outline_percentile(1.0).into(),
+            RemovalDepthMetric::Hausdorff95 => self.outline_percentile(0.95).into(),
+            RemovalDepthMetric::OvercutDepth => self.overcut(),
+            RemovalDepthMetric::UndercutDepth => self.undercut(),
+            RemovalDepthMetric::PulpExposed => {
                 let first = self.comparison.first_exposed(&self.process.removals);
                 let removed_mm3 = self.comparison.removed_vulnerable() as f64 * self.comparison.grid.voxel_mm3();
                 let evidence = first.map(|(voxel, removal)| Evidence {
@@ -248,71 +249,74 @@ impl MeasureSource<'_> {
                 });
                 ComputedValue { value: Some(if first.is_some() { 1.0 } else { 0.0 }), evidence }
             }
-            "remaining_dentine_thickness_min_mm" => {
+            RemovalDepthMetric::RemainingDentineThickness => {
                 let is_floor = |s: VoxelFlags| s.removed() && !s.vulnerable();
                 let nearest = self.comparison.nearest(is_floor, |s| s.vulnerable(), &self.process.removals);
                 self.deepest(nearest, None)
             }
-            _ => return None,
-        })
-    }
-
-    /// Computes a measure of force, movement or time; `None` for other measures.
-    fn of_process(&self, name: &str) -> Option<ComputedValue> {
-        let stats = self.process;
-        Some(match name {
-            "force_max_n" => highest_or_zero(stats.force.highest),
-            "force_mean_n" => stats.force.mean().into(),
-            "speed_max_mm_s" => stats.speed.highest.into(),
-            "force_max_near_pulp_n" => highest_or_zero(stats.force_near.highest),
-            "force_mean_near_pulp_n" => stats.force_near.mean().unwrap_or(0.0).into(),
-            "speed_max_near_pulp_mm_s" => highest_or_zero(stats.speed_near.highest),
-            "path_length_mm" => stats.path_mm.into(),
-            "drilling_time_s" => seconds(stats.drilling_ticks).into(),
-            "contact_time_s" => seconds(stats.contact_ticks).into(),
-            "jerk" => stats.smoothness.into(),
-            "soft_tissue_drilled_s" => seconds(stats.soft_ticks).into(),
-            "neighbour_drilled_s" => seconds(stats.neighbour_ticks).into(),
-            "session_time_s" => seconds(stats.ticks).into(),
-            _ => return None,
-        })
-    }
-
-    /// Computes a measure of visibility, with the first hidden removal as evidence; `None` for other measures.
-    fn of_visibility(&self, name: &str) -> Option<ComputedValue> {
-        if !OF_VIEWS.iter().any(|about| about.name == name) {
-            return None;
         }
-        let Some(unseen) = &self.process.unseen else { return Some(ComputedValue::default()) };
+    }
+
+    /// Computes a measure of force, movement or time.
+    fn of_process(&self, metric: ProcessMetric) -> ComputedValue {
+        let stats = self.process;
+        match metric {
+            ProcessMetric::MaxForce => highest_or_zero(stats.force.highest),
+            ProcessMetric::MeanForce => stats.force.mean().into(),
+            ProcessMetric::MaxSpeed => stats.speed.highest.into(),
+            ProcessMetric::MaxForceNearPulp => highest_or_zero(stats.force_near.highest),
+            ProcessMetric::MeanForceNearPulp => stats.force_near.mean().unwrap_or(0.0).into(),
+            ProcessMetric::MaxSpeedNearPulp => highest_or_zero(stats.speed_near.highest),
+            ProcessMetric::PathLength => stats.path_mm.into(),
+            ProcessMetric::DrillingTime => seconds(stats.drilling_ticks).into(),
+            ProcessMetric::ContactTime => seconds(stats.contact_ticks).into(),
+            ProcessMetric::Jerk => stats.smoothness.into(),
+            ProcessMetric::SoftTissueDrilledTime => seconds(stats.soft_ticks).into(),
+            ProcessMetric::NeighbourDrilledTime => seconds(stats.neighbour_ticks).into(),
+            ProcessMetric::SessionTime => seconds(stats.ticks).into(),
+        }
+    }
+
+    /// Computes a measure of visibility, with the first hidden removal as evidence.
+    fn of_visibility(&self, metric: VisibilityMetric) -> ComputedValue {
+        let Some(unseen) = &self.process.unseen else { return ComputedValue::default() };
         let is_sound =
             |voxel: &&UnseenVoxel| self.recording.scenario.tissues.role(voxel.tissue) == Some(TissueRole::Sound);
-        let hidden = unseen.hidden.iter();
-        let (first, count) = match name {
-            "unseen_sound_cut_mm3" => (hidden.clone().find(is_sound), hidden.filter(is_sound).count()),
-            _ => (unseen.hidden.first(), unseen.hidden.len()),
-        };
-        let value = match name {
-            "unseen_cut_pct" => (unseen.judged > 0).then(|| 100.0 * count as f64 / unseen.judged as f64),
-            _ => Some(count as f64 * self.comparison.grid.voxel_mm3()),
+        let (first, count) = (unseen.hidden.first(), unseen.hidden.len());
+        let mm3 = |count: usize| count as f64 * self.comparison.grid.voxel_mm3();
+        let (value, first) = match metric {
+            VisibilityMetric::UnseenShare => {
+                ((unseen.judged > 0).then(|| 100.0 * count as f64 / unseen.judged as f64), first)
+            }
+            VisibilityMetric::UnseenVolume => (Some(mm3(count)), first),
+            VisibilityMetric::UnseenSoundVolume => {
+                let sound = || unseen.hidden.iter().filter(is_sound);
+                (Some(mm3(sound().count())), sound().next())
+            }
         };
         let evidence = first.map(|found| {
             let place = self.comparison.grid.centre(self.comparison.grid.cell(found.voxel as usize));
             Evidence { at: Some(found.at), tissue: Some(found.tissue), ..Evidence::at_place(place) }
         });
-        Some(ComputedValue { value, evidence })
+        ComputedValue { value, evidence }
     }
 
-    /// Computes a measure of a filling, of trials or of a periodontal chart; other measures have no value.
-    fn of_filling_trials_or_chart(&self, name: &str) -> ComputedValue {
-        if OF_FILLINGS.iter().any(|about| about.name == name) {
-            return self.restoration.map_or(ComputedValue::default(), |r| of_filling(r, name));
+    /// Computes a measure of trials, for the corrected result with the first error as evidence.
+    fn of_trials(&self, metric: TrialMetric) -> ComputedValue {
+        let Some(trials) = &self.trials else { return ComputedValue::default() };
+        let first_error = trials.first_error.filter(|_| metric == TrialMetric::Corrected);
+        let evidence = first_error.map(|(at, place)| Evidence { at: Some(at), ..Evidence::at_place(place) });
+        ComputedValue { value: trials.measure(metric), evidence }
+    }
+
+    /// Computes a measure of a zone.
+    fn of_zone(&self, metric: ZoneMetric, zone: &str) -> ComputedValue {
+        let near = || self.process.near_zones.get(zone);
+        match metric {
+            ZoneMetric::Removed => self.zone_removed_pct(zone),
+            ZoneMetric::MaxForceNear => near().map_or(ComputedValue::default(), |n| highest_or_zero(n.force.highest)),
+            ZoneMetric::MaxSpeedNear => near().map_or(ComputedValue::default(), |n| highest_or_zero(n.speed.highest)),
         }
-        if let Some(trials) = self.trials.as_ref().filter(|_| OF_DRAWS.iter().any(|about| about.name == name)) {
-            let first_error = trials.first_error.filter(|_| name == "detect_corrected_pct");
-            let evidence = first_error.map(|(at, place)| Evidence { at: Some(at), ..Evidence::at_place(place) });
-            return ComputedValue { value: trials.measure(name), evidence };
-        }
-        self.chart.and_then(|chart| charting::measure(name, chart)).into()
     }
 
     /// Computes a zone's removed share, with the voxel of the zone that was removed first as evidence.
@@ -440,30 +444,33 @@ impl MeasureSource<'_> {
 
 /// Computes a measure of a filling. The evidence of a distance is its position, without a time, since a surface results
 /// from many strokes.
-fn of_filling(restoration: &Restoration, name: &str) -> ComputedValue {
+fn of_filling(restoration: &Restoration, metric: FillingMetric) -> ComputedValue {
     let at = |value: f64, place: Vec3| ComputedValue { value: Some(value), evidence: Some(Evidence::at_place(place)) };
-    match name {
-        "filled_pct" if restoration.cavity > 0 => {
-            (100.0 * restoration.filled as f64 / restoration.cavity as f64).into()
+    match metric {
+        FillingMetric::Filled => {
+            (restoration.cavity > 0).then(|| 100.0 * restoration.filled as f64 / restoration.cavity as f64).into()
         }
-        "contour_mean_mm" => restoration.mean().into(),
-        "contour_p95_mm" => restoration.percentile(0.95).into(),
-        "contour_max_mm" => {
+        FillingMetric::ContourMean => restoration.mean().into(),
+        FillingMetric::ContourP95 => restoration.percentile(0.95).into(),
+        FillingMetric::ContourMax => {
             let farthest = [restoration.highest(), restoration.lowest()];
             let farthest = farthest.into_iter().flatten().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
             farthest.map_or(ComputedValue::default(), |(mm, place)| at(f64::from(mm.abs()), place))
         }
-        "overhang_max_mm" => restoration.highest().map_or(ComputedValue::default(), |(mm, place)| match mm > 0.0 {
-            true => at(f64::from(mm), place),
-            false => 0.0.into(),
-        }),
-        "deficit_max_mm" => restoration.lowest().map_or(ComputedValue::default(), |(mm, place)| match mm < 0.0 {
-            true => at(f64::from(-mm), place),
-            false => 0.0.into(),
-        }),
-        "overhang_mm3" => restoration.overhang_mm3.into(),
-        "void_mm3" => restoration.void_mm3.into(),
-        _ => ComputedValue::default(),
+        FillingMetric::OverhangMax => {
+            restoration.highest().map_or(ComputedValue::default(), |(mm, place)| match mm > 0.0 {
+                true => at(f64::from(mm), place),
+                false => 0.0.into(),
+            })
+        }
+        FillingMetric::DeficitMax => {
+            restoration.lowest().map_or(ComputedValue::default(), |(mm, place)| match mm < 0.0 {
+                true => at(f64::from(-mm), place),
+                false => 0.0.into(),
+            })
+        }
+        FillingMetric::OverhangVolume => restoration.overhang_mm3.into(),
+        FillingMetric::VoidVolume => restoration.void_mm3.into(),
     }
 }
 

@@ -1,10 +1,11 @@
 //! Trials in which the site of the caries was drawn: the share of correct answers, corrected for chance.
 //!
 //! Takes a scenario, its workpiece and the outcome of a session. Gives counts, the measures of
-//! [`OF_DRAWS`](crate::scenario::metric::OF_DRAWS), and the tissue that a possible site felt like. A person who guesses has an expected corrected result of 0, however
-//! often and however fast the guesses are made.
+//! [`OF_DRAWS`](crate::scenario::metric::OF_DRAWS), and the tissue that a possible site felt like. A person who guesses
+//! has an expected corrected result of 0, however often and however fast the guesses are made.
 
 use crate::record::Replay;
+use crate::scenario::metric_id::TrialMetric;
 use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece, anatomy_tissues};
 use crate::session::{SessionOutcome, StageResult};
 use typodont_core::frame::Vec3;
@@ -96,17 +97,16 @@ impl TrialSummary {
     }
 
     /// Computes one of the measures of the trials; `None` if it has no value.
-    pub fn measure(&self, name: &str) -> Option<f64> {
+    pub fn measure(&self, metric: TrialMetric) -> Option<f64> {
         let interval = || statistics::wilson_interval(self.share(), self.trials());
         let answered = self.correct + self.incorrect;
-        match name {
-            "detect_corrected_pct" => self.corrected_pct(self.share()),
-            "detect_corrected_low_pct" => self.corrected_pct(interval()[0]),
-            "detect_corrected_high_pct" => self.corrected_pct(interval()[1]),
-            "detect_trials_right" => Some(self.correct as f64),
-            "detect_level_corrected" => self.level_sum.map(|sum| sum / self.trials() as f64),
-            "detect_trial_time_s" => (answered > 0).then(|| self.time_sum / answered as f64),
-            _ => None,
+        match metric {
+            TrialMetric::Corrected => self.corrected_pct(self.share()),
+            TrialMetric::CorrectedLow => self.corrected_pct(interval()[0]),
+            TrialMetric::CorrectedHigh => self.corrected_pct(interval()[1]),
+            TrialMetric::TrialsRight => Some(self.correct as f64),
+            TrialMetric::LevelCorrected => self.level_sum.map(|sum| sum / self.trials() as f64),
+            TrialMetric::AnswerTime => (answered > 0).then(|| self.time_sum / answered as f64),
         }
     }
 }
@@ -153,18 +153,18 @@ mod tests {
     /// Numbers of Wilson's interval from R: `binom::binom.wilson(6, 8)` and `(2, 8)`.
     #[test]
     fn the_share_of_correct_answers_is_corrected_for_chance() {
-        let check = |summary: TrialSummary, name: &str, expected: f64| {
-            let found = summary.measure(name).unwrap();
-            assert!((found - expected).abs() < 1e-4, "{name}: {found} instead of {expected}");
+        let check = |summary: TrialSummary, metric: TrialMetric, expected: f64| {
+            let found = summary.measure(metric).unwrap();
+            assert!((found - expected).abs() < 1e-4, "{metric:?}: {found} instead of {expected}");
         };
-        check(summary(8, 0, 0, 0.5), "detect_corrected_pct", 100.0);
-        check(summary(4, 4, 0, 0.5), "detect_corrected_pct", 0.0);
-        check(summary(2, 6, 0, 0.25), "detect_corrected_pct", 0.0);
-        check(summary(0, 0, 8, 0.25), "detect_corrected_pct", 0.0);
-        check(summary(0, 8, 0, 0.5), "detect_corrected_pct", -100.0);
-        check(summary(3, 1, 4, 0.5), "detect_corrected_pct", 25.0);
-        check(summary(6, 2, 0, 0.5), "detect_corrected_low_pct", 100.0 * (2.0 * 0.409_275 - 1.0));
-        check(summary(6, 2, 0, 0.5), "detect_corrected_high_pct", 100.0 * (2.0 * 0.928_521 - 1.0));
+        check(summary(8, 0, 0, 0.5), TrialMetric::Corrected, 100.0);
+        check(summary(4, 4, 0, 0.5), TrialMetric::Corrected, 0.0);
+        check(summary(2, 6, 0, 0.25), TrialMetric::Corrected, 0.0);
+        check(summary(0, 0, 8, 0.25), TrialMetric::Corrected, 0.0);
+        check(summary(0, 8, 0, 0.5), TrialMetric::Corrected, -100.0);
+        check(summary(3, 1, 4, 0.5), TrialMetric::Corrected, 25.0);
+        check(summary(6, 2, 0, 0.5), TrialMetric::CorrectedLow, 100.0 * (2.0 * 0.409_275 - 1.0));
+        check(summary(6, 2, 0, 0.5), TrialMetric::CorrectedHigh, 100.0 * (2.0 * 0.928_521 - 1.0));
     }
 
     /// Sums the result of every possible session of six guesses, each weighted by its probability.
@@ -175,7 +175,7 @@ mod tests {
             for outcome in 0..1u32 << 6 {
                 let correct = outcome.count_ones() as usize;
                 let probability = chance.powi(correct as i32) * (1.0 - chance).powi(6 - correct as i32);
-                let result = summary(correct, 6 - correct, 0, chance).measure("detect_corrected_pct").unwrap();
+                let result = summary(correct, 6 - correct, 0, chance).measure(TrialMetric::Corrected).unwrap();
                 expected += probability * result;
             }
             assert!(expected.abs() < 1e-9, "{chance}: {expected}");

@@ -8,7 +8,10 @@ use typodont_exercise::scenario::Metric;
 pub const FLAGS: [&str; 3] = ["detect_tooth", "detect_quadrant", "pulp_exposed"];
 
 /// Shares and coefficients from 0 to 1 that have no unit.
-const SHARES: [&str; 5] = ["dice", "jaccard", "precision", "recall", "detect_level"];
+const SHARES: [&str; 6] = ["dice", "jaccard", "precision", "recall", "detect_level", "surface_within_tol"];
+
+/// Whole numbers of events.
+const COUNTS: [&str; 3] = ["detect_trials_right", "probing_force_high", "calculus_false_alarms"];
 
 /// Percentages of something else than the whole, which may exceed 100.
 const RATIOS: [&str; 1] = ["healthy_per_decay_pct"];
@@ -30,6 +33,7 @@ fn range_of_measure(name: &str) -> ValueRange {
         (name, _) if FLAGS.contains(&name) => ValueRange::Binary,
         (name, _) if SIGNED.contains(&name) => ValueRange::Unbounded,
         (name, _) if SHARES.contains(&name) => ValueRange::Within(0.0, 1.0),
+        (name, _) if COUNTS.contains(&name) => ValueRange::NonNegative,
         (name, "%") if !RATIOS.contains(&name) => ValueRange::Within(0.0, 100.0),
         (_, "%" | "s" | "mm" | "mm³" | "mm/s" | "N" | "%/s") => ValueRange::NonNegative,
         _ => ValueRange::Unbounded,
@@ -57,7 +61,7 @@ mod tests {
 
     #[test]
     fn the_ranges_name_measures_that_exist() {
-        for name in FLAGS.iter().chain(&SHARES).chain(&RATIOS).chain(&SIGNED) {
+        for name in FLAGS.iter().chain(&SHARES).chain(&COUNTS).chain(&RATIOS).chain(&SIGNED) {
             assert!(metric::all().any(|info| info.name == *name), "{name}");
         }
         assert_eq!(range_of_measure("time_to_clear_s"), ValueRange::NonNegative);
@@ -65,6 +69,16 @@ mod tests {
         assert_eq!(range_of_measure("decay_cleared_pct"), ValueRange::Within(0.0, 100.0));
         assert_eq!(range_of_measure("pulp_exposed"), ValueRange::Binary);
         assert_eq!(range_of_measure("jerk"), ValueRange::Unbounded);
+        assert_eq!(range_of_measure("surface_within_tol(0.3)"), ValueRange::Within(0.0, 1.0));
         assert_eq!(range_of_measure("unheard_of"), ValueRange::Unbounded);
+    }
+
+    #[test]
+    fn every_measure_without_a_unit_has_a_range() {
+        // Aim: a new measure without a unit is not left unbounded by mistake, as `surface_within_tol` was.
+        for info in metric::all().filter(|info| info.unit.is_empty()) {
+            let listed = FLAGS.iter().chain(&SHARES).chain(&COUNTS).chain(&SIGNED).any(|name| *name == info.name);
+            assert!(listed, "{}: in which of the lists of this file?", info.name);
+        }
     }
 }

@@ -60,7 +60,7 @@ impl Capabilities {
 
     /// Returns the first feature that a measure requires but the scenario lacks; `None` if nothing is missing.
     fn missing_for(&self, measure: &metric::MetricInfo) -> Option<RequiredFeature> {
-        measure.required_features().iter().copied().find(|&feature| !self.has(feature))
+        measure.required_features.iter().copied().find(|&feature| !self.has(feature))
     }
 }
 
