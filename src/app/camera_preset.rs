@@ -1,6 +1,6 @@
 //! Camera presets offered by the menu.
 
-use super::lesson_scene::LessonScene;
+use crate::lesson_scene::LessonScene;
 use typodont_render::{Orbit, Quadrant};
 use typodont_scene::{self as scene, ToothSide};
 

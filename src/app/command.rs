@@ -1,11 +1,11 @@
 //! Commands that screens send to the application.
 
-use super::camera_preset::CameraPreset;
-use super::editor::EditorCommand;
-use super::lesson_scene::DisplayMode;
-use super::pointer_hand::PointedPlace;
-use super::settings::Settings;
-use super::transfer_function_draft::TransferFunctionDraft;
+use crate::camera_preset::CameraPreset;
+use crate::editor::EditorCommand;
+use crate::lesson_scene::DisplayMode;
+use crate::pointer_hand::PointedPlace;
+use crate::settings::Settings;
+use crate::transfer_function_draft::TransferFunctionDraft;
 use std::path::PathBuf;
 use typodont_core::touch::Coefficient;
 use typodont_core::volume::Label;

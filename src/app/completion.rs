@@ -1,6 +1,6 @@
 //! The making of a bundle after its session: of a lesson in this window, or of a session that was interrupted.
 
-use super::lesson_state::LessonState;
+use crate::lesson_state::LessonState;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use typodont_lesson::InterruptedSession;
 use typodont_report::bundle::{BundleFolder, CompletionStep};

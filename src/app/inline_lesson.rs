@@ -1,7 +1,7 @@
 //! A lesson within the window's frames, for a page in a browser, which has no threads.
 
-use super::lesson_backend::LessonBackend;
-use super::lesson_run::LessonRun;
+use crate::lesson_backend::LessonBackend;
+use crate::lesson_run::LessonRun;
 
 /// Frames that are drawn before a long step, so that the screen says what is being done.
 const FRAMES_BEFORE_LONG_STEP: u32 = 2;

@@ -3,12 +3,9 @@
 //! Takes what the station's file says. Gives the settings of the window, the commands that a kiosk refuses, and the page
 //! on which a supervisor closes it. Never changes the user's settings file on behalf of a station.
 
-use super::command::AppCommand;
-use super::i18n::Translations;
-use super::settings::Settings;
-use super::supervisor_code::SupervisorCode;
-use super::theme;
-use eframe::egui;
+use crate::command::AppCommand;
+use crate::settings::Settings;
+use crate::supervisor_code::SupervisorCode;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -76,8 +73,8 @@ pub struct KioskExit {
     pub is_asked: bool,
     /// The supervisor's code was typed: the window may close.
     pub is_allowed: bool,
-    code: String,
-    is_wrong: bool,
+    pub code: String,
+    pub is_wrong: bool,
 }
 
 impl KioskExit {
@@ -103,45 +100,6 @@ impl KioskExit {
             _ => "nothing",
         }
     }
-}
-
-/// The question for the supervisor's code.
-pub fn exit_ui(
-    ui: &mut egui::Ui,
-    exit: &mut KioskExit,
-    kiosk: &KioskOptions,
-    words: &Translations,
-    commands: &mut Vec<AppCommand>,
-) {
-    if kiosk.supervisor_code.is_none() {
-        ui.label(words.get("kiosk.no_code"));
-        if ui.button(words.get("kiosk.back")).clicked() {
-            commands.push(AppCommand::AskToLeaveKiosk(false));
-        }
-        return;
-    }
-    let label = ui.label(words.get("kiosk.code")).id;
-    let typed = ui.add(egui::TextEdit::singleline(&mut exit.code).password(true).desired_width(220.0));
-    let is_entered = typed.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-    if !is_entered && !typed.has_focus() && exit.code.is_empty() {
-        typed.request_focus();
-    }
-    typed.labelled_by(label);
-    if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
-        commands.push(AppCommand::AskToLeaveKiosk(false));
-    }
-    if exit.is_wrong {
-        ui.colored_label(theme::ERROR, words.get("kiosk.wrong_code"));
-    }
-    ui.add_space(8.0);
-    ui.horizontal(|ui| {
-        if ui.add(theme::primary_button(words.get("kiosk.close"))).clicked() || is_entered {
-            commands.push(AppCommand::LeaveKiosk);
-        }
-        if ui.button(words.get("kiosk.back")).clicked() {
-            commands.push(AppCommand::AskToLeaveKiosk(false));
-        }
-    });
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! notices no difference: it sends commands, and reads the newest tick, all events in order, and all changed voxels in
 //! order. Nothing else crosses between them, so that a backend may also be a worker that passes these messages on.
 
-use super::snapshot::{LessonSnapshot, SNAPSHOT_WORDS};
+use crate::snapshot::{LessonSnapshot, SNAPSHOT_WORDS};
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::PathBuf;

@@ -3,9 +3,9 @@
 //! Takes the window's commands. Gives events, edits and the newest tick; messages that do not fit into a full queue wait
 //! here. Never waits: a step does what is due and returns.
 
-use super::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent};
-use super::lesson_sound::LessonSound;
-use super::snapshot::{LessonSnapshot, SNAPSHOT_WORDS};
+use crate::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent};
+use crate::lesson_sound::LessonSound;
+use crate::snapshot::{LessonSnapshot, SNAPSHOT_WORDS};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use typodont_audio::SoundSender;

@@ -1,9 +1,9 @@
 //! The scene of a lesson as it is drawn: tooth, mouth, instruments, particles and display modes.
 
-use super::section_view::SectionImage;
-use super::transfer_function_draft::{DensityHistogram, TransferFunctionDraft};
+use crate::transfer_function_draft::{DensityHistogram, TransferFunctionDraft};
 use std::cell::OnceCell;
 use std::sync::Arc;
+use typodont_core::frame::Vec3;
 use typodont_core::volume::{Label, Volume};
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::{Scenario, SceneLayout, Stage, Workpiece};
@@ -16,6 +16,14 @@ use typodont_scene::{self as scene, ContraAngle, Mouth};
 
 /// Maximum opening angle of the mouth, degrees: 50 mm between the incisors.
 const MAX_MOUTH_OPENING: f32 = 35.0;
+
+/// Image of a section through the working end, and what it depends on.
+pub struct SectionImage {
+    pub tip: Vec3,
+    pub azimuth: f32,
+    pub edit_count: u64,
+    pub texture: eframe::egui::TextureHandle,
+}
 
 /// The drawn scene of a lesson.
 pub struct LessonScene {

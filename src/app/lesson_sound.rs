@@ -19,10 +19,10 @@ const ELECTRIC_FROM_RPM: f32 = 40_000.0;
 const TURBINE_FROM_RPM: f32 = 220_000.0;
 
 /// Contact force above which the patient feels pain, N. The thesis (6.3) gives no number; its dentists cut with less
-/// than 2 N.
+/// than 2 N, above which the window warns (`HIGH_FORCE` in `ui::practice`).
 const PAINFUL_FORCE: f32 = 2.5;
 
-/// Force above [`PAINFUL_FORCE`] at which a cry is loudest, N.
+/// Excess over [`PAINFUL_FORCE`] at which a cry reaches its full loudness, N.
 const PAINFUL_SPAN: f32 = 2.0;
 
 /// Time without pain after which the next pain causes a new cry, s.

@@ -1,17 +1,17 @@
 //! A lesson as the window knows it: its events so far, its scene, and answers not yet submitted.
 
-use super::answer_draft::parse_draft;
-use super::completion::CompletionState;
-use super::controls_guide::{ControlsProgress, LessonProgress};
-use super::inline_lesson::InlineLesson;
-use super::lesson_backend::{LessonBackend, LessonClient, LessonCommand, LessonConfig, LessonEvent};
-use super::lesson_run::LessonRun;
-use super::lesson_scene::{DisplayMode, LessonScene};
-use super::lesson_thread::LessonThread;
-use super::messages::{self, PauseReason, SecondHandStatus};
-use super::pointer_hand::{PointedPlace, PointerHand};
-use super::snapshot::LessonSnapshot;
-use super::view_refresh::ViewRefresh;
+use crate::answer_draft::parse_draft;
+use crate::completion::CompletionState;
+use crate::controls_progress::{ControlsProgress, LessonProgress};
+use crate::inline_lesson::InlineLesson;
+use crate::lesson_backend::{LessonBackend, LessonClient, LessonCommand, LessonConfig, LessonEvent};
+use crate::lesson_run::LessonRun;
+use crate::lesson_scene::{DisplayMode, LessonScene};
+use crate::lesson_thread::LessonThread;
+use crate::messages::{self, PauseReason, SecondHandStatus};
+use crate::pointer_hand::{PointedPlace, PointerHand};
+use crate::snapshot::LessonSnapshot;
+use crate::view_refresh::ViewRefresh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer, SoundSender};

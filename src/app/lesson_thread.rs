@@ -1,7 +1,7 @@
 //! A lesson on a thread of its own, which polls the servo every few milliseconds, whatever the window does.
 
-use super::lesson_backend::LessonBackend;
-use super::lesson_run::LessonRun;
+use crate::lesson_backend::LessonBackend;
+use crate::lesson_run::LessonRun;
 use std::thread::JoinHandle;
 use web_time::Duration;
 

@@ -1,6 +1,6 @@
 //! Messages of the lesson and the device to the user, as keys of a language file.
 
-use super::i18n::Translations;
+use crate::i18n::Translations;
 use std::net::SocketAddr;
 use typodont_core::device::{DeviceError, DeviceState};
 use typodont_devices::servo::SecondHandEvent;

@@ -1,7 +1,7 @@
 //! The hand of a trainee who works with a mouse, a pen or a finger: where it points, and how hard it presses.
 
-use super::lesson_scene::LessonScene;
-use super::snapshot::LessonSnapshot;
+use crate::lesson_scene::LessonScene;
+use crate::snapshot::LessonSnapshot;
 use typodont_core::device::UPRIGHT;
 use typodont_core::frame::{Quat, Vec3};
 use typodont_devices::mouse::{HandTarget, Mouse};

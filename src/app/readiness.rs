@@ -3,7 +3,7 @@
 //! Takes the system as it is. Gives, for each, a name or the reason why it cannot be used. Never changes a setting, plays
 //! nothing and opens no window.
 
-use super::{i18n, platform, settings};
+use crate::{i18n, platform, settings};
 use std::path::PathBuf;
 use typodont_audio::AudioError;
 use winit::event_loop::EventLoop;
@@ -16,7 +16,7 @@ pub fn connect_to_display() -> Result<(), String> {
     match EventLoop::builder().build() {
         Ok(_) => Ok(()),
         // winit's message begins with a line of its own source.
-        Err(error) => Err(super::without_source_line(&error.to_string())),
+        Err(error) => Err(crate::without_source_line(&error.to_string())),
     }
 }
 

@@ -1,9 +1,9 @@
 //! Screens of the window.
 
-use super::completion::Completion;
-use super::editor::EditorState;
-use super::lesson_state::LessonState;
-use super::results::LessonResults;
+use crate::completion::Completion;
+use crate::editor::EditorState;
+use crate::lesson_state::LessonState;
+use crate::results::LessonResults;
 
 /// The screen that is shown.
 pub enum Screen {

@@ -1,6 +1,6 @@
 //! Earlier sessions of this computer, read on a thread of its own; of a page, those that the browser keeps.
 
-use super::platform;
+use crate::platform;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver};

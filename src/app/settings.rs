@@ -1,7 +1,7 @@
 //! The user's settings, kept where the platform keeps them: in a file, or in the page's own storage.
 
-use super::i18n::{self, Translations};
-use super::platform;
+use crate::i18n::{self, Translations};
+use crate::platform;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use typodont_render::{Stereo, StereoLayout};
@@ -54,7 +54,7 @@ pub enum StereoMode {
 impl Default for Settings {
     fn default() -> Settings {
         Settings {
-            language: super::i18n::system_language(),
+            language: crate::i18n::system_language(),
             device: "mouse".into(),
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,

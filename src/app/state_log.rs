@@ -3,7 +3,7 @@
 //!
 //! Tests and kiosks use it to wait for a state instead of a fixed time.
 
-use super::platform;
+use crate::platform;
 use std::collections::BTreeMap;
 
 #[derive(Default)]

@@ -1,8 +1,8 @@
 //! Redrawing of the view: only when something in it has changed, and, where drawing is slow, at a lower resolution
 //! while it changes.
 
-use super::lesson_scene::DisplayMode;
-use super::snapshot::InstrumentPose;
+use crate::lesson_scene::DisplayMode;
+use crate::snapshot::InstrumentPose;
 use typodont_render::{Orbit, Stereo};
 
 /// Frame time above which the resolution falls, and below which it rises again, s.

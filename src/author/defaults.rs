@@ -6,6 +6,9 @@ use super::schema_form::{FieldKind, SchemaForm};
 use serde_json::{Map, Value, json};
 use typodont_formats::pointer::child;
 
+/// Time limit of a new stage, s; the file of an exercise has no default, and a stage without a limit has none.
+pub const STAGE_TIME_LIMIT_S: u32 = 300;
+
 /// Returns a short, readable exercise: a molar in its jaw, one decay, one stage, a rubric of three items. The texts are
 /// given in the author's language.
 pub fn new_exercise(title: &str, stage: &str, instruction: &str, lines: [&str; 3], fail: &str) -> String {
@@ -36,7 +39,7 @@ pub fn new_exercise(title: &str, stage: &str, instruction: &str, lines: [&str; 3
       "id": "stage-1",
       "title": {stage},
       "instruction": {instruction},
-      "time_limit_s": 300,
+      "time_limit_s": {STAGE_TIME_LIMIT_S},
       "cutting": true,
       "show_decay": true,
       "ends_when": ["confirmed"]
@@ -72,7 +75,7 @@ pub fn default_entry(form: &SchemaForm, whole: &Value, pointer: &str) -> Value {
     let id = |stem: &str| unused_id(whole, stem);
     match key {
         "stages" => json!({
-            "id": id("stage"), "title": id("stage"), "instruction": "…", "time_limit_s": 300, "ends_when": ["confirmed"]
+            "id": id("stage"), "title": id("stage"), "instruction": "…", "time_limit_s": STAGE_TIME_LIMIT_S, "ends_when": ["confirmed"]
         }),
         "decay" => json!({
             "id": id("lesion"), "shape": { "sphere": { "radius_mm": 1.5 } }, "surface": "O", "at": "centre", "depth_mm": 0.4

@@ -190,3 +190,19 @@ fn no_circle_of_imports_is_large() {
     assert!(edges > 500, "only {edges} imports were found");
     assert!(wrong.is_empty(), "files that import each other in a circle:\n{}", wrong.join("\n"));
 }
+
+#[test]
+fn what_is_drawn_is_known_only_to_the_application() {
+    // Aim: the state of the window can be read, tested and carried into a page without its screens. Method: who imports
+    // `ui` of the crate `app`.
+    let files = sources();
+    let own: Vec<&SourceFile> = files.iter().filter(|file| file.krate == "app").collect();
+    let imports = Crate::of(&own).imports();
+    let of = |module: &Module, folder: &str| module.first().is_some_and(|first| first == folder);
+    let drawing = |targets: &BTreeSet<Module>| targets.iter().any(|target| of(target, "ui"));
+    let importers: Vec<&Module> =
+        imports.iter().filter(|(_, targets)| drawing(targets)).map(|(from, _)| from).collect();
+    assert!(importers.iter().any(|from| of(from, "app")), "the application draws its screens");
+    let wrong: Vec<_> = importers.iter().filter(|from| !of(from, "app") && !of(from, "ui")).collect();
+    assert!(wrong.is_empty(), "only `app` may use the screens: {wrong:?}");
+}

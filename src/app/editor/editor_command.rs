@@ -1,7 +1,7 @@
 //! Commands of the author's screen.
 
-use super::editor_section::EditorSection;
-use super::preview::PreviewMode;
+use crate::editor::editor_section::EditorSection;
+use crate::editor::preview::PreviewMode;
 use serde_json::Value;
 use std::path::PathBuf;
 use typodont_core::frame::Vec3;

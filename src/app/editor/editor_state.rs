@@ -1,10 +1,10 @@
 //! The exercise being edited: its draft, its file, its built workpiece and the complaints about it.
 
-use super::super::platform;
-use super::build_worker::{BuildJob, BuildResult, BuildWorker};
-use super::editor_command::EditorCommand;
-use super::editor_section::EditorSection;
-use super::preview::PreviewState;
+use crate::editor::build_worker::{BuildJob, BuildResult, BuildWorker};
+use crate::editor::editor_command::EditorCommand;
+use crate::editor::editor_section::EditorSection;
+use crate::editor::preview::PreviewState;
+use crate::platform;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use typodont_author::{

@@ -1,6 +1,6 @@
 //! The author's view of the tooth: camera, display mode and slice position.
 
-use super::build_worker::BuildResult;
+use crate::editor::build_worker::BuildResult;
 use eframe::egui;
 use std::sync::Arc;
 use typodont_core::frame::Vec3;

@@ -1,0 +1,424 @@
+//! The commands of every screen, each carried out in one place.
+
+use super::{App, CloseState, repaint_waker};
+use crate::command::{AppCommand, CameraCommand, PracticeCommand};
+use crate::completion::Completion;
+use crate::editor::{EditorCommand, EditorState, OpenMode};
+use crate::exercise_list::{self, ExerciseList};
+use crate::i18n::{self};
+use crate::kiosk::{self};
+use crate::lesson_backend::{InputDevice, LessonConfig};
+use crate::lesson_scene::DisplayMode;
+use crate::lesson_state::LessonState;
+use crate::platform;
+use crate::results::BundleState;
+use crate::screen::Screen;
+use crate::settings::Settings;
+use crate::ui::{briefing, shortcuts, theme};
+use eframe::egui::{self, ViewportCommand};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use typodont_audio::PlaybackOptions;
+use typodont_author::new_exercise;
+use typodont_exercise::scenario::Scenario;
+use typodont_exercise::session::Input;
+use typodont_formats::Library;
+use typodont_lesson as lesson;
+use typodont_lesson::SessionSeed;
+
+impl App {
+    /// Shows the list without a participant. In a kiosk, the language and the size of the last one are forgotten, too.
+    pub(super) fn change_participant(&mut self, ctx: &egui::Context) {
+        self.go_back();
+        self.participant.clear();
+        self.examiner_code.clear();
+        if self.options.kiosk().is_some() {
+            self.exercise_list.selected = 0;
+            self.overlay = shortcuts::OverlayState::default();
+            self.kiosk_exit.ask(false);
+            self.apply_settings(self.first_settings.clone(), ctx);
+        }
+    }
+
+    /// Closes a kiosk if what was typed is the supervisor's code.
+    pub(super) fn leave_kiosk(&mut self, ctx: &egui::Context) {
+        let App { kiosk_exit, options, .. } = self;
+        if options.kiosk().is_some_and(|kiosk| kiosk_exit.try_code(kiosk)) {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+
+    /// Leaves the results; a bundle that is still being made is completed in the background. A page keeps no bundle: one
+    /// that was not saved is saved now.
+    pub(super) fn leave_results(&mut self) {
+        if platform::IS_PAGE && matches!(&self.screen, Screen::Results(results) if !results.is_downloaded) {
+            self.download_bundle();
+        }
+        if let Screen::Results(results) = std::mem::replace(&mut self.screen, Screen::ExerciseList)
+            && let BundleState::Pending(completion) = results.state
+        {
+            self.completions.push(completion);
+        }
+    }
+
+    /// Scores the interrupted session that the list offers.
+    pub(super) fn finish_interrupted(&mut self, ctx: &egui::Context) {
+        let Some(session) = self.history.take_interrupted() else { return };
+        let templates = self.options.templates.clone();
+        self.screen = match Completion::of_interrupted(session, templates, repaint_waker(ctx)) {
+            Ok(completion) => Screen::Completion(Box::new(completion)),
+            Err(e) => Screen::Failed(format!("no-thread: the session cannot be scored: {e}")),
+        };
+    }
+
+    pub(super) fn set_interrupted_aside(&mut self) {
+        let moved = self.history.take_interrupted().map(|session| session.set_aside());
+        if let Some(Err(why)) = moved {
+            self.complaints.push(why);
+        }
+    }
+
+    pub(super) fn execute(&mut self, command: AppCommand, ctx: &egui::Context) {
+        if self.options.kiosk().is_some() && kiosk::is_refused(&command) {
+            return;
+        }
+        match command {
+            AppCommand::SelectExercise(place) => self.exercise_list.selected = place,
+            AppCommand::SelectNextExercise(by) => self.select_next_exercise(by),
+            AppCommand::OpenBriefing => self.open_briefing(),
+            AppCommand::OpenFolder(folder) => {
+                self.exercise_list = ExerciseList::load(&folder);
+                self.apply_settings(Settings { exercises: folder, ..self.settings.clone() }, ctx);
+            }
+            AppCommand::BackToList => self.go_back(),
+            AppCommand::BeginLesson => self.begin_lesson(ctx),
+            AppCommand::NewExercise => self.create_exercise(ctx),
+            AppCommand::EditExercise => self.edit_selected(ctx),
+            AppCommand::Editor(EditorCommand::TestRun) => self.test_run(ctx),
+            AppCommand::Editor(EditorCommand::Leave) => self.leave_editor(),
+            AppCommand::Editor(ask) => {
+                if let Screen::Editor(editor) = &mut self.screen {
+                    editor.execute(ask);
+                }
+            }
+            AppCommand::OpenReport => self.open_report(ctx),
+            AppCommand::DownloadBundle => self.download_bundle(),
+            AppCommand::TryAgain => {
+                self.leave_results();
+                self.screen = Screen::Briefing;
+            }
+            AppCommand::FinishInterrupted => self.finish_interrupted(ctx),
+            AppCommand::SetAsideInterrupted => self.set_interrupted_aside(),
+            AppCommand::ShowShortcuts(is_open) => {
+                self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false })
+            }
+            AppCommand::ShowSettings(is_open) => {
+                self.open_overlay(shortcuts::OverlayState { shortcuts: false, settings: is_open })
+            }
+            AppCommand::ChangeParticipant => self.change_participant(ctx),
+            AppCommand::AskToLeaveKiosk(is_asked) => self.kiosk_exit.ask(is_asked),
+            AppCommand::LeaveKiosk => self.leave_kiosk(ctx),
+            AppCommand::CloseWindow(is_closing) => self.confirm_close(is_closing, ctx),
+            AppCommand::ApplySettings(settings) => self.apply_settings(*settings, ctx),
+            AppCommand::Practice(command) => {
+                if let Screen::Lesson(lesson) = &mut self.screen {
+                    execute_in_lesson(lesson, command);
+                }
+            }
+            AppCommand::Camera(command) => self.move_camera(command),
+        }
+    }
+
+    /// Moves the selection down the list by this many places; negative is up.
+    pub(super) fn select_next_exercise(&mut self, by: i32) {
+        let last = self.exercise_list.exercises.len().saturating_sub(1);
+        self.exercise_list.selected = self.exercise_list.selected.saturating_add_signed(by as isize).min(last);
+        self.exercise_list.scroll_to_selected = true;
+    }
+
+    /// Shows the instructions of the selected exercise, if it is valid.
+    pub(super) fn open_briefing(&mut self) {
+        let App { exercise_list: list, history, participant, settings, .. } = self;
+        if list.can_open_selected(history, participant, settings) {
+            self.examiner_code.clear();
+            self.screen = Screen::Briefing;
+        }
+    }
+
+    /// Returns to the author's screen after a test run, otherwise to the list of exercises.
+    pub(super) fn go_back(&mut self) {
+        self.leave_results();
+        self.examiner_code.clear();
+        if let Some(mut editor) = self.test_run_origin.take() {
+            editor.invalidate_preview();
+            self.screen = Screen::Editor(editor);
+            return;
+        }
+        self.exercise_list.scroll_to_selected = true;
+        self.screen = Screen::ExerciseList;
+    }
+
+    /// Opens the report of the results in the browser.
+    pub(super) fn open_report(&self, ctx: &egui::Context) {
+        if let Screen::Results(results) = &self.screen
+            && let Some(page) = results.report_url()
+        {
+            ctx.open_url(egui::OpenUrl::new_tab(page));
+        }
+    }
+
+    /// Gives the bundle of the results to the user as one file.
+    pub(super) fn download_bundle(&mut self) {
+        if let Screen::Results(results) = &mut self.screen
+            && let BundleState::Finished(bundle) = &results.state
+        {
+            let complaint = platform::download(bundle);
+            results.is_downloaded = complaint.is_none();
+            self.complaints.extend(complaint);
+        }
+    }
+
+    /// Moves the camera of a lesson or of the author's preview.
+    pub(super) fn move_camera(&mut self, command: CameraCommand) {
+        let orbit = match &mut self.screen {
+            Screen::Lesson(lesson) => &mut lesson.orbit,
+            Screen::Editor(editor) => &mut editor.preview.orbit,
+            Screen::ExerciseList
+            | Screen::Briefing
+            | Screen::Completion(_)
+            | Screen::Results(_)
+            | Screen::Failed(_) => return,
+        };
+        *orbit = match command {
+            CameraCommand::Orbit { right, up } => orbit.rotated(right, up),
+            CameraCommand::Zoom(factor) => orbit.zoomed(factor),
+            CameraCommand::Pan { right, up } => orbit.panned(right, up),
+        };
+    }
+
+    /// Shows one page over the screen, or none. The pointer is released while a page is shown.
+    pub(super) fn open_overlay(&mut self, overlay: shortcuts::OverlayState) {
+        self.overlay = overlay;
+        if let Screen::Lesson(lesson) = &mut self.screen
+            && lesson.is_pointer_captured
+        {
+            lesson.release_pointer();
+        }
+    }
+
+    /// Aborts the lesson and closes the window when its bundle is written, or continues the lesson.
+    pub(super) fn confirm_close(&mut self, is_closing: bool, ctx: &egui::Context) {
+        self.closing = CloseState::No;
+        match &mut self.screen {
+            _ if !is_closing => {}
+            Screen::Lesson(lesson) => {
+                lesson.abort();
+                self.closing = CloseState::AfterLesson;
+            }
+            _ => ctx.send_viewport_cmd(ViewportCommand::Close),
+        }
+    }
+
+    /// Opens the author's screen with a new exercise in the user's language.
+    pub(super) fn create_exercise(&mut self, ctx: &egui::Context) {
+        let words = &self.words;
+        let lines = ["author.new_cleared", "author.new_spared", "author.new_light"].map(|key| words.get(key));
+        let [title, stage, instruction] =
+            ["author.new_title", "author.new_stage", "author.new_instruction"].map(|key| words.get(key));
+        let text = new_exercise(title, stage, instruction, lines, words.get("author.new_fail"));
+        self.screen = Screen::Editor(Box::new(EditorState::new(text, repaint_waker(ctx))));
+    }
+
+    /// Opens the selected exercise at the author's screen; a shipped exercise is opened as a copy.
+    pub(super) fn edit_selected(&mut self, ctx: &egui::Context) {
+        let Some(exercise) = self.exercise_list.selected_exercise() else { return };
+        match (exercise.path.clone(), exercise_list::shipped_text(&exercise.name)) {
+            (Some(path), _) => self.open_editor(&path, OpenMode::Edit, ctx),
+            (None, Some(text)) => {
+                self.screen = Screen::Editor(Box::new(EditorState::copy(&exercise.name, text, repaint_waker(ctx))));
+            }
+            (None, None) => {}
+        }
+    }
+
+    pub(super) fn open_editor(&mut self, path: &Path, mode: OpenMode, ctx: &egui::Context) {
+        self.screen = match EditorState::open(path, mode, repaint_waker(ctx)) {
+            Ok(editor) => Screen::Editor(Box::new(editor)),
+            Err(complaint) => Screen::Failed(complaint.headline()),
+        };
+    }
+
+    /// Returns to the exercise list, which now includes the edited exercise. Unsaved changes are kept as a draft.
+    pub(super) fn leave_editor(&mut self) {
+        let Screen::Editor(editor) = &mut self.screen else { return };
+        editor.autosave();
+        let path = editor.path.clone();
+        self.exercise_list = ExerciseList::load(&self.settings.exercises);
+        if let Some(path) = path {
+            self.exercise_list.select_file(&path);
+        }
+        self.screen = Screen::ExerciseList;
+    }
+
+    /// Begins a lesson with the exercise being edited. Its bundle replaces that of the test run before.
+    pub(super) fn test_run(&mut self, ctx: &egui::Context) {
+        let Screen::Editor(editor) = &mut self.screen else { return };
+        editor.autosave();
+        if !self.completions.is_empty() {
+            // Both would write into the same folder.
+            editor.notice = Some(("briefing.report_first", String::new()));
+            return;
+        }
+        let scenario = match editor.scenario() {
+            Ok(scenario) => scenario,
+            Err(_) => return editor.execute(EditorCommand::Check),
+        };
+        let library = editor.library.clone();
+        let out = platform::config_folder().unwrap_or_else(std::env::temp_dir).join("tried");
+        let _ = std::fs::remove_dir_all(&out);
+        let left = std::mem::replace(&mut self.screen, Screen::ExerciseList);
+        if let Screen::Editor(editor) = left {
+            self.test_run_origin = Some(editor);
+        }
+        self.begin_lesson_with(Arc::new(scenario), library, BTreeMap::new(), out, ctx);
+    }
+
+    pub(super) fn begin_lesson(&mut self, ctx: &egui::Context) {
+        if !self.completions.is_empty() {
+            return;
+        }
+        if self.options.kiosk().is_some() && self.participant.is_empty() {
+            return;
+        }
+        let Some(exercise) = self.exercise_list.selected_exercise() else { return };
+        let (Ok(scenario), library) = (&exercise.scenario, exercise.library.clone()) else { return };
+        let is_code_valid = briefing::is_valid_examiner_code(&self.examiner_code);
+        if !lesson::is_valid_participant_code(&self.participant) || !is_code_valid {
+            return;
+        }
+        let (scenario, digests, out) = (scenario.clone(), exercise.digests.clone(), self.options.out.clone());
+        self.begin_lesson_with(scenario, library, digests, out, ctx);
+    }
+
+    pub(super) fn begin_lesson_with(
+        &mut self,
+        scenario: Arc<Scenario>,
+        library: Library,
+        digests: BTreeMap<String, String>,
+        out: PathBuf,
+        ctx: &egui::Context,
+    ) {
+        let input_device = match self.options.device.as_deref().unwrap_or(&self.settings.device) {
+            "mouse" => InputDevice::Mouse,
+            device => match lesson::open_device(device) {
+                Ok(held) => InputDevice::Device(held),
+                Err(failed) => {
+                    self.screen = Screen::Failed(failed.to_string());
+                    return;
+                }
+            },
+        };
+        let started = jiff::Timestamp::now();
+        let typed = Some(std::mem::take(&mut self.examiner_code)).filter(|code| !code.is_empty());
+        let seed = match (typed.as_ref().or(self.options.seed_code.as_ref()), self.options.seed) {
+            (Some(code), _) => SessionSeed::sealed(code, &self.participant, started, &scenario),
+            (None, Some(seed)) => Ok(SessionSeed::given(seed)),
+            (None, None) => SessionSeed::drawn(),
+        };
+        let seed = match seed {
+            Ok(seed) => seed,
+            Err(why) => {
+                self.screen = Screen::Failed(why.to_string());
+                return;
+            }
+        };
+        let config = LessonConfig {
+            scenario,
+            seed,
+            participant: self.participant.clone(),
+            // A page has no folders.
+            out: (!platform::IS_PAGE).then_some(out),
+            templates: self.options.templates.clone(),
+            started,
+            input_device,
+            second: self.options.second.clone(),
+            digests,
+            wake: Arc::from(repaint_waker(ctx)),
+        };
+        // A sealed seed is shown nowhere; the sound does not need it.
+        let shown_seed = if seed.is_sealed() { 0 } else { seed.value };
+        self.state_log.record("seed", shown_seed);
+        let output =
+            PlaybackOptions { seed: shown_seed, replacements: self.replacements.clone(), ..PlaybackOptions::default() };
+        let mode = if self.has_graphics { DisplayMode::Iso } else { DisplayMode::Surface };
+        self.screen = match LessonState::begin(config, library, output, mode) {
+            Ok(lesson) => Screen::Lesson(Box::new(lesson)),
+            Err(why) => Screen::Failed(why),
+        };
+    }
+
+    pub(super) fn apply_settings(&mut self, settings: Settings, ctx: &egui::Context) {
+        self.words = i18n::select_language(&self.languages, &settings.language);
+        if settings.font_size == self.settings.font_size {
+            theme::apply(ctx, &settings);
+        }
+        self.settings = settings;
+        self.has_unsaved_settings = true;
+    }
+}
+
+/// Carries out commands of a lesson.
+fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
+    match command {
+        PracticeCommand::SelectInstrument(instrument) => lesson.submit(Input::Take { instrument }),
+        PracticeCommand::AnswerQuestion(question, value) => lesson.answer_question(question, value),
+        PracticeCommand::AddToChart(sign) => lesson.add_to_chart(sign),
+        PracticeCommand::FinishStage => lesson.finish_stage(),
+        PracticeCommand::ContinueStage => lesson.is_confirming_finish = false,
+        PracticeCommand::Pause(is_paused) => lesson.pause(is_paused),
+        PracticeCommand::AskToAbort(is_giving_up) => lesson.is_confirming_abort = is_giving_up,
+        PracticeCommand::Abort => lesson.abort(),
+        PracticeCommand::AdjustCoefficient(label, coefficient, value) => lesson.adjust(label, coefficient, value),
+        PracticeCommand::SetDisplayMode(way) => lesson.display_mode = way,
+        PracticeCommand::SetTransferFunction(curves) => {
+            if let Some(scene) = &mut lesson.scene {
+                scene.set_transfer_function(*curves);
+                lesson.display_mode = DisplayMode::Drawn;
+            }
+        }
+        PracticeCommand::CapturePointer(is_held) => capture_pointer(lesson, is_held),
+        PracticeCommand::PointAt(place) => lesson.point_at(place),
+        PracticeCommand::ChangeStrength(steps) => lesson.change_strength(steps),
+        // A key of the same frame may have put the instrument down.
+        PracticeCommand::SetPressure(_) | PracticeCommand::SetDeviceButton { .. } if !lesson.is_pointer_captured => {}
+        PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
+        PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
+        PracticeCommand::AdjustMouthOpening(by) => {
+            if let Some(scene) = &mut lesson.scene {
+                scene.open_mouth(by);
+            }
+        }
+        PracticeCommand::SetCamera(view) => {
+            if let Some(orbit) = lesson.scene.as_ref().and_then(|matter| view.orbit(matter)) {
+                lesson.orbit = orbit;
+            }
+        }
+        PracticeCommand::RateStatement(item, value) => {
+            lesson.rate_statement(item, value);
+        }
+        PracticeCommand::SelectNextStatement(by) => lesson.select_next_statement(by),
+        PracticeCommand::SubmitQuestionnaire if lesson.unrated_statements() > 0 && !lesson.is_confirming_submit => {
+            lesson.is_confirming_submit = true
+        }
+        PracticeCommand::SubmitQuestionnaire => lesson.submit_questionnaire(),
+    }
+}
+
+/// Makes the pointer act as the device if the lesson has a mouse and is not paused, or releases it.
+fn capture_pointer(lesson: &mut LessonState, is_held: bool) {
+    lesson.is_pointer_captured = is_held && lesson.has_mouse() && !lesson.is_paused;
+    if !is_held {
+        lesson.release_pointer();
+    }
+}

@@ -1,0 +1,213 @@
+//! Events that are taken over before each frame: of lessons, bundles, kiosks and of the window itself.
+
+use super::{App, CloseState};
+use crate::AppOptions;
+use crate::completion::{Completion, CompletionProgress};
+use crate::results::{BundleState, LessonResults};
+use crate::screen::Screen;
+use crate::ui::{shortcuts, theme};
+use eframe::egui::{self, ViewportCommand};
+use std::time::Duration;
+use typodont_exercise::scenario::QuestionnaireTime;
+use typodont_report::FirstResult;
+use typodont_report::bundle::BundleFolder;
+
+/// Frame interval of a running lesson.
+const LESSON_FRAME_INTERVAL: Duration = Duration::from_millis(16);
+
+/// Frame interval of the other screens: soon after an input, and at rest.
+const BUSY_FRAME_INTERVAL: Duration = Duration::from_millis(100);
+const IDLE_FRAME_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Time after an input during which a screen is busy, s.
+const BUSY_TIME: f64 = 2.0;
+
+impl App {
+    /// Takes over all events since the last frame.
+    pub(super) fn poll(&mut self, ctx: &egui::Context) {
+        if let Screen::Editor(editor) = &mut self.screen {
+            editor.poll(ctx.input(|input| input.time));
+        }
+        self.history.poll();
+        self.poll_kiosk(ctx);
+        for completion in &mut self.completions {
+            completion.poll();
+            match &completion.state().outcome {
+                Some(Ok(bundle)) => finish_bundle(&self.options, bundle),
+                Some(Err(why)) => self.complaints.push(why.clone()),
+                None => {}
+            }
+        }
+        self.completions.retain(|completion| completion.state().outcome.is_none());
+        match &mut self.screen {
+            Screen::Lesson(lesson) => {
+                lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
+                self.skip_questionnaire();
+                self.poll_lesson();
+            }
+            Screen::Completion(completion) => {
+                completion.poll();
+                self.poll_interrupted();
+            }
+            Screen::Results(results) if results.is_pending() => {
+                results.poll(ctx);
+                if let BundleState::Finished(bundle) = &results.state {
+                    finish_bundle(&self.options, bundle);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Makes a kiosk ready for the next participant after some time without input, and keeps it on the whole screen.
+    pub(super) fn poll_kiosk(&mut self, ctx: &egui::Context) {
+        let Some(kiosk) = self.options.kiosk() else { return };
+        let now = ctx.input(|input| input.time);
+        let is_at_rest = matches!(self.screen, Screen::Briefing | Screen::Results(_) | Screen::Failed(_))
+            || (matches!(self.screen, Screen::ExerciseList) && !self.participant.is_empty());
+        let idle_limit = kiosk.idle.as_secs_f64();
+        if !is_at_rest {
+            // Whoever moves a haptic device touches neither the mouse nor the keyboard.
+            self.last_input = now;
+        } else if now - self.last_input > idle_limit {
+            self.change_participant(ctx);
+        }
+        let (is_full, is_minimized) =
+            ctx.input(|input| (input.viewport().fullscreen, input.viewport().minimized.unwrap_or(false)));
+        if is_full == Some(false) || is_minimized {
+            ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
+            ctx.send_viewport_cmd(ViewportCommand::Fullscreen(true));
+        }
+    }
+
+    /// Shows the result of the lesson once it is scored, or the reason why there is none.
+    pub(super) fn poll_lesson(&mut self) {
+        let Screen::Lesson(lesson) = &mut self.screen else { return };
+        if let Some(first) = lesson.completion.first_result.take() {
+            if let Some(ended) = lesson.ended {
+                self.state_log.record("result_after_ms", ended.elapsed().as_millis());
+            }
+            if let Screen::Lesson(lesson) = std::mem::replace(&mut self.screen, Screen::ExerciseList) {
+                let is_test_run = self.test_run_origin.is_some();
+                self.show_results(*first, Completion::of_lesson(lesson), !is_test_run);
+            }
+        } else if let Some(Err(why)) = lesson.completion.outcome.take() {
+            self.screen = Screen::Failed(why);
+        }
+    }
+
+    /// Shows the result of an interrupted session once it is scored, or the reason why there is none.
+    pub(super) fn poll_interrupted(&mut self) {
+        let Screen::Completion(completion) = &mut self.screen else { return };
+        if let Some(first) = completion.take_first_result() {
+            let has_retry = self.exercise_list.select_id(&first.session.scenario.id);
+            if let Screen::Completion(completion) = std::mem::replace(&mut self.screen, Screen::ExerciseList) {
+                self.show_results(*first, *completion, has_retry);
+            }
+        } else if let Some(Err(why)) = completion.state().outcome.clone() {
+            self.screen = Screen::Failed(why);
+        }
+    }
+
+    pub(super) fn show_results(&mut self, first: FirstResult, completion: Completion, has_retry: bool) {
+        if self.test_run_origin.is_none() {
+            self.complaints.extend(self.history.add(&first.session));
+        }
+        let has_report = self.options.kiosk().is_none();
+        self.screen = Screen::Results(Box::new(LessonResults::new(first, completion, has_retry, has_report)));
+    }
+
+    /// Ends a lesson without its questionnaire if the exercise asks it at the end of the course, and that is not yet.
+    pub(super) fn skip_questionnaire(&mut self) {
+        let Screen::Lesson(lesson) = &mut self.screen else { return };
+        if !lesson.are_stages_over || lesson.is_submitted || lesson.is_questionnaire_due {
+            return;
+        }
+        let course = self.exercise_list.course();
+        let scenario = &lesson.scenario;
+        lesson.is_questionnaire_due = self.test_run_origin.is_some()
+            || scenario.questionnaire_time == QuestionnaireTime::EachTime
+            || self.history.is_course_over(scenario, &course, &self.participant);
+        if !lesson.is_questionnaire_due {
+            lesson.submit_questionnaire();
+        }
+    }
+
+    /// Progress of a bundle that is being made in the background.
+    pub(super) fn background_progress(&self) -> Option<CompletionProgress> {
+        self.completions.first().map(|completion| completion.state().progress)
+    }
+
+    /// Delays a request to close the window while a lesson runs and until its bundle is written.
+    pub(super) fn handle_close_request(&mut self, ctx: &egui::Context) {
+        let is_asked = ctx.input(|input| input.viewport().close_requested());
+        if is_asked && self.options.kiosk().is_some() && !self.kiosk_exit.is_allowed {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.open_overlay(shortcuts::OverlayState::default());
+            return self.kiosk_exit.ask(true);
+        }
+        let is_in_lesson = matches!(self.screen, Screen::Lesson(_));
+        let is_completing = !self.completions.is_empty()
+            || match &self.screen {
+                Screen::Lesson(lesson) => lesson.is_scoring,
+                Screen::Completion(_) => true,
+                Screen::Results(results) => results.is_pending(),
+                _ => false,
+            };
+        if ctx.input(|input| input.viewport().close_requested())
+            && let Screen::Editor(editor) = &mut self.screen
+        {
+            editor.autosave();
+        }
+        if ctx.input(|input| input.viewport().close_requested()) && (is_in_lesson || is_completing) {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            if is_completing {
+                self.closing = CloseState::AfterLesson;
+            } else if self.closing == CloseState::No {
+                self.open_overlay(shortcuts::OverlayState::default());
+                self.closing = CloseState::Asked;
+            }
+        }
+        if self.closing == CloseState::AfterLesson && !is_in_lesson && !is_completing {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+
+    /// True if work would be lost with a page that is closed now.
+    pub(super) fn has_unsaved_work(&self) -> bool {
+        match &self.screen {
+            Screen::Lesson(_) | Screen::Completion(_) => true,
+            Screen::Results(results) => !results.is_downloaded,
+            _ => !self.completions.is_empty(),
+        }
+    }
+
+    /// Time until the next frame, if nothing requests one before.
+    pub(super) fn frame_interval(&mut self, ctx: &egui::Context) -> Duration {
+        let now = ctx.input(|input| input.time);
+        if ctx.input(|input| !input.events.is_empty()) {
+            self.last_input = now;
+        }
+        match &self.screen {
+            Screen::Lesson(lesson) if lesson.needs_frames() => Duration::ZERO,
+            // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
+            Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
+            Screen::Lesson(lesson) if !lesson.are_stages_over => {
+                match lesson.view_refresh.is_active(now) || lesson.pointer_hand.is_pressing {
+                    true => LESSON_FRAME_INTERVAL,
+                    // Only the clock moves. Movement of the hand requests a frame at once.
+                    false => lesson.time_to_next_second(),
+                }
+            }
+            _ if now - self.last_input < BUSY_TIME => BUSY_FRAME_INTERVAL,
+            _ => IDLE_FRAME_INTERVAL,
+        }
+    }
+}
+
+/// Tells of a bundle that has just been finished.
+fn finish_bundle(options: &AppOptions, bundle: &BundleFolder) {
+    if let Some(listener) = &options.on_bundle {
+        listener(bundle);
+    }
+}

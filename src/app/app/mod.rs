@@ -1,0 +1,223 @@
+//! The application: chooses the screen that is shown, and carries out the commands of every screen.
+//!
+//! Before each frame [`eframe::App::logic`] takes over events and carries out the keys' commands, also while the window is
+//! hidden. [`eframe::App::ui`] draws the frame, and then has the commands carried out that were asked for in it.
+
+mod command_handler;
+mod events;
+mod frame;
+mod frame_log;
+
+use crate::AppOptions;
+use crate::completion::Completion;
+use crate::editor::EditorState;
+use crate::exercise_list::ExerciseList;
+use crate::i18n::{self, Translations};
+use crate::kiosk::KioskExit;
+use crate::platform;
+use crate::screen::Screen;
+use crate::session_history::SessionHistory;
+use crate::settings::{self, Settings};
+use crate::state_log::StateLog;
+use crate::ui::viewport::Viewport;
+use crate::ui::{shortcuts, theme, ui_anchors, viewport};
+use eframe::egui::{self};
+use std::path::PathBuf;
+use std::time::Duration;
+use typodont_audio::Replacements;
+use typodont_audio::wav_files;
+use typodont_formats::diagnostic::{Diagnostic, headlines};
+
+pub struct App {
+    options: AppOptions,
+    settings: Settings,
+    languages: Vec<Translations>,
+    words: Translations,
+    exercise_list: ExerciseList,
+    history: SessionHistory,
+    /// Bundles that are still being made after their results were left.
+    completions: Vec<Completion>,
+    participant: String,
+    /// Examiner's code for the next session, as typed in the briefing. Forgotten when that session begins.
+    examiner_code: String,
+    screen: Screen,
+    /// The editor to return to after the test run of an exercise.
+    test_run_origin: Option<Box<EditorState>>,
+    overlay: shortcuts::OverlayState,
+    closing: CloseState,
+    /// A supervisor's attempt to close a kiosk.
+    kiosk_exit: KioskExit,
+    /// Settings with which the window opened.
+    first_settings: Settings,
+    /// True if a widget had the keyboard focus at the end of the last frame.
+    had_focus: bool,
+    /// True if settings were changed and are not saved yet.
+    has_unsaved_settings: bool,
+    /// Errors that concern no single screen, such as unreadable settings, languages or sounds.
+    complaints: Vec<String>,
+    state_log: StateLog,
+    /// True if a graphics processor draws; false for rendering in software.
+    has_graphics: bool,
+    /// Sound files with which the school replaces the built-in sounds.
+    replacements: Replacements,
+    /// Created for the first lesson and kept for the next.
+    viewport: Option<Viewport>,
+    frame_count: u64,
+    /// Time of the last input, s.
+    last_input: f64,
+}
+
+/// State of a request to close the window.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum CloseState {
+    No,
+    /// The user is asked to confirm that the lesson is aborted.
+    Asked,
+    /// The window closes as soon as the lesson's bundle is written.
+    AfterLesson,
+}
+
+/// Interval at which events are taken over while the window is hidden: a bundle is completed and a lesson's time is kept.
+const HIDDEN_INTERVAL: Duration = Duration::from_millis(100);
+
+impl App {
+    pub fn new(context: &eframe::CreationContext, mut options: AppOptions) -> App {
+        let ctx = &context.egui_ctx;
+        let (mut settings, languages, mut complaints) = settings::load_with_languages();
+        if let Some(station) = &options.station {
+            settings = station.settings(settings);
+            complaints.extend(station.complaint.clone());
+        }
+        let is_known = |code: &String| languages.iter().any(|words| words.code == *code);
+        if let Some(code) = options.language.take().filter(is_known) {
+            settings.language = code;
+        }
+        let (replacements, broken) = read_sounds();
+        complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
+        theme::apply(ctx, &settings);
+        let is_given = options.given.is_some();
+        let mut exercise_list = match options.given.take() {
+            Some(given) => ExerciseList::only(given),
+            None => ExerciseList::load(&settings.exercises),
+        };
+        let mut screen = Screen::ExerciseList;
+        if let Some(path) = &options.exercise {
+            exercise_list.add_and_select(path);
+            if let Some(scan) = &options.tooth {
+                exercise_list.replace_teeth(scan);
+            }
+        }
+        let is_one_selected = is_given || options.exercise.is_some();
+        if is_one_selected && exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
+            screen = Screen::Briefing;
+        }
+        let begins = options.begins_at_once;
+        let history = SessionHistory::read(&options.out, options.templates.clone(), repaint_waker(ctx));
+        let mut app = App {
+            history,
+            completions: Vec::new(),
+            words: i18n::select_language(&languages, &settings.language),
+            participant: options.participant.clone(),
+            examiner_code: String::new(),
+            options,
+            first_settings: settings.clone(),
+            kiosk_exit: KioskExit::default(),
+            settings,
+            languages,
+            exercise_list,
+            screen,
+            test_run_origin: None,
+            overlay: shortcuts::OverlayState::default(),
+            closing: CloseState::No,
+            had_focus: false,
+            has_unsaved_settings: false,
+            complaints,
+            state_log: StateLog::from_environment(),
+            replacements,
+            has_graphics: context.wgpu_render_state.as_ref().is_some_and(viewport::has_graphics),
+            viewport: None,
+            frame_count: 0,
+            last_input: 0.0,
+        };
+        if let (Some(mode), Some(path)) = (app.options.editor_mode, app.options.exercise.clone()) {
+            app.open_editor(&path, mode, ctx);
+        } else if begins {
+            app.begin_lesson(ctx);
+        }
+        app
+    }
+
+    /// Applies and saves changed settings once the mouse button is released: a text size that changed during a drag
+    /// would move the slider away from the pointer.
+    fn save_settings(&mut self, ctx: &egui::Context) {
+        if self.has_unsaved_settings && !ctx.input(|input| input.pointer.any_down()) {
+            theme::apply(ctx, &self.settings);
+            let own = match &self.options.station {
+                Some(station) if station.kiosk.is_some() => None,
+                Some(station) => Some(station.own_settings(&self.settings, Settings::load().0)),
+                None => Some(self.settings.clone()),
+            };
+            self.complaints.extend(own.and_then(|own| own.save()));
+            self.has_unsaved_settings = false;
+        }
+    }
+}
+
+/// A function that makes the window draw a new frame; callable from another thread.
+fn repaint_waker(ctx: &egui::Context) -> Box<dyn Fn() + Send + Sync> {
+    let ctx = ctx.clone();
+    Box::new(move || ctx.request_repaint())
+}
+
+/// The school's own sounds, and the files that are not sounds. A page has no folder for them.
+fn read_sounds() -> (Replacements, Vec<Diagnostic>) {
+    match platform::IS_PAGE {
+        true => Default::default(),
+        false => wav_files::read_folder(&sounds_folder()),
+    }
+}
+
+/// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the settings folder.
+fn sounds_folder() -> PathBuf {
+    let beside = PathBuf::from("content/sounds");
+    match platform::config_folder() {
+        Some(folder) if !beside.is_dir() => folder.join("sounds"),
+        _ => beside,
+    }
+}
+
+impl eframe::App for App {
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
+
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.poll(ctx);
+        self.handle_close_request(ctx);
+        self.save_settings(ctx);
+        platform::set_unsaved_work(self.has_unsaved_work());
+        // A hidden window has no frame that would ask for the next one.
+        if ctx.input(|input| input.viewport().visible()) == Some(false) {
+            ctx.request_repaint_after(HIDDEN_INTERVAL);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        let mut commands = Vec::new();
+        shortcuts::collect_commands(&ctx, &self.screen, self.overlay, self.had_focus, &mut commands);
+        self.frame_ui(ui, frame, &mut commands);
+        for command in commands {
+            self.execute(command, &ctx);
+        }
+        self.had_focus = ctx.memory(|memory| memory.focused().is_some());
+        self.frame_count += 1;
+        self.state_log.record("frames", self.frame_count);
+        self.log_state();
+        ui_anchors::log_anchors(&ctx, &mut self.state_log);
+        if let Some(wait) = self.options.frame_delay {
+            std::thread::sleep(wait);
+        }
+        ctx.request_repaint_after(self.frame_interval(&ctx));
+    }
+}

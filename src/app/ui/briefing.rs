@@ -1,0 +1,115 @@
+//! The briefing before an exercise: the task, the time allowed and the instruments.
+
+use crate::command::AppCommand;
+use crate::completion::CompletionProgress;
+use crate::i18n::Translations;
+use crate::ui::theme;
+use crate::ui::ui_anchors;
+use eframe::egui;
+use typodont_exercise::scenario::{Scenario, Stage};
+use typodont_lesson as lesson;
+
+/// Texts typed before an exercise.
+pub struct BriefingFields<'a> {
+    pub participant: &'a mut String,
+    /// True if a session needs a participant's code, as in a kiosk.
+    pub is_code_required: bool,
+    /// Examiner's code, empty for a session without one; `None` where the code was given at the command line.
+    pub examiner_code: Option<&'a mut String>,
+}
+
+/// Returns true if a session with this examiner's code, which may be empty, can begin.
+pub fn is_valid_examiner_code(code: &str) -> bool {
+    code.is_empty() || lesson::is_long_enough(code)
+}
+
+/// Draws the exercise's instructions, and the fields for the participant code and for the examiner's code.
+pub fn briefing_ui(
+    ui: &mut egui::Ui,
+    scenario: &Scenario,
+    fields: BriefingFields,
+    completion: Option<CompletionProgress>,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let BriefingFields { participant, is_code_required, examiner_code } = fields;
+    let examiner_code = examiner_code.filter(|_| lesson::is_sealable(scenario));
+    theme::centered_column(ui, |ui| {
+        ui.heading(words.own(&scenario.texts, &scenario.title));
+        ui.label(words.own(&scenario.texts, &scenario.summary));
+        ui.add_space(16.0);
+        let below = [(true, 140.0), (completion.is_some(), 70.0), (examiner_code.is_some(), 60.0)];
+        let below: f32 = below.iter().filter(|(is_shown, _)| *is_shown).map(|(_, height)| height).sum();
+        let room = (ui.available_height() - below).max(160.0);
+        egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
+            for (number, stage) in scenario.stages.iter().enumerate() {
+                stage_ui(ui, scenario, stage, number + 1, words);
+            }
+        });
+        ui.add_space(16.0);
+        ui.horizontal(|ui| {
+            let label = ui.label(words.get("briefing.participant")).id;
+            let edit = egui::TextEdit::singleline(participant).char_limit(64).desired_width(180.0);
+            ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
+        });
+        if !lesson::is_valid_participant_code(participant) {
+            ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
+        }
+        let is_code_missing = is_code_required && participant.is_empty();
+        if is_code_missing {
+            ui.label(words.get("kiosk.code_required"));
+        }
+        let has_valid_code = examiner_code.as_ref().is_none_or(|code| is_valid_examiner_code(code.as_str()));
+        if let Some(code) = examiner_code {
+            examiner_code_ui(ui, code, words);
+        }
+        ui.add_space(8.0);
+        if let Some(progress) = completion {
+            // Drawing images takes all processors, and the next session's force would suffer.
+            ui.weak(words.get("briefing.report_first"));
+            theme::progress_bar(ui, words.get(progress.key), progress.share);
+        }
+        ui.horizontal(|ui| {
+            let has_participant = !is_code_missing && lesson::is_valid_participant_code(participant);
+            let is_ready = completion.is_none() && has_valid_code && has_participant;
+            let begin = ui.add_enabled(is_ready, theme::primary_button(words.get("briefing.begin")));
+            ui_anchors::anchor(ui, "briefing.begin", begin.rect);
+            if begin.clicked() {
+                commands.push(AppCommand::BeginLesson);
+            }
+            if ui.button(words.get("briefing.back")).clicked() {
+                commands.push(AppCommand::BackToList);
+            }
+        });
+    });
+}
+
+/// Draws the field for the code that makes an examination of the session.
+fn examiner_code_ui(ui: &mut egui::Ui, code: &mut String, words: &Translations) {
+    ui.horizontal(|ui| {
+        let label = ui.label(words.get("briefing.code")).id;
+        let edit = egui::TextEdit::singleline(code).password(true).char_limit(200).desired_width(180.0);
+        ui.add(edit.hint_text(words.get("briefing.code_hint"))).labelled_by(label);
+    });
+    match is_valid_examiner_code(code) {
+        true => ui.weak(words.get("briefing.code_about")),
+        false => ui.colored_label(theme::ERROR, words.get("briefing.code_short")),
+    };
+}
+
+fn stage_ui(ui: &mut egui::Ui, scenario: &Scenario, stage: &Stage, number: usize, words: &Translations) {
+    egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(8).inner_margin(14).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.label(
+            egui::RichText::new(format!("{number}. {}", words.own(&scenario.texts, &stage.title))).strong().size(18.0),
+        );
+        ui.label(words.own(&scenario.texts, &stage.instruction));
+        let title = |&i: &usize| words.own(&scenario.texts, &scenario.instruments[i].title);
+        let tray: Vec<&str> = stage.instruments.iter().map(title).collect();
+        ui.weak(words.format("briefing.tray", tray.join(", ")));
+        if let Some(limit) = stage.time_limit {
+            ui.weak(words.format("briefing.limit", crate::ui::practice::format_time(limit)));
+        }
+    });
+    ui.add_space(6.0);
+}

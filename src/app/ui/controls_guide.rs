@@ -1,0 +1,118 @@
+//! A card over the view that teaches how the instrument is handled, with a picture of each action and a mark for those
+//! that were done. Pointers and haptic devices have cards of their own.
+
+use crate::i18n::Translations;
+use crate::lesson_state::LessonState;
+use crate::ui::theme;
+use eframe::egui::{self, Color32, Pos2, Rect, Stroke, Vec2, vec2};
+
+/// Picture of an action.
+#[derive(Clone, Copy)]
+enum ActionPicture {
+    /// A mouse, with the part that is used.
+    Mouse(MousePart),
+    /// A stylus over a surface: free, touching or pressed.
+    Stylus(f32),
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum MousePart {
+    Whole,
+    LeftButton,
+    RightButton,
+}
+
+/// Draws the card in the upper left corner of the view.
+pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, words: &Translations) {
+    let Some(stage) = lesson.stage().filter(|stage| stage.shows_controls) else { return };
+    let progress = lesson.controls;
+    let is_pointer = lesson.has_mouse();
+    let mut rows = match is_pointer {
+        true => vec![
+            (
+                ActionPicture::Mouse(MousePart::LeftButton),
+                "guide.mouse_pick_up",
+                lesson.is_pointer_captured || progress.has_moved,
+            ),
+            (ActionPicture::Mouse(MousePart::Whole), "guide.mouse_move", progress.has_moved && progress.has_touched),
+            (ActionPicture::Mouse(MousePart::LeftButton), "guide.mouse_press", progress.has_pressed),
+            (ActionPicture::Mouse(MousePart::RightButton), "guide.mouse_rotate", progress.has_rotated),
+        ],
+        false => vec![
+            (ActionPicture::Stylus(0.35), "guide.arm_move", progress.has_moved),
+            (ActionPicture::Stylus(0.0), "guide.arm_touch", progress.has_touched),
+            (ActionPicture::Stylus(-0.12), "guide.arm_press", progress.has_pressed),
+            (ActionPicture::Mouse(MousePart::LeftButton), "guide.arm_rotate", progress.has_rotated),
+        ],
+    };
+    if stage.cutting {
+        let picture =
+            if is_pointer { ActionPicture::Mouse(MousePart::LeftButton) } else { ActionPicture::Stylus(-0.12) };
+        rows.push((picture, "guide.cut", progress.has_cut));
+    }
+    let width = 300.0f32.min(view.width() - 24.0);
+    let place = Rect::from_min_size(view.min + vec2(12.0, 12.0), vec2(width, view.height() - 24.0));
+    let mut card = ui.new_child(egui::UiBuilder::new().max_rect(place));
+    let frame = egui::Frame::NONE.fill(Color32::from_white_alpha(235)).corner_radius(8).inner_margin(10);
+    frame.show(&mut card, |ui| {
+        ui.strong(words.get("guide.title"));
+        for (picture, key, is_done) in rows {
+            row_ui(ui, picture, words.get(key), is_done);
+        }
+    });
+}
+
+fn row_ui(ui: &mut egui::Ui, picture: ActionPicture, text: &str, is_done: bool) {
+    const SIZE: Vec2 = vec2(30.0, 34.0);
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(SIZE, egui::Sense::hover());
+        match picture {
+            ActionPicture::Mouse(part) => mouse_picture(ui.painter(), rect, part),
+            ActionPicture::Stylus(height) => stylus_picture(ui.painter(), rect, height),
+        }
+        let (mark, _) = ui.allocate_exact_size(vec2(18.0, 18.0), egui::Sense::hover());
+        if is_done {
+            let font = egui::FontId::proportional(17.0);
+            ui.painter().text(mark.center(), egui::Align2::CENTER_CENTER, "✔", font, theme::SUCCESS);
+        } else {
+            ui.painter().circle_stroke(mark.center(), 6.0, Stroke::new(1.5, theme::WARNING));
+        }
+        ui.add(egui::Label::new(egui::RichText::new(text).size(14.0)).wrap().selectable(false));
+    });
+}
+
+/// Outline of a mouse, with the part in use filled.
+fn mouse_picture(painter: &egui::Painter, rect: Rect, part: MousePart) {
+    let body = Rect::from_center_size(rect.center(), vec2(22.0, 32.0));
+    let line = Stroke::new(1.5, Color32::from_gray(0x40));
+    let button = |is_right: bool| {
+        let half = vec2(0.5 * body.width(), 0.42 * body.height());
+        Rect::from_min_size(body.min + vec2(if is_right { half.x } else { 0.0 }, 0.0), half)
+    };
+    let (round, sharp) = (10, 2);
+    match part {
+        MousePart::Whole => painter.rect_filled(body, round, theme::ACCENT.gamma_multiply(0.35)),
+        MousePart::LeftButton => {
+            let corners = egui::CornerRadius { nw: round, ne: sharp, sw: sharp, se: sharp };
+            painter.rect_filled(button(false), corners, theme::ACCENT)
+        }
+        MousePart::RightButton => {
+            let corners = egui::CornerRadius { nw: sharp, ne: round, sw: sharp, se: sharp };
+            painter.rect_filled(button(true), corners, theme::ACCENT)
+        }
+    };
+    painter.rect_stroke(body, round, line, egui::StrokeKind::Inside);
+    painter.vline(body.center().x, body.top()..=body.top() + 0.42 * body.height(), line);
+    painter.hline(body.x_range(), body.top() + 0.42 * body.height(), line);
+}
+
+/// A stylus whose tip is at a height over a surface, as a share of the picture's height; below zero it presses.
+fn stylus_picture(painter: &egui::Painter, rect: Rect, height: f32) {
+    let ground = rect.bottom() - 6.0;
+    let tip = Pos2::new(rect.left() + 9.0, ground - height.max(-0.05) * rect.height());
+    painter.hline(rect.x_range(), ground, Stroke::new(2.0, Color32::from_gray(0x70)));
+    painter.line_segment([tip, tip + vec2(16.0, -22.0)], Stroke::new(4.0, theme::ACCENT));
+    if height < 0.0 {
+        painter.circle_stroke(tip, 6.0, Stroke::new(2.0, theme::WARNING));
+    }
+}

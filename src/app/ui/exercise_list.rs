@@ -1,0 +1,219 @@
+//! The list of exercises as it is drawn: cards with results, the participant, an interrupted session.
+
+use crate::command::AppCommand;
+use crate::exercise_list::{Exercise, ExerciseList};
+use crate::i18n::Translations;
+use crate::platform;
+use crate::session_history::{AttemptSummary, SessionHistory};
+use crate::settings::Settings;
+use crate::ui::theme;
+use crate::ui::ui_anchors;
+use eframe::egui;
+use typodont_lesson::{self as lesson, InterruptedSession};
+
+/// Earlier sessions, settings and texts with which the list is drawn.
+pub struct ListContext<'a> {
+    pub history: &'a SessionHistory,
+    pub settings: &'a Settings,
+    pub words: &'a Translations,
+    /// True if the list has no way to the author's screen or to another folder.
+    pub is_kiosk: bool,
+}
+
+/// Draws the list. Pushes a command when the user selects an exercise or another folder.
+pub fn exercise_list_ui(
+    ui: &mut egui::Ui,
+    list: &mut ExerciseList,
+    participant: &mut String,
+    context: &ListContext,
+    commands: &mut Vec<AppCommand>,
+) {
+    let words = context.words;
+    theme::centered_column(ui, |ui| {
+        ui.heading(words.get("shelf.title"));
+        participant_ui(ui, participant, words, commands);
+        if let Some(session) = context.history.interrupted() {
+            interrupted_ui(ui, list, session, words, commands);
+        }
+        ui.add_space(8.0);
+        let room = (ui.available_height() - 150.0).max(160.0);
+        egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
+            for (place, exercise) in list.exercises.iter().enumerate() {
+                let required = list.required_before(place, context.history, participant, context.settings);
+                let card = ExerciseCard {
+                    place,
+                    is_selected: list.selected == place,
+                    summary: context.history.summary(exercise.id(), participant),
+                    required: required.map(|first| first.title(words)),
+                };
+                let card = exercise_ui(ui, exercise, &card, words, commands);
+                if card.gained_focus() || (list.scroll_to_selected && list.selected == place) {
+                    card.scroll_to_me(None);
+                }
+            }
+            list.scroll_to_selected = false;
+        });
+        ui.add_space(12.0);
+        let is_valid = list.can_open_selected(context.history, participant, context.settings);
+        ui.horizontal(|ui| {
+            let open = ui.add_enabled(is_valid, theme::primary_button(words.get("shelf.open")));
+            ui_anchors::anchor(ui, "shelf.open", open.rect);
+            if open.clicked() {
+                commands.push(AppCommand::OpenBriefing);
+            }
+            // The author's screen keeps files and builds teeth on a thread: a page has neither.
+            let authoring = [("shelf.edit", AppCommand::EditExercise), ("shelf.new", AppCommand::NewExercise)];
+            for (key, command) in authoring.into_iter().filter(|_| !platform::IS_PAGE && !context.is_kiosk) {
+                let button = ui.button(words.get(key));
+                ui_anchors::anchor(ui, key, button.rect);
+                if button.clicked() {
+                    commands.push(command);
+                }
+            }
+        });
+        if platform::IS_PAGE {
+            return;
+        }
+        if !context.is_kiosk {
+            folder_ui(ui, &mut list.folder, words, commands);
+        }
+        if let Some(complaint) = &list.complaint {
+            ui.colored_label(theme::ERROR, complaint);
+        }
+    });
+}
+
+/// The field for a further folder with exercises.
+fn folder_ui(ui: &mut egui::Ui, folder: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
+    ui.horizontal_wrapped(|ui| {
+        let label = ui.label(words.get("shelf.folder")).id;
+        let edit = egui::TextEdit::singleline(folder).desired_width(260.0);
+        let typed = ui.add(edit.hint_text(words.get("shelf.folder_hint"))).labelled_by(label);
+        if typed.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
+            commands.push(AppCommand::OpenFolder(folder.clone().into()));
+        }
+    });
+}
+
+/// The field for the participant code, whose results the list shows.
+fn participant_ui(ui: &mut egui::Ui, participant: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
+    ui.horizontal_wrapped(|ui| {
+        let label = ui.label(words.get("briefing.participant")).id;
+        let edit = egui::TextEdit::singleline(participant).char_limit(64).desired_width(180.0);
+        ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
+        if !participant.is_empty() && ui.button(words.get("shelf.someone_else")).clicked() {
+            commands.push(AppCommand::ChangeParticipant);
+        }
+    });
+    if !lesson::is_valid_participant_code(participant) {
+        ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
+    }
+}
+
+/// Offers to finish a session that was interrupted.
+fn interrupted_ui(
+    ui: &mut egui::Ui,
+    list: &ExerciseList,
+    session: &InterruptedSession,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let own = list.exercises.iter().find(|exercise| exercise.id() == session.scenario_id);
+    let title = own.map_or(session.scenario_id.as_str(), |own| own.title(words));
+    let when = session.started.get(..16).unwrap_or_default().replace('T', " ");
+    let frame = egui::Frame::NONE.stroke(egui::Stroke::new(2.0, theme::WARNING)).corner_radius(8).inner_margin(12);
+    ui.add_space(8.0);
+    frame.show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.strong(words.format("shelf.interrupted", format!("{title} · {when} UTC")));
+        ui.label(words.get(if session.is_sealed { "shelf.interrupted_sealed" } else { "shelf.interrupted_about" }));
+        ui.horizontal_wrapped(|ui| {
+            let asked =
+                [("shelf.finish", AppCommand::FinishInterrupted), ("shelf.aside", AppCommand::SetAsideInterrupted)];
+            for (key, command) in asked.into_iter().filter(|(key, _)| *key == "shelf.aside" || !session.is_sealed) {
+                let button = ui.button(words.get(key));
+                ui_anchors::anchor(ui, key, button.rect);
+                if button.clicked() {
+                    commands.push(command);
+                }
+            }
+        });
+    });
+}
+
+/// An exercise as its card shows it, beside its own texts.
+struct ExerciseCard<'a> {
+    place: usize,
+    is_selected: bool,
+    summary: AttemptSummary,
+    /// Title of the exercise that must be passed first, if any.
+    required: Option<&'a str>,
+}
+
+fn exercise_ui(
+    ui: &mut egui::Ui,
+    exercise: &Exercise,
+    card: &ExerciseCard,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) -> egui::Response {
+    let (title, about, colour) = match &exercise.scenario {
+        Ok(scenario) => (exercise.title(words), words.own(&scenario.texts, &scenario.summary), None),
+        Err(complaint) => (exercise.name.as_str(), complaint.as_str(), Some(theme::ERROR)),
+    };
+    let place = card.place;
+    let fill = if card.is_selected { theme::ACCENT.gamma_multiply(0.14) } else { egui::Color32::WHITE };
+    let edge = if card.is_selected {
+        egui::Stroke::new(2.0, theme::ACCENT)
+    } else {
+        egui::Stroke::new(1.0, egui::Color32::from_gray(0xdd))
+    };
+    let (state, state_colour) = state_of(card, words);
+    let frame = egui::Frame::NONE.fill(fill).stroke(edge).corner_radius(8).inner_margin(14);
+    let shown = frame.show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        let numbered = format!("{}. {title}", place + 1);
+        ui.add(egui::Label::new(egui::RichText::new(numbered).strong().size(18.0)).selectable(false));
+        let about = egui::RichText::new(about);
+        let about = if let Some(colour) = colour { about.color(colour) } else { about };
+        ui.add(egui::Label::new(about).wrap().selectable(false));
+        if colour.is_none() {
+            let state = egui::RichText::new(&state).color(state_colour);
+            ui.add(egui::Label::new(state).wrap().selectable(false));
+        }
+    });
+    let response = ui.interact(shown.response.rect, ui.scope_id().with(("exercise", place)), egui::Sense::click());
+    response.widget_info(|| {
+        egui::WidgetInfo::selected(egui::Role::Button, true, card.is_selected, format!("{title}. {state}"))
+    });
+    if response.clicked() {
+        commands.push(AppCommand::SelectExercise(place));
+    }
+    if response.double_clicked() {
+        commands.push(AppCommand::OpenBriefing);
+    }
+    if response.has_focus() {
+        ui.painter().rect_stroke(response.rect, 8, egui::Stroke::new(2.0, theme::ACCENT), egui::StrokeKind::Outside);
+    }
+    ui.add_space(4.0);
+    response
+}
+
+/// Results of the participant at an exercise, or the condition under which it opens, with a colour.
+fn state_of(card: &ExerciseCard, words: &Translations) -> (String, egui::Color32) {
+    let grey = egui::Color32::from_gray(0x60);
+    let AttemptSummary { count, best, last, last_date, is_passed } = &card.summary;
+    let points = |(points, most): &(f64, f64)| format!("{points:.0} / {most:.0}");
+    match (card.required, count) {
+        (Some(first), _) => (words.format("shelf.required", first), theme::WARNING),
+        (None, 0) => (words.get("shelf.not_done").to_string(), grey),
+        (None, _) => {
+            let mut parts = vec![words.get(if *is_passed { "shelf.passed" } else { "shelf.not_passed" }).to_string()];
+            parts.extend(best.as_ref().map(|best| words.format("shelf.best", points(best))));
+            parts.extend(last.as_ref().map(|last| words.format("shelf.last", points(last))));
+            parts.push(words.format("shelf.attempts", count));
+            parts.push(last_date.clone());
+            (parts.join(" · "), if *is_passed { theme::SUCCESS } else { grey })
+        }
+    }
+}

@@ -1,0 +1,494 @@
+//! The practice screen: the view of the tooth, the task, the instrument in use and the force applied.
+
+use crate::command::{AppCommand, PracticeCommand};
+use crate::i18n::Translations;
+use crate::lesson_scene::DisplayMode;
+use crate::lesson_state::LessonState;
+use crate::settings::Settings;
+use crate::snapshot::{InstrumentPose, LessonSnapshot};
+use crate::ui::viewport::{EyeWindow, Viewport};
+use crate::ui::{controls_guide, periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
+use crate::view_refresh::{Redraw, ViewInputs};
+use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
+use typodont_core::frame::{Pose, Vec3};
+use typodont_exercise::catalog::TissueRole;
+use typodont_render::{
+    Background, Changes, Eye, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
+};
+use typodont_scene as scene;
+use typodont_scene::particles::ParticleField;
+
+/// Full width of the force bar, N: the maximum force of a PHANTOM Omni.
+const BAR_FULL: f32 = 3.3;
+
+/// Force above which a warning is shown, N: the thesis's dentists cut with less. The patient cries later (`PAINFUL_FORCE`
+/// in `lesson_sound`).
+const HIGH_FORCE: f32 = 2.0;
+
+/// Formats a time, s, as minutes and seconds.
+pub fn format_time(seconds: f64) -> String {
+    let whole = seconds.max(0.0) as u64;
+    format!("{}:{:02}", whole / 60, whole % 60)
+}
+
+/// The whole screen.
+pub fn practice_ui(
+    ui: &mut egui::Ui,
+    lesson: &mut LessonState,
+    settings: &Settings,
+    viewport: Option<&mut Viewport>,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    // The window is cleared in the panels' colour; filling them again would cost as much as drawing the tooth where there
+    // is no graphics processor.
+    let side = egui::Frame::side_top_panel(ui.style()).inner_margin(16).fill(Color32::TRANSPARENT);
+    let width = ui.available_width();
+    egui::Panel::left("task").exact_size(310.0f32.min(0.28 * width)).resizable(false).frame(side).show(ui, |ui| {
+        egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| task_ui(ui, lesson, words, commands));
+    });
+    egui::Panel::right("menu").exact_size(250.0f32.min(0.24 * width)).resizable(false).frame(side).show(ui, |ui| {
+        egui::ScrollArea::vertical()
+            .auto_shrink([false, false])
+            .show(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, words, commands));
+    });
+    egui::Panel::bottom("force")
+        .exact_size(64.0)
+        .resizable(false)
+        .frame(side)
+        .show(ui, |ui| force_ui(ui, lesson, words));
+    egui::CentralPanel::no_frame().show(ui, |ui| view_ui(ui, lesson, settings, viewport, words, commands));
+}
+
+/// The stage, its time, its questions and its end.
+fn task_ui(ui: &mut egui::Ui, lesson: &mut LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let scenario = lesson.scenario.clone();
+    let Some(stage) = lesson.stage.and_then(|stage| scenario.stages.get(stage)) else {
+        ui.label(words.get("practice.making"));
+        theme::progress_dots(ui);
+        return;
+    };
+    let number = lesson.stage.unwrap_or_default() + 1;
+    ui.weak(format!("{} {number} / {}", words.get("practice.stage"), scenario.stages.len()));
+    ui.heading(words.own(&scenario.texts, &stage.title));
+    ui.label(words.own(&scenario.texts, &stage.instruction));
+    ui.add_space(8.0);
+    time_ui(ui, stage.time_limit, lesson.snapshot.as_ref(), words);
+    if lesson.is_awaiting_movement {
+        ui.colored_label(theme::ACCENT, words.get("practice.clock_stopped"));
+    }
+    if let Some(before) = &lesson.timed_out_stage {
+        ui.colored_label(theme::WARNING, words.format("practice.time_up", words.own(&scenario.texts, before)));
+    }
+    if stage.show_decay
+        && stage.cutting
+        && let Some(cleared) = lesson.snapshot.and_then(|seen| seen.cleared_pct)
+    {
+        let left = 100.0 - cleared;
+        ui.label(words.format("practice.left", format!("{left:.0}")));
+        ui.add(egui::ProgressBar::new(left / 100.0).fill(theme::ACCENT).desired_height(10.0));
+    }
+    ui.add_space(8.0);
+    if let Some(second) = &lesson.second_hand {
+        ui.label(words.format("practice.second", second.text(words)));
+    }
+    if let Some(why) = &lesson.pause_reason {
+        ui.colored_label(theme::WARNING, words.format("practice.standstill", why.text(words)));
+    }
+    if lesson.is_paused {
+        ui.colored_label(theme::WARNING, words.get("practice.paused"));
+    }
+    questions::questions_ui(ui, stage, lesson, words, commands);
+    periodontal_chart::periodontal_chart_ui(ui, stage, lesson, words, commands);
+    ui.add_space(12.0);
+    if stage.ends.confirmed {
+        // A row, so that the text stands in the button's middle.
+        let done = ui.horizontal(|ui| ui.add(theme::primary_button(words.get("practice.done")))).inner;
+        if done.clicked() {
+            commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
+        }
+    }
+    if lesson.is_confirming_finish {
+        confirm_finish_ui(ui.ctx(), words, commands);
+    }
+    if let Some(why) = &lesson.refusal_key {
+        ui.colored_label(theme::ERROR, words.format("practice.refused", words.get(why)));
+    }
+    ui.add_space(16.0);
+    abort_ui(ui, lesson, words, commands);
+}
+
+/// The question before a stage ends, over the screen, so that no click that was meant for another button ends it.
+fn confirm_finish_ui(ctx: &egui::Context, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let frame = egui::Frame::popup(&ctx.global_style()).inner_margin(24);
+    let shown = egui::Modal::new(egui::Id::unique("finish")).frame(frame).show(ctx, |ui| {
+        ui.set_max_width(440.0);
+        ui.heading(words.get("practice.finish_sure"));
+        ui.label(words.get("practice.finish_about"));
+        ui.add_space(8.0);
+        ui.horizontal_wrapped(|ui| {
+            if ui.add(theme::primary_button(words.get("practice.finish_yes"))).clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
+            }
+            if ui.button(words.get("practice.finish_no")).clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::ContinueStage));
+            }
+        });
+    });
+    if shown.should_close() {
+        commands.push(AppCommand::Practice(PracticeCommand::ContinueStage));
+    }
+}
+
+fn time_ui(ui: &mut egui::Ui, limit: Option<f64>, snapshot: Option<&LessonSnapshot>, words: &Translations) {
+    /// Remaining time from which it is shown as a warning, s.
+    const SHORT: f64 = 30.0;
+    let elapsed = snapshot.map_or(0.0, |seen| f64::from(seen.stage_seconds));
+    let (text, colour) = match limit {
+        Some(limit) if limit - elapsed < SHORT => {
+            (words.format("practice.time_left", format_time((limit - elapsed).ceil())), theme::WARNING)
+        }
+        Some(limit) => (words.format("practice.time_left", format_time((limit - elapsed).ceil())), theme::ACCENT),
+        None => (words.format("practice.time", format_time(elapsed)), theme::ACCENT),
+    };
+    ui.label(egui::RichText::new(text).size(20.0).strong().color(colour));
+}
+
+fn abort_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
+    if !lesson.is_confirming_abort {
+        if ui.button(words.get("practice.give_up")).clicked() {
+            commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(true)));
+        }
+        return;
+    }
+    ui.colored_label(theme::ERROR, words.get("practice.give_up_sure"));
+    ui.horizontal(|ui| {
+        if ui.button(words.get("practice.give_up_yes")).clicked() {
+            commands.push(AppCommand::Practice(PracticeCommand::Abort));
+        }
+        if ui.button(words.get("practice.give_up_no")).clicked() {
+            commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(false)));
+        }
+    });
+}
+
+/// Force applied by the trainee, as a bar, with a warning about tissue that should not be touched.
+fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
+    let snapshot = lesson.snapshot.unwrap_or_default();
+    let force = snapshot.spring;
+    ui.horizontal_centered(|ui| {
+        ui.strong(words.get("practice.force"));
+        let (rect, response) = ui.allocate_exact_size(egui::vec2(260.0, 22.0), Sense::hover());
+        let label = words.get("practice.force").to_string();
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Meter, true, format!("{label} {force:.1} N")));
+        let painter = ui.painter();
+        painter.rect_filled(rect, 5, Color32::from_gray(0xe2));
+        let width = rect.width() * (force / BAR_FULL).clamp(0.0, 1.0);
+        let fill = if force > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
+        painter.rect_filled(Rect::from_min_size(rect.min, egui::vec2(width, rect.height())), 5, fill);
+        if let Some(strength) = lesson.press_strength() {
+            let x = rect.min.x + rect.width() * (strength / BAR_FULL).clamp(0.0, 1.0);
+            painter.vline(x, rect.y_range(), Stroke::new(2.5, theme::ACCENT));
+        }
+        ui.monospace(format!("{force:4.1} N"));
+        // There is no room for both in a narrow window.
+        match (warning(lesson, &snapshot), lesson.press_strength()) {
+            (Some(key), _) => {
+                let text = egui::RichText::new(format!("! {}", words.get(key))).strong().color(theme::ERROR);
+                ui.add(egui::Label::new(text).wrap());
+            }
+            (None, Some(strength)) => _ = ui.weak(words.format("practice.strength", format!("{strength:.1}"))),
+            (None, None) => {}
+        }
+    });
+}
+
+/// Text key of a warning about the trainee's present action, if there is one.
+fn warning(lesson: &LessonState, snapshot: &LessonSnapshot) -> Option<&'static str> {
+    let cuts = lesson.scenario.instruments.get(snapshot.instrument as usize).is_some_and(|i| i.is_bur());
+    let is_cutting = cuts && lesson.stage().is_some_and(|stage| stage.cutting);
+    let is_decay_shown = lesson.is_decay_shown();
+    match snapshot.touch.and_then(|label| lesson.scenario.tissues.role(label)) {
+        Some(TissueRole::Soft) if is_cutting => Some("practice.warn_soft"),
+        Some(TissueRole::Neighbour) if is_cutting => Some("practice.warn_neighbour"),
+        Some(TissueRole::Vulnerable) if is_cutting => Some("practice.warn_pulp"),
+        Some(TissueRole::Sound) if snapshot.cutting && is_decay_shown => Some("practice.warn_sound"),
+        _ if snapshot.spring > HIGH_FORCE => Some("practice.warn_force"),
+        _ => None,
+    }
+}
+
+/// The view of the tooth and the instrument, with the state of the pointer.
+fn view_ui(
+    ui: &mut egui::Ui,
+    lesson: &mut LessonState,
+    settings: &Settings,
+    viewport: Option<&mut Viewport>,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let rect = ui.available_rect_before_wrap();
+    let view = ui.interact(rect, ui.scope_id().with("view"), Sense::click_and_drag());
+    view.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, words.get("practice.view")));
+    viewport_input::collect_commands(ui, &view, lesson.is_pointer_captured, commands);
+    if lesson.is_pointer_captured && !ui.input(|input| input.focused) {
+        commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));
+    }
+    let scale = ui.pixels_per_point();
+    let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
+    let mut viewport = viewport;
+    let now = ui.input(|input| input.time);
+    if lesson.scene.is_some() && viewport.is_some() {
+        lesson.record_view(size[0] as f32 / size[1] as f32);
+    }
+    match viewport.as_deref_mut().map(|viewport| refresh_view(lesson, settings, viewport, size, now)) {
+        Some(Ok(Some(id))) => {
+            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+            ui.painter().image(id, rect, whole, Color32::WHITE);
+            if settings.stereo().is_none() {
+                pointer_ring(ui, lesson, rect);
+            }
+            let is_section_allowed = is_section_allowed(lesson);
+            if let (Some(scene), Some(snapshot)) = (&mut lesson.scene, &lesson.snapshot)
+                && let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize)
+                && is_section_allowed
+            {
+                section_view::section_ui(ui, rect, scene, &lesson.orbit, snapshot, instrument);
+            }
+            controls_guide::controls_guide_ui(ui, lesson, rect, words);
+        }
+        Some(Ok(None)) => {
+            ui.painter().rect_filled(rect, 0, Color32::from_rgb(0xd5, 0xdc, 0xe0));
+        }
+        Some(Err(error)) => {
+            ui.put(
+                rect.shrink(40.0),
+                egui::Label::new(egui::RichText::new(error.to_string()).color(theme::ERROR)).wrap(),
+            );
+        }
+        None => {
+            ui.put(rect.shrink(40.0), egui::Label::new(words.get("practice.no_picture")));
+        }
+    }
+    if let Some(viewport) = viewport.filter(|_| settings.second_eye().is_some()) {
+        second_eye_window(ui.ctx(), viewport, words);
+    }
+    if lesson.has_mouse() && lesson.scene.is_some() {
+        pointer_hint_ui(ui, rect, lesson.is_pointer_captured, words, commands);
+    }
+}
+
+/// Hint at the lower edge of the view about the pointer, and a button that puts the instrument down for those who have no
+/// keyboard.
+fn pointer_hint_ui(
+    ui: &mut egui::Ui,
+    view: Rect,
+    is_captured: bool,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    /// Width of the button, points.
+    const BUTTON: f32 = 136.0;
+    let at = view.center_bottom() - egui::vec2(0.0, 26.0);
+    let width = (view.width() - 24.0).clamp(40.0, if is_captured { 680.0 } else { 620.0 });
+    let place = Rect::from_center_size(at, egui::vec2(width, 36.0));
+    ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
+    let text = |key| egui::RichText::new(words.get(key)).size(13.0);
+    let hint = |key| egui::Label::new(text(key).color(Color32::WHITE)).selectable(false);
+    if !is_captured {
+        ui.put(place, hint("practice.free"));
+        return;
+    }
+    let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));
+    ui.put(left.shrink2(egui::vec2(8.0, 0.0)), hint("practice.held"));
+    if ui
+        .put(
+            right.shrink(4.0),
+            egui::Button::new(text("practice.put_down")).small().wrap_mode(egui::TextWrapMode::Extend),
+        )
+        .clicked()
+    {
+        commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));
+    }
+}
+
+/// True if the section may show what lies beneath the surface: where decay is hidden, it would give it away.
+fn is_section_allowed(lesson: &LessonState) -> bool {
+    lesson.has_mouse() && lesson.is_pointer_captured && lesson.stage().is_some_and(|stage| stage.show_decay)
+}
+
+/// Draws the lesson's scene if the last image is not right any more; `None` before it is built. `now`: s.
+fn refresh_view(
+    lesson: &mut LessonState,
+    settings: &Settings,
+    viewport: &mut Viewport,
+    size: [u32; 2],
+    now: f64,
+) -> Result<Option<egui::TextureId>, RenderError> {
+    let Some(scene) = &lesson.scene else { return Ok(None) };
+    let particles = scene.particles.as_ref();
+    let particle_count = particles.map_or(0, ParticleField::count);
+    let stereo = [settings.stereo(), settings.second_eye()];
+    let inputs = ViewInputs {
+        size,
+        orbit: lesson.orbit,
+        mode: lesson.display_mode,
+        instrument: lesson.snapshot.as_ref().map(InstrumentPose::from),
+        edit_count: scene.edit_count,
+        appearance_count: scene.appearance_count,
+        stereo,
+        second_size: viewport.second_eye_size(),
+        is_smooth: settings.is_smooth(viewport.has_graphics()),
+        particle_count,
+    };
+    let is_moving = particle_count > 0 && !lesson.is_standing_still();
+    // In stereo each pixel may belong to one eye.
+    let may_be_coarse = stereo == [None, None];
+    let share = match lesson.view_refresh.plan(inputs, is_moving, may_be_coarse, now) {
+        Redraw::Keep if let Some(texture) = viewport.texture() => return Ok(Some(texture)),
+        Redraw::Keep => 1.0,
+        Redraw::At(share) => share,
+    };
+    let drawn = draw_view(lesson, settings, viewport, size.map(|pixels| (share * pixels as f32).ceil() as u32));
+    if drawn.is_err() {
+        lesson.view_refresh.invalidate();
+    }
+    drawn
+}
+
+/// Draws the lesson's scene; `None` before it is built.
+fn draw_view(
+    lesson: &mut LessonState,
+    settings: &Settings,
+    viewport: &mut Viewport,
+    size: [u32; 2],
+) -> Result<Option<egui::TextureId>, RenderError> {
+    let (viewpoint, mode, snapshot) = (lesson.orbit.viewpoint(), lesson.display_mode, lesson.snapshot);
+    let is_pointer = lesson.has_mouse();
+    let Some(lesson_scene) = &mut lesson.scene else { return Ok(None) };
+    let changed = lesson_scene.volume.take_dirty();
+    let is_radiograph = mode == DisplayMode::Xray;
+    // On the film neither gingiva nor neighbours cover the tooth; the instrument stays.
+    let mut solids = if is_radiograph { Vec::new() } else { lesson_scene.surroundings.clone() };
+    solids.extend(lesson_scene.ejector.clone().filter(|_| !is_radiograph));
+    if let Some(field) = &mut lesson_scene.particles {
+        field.sort_for_view(&viewpoint);
+    }
+    let mut mirror = None;
+    if let Some(snapshot) = snapshot
+        && let Some(instrument) = lesson_scene.instruments.get(snapshot.instrument as usize)
+    {
+        let world_from_tip = Pose { position: snapshot.tip, orientation: snapshot.orientation };
+        let index = snapshot.instrument as usize;
+        let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
+        match lesson_scene.contra_angles.get(index).and_then(Option::as_ref).filter(|_| is_pointer) {
+            Some(held) => {
+                solids.push(placed(&held.bur));
+                if !hides_tip(&viewpoint, world_from_tip) {
+                    solids.push(placed(&held.handpiece));
+                }
+            }
+            None => solids.push(placed(instrument)),
+        }
+        mirror = lesson
+            .scenario
+            .instruments
+            .get(snapshot.instrument as usize)
+            .and_then(|entry| scene::mirror_face(entry, world_from_tip));
+    }
+    let mut scene = RenderScene {
+        tooth: Some(VolumeInstance {
+            volume: &lesson_scene.volume,
+            changes: if lesson_scene.is_new { Changes::All } else { Changes::Bricks(&changed) },
+            world_from_tooth: lesson_scene.workpiece.world_from_tooth,
+            palette: &lesson_scene.palette,
+            mode: lesson_scene.render_mode(mode),
+        }),
+        solids,
+        opaque_particles: lesson_scene.particles.as_ref().map(ParticleField::opaque).unwrap_or_default(),
+        translucent_particles: lesson_scene.particles.as_ref().map(ParticleField::translucent).unwrap_or_default(),
+        mirror,
+        lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+        background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
+        is_antialiased: settings.is_smooth(viewport.has_graphics()),
+    };
+    let mut drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, settings.stereo(), size);
+    if let Some(second_eye) = settings.second_eye()
+        && drawn.is_ok()
+    {
+        // Nothing has changed between the two eyes.
+        scene.tooth.iter_mut().for_each(|tooth| tooth.changes = Changes::Bricks(&[]));
+        let other =
+            viewport.draw(EyeWindow::SecondEye, &scene, &viewpoint, Some(second_eye), viewport.second_eye_size());
+        drawn = other.and(drawn);
+    }
+    // After a failed frame the whole volume is sent to the renderer again, since its changes were lost.
+    lesson_scene.is_new = drawn.is_err();
+    drawn.map(Some)
+}
+
+/// True if a handpiece over the working end would hide the work: it is seen from above, within 42° of its axis.
+fn hides_tip(viewpoint: &Viewpoint, world_from_tip: Pose) -> bool {
+    const COSINE: f32 = 0.74;
+    let to_eye = (viewpoint.position - world_from_tip.position).normalize_or(Vec3::Y);
+    to_eye.dot(world_from_tip.rotate(Vec3::Z)) > COSINE
+}
+
+/// The window of the right eye; if the system supports only one window, a panel within it.
+fn second_eye_window(ctx: &egui::Context, viewport: &mut Viewport, words: &Translations) {
+    let title = words.get("practice.right_eye");
+    let builder =
+        egui::ViewportBuilder::default().with_title(format!("Typodont · {title}")).with_inner_size([640.0, 480.0]);
+    let id = egui::ViewportId::from_hash_of("right eye");
+    ctx.show_viewport_immediate(id, builder, |ui, _| {
+        let rect = ui.max_rect();
+        let scale = ui.pixels_per_point();
+        viewport
+            .set_second_eye_size([rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32));
+        if let Some(picture) = viewport.second_eye_texture() {
+            let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
+            ui.painter().image(picture, rect, whole, Color32::WHITE);
+        }
+    });
+}
+
+/// Draws the working end's ring on the surface under the pointer, and the share of the strength with which it presses.
+fn pointer_ring(ui: &egui::Ui, lesson: &LessonState, rect: Rect) {
+    const CORNERS: usize = 32;
+    /// Distance of the gauge from the ring, points.
+    const GAUGE: f32 = 7.0;
+    let (Some(snapshot), Some(spot), Some(strength)) =
+        (lesson.snapshot, lesson.pointer_hand.spot, lesson.press_strength())
+    else {
+        return;
+    };
+    let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize) else { return };
+    let eye = lesson.orbit.viewpoint().eye(rect.width() / rect.height());
+    let radius = scene::pointing::ring_radius(&instrument.end);
+    let side = spot.normal.any_orthonormal_vector();
+    let corner = |i: usize| {
+        let (sin, cos) = (std::f32::consts::TAU * i as f32 / CORNERS as f32).sin_cos();
+        project(&eye, spot.place + (side * cos + spot.normal.cross(side) * sin) * radius, rect)
+    };
+    let colour = if snapshot.spring > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
+    let ring: Vec<Pos2> = (0..=CORNERS).filter_map(corner).collect();
+    ui.painter().add(egui::Shape::line(ring.clone(), Stroke::new(4.0, Color32::from_black_alpha(90))));
+    ui.painter().add(egui::Shape::line(ring.clone(), Stroke::new(2.0, Color32::WHITE)));
+    let Some(middle) = project(&eye, spot.place, rect) else { return };
+    let share = (snapshot.spring / strength.max(0.1)).clamp(0.0, 1.0);
+    if lesson.pointer_hand.is_pressing && share > 0.02 {
+        let reach = ring.iter().map(|p| p.distance(middle)).fold(8.0, f32::max) + GAUGE;
+        let end = (CORNERS as f32 * share).round() as usize;
+        let at = |i: usize| {
+            let angle = std::f32::consts::TAU * i as f32 / CORNERS as f32 - std::f32::consts::FRAC_PI_2;
+            middle + egui::vec2(angle.cos(), angle.sin()) * reach
+        };
+        ui.painter().add(egui::Shape::line((0..=end).map(at).collect(), Stroke::new(4.0, colour)));
+    }
+}
+
+/// Screen position of a point of the world; `None` behind the camera.
+fn project(eye: &Eye, point_in_world: Vec3, rect: Rect) -> Option<Pos2> {
+    let ([x, y], depth) = eye.project(point_in_world);
+    (depth > 0.0).then(|| rect.min + egui::vec2(x * rect.width(), y * rect.height()))
+}

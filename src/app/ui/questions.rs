@@ -1,0 +1,146 @@
+//! Questions of a stage, and the controls that answer them.
+
+use crate::answer_draft::parse_draft;
+use crate::command::{AppCommand, PracticeCommand};
+use crate::i18n::Translations;
+use crate::lesson_state::LessonState;
+use crate::ui::theme;
+use eframe::egui;
+use typodont_exercise::local_text::LocalTexts;
+use typodont_exercise::scenario::{Question, QuestionKind, Stage};
+use typodont_exercise::session::AnswerValue;
+
+/// Every question of a stage.
+pub fn questions_ui(
+    ui: &mut egui::Ui,
+    stage: &Stage,
+    lesson: &mut LessonState,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let scenario = lesson.scenario.clone();
+    let teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
+    for (place, question) in stage.ask.iter().enumerate() {
+        let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
+        ui.add_space(10.0);
+        ui.strong(words.own(&scenario.texts, &question.text));
+        let draft = lesson.drafts.entry(question.id.clone()).or_default();
+        let current = lesson.answers.get(&question.id);
+        ui.push_id(place, |ui| {
+            if let Some(answer) =
+                (QuestionUi { question, current, texts: &scenario.texts, words }).answer_ui(ui, &teeth, draft)
+            {
+                commands.push(AppCommand::Practice(PracticeCommand::AnswerQuestion(question.id.clone(), answer)));
+            }
+        });
+        if parse_draft(question, draft).is_some_and(|answer| answer.is_none()) {
+            ui.colored_label(theme::ERROR, words.get("questions.not_a_number"));
+        }
+        if is_answered {
+            let noted = match current {
+                Some(AnswerValue::Number(number)) => format!(": {number}"),
+                _ => String::new(),
+            };
+            ui.colored_label(theme::SUCCESS, format!("{}{noted}", words.get("questions.noted")));
+        }
+    }
+}
+
+/// One question with its last submitted answer.
+struct QuestionUi<'a> {
+    question: &'a Question,
+    current: Option<&'a AnswerValue>,
+    texts: &'a LocalTexts,
+    words: &'a Translations,
+}
+
+impl QuestionUi<'_> {
+    /// Draws the controls of the question; returns the answer given in this frame, if any.
+    fn answer_ui(&self, ui: &mut egui::Ui, teeth: &[(String, u8)], draft: &mut String) -> Option<AnswerValue> {
+        let words = self.words;
+        match &self.question.kind {
+            QuestionKind::ToothWith { .. } => {
+                let sides = [words.get("questions.left_tooth"), words.get("questions.right_tooth")];
+                let title = |place: usize, fdi: u8| match teeth.len() {
+                    2 => format!("{} ({fdi})", sides[place.min(1)]),
+                    _ => fdi.to_string(),
+                };
+                let options =
+                    teeth.iter().enumerate().map(|(i, (id, fdi))| (AnswerValue::Word(id.clone()), title(i, *fdi)));
+                self.buttons(ui, options)
+            }
+            QuestionKind::QuadrantOf { .. } => self.quadrants(ui),
+            QuestionKind::Choice { options, .. } => self.buttons(
+                ui,
+                options
+                    .iter()
+                    .map(|(id, title)| (AnswerValue::Word(id.clone()), words.own(self.texts, title).to_string())),
+            ),
+            QuestionKind::YesNo { .. } => {
+                let options = [(true, "questions.yes"), (false, "questions.no")];
+                self.buttons(
+                    ui,
+                    options.into_iter().map(|(yes, key)| (AnswerValue::YesNo(yes), words.get(key).to_string())),
+                )
+            }
+            QuestionKind::Number { unit, .. } => self.line(ui, draft, unit),
+            QuestionKind::Text => self.line(ui, draft, ""),
+        }
+    }
+
+    fn buttons(&self, ui: &mut egui::Ui, options: impl Iterator<Item = (AnswerValue, String)>) -> Option<AnswerValue> {
+        let mut chosen = None;
+        ui.horizontal_wrapped(|ui| {
+            for (answer, title) in options {
+                if self.button(ui, &answer, &title, egui::Vec2::ZERO) {
+                    chosen = Some(answer);
+                }
+            }
+        });
+        chosen
+    }
+
+    /// Quarters in occlusal view: 1 and 2 are away from the trainee.
+    fn quadrants(&self, ui: &mut egui::Ui) -> Option<AnswerValue> {
+        let mut chosen = None;
+        ui.weak(self.words.get("questions.from_above"));
+        egui::Grid::new("quadrants").spacing([6.0, 6.0]).show(ui, |ui| {
+            for row in [[1u8, 2], [3, 4]] {
+                for quadrant in row {
+                    let answer = AnswerValue::Quadrant(quadrant);
+                    if self.button(ui, &answer, &quadrant.to_string(), egui::vec2(64.0, 44.0)) {
+                        chosen = Some(answer);
+                    }
+                }
+                ui.end_row();
+            }
+        });
+        chosen
+    }
+
+    /// A button that is marked while its answer is the submitted one; returns true when clicked.
+    fn button(&self, ui: &mut egui::Ui, answer: &AnswerValue, title: &str, min_size: egui::Vec2) -> bool {
+        let is_current = self.current == Some(answer);
+        let button = ui.add(egui::Button::selectable(is_current, title).frame_when_inactive(true).min_size(min_size));
+        button.widget_info(|| {
+            let name = format!("{}: {title}", self.words.own(self.texts, &self.question.text));
+            egui::WidgetInfo::selected(egui::Role::RadioButton, true, is_current, name)
+        });
+        button.clicked()
+    }
+
+    /// A text field; returns its answer when the user submits it.
+    fn line(&self, ui: &mut egui::Ui, draft: &mut String, unit: &str) -> Option<AnswerValue> {
+        let mut is_submitted = false;
+        ui.horizontal(|ui| {
+            let line = ui.add(egui::TextEdit::singleline(draft).desired_width(150.0));
+            line.widget_info(|| {
+                egui::WidgetInfo::labeled(egui::Role::TextInput, true, self.words.own(self.texts, &self.question.text))
+            });
+            ui.label(unit);
+            let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+            is_submitted = ui.button(self.words.get("questions.say")).clicked() || is_entered;
+        });
+        parse_draft(self.question, draft).flatten().filter(|_| is_submitted)
+    }
+}

@@ -1,0 +1,145 @@
+//! The screen of the settings.
+
+use crate::command::AppCommand;
+use crate::i18n::Translations;
+use crate::platform;
+use crate::settings::{FONT_SIZES, Settings, StereoMode};
+use crate::ui::ui_anchors;
+use eframe::egui;
+use typodont_devices::DRIVERS;
+
+const STEREO_MODES: [(StereoMode, &str); 6] = [
+    (StereoMode::Off, "settings.stereo_off"),
+    (StereoMode::SideBySide, "settings.stereo_side"),
+    (StereoMode::TopBottom, "settings.stereo_top"),
+    (StereoMode::Rows, "settings.stereo_rows"),
+    (StereoMode::Anaglyph, "settings.stereo_anaglyph"),
+    (StereoMode::TwoWindows, "settings.stereo_two"),
+];
+
+/// Draws all settings. Pushes commands for changes, and changes nothing itself.
+pub fn settings_ui(
+    ui: &mut egui::Ui,
+    settings: &Settings,
+    has_graphics: bool,
+    languages: &[Translations],
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let mut new = settings.clone();
+    egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
+        language_row(ui, &mut new, languages, words);
+        device_row(ui, &mut new, words);
+        stereo_row(ui, &mut new, words);
+        row(ui, words.get("settings.eyes"), |ui| {
+            let slider = egui::Slider::new(&mut new.eye_distance_mm, 0.0..=80.0).suffix(" mm").fixed_decimals(0);
+            ui.add_enabled(new.stereo != StereoMode::Off, slider)
+        });
+        row(ui, words.get("settings.volume"), |ui| {
+            let percent = |share: f64, _| format!("{:.0} %", 100.0 * share);
+            ui.add(egui::Slider::new(&mut new.volume, 0.0..=1.0).custom_formatter(percent))
+        });
+        font_row(ui, &mut new, words);
+        ui.label("");
+        let mut is_smooth = settings.is_smooth(has_graphics);
+        if ui.checkbox(&mut is_smooth, words.get("settings.smooth")).changed() {
+            new.smooth_edges = Some(is_smooth);
+        }
+        ui.end_row();
+        ui.label("");
+        ui.checkbox(&mut new.high_contrast, words.get("settings.contrast"));
+        ui.end_row();
+    });
+    if new != *settings {
+        commands.push(AppCommand::ApplySettings(Box::new(new)));
+    }
+    ui.add_space(12.0);
+    if let Some(path) = platform::settings_file() {
+        ui.weak(words.format("settings.kept", path.display()));
+    }
+    ui.add_space(8.0);
+    if ui.button(words.get("settings.close")).clicked() {
+        commands.push(AppCommand::ShowSettings(false));
+    }
+}
+
+/// Draws the settings of a kiosk: language and size, which hold until the next participant; and the way to close it.
+pub fn kiosk_settings_ui(
+    ui: &mut egui::Ui,
+    settings: &Settings,
+    languages: &[Translations],
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let mut new = settings.clone();
+    egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
+        language_row(ui, &mut new, languages, words);
+        font_row(ui, &mut new, words);
+    });
+    if new != *settings {
+        commands.push(AppCommand::ApplySettings(Box::new(new)));
+    }
+    ui.add_space(12.0);
+    ui.horizontal(|ui| {
+        if ui.button(words.get("settings.close")).clicked() {
+            commands.push(AppCommand::ShowSettings(false));
+        }
+        let close = ui.button(words.get("kiosk.close_program"));
+        ui_anchors::anchor(ui, "kiosk.close_program", close.rect);
+        if close.clicked() {
+            commands.extend([AppCommand::ShowSettings(false), AppCommand::AskToLeaveKiosk(true)]);
+        }
+    });
+}
+
+/// Draws one row of the settings: a label, and the widget that it names.
+fn row(ui: &mut egui::Ui, label: &str, widget: impl FnOnce(&mut egui::Ui) -> egui::Response) {
+    let label = ui.label(label).id;
+    widget(ui).labelled_by(label);
+    ui.end_row();
+}
+
+fn language_row(ui: &mut egui::Ui, settings: &mut Settings, languages: &[Translations], words: &Translations) {
+    row(ui, words.get("settings.language"), |ui| {
+        let current = languages.iter().find(|w| w.code == settings.language).map_or("English", |w| w.name());
+        let choice = egui::ComboBox::from_id_salt("language").selected_text(current).show_ui(ui, |ui| {
+            for language in languages {
+                ui.selectable_value(&mut settings.language, language.code.clone(), language.name());
+            }
+        });
+        choice.response
+    });
+}
+
+fn font_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    row(ui, words.get("settings.font"), |ui| {
+        ui.add(egui::Slider::new(&mut settings.font_size, FONT_SIZES).step_by(0.1).fixed_decimals(1))
+    });
+}
+
+fn device_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    row(ui, words.get("settings.device"), |ui| {
+        let choice = egui::ComboBox::from_id_salt("device").selected_text(settings.device.clone()).show_ui(ui, |ui| {
+            for driver in DRIVERS {
+                let name = driver.name().to_string();
+                ui.selectable_value(&mut settings.device, name.clone(), name).on_hover_text(driver.description());
+            }
+        });
+        choice.response
+    });
+}
+
+fn stereo_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    row(ui, words.get("settings.stereo"), |ui| {
+        let current =
+            STEREO_MODES.iter().find(|(mode, _)| *mode == settings.stereo).map_or("", |(_, key)| words.get(key));
+        let choice = egui::ComboBox::from_id_salt("stereo").selected_text(current).show_ui(ui, |ui| {
+            // A page has one window.
+            let modes = STEREO_MODES.into_iter();
+            for (mode, key) in modes.filter(|(mode, _)| !platform::IS_PAGE || *mode != StereoMode::TwoWindows) {
+                ui.selectable_value(&mut settings.stereo, mode, words.get(key));
+            }
+        });
+        choice.response
+    });
+}

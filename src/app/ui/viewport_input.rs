@@ -1,0 +1,285 @@
+//! The pointer over the practice view: it acts as the device, or moves the camera.
+//!
+//! While it is free, its buttons move the camera as in the thesis: left rotates, right zooms, middle shifts. While it
+//! acts as the device, the hand follows the surface under the pointer, the left button presses, the wheel sets the
+//! strength, and the right button rotates the view; with the Ctrl key the buttons and the wheel move the camera as
+//! before. A pen presses as hard as it is pressed; one finger points, and a second one presses.
+
+use crate::command::{AppCommand, CameraCommand, PracticeCommand};
+use crate::pointer_hand::PointedPlace;
+use crate::ui::touches::Touches;
+use eframe::egui::{self, Event, MouseWheelUnit, PointerButton};
+
+/// Rotation by a drag across one point of the screen, rad: half a turn in 300 points.
+const RADIANS_PER_POINT: f32 = 0.0105;
+
+/// Zoom by a drag across one point, as a share of the distance.
+const ZOOM_PER_POINT: f32 = 0.006;
+
+/// Zoom by one step of the wheel, as a share of the distance.
+const ZOOM_PER_WHEEL_STEP: f32 = 0.1;
+
+/// Points that count as one step of a wheel, for touchpads, which report points only.
+const POINTS_PER_STEP: f32 = 40.0;
+
+/// Collects the commands of the pointer over a view, captured or free.
+pub fn collect_commands(ui: &egui::Ui, view: &egui::Response, is_captured: bool, commands: &mut Vec<AppCommand>) {
+    let contact = contact(ui, view);
+    match is_captured {
+        true => captured_pointer(ui, view, &contact, commands),
+        false => free_pointer(ui, view, commands),
+    }
+}
+
+/// Effect of a drag on the camera.
+#[derive(Clone, Copy)]
+enum CameraDrag {
+    Orbit,
+    Zoom,
+    Pan,
+}
+
+/// The drag of the pressed button, as in the thesis.
+fn camera_drag(input: &egui::InputState) -> Option<CameraDrag> {
+    let down = |button| input.pointer.button_down(button);
+    match () {
+        () if down(PointerButton::Primary) => Some(CameraDrag::Orbit),
+        () if down(PointerButton::Secondary) => Some(CameraDrag::Zoom),
+        () if down(PointerButton::Middle) => Some(CameraDrag::Pan),
+        () => None,
+    }
+}
+
+/// As [`camera_drag`]; with one button only, as on a touchpad, Ctrl zooms and Shift shifts.
+fn free_camera_drag(input: &egui::InputState) -> Option<CameraDrag> {
+    match (camera_drag(input)?, input.modifiers) {
+        (CameraDrag::Orbit, m) if m.command => Some(CameraDrag::Zoom),
+        (CameraDrag::Orbit, m) if m.shift => Some(CameraDrag::Pan),
+        (drag, _) => Some(drag),
+    }
+}
+
+fn camera_command(drag: CameraDrag, by: egui::Vec2, height: f32) -> AppCommand {
+    match drag {
+        CameraDrag::Orbit => {
+            AppCommand::Camera(CameraCommand::Orbit { right: -by.x * RADIANS_PER_POINT, up: by.y * RADIANS_PER_POINT })
+        }
+        CameraDrag::Zoom => AppCommand::Camera(CameraCommand::Zoom((by.y * ZOOM_PER_POINT).exp())),
+        CameraDrag::Pan => AppCommand::Camera(CameraCommand::Pan { right: by.x / height, up: -by.y / height }),
+    }
+}
+
+fn free_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppCommand>) {
+    let height = view.rect.height().max(1.0);
+    if view.dragged()
+        && let Some(drag) = ui.input(free_camera_drag)
+        && view.drag_motion() != egui::Vec2::ZERO
+    {
+        commands.push(camera_command(drag, view.drag_motion(), height));
+    }
+    if view.clicked() {
+        commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(true)));
+    }
+    let steps = wheel(ui);
+    if view.hovered() && steps != 0.0 {
+        commands.push(AppCommand::Camera(CameraCommand::Zoom((-steps * ZOOM_PER_WHEEL_STEP).exp())));
+    }
+    // Two fingers that part zoom in.
+    if let Some(fingers) = ui.input(|input| input.multi_touch()).filter(|fingers| fingers.zoom_delta != 1.0) {
+        commands.push(AppCommand::Camera(CameraCommand::Zoom(1.0 / fingers.zoom_delta)));
+    }
+}
+
+/// Share of the pointer's movement that the hand follows while Shift is held.
+const FINE_SHARE: f32 = 0.25;
+
+/// Contact of the pointer with the view, from frame to frame.
+#[derive(Clone, Debug, Default)]
+struct PointerContact {
+    touches: Touches,
+    /// True while a press lasts that began on the view.
+    began_on_view: bool,
+}
+
+/// Takes over the events of a frame, whether the pointer is captured or free, so that no end of a contact is missed.
+fn contact(ui: &egui::Ui, view: &egui::Response) -> PointerContact {
+    let (events, any_touches) = ui.input(|input| (input.events.clone(), input.any_touches()));
+    let (is_pressed, is_down) = ui.input(|input| (input.pointer.primary_pressed(), input.pointer.primary_down()));
+    ui.data_mut(|data| {
+        let contact = data.get_temp_mut_or_default::<PointerContact>(view.id.with("contact"));
+        contact.touches.update(&events);
+        if !any_touches {
+            contact.touches.clear();
+        }
+        // egui forgets the widget on which a long touch began.
+        contact.began_on_view = is_down && (contact.began_on_view || is_pressed && view.is_pointer_button_down_on());
+        contact.clone()
+    })
+}
+
+fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &PointerContact, commands: &mut Vec<AppCommand>) {
+    view.clone().on_hover_cursor(egui::CursorIcon::Crosshair);
+    let rect = view.rect;
+    let (modifiers, at) = ui.input(|input| (input.modifiers, input.pointer.latest_pos()));
+    let is_on_view = view.contains_pointer() || contact.began_on_view;
+    let drag = match (ui.input(camera_drag), modifiers.command) {
+        (drag, true) => drag,
+        (Some(CameraDrag::Zoom), false) => Some(CameraDrag::Orbit),
+        (Some(CameraDrag::Pan), false) => Some(CameraDrag::Pan),
+        (Some(CameraDrag::Orbit) | None, false) => None,
+    };
+    if view.dragged()
+        && let Some(drag) = drag
+        && view.drag_motion() != egui::Vec2::ZERO
+    {
+        commands.push(camera_command(drag, view.drag_motion(), rect.height().max(1.0)));
+    }
+    let steps = wheel(ui);
+    if view.hovered() && steps != 0.0 {
+        commands.push(match modifiers.command {
+            true => AppCommand::Camera(CameraCommand::Zoom((-steps * ZOOM_PER_WHEEL_STEP).exp())),
+            false => AppCommand::Practice(PracticeCommand::ChangeStrength(steps)),
+        });
+    }
+    let is_working = is_on_view && drag.is_none();
+    // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
+    let pressure = contact.touches.pressure().unwrap_or(1.0);
+    let is_down = is_working && contact.began_on_view && pressure > 0.0;
+    commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
+    commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
+    let place = at.filter(|_| is_working).map(|at| {
+        let share = (fine_position(ui, view.id, at, modifiers.shift) - rect.min) / rect.size();
+        PointedPlace { share: [share.x, share.y], aspect: rect.width() / rect.height().max(1.0) }
+    });
+    commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
+}
+
+/// Position at which the hand points: that of the pointer, or, while Shift is held, one that follows it more finely
+/// from where it was.
+fn fine_position(ui: &egui::Ui, view: egui::Id, at: egui::Pos2, is_fine: bool) -> egui::Pos2 {
+    let anchor = view.with("fine");
+    if !is_fine {
+        ui.data_mut(|data| data.remove_temp::<egui::Pos2>(anchor));
+        return at;
+    }
+    let start = ui.data_mut(|data| *data.get_temp_mut_or_insert_with(anchor, || at));
+    start + (at - start) * FINE_SHARE
+}
+
+/// Steps of the wheel since the last frame; forward is positive.
+fn wheel(ui: &egui::Ui) -> f32 {
+    ui.input(|input| {
+        let steps = |event: &Event| match event {
+            Event::MouseWheel { unit: MouseWheelUnit::Point, delta, .. } => delta.y / POINTS_PER_STEP,
+            Event::MouseWheel { delta, .. } => delta.y,
+            _ => 0.0,
+        };
+        input.events.iter().map(steps).sum()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::{Modifiers, Pos2, RawInput, Rect, Sense, TouchDeviceId, TouchId, TouchPhase, Vec2};
+
+    /// A view that fills a window, and the commands of each frame.
+    #[derive(Default)]
+    struct Screen(egui::Context);
+
+    impl Screen {
+        /// Shows a frame in which these events come in; returns the share of the strength with which the hand presses, and
+        /// the place at which it points.
+        fn frame(&self, events: Vec<Event>) -> (f32, Option<[f32; 2]>) {
+            self.frame_at(None, events)
+        }
+
+        /// The same at a time, s.
+        fn frame_at(&self, time: Option<f64>, events: Vec<Event>) -> (f32, Option<[f32; 2]>) {
+            let mut commands = Vec::new();
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 600.0)));
+            let input = RawInput { screen_rect, time, events, ..RawInput::default() };
+            let mut output = self.0.run_ui(input, |ui| {
+                let view = ui.interact(ui.max_rect(), ui.scope_id().with("view"), Sense::click_and_drag());
+                commands.clear();
+                collect_commands(ui, &view, true, &mut commands);
+            });
+            output.textures_delta.clear();
+            let (mut pressure, mut is_pressed, mut place) = (1.0, false, None);
+            for command in commands {
+                match command {
+                    AppCommand::Practice(PracticeCommand::SetPressure(share)) => pressure = share,
+                    AppCommand::Practice(PracticeCommand::SetDeviceButton { is_down, .. }) => is_pressed = is_down,
+                    AppCommand::Practice(PracticeCommand::PointAt(pointed)) => place = pointed.map(|p| p.share),
+                    _ => {}
+                }
+            }
+            (if is_pressed { pressure } else { 0.0 }, place)
+        }
+    }
+
+    /// Events of a touch as winit's egui integration sends them: the first touch moves the pointer, too.
+    fn touch(id: u64, phase: TouchPhase, pos: Pos2, force: Option<f32>) -> Vec<Event> {
+        let touch = Event::Touch { device_id: TouchDeviceId(1), id: TouchId(id), phase, pos, force };
+        let button =
+            |pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers: Modifiers::NONE };
+        let pointer = match (id, phase) {
+            (0, TouchPhase::Start) => vec![Event::PointerMoved(pos), button(true)],
+            (0, TouchPhase::Move) => vec![Event::PointerMoved(pos)],
+            (0, TouchPhase::End | TouchPhase::Cancel) => vec![button(false), Event::PointerGone],
+            _ => Vec::new(),
+        };
+        [vec![touch], pointer].concat()
+    }
+
+    #[test]
+    fn one_finger_points_and_a_second_one_presses() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let (first, second) = (Pos2::new(400.0, 300.0), Pos2::new(200.0, 150.0));
+        assert_eq!(screen.frame(touch(0, TouchPhase::Start, first, None)), (0.0, Some([0.5, 0.5])));
+        assert_eq!(screen.frame(touch(1, TouchPhase::Start, second, None)), (1.0, Some([0.5, 0.5])));
+        let moved = touch(0, TouchPhase::Move, Pos2::new(200.0, 300.0), None);
+        assert_eq!(screen.frame(moved), (1.0, Some([0.25, 0.5])), "the first finger points while the second presses");
+        assert_eq!(screen.frame(touch(1, TouchPhase::End, second, None)).0, 0.0);
+        assert_eq!(screen.frame(touch(0, TouchPhase::End, first, None)), (0.0, None), "a lifted hand is put down");
+    }
+
+    #[test]
+    fn a_pen_presses_as_hard_as_it_is_pressed() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let at = Pos2::new(400.0, 300.0);
+        assert_eq!(screen.frame(touch(0, TouchPhase::Start, at, Some(0.02))).0, 0.0, "it rests on the screen");
+        assert_eq!(screen.frame(touch(0, TouchPhase::Move, at, Some(0.4))).0, 0.4);
+        assert_eq!(screen.frame(touch(0, TouchPhase::Move, at, Some(1.0))).0, 1.0);
+        assert_eq!(screen.frame(touch(0, TouchPhase::End, at, Some(0.0))).0, 0.0);
+    }
+
+    #[test]
+    fn a_long_press_at_one_place_stays_a_press() {
+        let screen = Screen::default();
+        screen.frame_at(Some(0.0), Vec::new());
+        let (first, second) = (Pos2::new(400.0, 300.0), Pos2::new(200.0, 150.0));
+        screen.frame_at(Some(0.1), touch(0, TouchPhase::Start, first, None));
+        for tenth in 2..30 {
+            assert_eq!(screen.frame_at(Some(0.1 * f64::from(tenth)), Vec::new()), (0.0, Some([0.5, 0.5])));
+        }
+        assert_eq!(screen.frame_at(Some(3.0), touch(1, TouchPhase::Start, second, None)), (1.0, Some([0.5, 0.5])));
+        for tenth in 31..60 {
+            assert_eq!(screen.frame_at(Some(0.1 * f64::from(tenth)), Vec::new()).0, 1.0);
+        }
+        assert_eq!(screen.frame_at(Some(6.0), touch(1, TouchPhase::End, second, None)).0, 0.0);
+    }
+
+    #[test]
+    fn a_mouse_presses_with_its_full_strength() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let pos = Pos2::new(400.0, 300.0);
+        let button =
+            Event::PointerButton { pos, button: PointerButton::Primary, pressed: true, modifiers: Modifiers::NONE };
+        assert_eq!(screen.frame(vec![Event::PointerMoved(pos)]), (0.0, Some([0.5, 0.5])));
+        assert_eq!(screen.frame(vec![button]).0, 1.0);
+    }
+}
