@@ -20,6 +20,8 @@ mod finish;
 mod folder_source;
 #[cfg(feature = "integrations")]
 mod gradebook;
+#[cfg(any(feature = "review", feature = "school"))]
+mod http_server;
 mod import;
 #[cfg(feature = "manuals")]
 mod manuals;

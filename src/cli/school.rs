@@ -1,7 +1,6 @@
 //! `typodont school`, `sync`, `enqueue`, `worker`, `rescore`: for schools with many stations and a database.
 
 mod admit;
-mod connection;
 mod database;
 pub mod enqueue;
 mod erase;
@@ -9,10 +8,10 @@ mod export;
 pub mod fetch;
 mod store_marker;
 mod metrics;
-mod retry;
 pub mod rescore;
 mod source;
-mod store;
+mod errors;
+mod store_arguments;
 pub mod sync;
 pub mod worker;
 
@@ -21,11 +20,12 @@ use clap::{Args, Subcommand};
 pub use database::DatabaseArguments;
 pub use export::write as write_partitions;
 pub use source::SessionSource;
-pub use store::ObjectStoreHandle;
 #[cfg(feature = "review")]
-pub use store::StoreArguments;
+pub use store_arguments::StoreArguments;
 use typodont_report::sanitize_display;
 use typodont_school as school;
+use typodont_school::records::{self, Retention};
+pub use typodont_school::store::ObjectStoreHandle;
 
 #[derive(Args)]
 pub struct Arguments {
@@ -113,14 +113,8 @@ fn class(arguments: &ClassArguments) -> Result<(), CliError> {
         )));
     }
     let mut connection = arguments.at.connection()?;
-    let sql = "INSERT INTO typodont.class (name, keep_days) VALUES ($1, $2)
-      ON CONFLICT (name) DO UPDATE
-      SET keep_days = CASE WHEN $3 THEN NULL ELSE coalesce(excluded.keep_days, class.keep_days) END
-      RETURNING keep_days";
-    let values: &[&(dyn postgres::types::ToSql + Sync)] =
-        &[&arguments.name, &arguments.keep_days, &arguments.keep_always];
-    let row = connection.query_with_retry(|client| client.query_one(sql, values))?;
-    match row.get::<_, Option<i32>>(0) {
+    let retention = Retention { days: arguments.keep_days, is_unlimited: arguments.keep_always };
+    match connection.query_with_retry(|client| records::set_class(client, &arguments.name, retention))? {
         Some(1) => print_line(format!("{}: sessions are kept for 1 day", arguments.name)),
         Some(days) => print_line(format!("{}: sessions are kept for {days} days", arguments.name)),
         None => print_line(format!("{}: sessions are kept without limit", arguments.name)),
@@ -128,11 +122,6 @@ fn class(arguments: &ClassArguments) -> Result<(), CliError> {
 }
 
 fn audit(arguments: &AuditArguments) -> Result<(), CliError> {
-    let sql =
-        "SELECT json_build_object('number', id, 'at', at, 'login', login, 'action', action, 'session', session_id,
-      'detail', detail)::text FROM typodont.audit ORDER BY id";
-    for row in arguments.at.connection()?.query_with_retry(|client| client.query(sql, &[]))? {
-        print_line(row.get::<_, String>(0))?;
-    }
-    Ok(())
+    let lines = arguments.at.connection()?.query_with_retry(records::audit_log)?;
+    lines.iter().try_for_each(print_line)
 }

@@ -17,8 +17,8 @@ const LATE_AFTER: Duration = Duration::from_millis(20);
 /// only now and then would kick.
 const RECOVERY_TIME: Duration = Duration::from_millis(200);
 
-/// Invalid reports, minus valid ones, above which the device is declared not to be one of ours: 0.05 s of reports at
-/// 1 kHz, longer than a burst of noise on a cable.
+/// Limit of the error count, which rises by one with each invalid report and falls by one with each valid one. Above it
+/// the device counts as lost: 0.05 s of reports at 1 kHz, longer than a burst of noise on a cable.
 const MAX_INVALID: u32 = 50;
 
 /// Invalid reports, minus valid ones, up to which a valid one is used. Random numbers can look valid.
@@ -119,7 +119,7 @@ impl ReportFilter {
 }
 
 /// Consecutive implausible poses after which a device counts as faulty: about 0.5 s.
-const MAX_REJECTS: u32 = 500;
+const IMPLAUSIBLE_POSES_MAX: u32 = 500;
 
 /// Multiple of the half workspace that an arm may still reach: the usable workspace is a box within a larger shape.
 const WORKSPACE_FACTOR: f32 = 10.0;
@@ -144,7 +144,7 @@ impl PoseRejects {
     /// Returns [`DeviceError::Lost`] after too many in a row.
     pub fn reject(&mut self) -> Result<DeviceReport, DeviceError> {
         self.consecutive += 1;
-        if self.consecutive > MAX_REJECTS {
+        if self.consecutive > IMPLAUSIBLE_POSES_MAX {
             return Err(DeviceError::Lost {
                 why: "its positions are implausible; switch it off and on again",
                 code: 0,

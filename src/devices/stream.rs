@@ -87,7 +87,7 @@ const MAX_PER_POLL: usize = 256;
 
 /// Time and number of consecutive refusals after which the device reports an error. A few may be stray datagrams.
 const REJECT_TIMEOUT: Duration = Duration::from_millis(200);
-const MAX_REJECTS: u32 = 10;
+const REFUSED_DATAGRAMS_MAX: u32 = 10;
 
 /// Time after its last pose for which a sender keeps the port to itself: with two hands in one stream the hand would
 /// jump back and forth.
@@ -125,7 +125,7 @@ impl Protocol for PoseStreamProtocol {
         if self
             .reject_streak
             .as_ref()
-            .is_some_and(|row| row.count > MAX_REJECTS && row.since.elapsed() > REJECT_TIMEOUT)
+            .is_some_and(|row| row.count > REFUSED_DATAGRAMS_MAX && row.since.elapsed() > REJECT_TIMEOUT)
         {
             let why = "the datagrams are not poses as content/devices/stream.md defines them; the code is their number";
             return Err(DeviceError::Lost { why, code: self.rejected });

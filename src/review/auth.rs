@@ -227,7 +227,8 @@ impl Auth {
         Ok(word + &tag)
     }
 
-    /// Returns the tag of the tag that a device cookie with this word must have, for a comparison in constant time.
+    /// Computes the tag expected in a device cookie with this word, hashed once more under the key so that `verify_tag`
+    /// can compare it in constant time.
     fn device_tag(&self, word: &str) -> [u8; 32] {
         let tag = hex(&crypto::hmac_tag(&self.key, format!("device {word}").as_bytes()));
         crypto::hmac_tag(&self.key, tag.as_bytes())

@@ -24,7 +24,7 @@ pub struct Lease {
     /// Name of the worker.
     pub worker: String,
     pub scorer_version: u32,
-    /// Duration, s. The lease is renewed three times in this period.
+    /// Duration, s. The worker renews the lease several times in this period.
     pub seconds: f64,
     /// Attempts after which a session is set aside.
     pub attempts_max: i32,

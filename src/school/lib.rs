@@ -1,8 +1,8 @@
 //! Central records of a school with many stations: rows in PostgreSQL, bundles in an object store.
 //!
-//! Takes finished bundles and an open database connection. Gives database rows, bundle archives, scoring jobs and
-//! their results. Never reads a clock, prints, or decides when to connect: the command line does. [`UreqHttpClient`] alone
-//! opens connections, for the object store.
+//! Takes finished bundles, and the addresses of a database and a store. Gives database rows, bundle archives, scoring
+//! jobs and their results. Never prints, and reads no clock but the one by which [`retry`] ends. Only [`connection`] and
+//! [`UreqHttpClient`] open connections.
 //!
 //! ```
 //! use typodont_school::Shard;
@@ -18,11 +18,15 @@ mod database_url;
 mod erasure;
 mod http_client;
 mod migrations;
+pub mod roles;
 mod archive;
 pub mod partition;
 pub mod records;
 mod scoring;
 mod shard;
+pub mod retry;
+pub mod connection;
+pub mod store;
 pub mod jobs;
 
 pub use archive::{

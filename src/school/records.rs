@@ -414,3 +414,43 @@ pub fn insert_log_lines<D: LoggedDraft>(
 pub fn is_missing_table(error: &Error) -> bool {
     error.code() == Some(&SqlState::UNDEFINED_TABLE)
 }
+
+/// Period for which the sessions of a class are kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Retention {
+    /// Days; `None` leaves a known class as it is.
+    pub days: Option<i32>,
+    /// True if sessions are kept without limit, whatever was set before.
+    pub is_unlimited: bool,
+}
+
+/// Creates a class or changes its retention; returns the days for which its sessions are kept, `None` without limit.
+///
+/// # Errors
+/// The database's error.
+pub fn set_class(client: &mut Client, name: &str, retention: Retention) -> Result<Option<i32>, Error> {
+    let sql = "INSERT INTO typodont.class (name, keep_days) VALUES ($1, $2)
+      ON CONFLICT (name) DO UPDATE
+      SET keep_days = CASE WHEN $3 THEN NULL ELSE coalesce(excluded.keep_days, class.keep_days) END
+      RETURNING keep_days";
+    Ok(client.query_one(sql, &[&name, &retention.days, &retention.is_unlimited])?.get(0))
+}
+
+/// Returns the audit log, an object of JSON per entry, oldest first.
+///
+/// # Errors
+/// The database's error.
+pub fn audit_log(client: &mut Client) -> Result<Vec<String>, Error> {
+    let sql =
+        "SELECT json_build_object('number', id, 'at', at, 'login', login, 'action', action, 'session', session_id,
+      'detail', detail)::text FROM typodont.audit ORDER BY id";
+    Ok(client.query(sql, &[])?.iter().map(|row| row.get(0)).collect())
+}
+
+/// Records in the audit log that this login has read a number of sessions.
+///
+/// # Errors
+/// The database's error.
+pub fn note_read(client: &mut Client, count: usize) -> Result<(), Error> {
+    client.query("SELECT typodont.note('sessions read', $1)", &[&count.to_string()]).map(|_| ())
+}

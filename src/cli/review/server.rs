@@ -1,12 +1,9 @@
-//! HTTP/1.1 server of the review pages, with limits on connections and times.
+//! The review pages over HTTP: requests and responses of the review application, with limits on connections.
 
 use super::connections::{Admission, ConnectionTable};
+use crate::cli::http_server::{self, HttpRequest, HttpResponse};
 use http_body_util::{BodyExt, Full, Limited};
-use hyper::body::{Bytes, Incoming};
-use hyper::server::conn::http1;
-use hyper::service::service_fn;
-use hyper_util::rt::{TokioIo, TokioTimer};
-use std::convert::Infallible;
+use hyper::body::Bytes;
 use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -16,19 +13,8 @@ use tokio::task::AbortHandle;
 use typodont_report::sanitize_display;
 use typodont_review::{BODY_MAX, Request, Response, ReviewApp, route_name};
 
-/// Time limits for the head of a request and for its body; a browser needs milliseconds.
-const HEAD_WAIT: Duration = Duration::from_secs(5);
+/// Time limit for the body of a request; a browser needs milliseconds.
 const BODY_WAIT: Duration = Duration::from_secs(10);
-
-/// Time limit of a connection: a report of 6 MB over a slow line takes a minute.
-const CONNECTION_LIFE: Duration = Duration::from_secs(180);
-
-/// Pause after the system failed to accept a connection.
-const ACCEPT_BACKOFF: Duration = Duration::from_millis(100);
-
-/// Maximum number of headers of a request, and of bytes of its head; a browser sends about fifteen headers.
-const HEADERS_MAX: usize = 64;
-const HEAD_MAX: usize = 32 << 10;
 
 /// Maximum length of a logged line, characters.
 const LOG_LINE_MAX: usize = 300;
@@ -47,35 +33,20 @@ fn locked(connections: &Connections) -> MutexGuard<'_, ConnectionTable<AbortHand
 /// The system's error if the server cannot be started on this listener.
 pub fn serve(listener: std::net::TcpListener, app: Arc<ReviewApp>, proxy: Option<IpAddr>) -> io::Result<()> {
     let at = listener.local_addr()?;
-    listener.set_nonblocking(true)?;
-    let runtime =
-        tokio::runtime::Builder::new_current_thread().enable_io().enable_time().max_blocking_threads(8).build()?;
-    runtime.block_on(async move {
-        let listener = tokio::net::TcpListener::from_std(listener)?;
-        let connections = Arc::new(Mutex::new(ConnectionTable::new(proxy)));
-        // Connections are accepted at any time: one that waits to be accepted could not be told from an idle one.
-        loop {
-            match listener.accept().await {
-                Ok((stream, peer)) => {
-                    let Admission::Admitted(number, evicted) = locked(&connections).admit(peer.ip().to_canonical())
-                    else {
-                        continue;
-                    };
-                    if let Some(evicted) = evicted {
-                        evicted.abort();
-                    }
-                    let (desk, open) = (Arc::clone(&app), Arc::clone(&connections));
-                    let connection = ConnectionContext { number, peer, at, proxy, app: desk, connections: open };
-                    let task = tokio::spawn(serve_connection(stream, connection));
-                    locked(&connections).set_handle(number, task.abort_handle());
-                }
-                Err(error) => {
-                    log(&format!("a connection could not be accepted: {error}"));
-                    tokio::time::sleep(ACCEPT_BACKOFF).await;
-                }
-            }
+    let connections = Arc::new(Mutex::new(ConnectionTable::new(proxy)));
+    let accepted = move |stream: TcpStream, peer: SocketAddr| {
+        let Admission::Admitted(number, evicted) = locked(&connections).admit(peer.ip().to_canonical()) else {
+            return;
+        };
+        if let Some(evicted) = evicted {
+            evicted.abort();
         }
-    })
+        let (desk, open) = (Arc::clone(&app), Arc::clone(&connections));
+        let connection = ConnectionContext { number, peer, at, proxy, app: desk, connections: open };
+        let task = tokio::spawn(serve_connection(stream, connection));
+        locked(&connections).set_handle(number, task.abort_handle());
+    };
+    http_server::listen(listener, accepted, log)
 }
 
 /// A connection, and what its requests need.
@@ -93,22 +64,12 @@ async fn serve_connection(stream: TcpStream, mut context: ConnectionContext) {
     // For a listener on an address such as 0.0.0.0: the local address at which this request arrived.
     context.at = stream.local_addr().unwrap_or(context.at);
     let _guard = ConnectionGuard { connections: Arc::clone(&context.connections), number: context.number };
-    let service = service_fn(move |asked: hyper::Request<Incoming>| {
-        let context = context.clone();
-        async move {
-            let response = handle(asked, &context).await;
-            locked(&context.connections).end_request(context.number, Instant::now());
-            Ok::<_, Infallible>(to_hyper(response))
-        }
-    });
-    let connection = http1::Builder::new()
-        .timer(TokioTimer::new())
-        .header_read_timeout(HEAD_WAIT)
-        .max_headers(HEADERS_MAX)
-        .max_buf_size(HEAD_MAX)
-        .serve_connection(TokioIo::new(stream), service);
-    // A connection that the browser closes, or that exceeds its time limit, is not an error of the server.
-    let _ = tokio::time::timeout(CONNECTION_LIFE, connection).await;
+    let answered = async |request: HttpRequest| {
+        let response = handle(request, &context).await;
+        locked(&context.connections).end_request(context.number, Instant::now());
+        to_hyper(response)
+    };
+    http_server::serve_connection(stream, answered).await;
 }
 
 /// Entry of a connection in the table, removed when the connection ends in whichever way.
@@ -137,7 +98,7 @@ fn client_address(peer: IpAddr, proxy: Option<IpAddr>, headers: &hyper::HeaderMa
 }
 
 /// Handles one request; the log line about it contains none of the request's content.
-async fn handle(hyper_request: hyper::Request<Incoming>, context: &ConnectionContext) -> Response {
+async fn handle(hyper_request: HttpRequest, context: &ConnectionContext) -> Response {
     let (at, app) = (context.at, Arc::clone(&context.app));
     let peer = client_address(context.peer.ip(), context.proxy, hyper_request.headers());
     let begun = Instant::now();
@@ -169,11 +130,7 @@ async fn handle(hyper_request: hyper::Request<Incoming>, context: &ConnectionCon
     response
 }
 
-async fn read_request(
-    hyper_request: hyper::Request<Incoming>,
-    peer: IpAddr,
-    at: SocketAddr,
-) -> Result<Request, Box<Response>> {
+async fn read_request(hyper_request: HttpRequest, peer: IpAddr, at: SocketAddr) -> Result<Request, Box<Response>> {
     let (head, body) = hyper_request.into_parts();
     let refused =
         |status: u16, why: &str| Err(Box::new(Response::plain_error(status, why).with_header("connection", "close")));
@@ -200,7 +157,7 @@ async fn read_request(
     })
 }
 
-fn to_hyper(response: Response) -> hyper::Response<Full<Bytes>> {
+fn to_hyper(response: Response) -> HttpResponse {
     let mut built = hyper::Response::builder().status(response.status);
     for (name, value) in &response.headers {
         built = built.header(*name, value);

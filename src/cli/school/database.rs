@@ -1,7 +1,5 @@
 //! Address and password of the database; the password comes from files or the environment, never from the command line.
 
-use super::connection::DbConnection;
-use super::retry::RetryPolicy;
 use crate::cli::CliError;
 use crate::cli::secret_file::require_private;
 use clap::Args;
@@ -14,6 +12,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio_postgres_rustls::MakeRustlsConnect;
+use typodont_school::connection::DbConnection;
+use typodont_school::retry::RetryPolicy;
 use typodont_school::{is_local, parse_database_url};
 
 /// Environment variables with the database's address and password file, if the command line does not give them.
@@ -73,15 +73,12 @@ impl DatabaseArguments {
         if tls.is_none() {
             config.ssl_mode(SslMode::Disable);
         }
-        Ok(DbConnection { config, tls, retry_policy: self.retry_policy()?, client: None })
+        Ok(DbConnection::new(config, tls, self.retry_policy()?))
     }
 
     /// An open client, for statements that must not run twice.
     pub fn connect(&self) -> Result<postgres::Client, CliError> {
-        let mut connection = self.connection()?;
-        let retry_policy = connection.retry_policy;
-        retry_policy.retry(|| connection.connect().map(|_| ()))?;
-        connection.client.ok_or_else(|| CliError::wrong("--database: no-answer"))
+        Ok(self.connection()?.into_client()?)
     }
 }
 

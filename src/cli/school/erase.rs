@@ -1,12 +1,13 @@
 //! `typodont school erase` and `retain`: erase sessions from the records, the store and the exports.
 
-use super::connection::DbConnection;
 use super::database::DatabaseArguments;
 use super::export::rewrite_partition;
-use super::store::{ObjectStoreHandle, StoreArguments};
+use super::store_arguments::StoreArguments;
 use super::store_marker;
 use crate::cli::{CliError, print_line};
 use clap::Args;
+use typodont_school::connection::DbConnection;
+use typodont_school::store::ObjectStoreHandle;
 use typodont_school::{PendingDeletion, erase_participant, expired_sessions, mark_deleted, pending_deletions};
 
 #[derive(Args)]
@@ -140,7 +141,7 @@ fn print_dry_run(connection: &mut DbConnection, code: &str) -> Result<(), CliErr
 fn remove_pending(
     connection: &mut DbConnection,
     store: &ObjectStoreHandle,
-    retry_policy: super::retry::RetryPolicy,
+    retry_policy: typodont_school::retry::RetryPolicy,
 ) -> Result<(), CliError> {
     let mut unreached = false;
     for what in connection.query_with_retry(pending_deletions)? {

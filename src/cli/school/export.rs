@@ -1,17 +1,17 @@
 //! Parquet exports of the records, by class and month; every export is recorded before it is written.
 
-use super::connection::DbConnection;
-use super::retry::RetryPolicy;
 use super::source::SessionSource;
-use super::store::ObjectStoreHandle;
 use crate::cli::verification::VerificationArguments;
 use crate::cli::{CliError, print_line};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use typodont_report::sanitize_display;
+use typodont_school::connection::DbConnection;
 use typodont_school::partition;
 use typodont_school::records;
 use typodont_school::records::{SessionFilter, StoredSession};
+use typodont_school::retry::RetryPolicy;
+use typodont_school::store::ObjectStoreHandle;
 
 /// Writes all partitions to a folder, or to an object store by URL.
 pub fn write(source: &SessionSource, destination: &Path, verification: &VerificationArguments) -> Result<(), CliError> {

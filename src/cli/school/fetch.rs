@@ -1,10 +1,9 @@
 //! `typodont school fetch` and `judgements`: downloads bundles, and exchanges examiners' overrides and ratings with the
 //! records.
 
-use super::connection::{DbConnection, DbError};
 use super::database::DatabaseArguments;
 use super::source::{SessionSource, audit_read};
-use super::store::StoreArguments;
+use super::store_arguments::StoreArguments;
 use super::store_marker;
 use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, print_line};
@@ -18,6 +17,7 @@ use typodont_report::sanitize_display;
 use typodont_review::{
     AppendError, ChainedLog, LogEntry, LogSnapshot, LoggedDraft, OverrideSnapshot, RatingEntry, RatingSnapshot,
 };
+use typodont_school::connection::{DbConnection, DbError};
 use typodont_school::records;
 use typodont_school::records::{LogTable, StoredSession, is_plain_name};
 

@@ -1,15 +1,14 @@
 //! Counters for Prometheus, on the loopback address: text exposition format 0.0.4.
 
-use std::io::{self, Read, Write};
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use crate::cli::http_server::{self, HttpRequest, HttpResponse};
+use hyper::body::Bytes;
+use std::io;
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 use typodont_school::jobs::JobCounts;
-
-/// Time limit of a request with its response; a slower client is disconnected.
-const CLIENT_TIMEOUT: Duration = Duration::from_secs(2);
 
 #[derive(Debug, Default)]
 pub struct Counters {
@@ -65,32 +64,27 @@ pub fn serve(port: u16, counters: Arc<Counters>) -> io::Result<SocketAddr> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
     let at = listener.local_addr()?;
     thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            // A client that closes the connection early will ask again.
-            let _ = respond(stream, &counters);
-        }
+        let accepted = move |stream, _| {
+            let counters = Arc::clone(&counters);
+            tokio::spawn(async move {
+                http_server::serve_connection(stream, async |request| respond(&request, &counters)).await;
+            });
+        };
+        // Without its counters a worker works as well.
+        http_server::listen(listener, accepted, |_| {})
     });
     Ok(at)
 }
 
-fn respond(mut stream: TcpStream, counters: &Counters) -> io::Result<()> {
-    stream.set_read_timeout(Some(CLIENT_TIMEOUT))?;
-    stream.set_write_timeout(Some(CLIENT_TIMEOUT))?;
-    let mut head = [0; 2048];
-    let mut length = 0;
-    while length < head.len() && !head[..length].windows(4).any(|w| w == b"\r\n\r\n") {
-        match stream.read(&mut head[length..])? {
-            0 => break,
-            more => length += more,
-        }
-    }
-    let (status, body) = match head.starts_with(b"GET /metrics ") {
-        true => ("200 OK", counters.text()),
-        false => ("404 Not Found", "counters are at /metrics\n".to_string()),
+fn respond(request: &HttpRequest, counters: &Counters) -> HttpResponse {
+    let is_read = matches!(*request.method(), hyper::Method::GET | hyper::Method::HEAD);
+    let (status, body) = match request.uri().path() {
+        "/metrics" if is_read => (hyper::StatusCode::OK, counters.text()),
+        _ => (hyper::StatusCode::NOT_FOUND, "counters are at /metrics\n".to_string()),
     };
-    let length = body.len();
-    write!(
-        stream,
-        "HTTP/1.1 {status}\r\nContent-Type: text/plain; version=0.0.4\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
-    )
+    let mut response = HttpResponse::new(Bytes::from(body).into());
+    *response.status_mut() = status;
+    let plain = hyper::header::HeaderValue::from_static("text/plain; version=0.0.4");
+    response.headers_mut().insert(hyper::header::CONTENT_TYPE, plain);
+    response
 }

@@ -1,9 +1,8 @@
 //! Source of the sessions that a command reads: a folder, or a school's database with its store.
 
-use super::connection::DbConnection;
 use super::database::DatabaseArguments;
 use super::enqueue::parse_scorer_version;
-use super::store::{ObjectStoreHandle, StoreArguments};
+use super::store_arguments::StoreArguments;
 use crate::cli::{CliError, cohort};
 use clap::Args;
 use std::collections::BTreeSet;
@@ -12,8 +11,10 @@ use typodont_report::cohort::Cohort;
 use typodont_report::sanitize_display;
 use typodont_review::OverrideSnapshot;
 use typodont_school::RECORDING;
+use typodont_school::connection::DbConnection;
 use typodont_school::records;
 use typodont_school::records::{SessionFilter, StoredSession};
+use typodont_school::store::ObjectStoreHandle;
 
 #[derive(Args)]
 pub struct SessionSource {
@@ -150,10 +151,7 @@ impl SessionSource {
 
 /// Records in the audit log the number of sessions read, and the login.
 pub fn audit_read(connection: &mut DbConnection, stored: &[StoredSession]) -> Result<(), CliError> {
-    connection.query_with_retry(|client| {
-        client.query("SELECT typodont.note('sessions read', $1)", &[&stored.len().to_string()])
-    })?;
-    Ok(())
+    Ok(connection.query_with_retry(|client| records::note_read(client, stored.len()))?)
 }
 
 impl SourcedCohort {

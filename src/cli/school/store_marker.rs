@@ -3,11 +3,11 @@
 //! A folder whose disk is not mounted looks like an empty store. Without this check, sessions that can be scored would
 //! be set aside, and bundles on that disk would be reported as erased.
 
-use super::connection::DbConnection;
-use super::store::ObjectStoreHandle;
 use super::sync::SyncError;
 use crate::cli::CliError;
+use typodont_school::connection::DbConnection;
 use typodont_school::records::{confirm_store_marker, store_marker};
+use typodont_school::store::ObjectStoreHandle;
 
 /// Name of the object that holds the marker.
 const MARKER_OBJECT: &str = "typodont-store";

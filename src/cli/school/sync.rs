@@ -1,9 +1,7 @@
 //! `typodont sync`: uploads a station's finished bundles: first the files, then the row in the database.
 
-use super::connection::{DbConnection, DbError};
 use super::database::DatabaseArguments;
-use super::retry::Transient;
-use super::store::{ObjectStoreHandle, StoreArguments, StoreError};
+use super::store_arguments::StoreArguments;
 use super::store_marker;
 use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, print_line, station, verification};
@@ -18,8 +16,11 @@ use typodont_report::bundle::BundleFolder;
 use typodont_report::cohort::{find_bundles, read_session};
 use typodont_report::sanitize_display;
 use typodont_report::{SessionFile, Verifier};
+use typodont_school::connection::{DbConnection, DbError};
 use typodont_school::records;
 use typodont_school::records::{InsertOutcome, NewSession, SyncStatus};
+use typodont_school::retry::Transient;
+use typodont_school::store::{ObjectStoreHandle, StoreError};
 use typodont_school::{ArchiveError, BundleArchive};
 
 #[derive(Args)]

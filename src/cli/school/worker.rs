@@ -1,10 +1,8 @@
 //! `typodont worker`: scores queued sessions, one at a time, until it is stopped.
 
-use super::connection::{DbConnection, DbError};
 use super::database::DatabaseArguments;
 use super::metrics::{self, Counters};
-use super::retry::Transient;
-use super::store::{ObjectStoreHandle, StoreArguments};
+use super::store_arguments::StoreArguments;
 use super::store_marker;
 use crate::cli::progress::progress_bar;
 use crate::cli::{CliError, print_line};
@@ -18,8 +16,11 @@ use typodont_exercise::score::SCORER_VERSION;
 use typodont_report::SessionFile;
 use typodont_report::bundle::{compare_results, sha256};
 use typodont_report::sanitize_display;
+use typodont_school::connection::{DbConnection, DbError};
 use typodont_school::jobs;
 use typodont_school::jobs::{Lease, ScoringJob};
+use typodont_school::retry::Transient;
+use typodont_school::store::ObjectStoreHandle;
 use typodont_school::{RECORDING, rescore};
 
 #[derive(Args)]
@@ -50,6 +51,9 @@ const COUNT_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Pause after the first failed attempt, s; it doubles after each further one.
 const RETRY_AFTER_S: f64 = 2.0;
+
+/// Renewals in the duration of a lease: two may fail before the session is given to another worker.
+const RENEWALS_PER_LEASE: f64 = 3.0;
 
 /// Valid lease times, s: shorter leases expire while the disk is busy; longer ones block the session of a stopped
 /// worker for hours.
@@ -224,14 +228,14 @@ fn agrees_with_station(station_result: &str, result: &SessionFile, recording_dig
     (written.scorer_version == result.scorer_version).then(|| compare_results(result, &written).is_empty())
 }
 
-/// Renews the lease of the current session, three times per lease, on a connection of its own.
+/// Renews the lease of the current session, on a connection of its own.
 fn spawn_lease_renewal(
     mut connection: DbConnection,
     lease: Lease,
     current_session: Arc<Mutex<Option<String>>>,
     stop: Arc<AtomicBool>,
 ) {
-    let every = Duration::from_secs_f64(lease.seconds / 3.0);
+    let every = Duration::from_secs_f64(lease.seconds / RENEWALS_PER_LEASE);
     thread::spawn(move || {
         loop {
             thread::sleep(every);

@@ -1,10 +1,9 @@
 //! A connection to the database, which is opened again after an interruption.
 
+use super::records::{describe_db_error, is_transient};
 use super::retry::{RetryPolicy, Transient};
-use crate::cli::CliError;
 use postgres::{Client, Config, Error};
 use tokio_postgres_rustls::MakeRustlsConnect;
-use typodont_school::records::{describe_db_error, is_transient};
 
 /// Error of a query.
 #[derive(Debug)]
@@ -30,38 +29,31 @@ impl From<Error> for DbError {
     }
 }
 
-impl From<DbError> for CliError {
-    fn from(unanswered: DbError) -> CliError {
-        match unanswered {
-            DbError::Unavailable(why) => CliError::wrong(format!("--database: no-answer: {why}")),
-            DbError::Rejected(error) => CliError::wrong(match error.code().map(|code| code.code()) {
-                // A table, schema or function is missing.
-                Some("42P01" | "3F000" | "42883") => {
-                    "--database: no-schema: the tables are missing or out of date; run `typodont school init` as the \
-                     database's owner"
-                        .to_string()
-                }
-                Some("42501") => format!(
-                    "--database: not-allowed: the role of this login does not permit this ({}); see `typodont school \
-                    admit`",
-                    describe_db_error(&error)
-                ),
-                _ => format!("--database: refused: {}", describe_db_error(&error)),
-            }),
-        }
-    }
-}
-
 /// Address of the database, with the settings of its connection.
 pub struct DbConnection {
-    pub(super) config: Config,
+    config: Config,
     /// TLS for a connection to another computer; `None` for a local address that does not require it.
-    pub(super) tls: Option<MakeRustlsConnect>,
-    pub(super) retry_policy: RetryPolicy,
-    pub(super) client: Option<Client>,
+    tls: Option<MakeRustlsConnect>,
+    retry_policy: RetryPolicy,
+    client: Option<Client>,
 }
 
 impl DbConnection {
+    /// A connection that is opened by its first query. Without `tls` nothing is encrypted: for a local address.
+    pub fn new(config: Config, tls: Option<MakeRustlsConnect>, retry_policy: RetryPolicy) -> DbConnection {
+        DbConnection { config, tls, retry_policy, client: None }
+    }
+
+    /// Opens the connection, for statements that must not run twice.
+    ///
+    /// # Errors
+    /// As [`DbConnection::query_with_retry`].
+    pub fn into_client(mut self) -> Result<Client, DbError> {
+        let retry_policy = self.retry_policy;
+        retry_policy.retry(|| self.connect().map(|_| ()))?;
+        self.client.ok_or_else(|| DbError::Unavailable("the connection was closed".to_string()))
+    }
+
     /// Runs a query that may safely run twice: it is repeated if its answer is lost.
     ///
     /// # Errors
@@ -102,7 +94,7 @@ impl DbConnection {
         }
     }
 
-    pub(super) fn connect(&mut self) -> Result<&mut Client, DbError> {
+    fn connect(&mut self) -> Result<&mut Client, DbError> {
         let client = match self.client.take().filter(|client| !client.is_closed()) {
             Some(client) => client,
             None => match &self.tls {

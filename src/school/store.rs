@@ -1,9 +1,9 @@
 //! The store of bundles: a folder, S3, Azure or Google, named by a URL.
 
+use super::archive::Manifest;
+use super::http_client::UreqHttpClient;
+use super::records::is_plain_name;
 use super::retry::{RetryPolicy, Transient};
-use crate::cli::CliError;
-use clap::Args;
-use hyper::body::Bytes;
 use object_store::aws::{AmazonS3Builder, Checksum};
 use object_store::azure::MicrosoftAzureBuilder;
 use object_store::gcp::GoogleCloudStorageBuilder;
@@ -15,41 +15,13 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Runtime;
 use typodont_report::sanitize_display;
-use typodont_school::Manifest;
-use typodont_school::UreqHttpClient;
-use typodont_school::records::is_plain_name;
 use url::Url;
 
-/// Environment variables with the store's address and certificates, if the command line does not give them.
-const STORE_VARIABLE: &str = "TYPODONT_STORE";
+/// Environment variable with the certificates to trust in place of the public authorities.
 const CERTIFICATES_VARIABLE: &str = "TYPODONT_STORE_CERTIFICATES";
 
 /// Maximum length of a store's error text that is printed, characters.
 const ERROR_TEXT_MAX: usize = 400;
-
-#[derive(Args, Clone)]
-pub struct StoreArguments {
-    /// URL of the bundle store: file:///folder, s3://bucket/folder, az://container/folder or gs://bucket/folder; by default taken
-    /// from TYPODONT_STORE. Keys are read from the environment variables that these services' own tools use
-    #[arg(long, value_name = "URL")]
-    pub store: Option<String>,
-}
-
-impl StoreArguments {
-    pub fn is_configured(&self) -> bool {
-        self.store.is_some() || std::env::var_os(STORE_VARIABLE).is_some()
-    }
-
-    pub fn open(&self, retry_policy: RetryPolicy) -> Result<ObjectStoreHandle, CliError> {
-        let address = match &self.store {
-            Some(address) => address.clone(),
-            None => std::env::var(STORE_VARIABLE).map_err(|_| {
-                CliError::misuse(format!("no-store: give --store, or set the environment variable {STORE_VARIABLE}"))
-            })?,
-        };
-        ObjectStoreHandle::open(&address, retry_policy).map_err(|e| CliError::misuse(format!("--store: {e}")))
-    }
-}
 
 /// Error of a store.
 #[derive(Debug)]
@@ -77,12 +49,6 @@ impl From<object_store::Error> for StoreError {
         let why = sanitize_display(&error.to_string(), ERROR_TEXT_MAX);
         let is_plain_http = why.contains("plain-http:");
         StoreError { is_transient: !is_missing && !is_permanent && !is_plain_http, why, is_missing }
-    }
-}
-
-impl From<StoreError> for CliError {
-    fn from(undone: StoreError) -> CliError {
-        CliError::wrong(format!("--store: no-answer: {}", undone.why))
     }
 }
 
@@ -172,9 +138,9 @@ impl ObjectStoreHandle {
     }
 
     pub fn put(&self, name: &str, bytes: Vec<u8>) -> Result<(), StoreError> {
-        let (place, bytes) = (self.object_path(name), Bytes::from(bytes));
+        let (place, payload) = (self.object_path(name), PutPayload::from(bytes));
         self.retry_policy.retry(|| {
-            let put = self.inner.put(&place, PutPayload::from_bytes(bytes.clone()));
+            let put = self.inner.put(&place, payload.clone());
             Ok(self.runtime.block_on(put).map(|_| ())?)
         })
     }
