@@ -1,7 +1,7 @@
 //! A station of a school, and a kiosk: a station that one participant after another uses and nobody leaves.
 //!
-//! Takes what the station's file says. Gives the settings of the window, the commands that a kiosk refuses, and the page
-//! on which a supervisor closes it. Never changes the user's settings file on behalf of a station.
+//! Takes what the station's file says. Gives the settings of the window, the commands that a kiosk refuses, and the state
+//! of a supervisor's attempt to close it. Never changes the user's settings file on behalf of a station.
 
 use crate::command::AppCommand;
 use crate::settings::Settings;

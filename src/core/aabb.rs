@@ -16,6 +16,7 @@ impl Aabb {
     /// The box around no point: a union with it changes nothing.
     pub const EMPTY: Aabb = Aabb { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
 
+    #[inline]
     pub fn new(low: Vec3, high: Vec3) -> Aabb {
         Aabb { low, high }
     }
@@ -26,49 +27,59 @@ impl Aabb {
     }
 
     /// Returns the smallest box around this one and a point.
+    #[inline]
     pub fn with(self, point: Vec3) -> Aabb {
         Aabb { low: self.low.min(point), high: self.high.max(point) }
     }
 
     /// Returns the smallest box around two boxes.
+    #[inline]
     pub fn union(self, other: Aabb) -> Aabb {
         Aabb { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 
     /// Returns the box with `margin` more on every side.
+    #[inline]
     pub fn grown(self, margin: Vec3) -> Aabb {
         Aabb { low: self.low - margin, high: self.high + margin }
     }
 
     /// Returns true for a box without any point.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         !self.low.cmple(self.high).all()
     }
 
+    #[inline]
     pub fn centre(&self) -> Vec3 {
         0.5 * (self.low + self.high)
     }
 
     /// Lengths of the edges.
+    #[inline]
     pub fn size(&self) -> Vec3 {
         self.high - self.low
     }
 
+    #[inline]
     pub fn half_size(&self) -> Vec3 {
         0.5 * (self.high - self.low)
     }
 
     /// Returns the point of the box that is nearest to a point.
+    #[inline]
     pub fn nearest(&self, point: Vec3) -> Vec3 {
         point.clamp(self.low, self.high)
     }
 
     /// Returns true for a point inside or on the border.
+    #[inline]
     pub fn contains(&self, point: Vec3) -> bool {
         point.cmpge(self.low).all() && point.cmple(self.high).all()
     }
 
     /// Returns true if the boxes have a point in common.
+    #[inline]
     pub fn overlaps(&self, other: &Aabb) -> bool {
         self.low.cmple(other.high).all() && self.high.cmpge(other.low).all()
     }

@@ -159,7 +159,7 @@ fn items(
         let is_judged = |now: &EffectiveItem| now.judged.is_some() || now.followed_share.is_some();
         ComparedItemCell {
             value: app.translate(context, &phrases::value(&item.metric, item.value)),
-            points: display_format::number(item.points),
+            points: display_format::item_points(item.points, item.max_points),
             max_points: display_format::plain_number(item.max_points),
             judged: now.filter(is_judged).map(|now| display_format::number(now.points)),
         }

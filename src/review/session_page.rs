@@ -359,7 +359,7 @@ impl ReviewLocalizer<'_> {
             place: self.place(&item.metric),
             full_at: self.value(&item.metric, Some(item.full_at)),
             zero_at: self.value(&item.metric, Some(item.zero_at)),
-            points: display_format::number(item.points),
+            points: display_format::item_points(item.points, item.max_points),
             max_points: display_format::plain_number(item.max_points),
             judged,
             followed,

@@ -3,6 +3,7 @@
 use super::{App, CloseState};
 use crate::AppOptions;
 use crate::completion::{Completion, CompletionProgress};
+use crate::platform;
 use crate::results::{BundleState, LessonResults};
 use crate::screen::Screen;
 use crate::ui::{shortcuts, theme};
@@ -39,7 +40,16 @@ impl App {
             }
         }
         self.completions.retain(|completion| completion.state().outcome.is_none());
+        if let Screen::Lesson(lesson) = &mut self.screen
+            && lesson.is_pointer_captured
+            && !ctx.input(|input| input.focused)
+        {
+            lesson.is_pointer_captured = false;
+            lesson.release_pointer();
+        }
         match &mut self.screen {
+            // A page that nobody sees stands still, and goes on where it stopped.
+            Screen::Lesson(lesson) if platform::IS_PAGE && is_hidden(ctx) && !lesson.are_stages_over => {}
             Screen::Lesson(lesson) => {
                 lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
                 self.skip_questionnaire();
@@ -74,7 +84,8 @@ impl App {
         }
         let (is_full, is_minimized) =
             ctx.input(|input| (input.viewport().fullscreen, input.viewport().minimized.unwrap_or(false)));
-        if is_full == Some(false) || is_minimized {
+        // A covered window is brought to the whole screen when it is seen again.
+        if is_minimized || (is_full == Some(false) && !is_hidden(ctx)) {
             ctx.send_viewport_cmd(ViewportCommand::Minimized(false));
             ctx.send_viewport_cmd(ViewportCommand::Fullscreen(true));
         }
@@ -210,4 +221,9 @@ fn finish_bundle(options: &AppOptions, bundle: &BundleFolder) {
     if let Some(listener) = &options.on_bundle {
         listener(bundle);
     }
+}
+
+/// Returns true if the window is known to be minimised or covered, or the page to be in the background.
+pub(super) fn is_hidden(ctx: &egui::Context) -> bool {
+    ctx.input(|input| input.viewport().visible()) == Some(false)
 }

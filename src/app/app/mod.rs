@@ -1,7 +1,6 @@
 //! The application: chooses the screen that is shown, and carries out the commands of every screen.
 //!
-//! Before each frame [`eframe::App::logic`] takes over events and carries out the keys' commands, also while the window is
-//! hidden. [`eframe::App::ui`] draws the frame, and then has the commands carried out that were asked for in it.
+//! Before each frame [`eframe::App::logic`] takes over events, also while the window is known to be hidden. [`eframe::App::ui`] draws the frame, and then has the commands carried out that were asked for in it.
 
 mod command_handler;
 mod events;
@@ -197,7 +196,7 @@ impl eframe::App for App {
         self.save_settings(ctx);
         platform::set_unsaved_work(self.has_unsaved_work());
         // A hidden window has no frame that would ask for the next one.
-        if ctx.input(|input| input.viewport().visible()) == Some(false) {
+        if events::is_hidden(ctx) {
             ctx.request_repaint_after(HIDDEN_INTERVAL);
         }
     }

@@ -231,9 +231,6 @@ fn view_ui(
     let view = ui.interact(rect, ui.scope_id().with("view"), Sense::click_and_drag());
     view.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, words.get("practice.view")));
     viewport_input::collect_commands(ui, &view, lesson.is_pointer_captured, commands);
-    if lesson.is_pointer_captured && !ui.input(|input| input.focused) {
-        commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));
-    }
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
     let mut viewport = viewport;

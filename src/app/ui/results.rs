@@ -8,6 +8,7 @@ use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;
 use typodont_lesson::Attempt;
+use typodont_report::display_format::{item_points, plain_number, points};
 use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, SessionFile, phrases};
 
 /// Texts of the results: those of the window, and those of the report in the window's language.
@@ -85,7 +86,14 @@ fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: 
     };
     ui.horizontal_wrapped(|ui| {
         ui.label(egui::RichText::new(words.get(key)).size(24.0).strong().color(colour));
-        ui.label(egui::RichText::new(format!("{:.1} / {:.0}", grade.points, grade.max_points)).size(24.0));
+        ui.label(
+            egui::RichText::new(format!(
+                "{} / {}",
+                points(grade.points, grade.pass_points),
+                plain_number(grade.max_points)
+            ))
+            .size(24.0),
+        );
     });
     ui.weak(words.format("results.pass_at", format!("{:.0}", grade.pass_points)));
     for fail in &grade.hard_fails {
@@ -133,7 +141,7 @@ fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &R
         for item in &grade.items {
             ui.label(texts.own(first, &item.title));
             ui.label(texts.text(&phrases::value(&item.metric, item.value)));
-            ui.label(format!("{:.1} / {:.0}", item.points, item.max_points));
+            ui.label(format!("{} / {}", item_points(item.points, item.max_points), plain_number(item.max_points)));
             ui.end_row();
         }
     });

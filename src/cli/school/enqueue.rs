@@ -11,7 +11,7 @@ use typodont_school::records::has_class;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Version of the formulae; `current` is that of this program
+    /// Scoring version; `current` is that of this program
     #[arg(long, value_name = "VERSION")]
     scorer: String,
     /// Only sessions of this class
@@ -40,7 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let tally = connection.query_with_retry(|client| jobs::count_jobs(client, SCORER_VERSION))?;
     let jobs::JobCounts { waiting, leased, done, set_aside } = tally;
     print_line(format!(
-        "{new} sessions queued for scorer version {SCORER_VERSION}: {waiting} waiting, {leased} in progress, {done} \
+        "{new} sessions queued for scoring version {SCORER_VERSION}: {waiting} waiting, {leased} in progress, {done} \
         done, {set_aside} set aside"
     ))
 }
@@ -53,7 +53,7 @@ pub fn parse_scorer_version(word: &str) -> Result<u32, CliError> {
     match word == "current" || word == SCORER_VERSION.to_string() {
         true => Ok(SCORER_VERSION),
         false => Err(CliError::misuse(format!(
-            "--scorer: unknown-version: this program has scorer version {SCORER_VERSION} only; give --scorer current"
+            "--scorer: unknown-version: this program has scoring version {SCORER_VERSION} only; give --scorer current"
         ))),
     }
 }

@@ -47,7 +47,7 @@ impl Counters {
             "Time spent downloading and scoring sessions.",
             count(&self.milliseconds) / 1000.0,
         );
-        text += "# HELP typodont_jobs Sessions in the queue of this scorer version at the last query.\n# TYPE \
+        text += "# HELP typodont_jobs Sessions in the queue of this scoring version at the last query.\n# TYPE \
         typodont_jobs gauge\n";
         for (state, gauge) in ["waiting", "leased", "done", "set_aside"].iter().zip(&self.queue) {
             text += &format!("typodont_jobs{{state=\"{state}\"}} {}\n", gauge.load(Ordering::Relaxed));
@@ -71,7 +71,9 @@ pub fn serve(port: u16, counters: Arc<Counters>) -> io::Result<SocketAddr> {
             });
         };
         // Without its counters a worker works as well.
-        http_server::listen(listener, accepted, |_| {})
+        if let Err(error) = http_server::listen(listener, accepted, |_| {}) {
+            eprintln!("the counters are not served: {error}");
+        }
     });
     Ok(at)
 }
@@ -86,5 +88,6 @@ fn respond(request: &HttpRequest, counters: &Counters) -> HttpResponse {
     *response.status_mut() = status;
     let plain = hyper::header::HeaderValue::from_static("text/plain; version=0.0.4");
     response.headers_mut().insert(hyper::header::CONTENT_TYPE, plain);
+    response.headers_mut().insert(hyper::header::CONNECTION, hyper::header::HeaderValue::from_static("close"));
     response
 }

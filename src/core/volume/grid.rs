@@ -86,6 +86,7 @@ impl Grid {
     }
 
     /// Box around the voxel centres, tooth space, mm.
+    #[inline]
     pub fn extent(&self) -> Aabb {
         Aabb::new(self.origin, self.centre(self.dims.map(|n| n.saturating_sub(1))))
     }

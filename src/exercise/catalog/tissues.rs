@@ -20,7 +20,7 @@ pub enum TissueRole {
     Decay,
     /// Vulnerable tissue, such as pulp, which must not be removed or exposed.
     Vulnerable,
-    /// Gingiva and similar tissue: it is not cut, and must not be touched by a running bur.
+    /// Gingiva and similar tissue: it is not cut, and must not be touched by a rotating bur.
     Soft,
     /// A tooth other than the one to be treated.
     Neighbour,

@@ -806,6 +806,7 @@ mod tests {
     fn every_measure_has_a_row_and_a_name_of_its_own() {
         let (ids, names): (HashSet<_>, HashSet<_>) = all().map(|about| (about.id, about.name)).unzip();
         assert_eq!([ids.len(), names.len()], [all().count(); 2]);
+        assert_eq!(ids, MetricId::all().collect(), "a variant without a row, or a row of another");
     }
 
     #[test]

@@ -213,7 +213,7 @@ fn item_lines(
     };
     let points = |item: &ItemResultFile| {
         let (points, most) =
-            (display_format::significant(item.points, 2), display_format::plain_number(item.max_points));
+            (display_format::item_points(item.points, item.max_points), display_format::plain_number(item.max_points));
         translator.text("cohort.own_points", &[("points", points), ("most", most)])
     };
     let line = |item: &ItemResultFile| {

@@ -35,6 +35,10 @@ struct DecayColumn {
     floor: f32,
 }
 
+/// Half width of the narrowest arm that is cut beside a wider lesion, in radii of the bur. 0.15–0.4 work: below, specks are
+/// cut with sound tissue around them; above, caries is left in arms that the bur fits into by half.
+const ARM: f32 = 0.25;
+
 impl Excavation {
     /// Returns the path of the bur's centre, tooth space, mm. Empty without decay.
     pub fn path(&self, volume: &Volume, is_decay: impl Fn(Vec3, Label) -> bool) -> Vec<Vec3> {
@@ -45,9 +49,12 @@ impl Excavation {
         let half = 0.5 * grid.spacing.x.max(grid.spacing.y);
         let inside: Vec<f32> =
             distance::to_set(&flat, |i| columns[i].is_none()).into_iter().map(|d| (d - half).max(0.0)).collect();
-        // Where the decay is narrower than the bur, it is cut along its centre line: a narrow arm of a wide lesion too.
-        let fit = self.radius - self.margin;
-        let is_track = |i: usize| inside[i] >= fit || inside[i] >= 0.8 * widest_near(&flat, &inside, i, self.radius);
+        // Where the decay is narrower than the bur, it is cut along its centre line: a narrow arm of a wide lesion too, but
+        // no speck beside it.
+        let widest = inside.iter().filter(|d| d.is_finite()).fold(0.0, |a: f32, &b| a.max(b));
+        let (fit, least) = (self.radius - self.margin, (ARM * self.radius).min(0.8 * widest));
+        let is_arm = |i: usize| inside[i] >= least && inside[i] >= 0.8 * widest_near(&flat, &inside, i, self.radius);
+        let is_track = |i: usize| inside[i] >= fit || is_arm(i);
         let tracks = self.tracks(grid, |index| columns[index].filter(|_| is_track(index)));
         let floor_of = |column: &DecayColumn| column.floor + self.below - self.margin;
         let high = tracks.iter().map(|(_, c)| c.top).fold(f32::NEG_INFINITY, f32::max);
