@@ -94,7 +94,7 @@ function fell(voxel) {
     else await settled(async () => { await mark.focus(); await page.keyboard.press('Enter'); });
     claim(Math.abs(await moment() - at) < 0.011, `mark ${number} moves the time to ${await moment()} s, not ${at} s`);
     claim(await picture('solid') !== before, `mark ${number} does not move the eye`);
-    claim((await told()).text.includes(`Moment ${number}.`), `mark ${number} tells: ${(await told()).text}`);
+    claim((await told()).text.includes(`Flag ${number}.`), `mark ${number} tells: ${(await told()).text}`);
     if (number === 1) await photograph('report-mark.png');
   }
 
