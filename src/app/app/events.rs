@@ -44,7 +44,6 @@ impl App {
             && lesson.is_pointer_captured
             && !ctx.input(|input| input.focused)
         {
-            lesson.is_pointer_captured = false;
             lesson.release_pointer();
         }
         match &mut self.screen {

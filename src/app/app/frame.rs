@@ -11,7 +11,7 @@ use crate::ui::results::{ResultTexts, results_ui};
 use crate::ui::settings_screen::{kiosk_settings_ui, settings_ui};
 use crate::ui::viewport::Viewport;
 use crate::ui::{briefing, kiosk_exit, practice, questionnaire, shortcuts, theme, ui_anchors};
-use eframe::egui::{self};
+use eframe::egui;
 
 impl App {
     /// Draws the whole frame, and pushes the commands that are asked for in it.

@@ -1,6 +1,7 @@
 //! The application: chooses the screen that is shown, and carries out the commands of every screen.
 //!
-//! Before each frame [`eframe::App::logic`] takes over events, also while the window is known to be hidden. [`eframe::App::ui`] draws the frame, and then has the commands carried out that were asked for in it.
+//! Before each frame [`eframe::App::logic`] takes over events, also while the window is known to be hidden.
+//! [`eframe::App::ui`] draws the frame, and then has the commands carried out that were asked for in it.
 
 mod command_handler;
 mod events;
@@ -20,7 +21,7 @@ use crate::settings::{self, Settings};
 use crate::state_log::StateLog;
 use crate::ui::viewport::Viewport;
 use crate::ui::{shortcuts, theme, ui_anchors, viewport};
-use eframe::egui::{self};
+use eframe::egui;
 use std::path::PathBuf;
 use std::time::Duration;
 use typodont_audio::Replacements;

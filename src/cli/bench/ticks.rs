@@ -92,7 +92,7 @@ pub fn measure(tooth: Volume) -> Result<TickTimings, String> {
 
 fn crown(workpiece: &Workpiece) -> Vec3 {
     let place = &workpiece.teeth[0];
-    (place.crown.centre()).with_z(place.crown.high.z)
+    place.crown.centre().with_z(place.crown.high.z)
 }
 
 /// Height of the first solid voxel straight below a point, tooth space, mm.

@@ -7,6 +7,7 @@ use super::store_marker;
 use crate::cli::{CliError, print_line};
 use clap::Args;
 use typodont_school::connection::DbConnection;
+use typodont_school::retry::RetryPolicy;
 use typodont_school::store::ObjectStoreHandle;
 use typodont_school::{PendingDeletion, erase_participant, expired_sessions, mark_deleted, pending_deletions};
 
@@ -141,7 +142,7 @@ fn print_dry_run(connection: &mut DbConnection, code: &str) -> Result<(), CliErr
 fn remove_pending(
     connection: &mut DbConnection,
     store: &ObjectStoreHandle,
-    retry_policy: typodont_school::retry::RetryPolicy,
+    retry_policy: RetryPolicy,
 ) -> Result<(), CliError> {
     let mut unreached = false;
     for what in connection.query_with_retry(pending_deletions)? {
