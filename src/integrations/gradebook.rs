@@ -5,7 +5,7 @@
 //! and reads a number in round brackets at the end of a title as an assignment id.
 
 use crate::session_id;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use typodont_report::cohort::Cohort;
 use typodont_report::{GradeFile, SessionFile, Translator, VerificationStatus, csv, sanitize_display};
 
@@ -123,13 +123,19 @@ impl StudentTable {
     ///
     /// # Errors
     ///
-    /// Returns a message when the text is not a CSV table, lacks one of these columns, or lists a participant twice.
+    /// Returns a message when the text is not a CSV table, lacks one of these columns, has a column twice, or lists a
+    /// participant twice or two participants as the same student.
     pub fn read(name: &str, text: &str) -> Result<StudentTable, String> {
         let rows = csv::parse_rows(text).map_err(|e| format!("{name}: wrong-table: {e}"))?;
         let (head, lines) = rows.split_first().ok_or(format!("{name}: wrong-table: the file is empty"))?;
         let code = head.iter().position(|c| c.trim().eq_ignore_ascii_case("participant"));
         let code =
             code.ok_or(format!("{name}: wrong-table: the first line must contain the column \"participant\""))?;
+        let names: Vec<String> = head.iter().map(|c| c.trim().to_lowercase()).collect();
+        if let Some(twice) = (0..names.len()).find(|c| !names[*c].is_empty() && names[..*c].contains(&names[*c])) {
+            let column = sanitize_display(head[twice].trim(), 40);
+            return Err(format!("{name}: wrong-table: the first line contains the column \"{column}\" twice"));
+        }
         let others: Vec<usize> = (0..head.len()).filter(|c| *c != code).collect();
         if others.is_empty() {
             return Err(format!(
@@ -138,9 +144,16 @@ impl StudentTable {
         }
         let cell =
             |row: &Vec<String>, column: usize| row.get(column).map_or_else(String::new, |c| c.trim().to_string());
-        let mut cells = BTreeMap::new();
+        let mut cells: BTreeMap<String, Vec<String>> = BTreeMap::new();
         for (number, row) in (2..).zip(lines) {
-            let own = others.iter().map(|c| cell(row, *c)).collect();
+            let own: Vec<String> = others.iter().map(|c| cell(row, *c)).collect();
+            let is_same = |other: &Vec<String>| *other == own && own.iter().any(|text| !text.is_empty());
+            if let Some((other, _)) = cells.iter().find(|(who, other)| **who != cell(row, code) && is_same(other)) {
+                let [one, two] = [other, &cell(row, code)].map(|code| sanitize_display(code, 40));
+                return Err(format!(
+                    "{name}: row {number}: duplicate-student: \"{one}\" and \"{two}\" are the same student"
+                ));
+            }
             if cells.insert(cell(row, code), own).is_some() {
                 let duplicate = sanitize_display(&cell(row, code), 40);
                 return Err(format!("{name}: row {number}: duplicate-participant: \"{duplicate}\" is listed twice"));
@@ -149,12 +162,14 @@ impl StudentTable {
         Ok(StudentTable { columns: others.iter().map(|c| head[*c].trim().to_string()).collect(), cells })
     }
 
-    /// Returns a participant's cells in the given columns, empty for columns that the table lacks; `None` for an
-    /// unlisted participant.
+    /// Returns a participant's cells in the given columns, empty for columns that the table lacks; `None` for a
+    /// participant who is not listed, or whom none of these columns identifies.
     fn of(&self, participant: &str, columns: &[String]) -> Option<Vec<String>> {
         let own = self.cells.get(participant)?;
         let place = |column: &String| self.columns.iter().position(|c| c.eq_ignore_ascii_case(column));
-        Some(columns.iter().map(|c| place(c).map_or_else(String::new, |p| own[p].clone())).collect())
+        let cells: Vec<String> =
+            columns.iter().map(|c| place(c).map_or_else(String::new, |p| own[p].clone())).collect();
+        cells.iter().any(|text| !text.is_empty()).then_some(cells)
     }
 }
 
@@ -173,7 +188,6 @@ fn is_of(graded: &GradedSession, participant: &str, exercise: &SessionFile) -> b
 /// Builds the grade table of a cohort: one row per participant, one column per exercise (for Moodle also its
 /// feedback).
 pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
-    let GradebookOptions { lms, policy, critical, students, changes, translator } = *options;
     let graded: Vec<GradedSession> = cohort
         .sessions
         .iter()
@@ -181,122 +195,213 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
             Some(GradedSession { session, grade: session.grade.as_ref()?, status: cohort.status(path) })
         })
         .collect();
+    let columns = GradebookColumns::of(&graded, options);
     let mut warnings = Vec::new();
-    let mut exercises: Vec<&SessionFile> = Vec::new();
-    let mut people: Vec<&str> = Vec::new();
-    for GradedSession { session, .. } in &graded {
-        if !exercises.iter().any(|e| e.scenario.id == session.scenario.id) {
-            exercises.push(session);
-        }
-        if !session.participant.is_empty() && !people.contains(&session.participant.as_str()) {
-            people.push(&session.participant);
-        }
-    }
-    people.sort_unstable();
     let nameless = graded.iter().filter(|g| g.session.participant.is_empty()).count();
     if nameless > 0 {
         warnings.push(format!("{nameless} graded sessions have no participant code and were left out"));
     }
-    let identity_columns = match (lms, students) {
-        (Lms::Canvas, _) => CANVAS.map(String::from).to_vec(),
-        (Lms::Moodle, Some(students)) => students.columns.clone(),
-        (Lms::Moodle, None) => vec!["ID number".to_string()],
-    };
-    let mut head = identity_columns.clone();
-    let mut possible = vec![String::new(); identity_columns.len()];
-    for exercise in &exercises {
-        let plain = |e: &SessionFile| title(e, lms);
-        let is_alone = exercises.iter().filter(|e| plain(e) == plain(exercise)).count() == 1;
-        // A learning management system would treat two columns of the same name as one assignment.
-        let title = match is_alone {
-            true => plain(exercise),
-            false => format!("{} · {}", plain(exercise), sanitize_display(&exercise.scenario.id, TITLE_MAX)),
-        };
-        head.push(title.clone());
-        if lms == Lms::Moodle {
-            head.push(format!("{title} (feedback)"));
-        }
-        let max_points: Vec<f64> = graded
-            .iter()
-            .filter(|g| g.session.scenario.id == exercise.scenario.id && !g.status.differs())
-            .map(|g| g.grade.max_points)
-            .collect();
-        if max_points.windows(2).any(|pair| pair[0] != pair[1]) {
-            warnings.push(format!("the sessions of \"{title}\" have different maximum points: export them separately"));
-        }
-        possible.push(max_points.iter().copied().fold(0.0, f64::max).to_string());
-    }
-    let mut table = csv::format_row(&head);
-    if lms == Lms::Canvas {
-        possible[0] = "    Points Possible".into();
-        table += &csv::format_row(&possible);
-    }
+    warnings.extend(columns.exercises.iter().filter_map(ExerciseColumn::warning));
+    let people: BTreeSet<&str> =
+        graded.iter().map(|g| g.session.participant.as_str()).filter(|code| !code.is_empty()).collect();
+    let mut table = columns.head_rows(options.lms);
     let mut count = 0;
-    let (mut critical_errors, mut not_verified, mut changed) = (0, 0, 0);
+    let mut doubtful = DoubtfulGrades::default();
     for person in people {
-        let identity =
-            match students {
-                Some(students) => students.of(person, &identity_columns),
-                None => Some(
-                    identity_columns
-                        .iter()
-                        .map(|c| {
-                            if ["ID number", "SIS User ID"].contains(&c.as_str()) {
-                                person.into()
-                            } else {
-                                String::new()
-                            }
-                        })
-                        .collect(),
-                ),
-            };
-        let Some(mut line) = identity else {
-            warnings
-                .push(format!("\"{}\" is not in the table of students and was left out", sanitize_display(person, 40)));
+        let Some(mut line) = columns.identity_cells(person, options.students) else {
+            warnings.push(format!(
+                "\"{}\" is not identified by the table of students and was left out",
+                sanitize_display(person, 40)
+            ));
             continue;
         };
-        for exercise in &exercises {
-            let own = graded.iter().copied().filter(|g| is_of(g, person, exercise));
-            // A result that its recording does not give is nobody's grade; an earlier or later attempt may be.
-            let (differing, own): (Vec<GradedSession>, Vec<GradedSession>) = own.partition(|g| g.status.differs());
-            let selected = select_grade(&own, policy);
-            critical_errors += usize::from(selected.is_some_and(|g| !g.grade.hard_fails.is_empty() && !g.grade.passed));
-            not_verified += usize::from(selected.is_some_and(|g| !g.status.is_verified()));
-            let own_changes = selected.and_then(|g| changes.get(&session_id(g.session))).map_or(&[][..], |c| c);
-            changed += usize::from(!own_changes.is_empty());
-            line.push(selected.map_or_else(String::new, |g| critical.points(g.grade).to_string()));
-            if !differing.is_empty() {
-                let (person, count) = (sanitize_display(person, 40), differing.len());
-                let title = title(exercise, lms);
-                warnings.push(format!(
-                    "\"{person}\", \"{title}\": {count} sessions differ from their recordings, and their points are not \
-                     exported; typodont verify lists the differences"
-                ));
-            }
-            if lms == Lms::Moodle {
-                let without =
-                    if differing.is_empty() { String::new() } else { translator.text("gradebook.differs", &[]) };
-                line.push(selected.map_or(without, |g| feedback(g, critical, own_changes, translator)));
-            }
+        for ExerciseColumn { exercise, .. } in &columns.exercises {
+            let own: Vec<GradedSession> = graded.iter().copied().filter(|g| is_of(g, person, exercise)).collect();
+            let selected = SelectedGrade::of(&own, options);
+            doubtful.count(&selected);
+            warnings.extend(selected.warning(person, &title(exercise, options.lms)));
+            line.extend(selected.cells(options));
         }
         table += &csv::format_row(&line);
         count += 1;
     }
-    if not_verified > 0 {
-        warnings.push(format!(
-            "{not_verified} of these grades are not verified: no replay of the recording has confirmed them"
-        ));
-    }
-    if critical_errors > 0 {
-        warnings.push(critical.warning(critical_errors));
-    }
-    if changed > 0 && lms == Lms::Canvas {
-        warnings.push(format!(
-            "{changed} of these grades were changed by an examiner; names and reasons are in the export of the review \
-             desk, because this table has no place for them"
-        ));
-    }
+    warnings.extend(doubtful.warnings(options));
     Gradebook { csv: table, students: count, warnings }
+}
+
+/// Columns of a grade table: those that identify students, then those of the exercises.
+struct GradebookColumns<'a> {
+    identity: Vec<String>,
+    exercises: Vec<ExerciseColumn<'a>>,
+}
+
+/// Column of an exercise; for Moodle, a column with the feedback follows it.
+struct ExerciseColumn<'a> {
+    /// First graded session of the exercise.
+    exercise: &'a SessionFile,
+    /// Title that no other exercise has.
+    title: String,
+    /// Maximum points of each session that does not differ from its recording.
+    max_points: Vec<f64>,
+}
+
+impl<'a> GradebookColumns<'a> {
+    fn of(graded: &[GradedSession<'a>], options: &GradebookOptions) -> GradebookColumns<'a> {
+        let identity = match (options.lms, options.students) {
+            (Lms::Canvas, _) => CANVAS.map(String::from).to_vec(),
+            (Lms::Moodle, Some(students)) => students.columns.clone(),
+            (Lms::Moodle, None) => vec!["ID number".to_string()],
+        };
+        let mut exercises: Vec<&'a SessionFile> = Vec::new();
+        for session in graded.iter().map(|g| g.session) {
+            if !exercises.iter().any(|e| e.scenario.id == session.scenario.id) {
+                exercises.push(session);
+            }
+        }
+        let column = |exercise: &'a SessionFile| {
+            let own = graded.iter().filter(|g| g.session.scenario.id == exercise.scenario.id && !g.status.differs());
+            ExerciseColumn {
+                exercise,
+                title: unique_title(exercise, &exercises, options.lms),
+                max_points: own.map(|g| g.grade.max_points).collect(),
+            }
+        };
+        GradebookColumns { identity, exercises: exercises.iter().copied().map(column).collect() }
+    }
+
+    /// Returns the row of titles, and for Canvas that of the possible points.
+    fn head_rows(&self, lms: Lms) -> String {
+        let mut head = self.identity.clone();
+        let mut possible = vec![String::new(); self.identity.len()];
+        for column in &self.exercises {
+            head.push(column.title.clone());
+            if lms == Lms::Moodle {
+                head.push(format!("{} (feedback)", column.title));
+            }
+            possible.push(column.max_points.iter().copied().fold(0.0, f64::max).to_string());
+        }
+        let mut rows = csv::format_row(&head);
+        if lms == Lms::Canvas {
+            possible[0] = "    Points Possible".into();
+            rows += &csv::format_row(&possible);
+        }
+        rows
+    }
+
+    /// Returns the cells that identify a participant; `None` for one who is not in the table of students.
+    fn identity_cells(&self, person: &str, students: Option<&StudentTable>) -> Option<Vec<String>> {
+        match students {
+            Some(students) => students.of(person, &self.identity),
+            None => {
+                let is_code = |column: &str| ["ID number", "SIS User ID"].contains(&column);
+                let cell = |column: &String| if is_code(column) { person.to_string() } else { String::new() };
+                Some(self.identity.iter().map(cell).collect())
+            }
+        }
+    }
+}
+
+impl ExerciseColumn<'_> {
+    /// Returns the warning about sessions with different maximum points.
+    fn warning(&self) -> Option<String> {
+        let are_different = self.max_points.windows(2).any(|pair| pair[0] != pair[1]);
+        are_different.then(|| {
+            format!("the sessions of \"{}\" have different maximum points: export them separately", self.title)
+        })
+    }
+}
+
+/// Grade of a participant in an exercise, as far as there is one to export.
+struct SelectedGrade<'a> {
+    graded: Option<GradedSession<'a>>,
+    changes: &'a [GradeChange],
+    /// Number of sessions that differ from their recordings.
+    differing: usize,
+}
+
+impl<'a> SelectedGrade<'a> {
+    /// Selects a grade from one participant's sessions of an exercise, which are in chronological order.
+    fn of(sessions: &[GradedSession<'a>], options: &GradebookOptions<'a>) -> SelectedGrade<'a> {
+        // A result that its recording does not give is nobody's grade; an earlier or later attempt may be.
+        let (differing, own): (Vec<GradedSession>, Vec<GradedSession>) =
+            sessions.iter().copied().partition(|g| g.status.differs());
+        let graded = select_grade(&own, options.policy);
+        let changes = graded.and_then(|g| options.changes.get(&session_id(g.session)));
+        SelectedGrade { graded, changes: changes.map(Vec::as_slice).unwrap_or_default(), differing: differing.len() }
+    }
+
+    /// Returns the points, and for Moodle the feedback; empty without a grade.
+    fn cells(&self, options: &GradebookOptions) -> Vec<String> {
+        let GradebookOptions { lms, critical, translator, .. } = *options;
+        let mut cells = vec![self.graded.map_or_else(String::new, |g| critical.points(g.grade).to_string())];
+        if lms == Lms::Moodle {
+            cells.push(match self.graded {
+                Some(graded) => feedback(graded, critical, self.changes, translator),
+                None if self.differing > 0 => translator.text("gradebook.differs", &[]),
+                None => String::new(),
+            });
+        }
+        cells
+    }
+
+    /// Returns the warning about sessions that differ from their recordings.
+    fn warning(&self, person: &str, title: &str) -> Option<String> {
+        let (person, count) = (sanitize_display(person, 40), self.differing);
+        (count > 0).then(|| {
+            format!(
+                "\"{person}\", \"{title}\": {count} sessions differ from their recordings, and their points are not \
+                 exported; typodont verify lists the differences"
+            )
+        })
+    }
+}
+
+/// Numbers of exported grades that the table does not show as they are.
+#[derive(Default)]
+struct DoubtfulGrades {
+    critical_errors: usize,
+    not_verified: usize,
+    changed: usize,
+}
+
+impl DoubtfulGrades {
+    fn count(&mut self, selected: &SelectedGrade) {
+        let Some(GradedSession { grade, status, .. }) = selected.graded else { return };
+        self.critical_errors += usize::from(!grade.hard_fails.is_empty() && !grade.passed);
+        self.not_verified += usize::from(!status.is_verified());
+        self.changed += usize::from(!selected.changes.is_empty());
+    }
+
+    fn warnings(&self, options: &GradebookOptions) -> Vec<String> {
+        let DoubtfulGrades { critical_errors, not_verified, changed } = *self;
+        let mut warnings = Vec::new();
+        if not_verified > 0 {
+            warnings.push(format!(
+                "{not_verified} of these grades are not verified: no replay of the recording has confirmed them"
+            ));
+        }
+        if critical_errors > 0 {
+            warnings.push(options.critical.warning(critical_errors));
+        }
+        if changed > 0 && options.lms == Lms::Canvas {
+            warnings.push(format!(
+                "{changed} of these grades were changed by an examiner; names and reasons are in the export of the \
+                 review desk, because this table has no place for them"
+            ));
+        }
+        warnings
+    }
+}
+
+/// Returns the column title of an exercise, with its id where others have the same title: a learning management system
+/// would treat two columns of the same name as one assignment.
+fn unique_title(exercise: &SessionFile, exercises: &[&SessionFile], lms: Lms) -> String {
+    let plain = title(exercise, lms);
+    let is_alone = exercises.iter().filter(|e| title(e, lms) == plain).count() == 1;
+    match is_alone {
+        true => plain,
+        false => format!("{plain} · {}", sanitize_display(&exercise.scenario.id, TITLE_MAX)),
+    }
 }
 
 /// Returns the column title of an exercise; for Canvas, a final number in round brackets is put in square brackets.
@@ -399,5 +504,24 @@ mod tests {
         let excused = GradeFile { passed: true, ..failed };
         assert_eq!(policies.map(|p| p.points(&excused)), [82.5; 3]);
         assert!(CriticalErrorPolicy::Keep.warning(2).contains("unchanged"));
+    }
+
+    #[test]
+    fn a_table_of_students_identifies_each_participant_as_one_student() {
+        let read = |text: &str| StudentTable::read("students.csv", text);
+        let table = read("participant,email\nP-1,a@school\nP-2,\n").unwrap();
+        let columns = |names: &[&str]| names.iter().map(|name| name.to_string()).collect::<Vec<_>>();
+        assert_eq!(table.of("P-1", &columns(&["ID", "email"])), Some(columns(&["", "a@school"])));
+        // Whom nothing identifies would be a row that belongs to nobody.
+        assert_eq!(table.of("P-2", &columns(&["ID", "email"])), None);
+        assert_eq!(table.of("P-1", &columns(&CANVAS)), None);
+        for (text, code) in [
+            ("participant,email,EMAIL\nP-1,a@school,b\n", "column \"EMAIL\" twice"),
+            ("participant,Participant,email\nP-1,x,a@school\n", "column \"Participant\" twice"),
+            ("participant,email\nP-1,a@school\nP-2,a@school\n", "duplicate-student"),
+            ("participant,email\nP-1,a@school\nP-1,a@school\n", "duplicate-participant"),
+        ] {
+            assert!(read(text).unwrap_err().contains(code), "{text}");
+        }
     }
 }

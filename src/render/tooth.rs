@@ -130,22 +130,19 @@ impl ToothTextures {
             transfer_texture,
             group,
         };
-        resources::write_box(queue, &textures.voxels, [0; 3], dims, &interleaved(volume, [0; 3], dims));
-        resources::write_box(
-            queue,
-            &textures.empty_texture,
-            [0; 3],
-            textures.empty_space.dims(),
-            textures.empty_space.entries(),
-        );
-        resources::write_box(
-            queue,
-            &textures.occlusion_texture,
-            [0; 3],
-            textures.occlusion.dims(),
-            textures.occlusion.means(),
-        );
+        textures.upload(queue, volume);
         textures
+    }
+
+    /// Uploads all voxels and everything that is derived from them.
+    fn upload(&self, queue: &wgpu::Queue, volume: &Volume) {
+        resources::write_box(queue, &self.voxels, [0; 3], self.dims, &interleaved(volume, [0; 3], self.dims));
+        self.upload_empty_space(queue);
+        resources::write_box(queue, &self.occlusion_texture, [0; 3], self.occlusion.dims(), self.occlusion.means());
+    }
+
+    fn upload_empty_space(&self, queue: &wgpu::Queue) {
+        resources::write_box(queue, &self.empty_texture, [0; 3], self.empty_space.dims(), self.empty_space.entries());
     }
 
     /// True when these textures can be updated with a volume's changes.
@@ -166,13 +163,7 @@ impl ToothTextures {
         }
         let differing = self.empty_space.update(tooth.volume, changed);
         if self.empty_space.set_mode(&tooth.mode) {
-            resources::write_box(
-                queue,
-                &self.empty_texture,
-                [0; 3],
-                self.empty_space.dims(),
-                self.empty_space.entries(),
-            );
+            self.upload_empty_space(queue);
         } else {
             for brick in differing {
                 let place = tooth.volume.bricks().corner(brick).map(|c| c / BRICK);

@@ -3,7 +3,7 @@
 use super::display_format;
 use super::language::{Languages, Message, escape_html};
 use std::fmt::Write;
-use typodont_exercise::score::Trace;
+use typodont_exercise::score::{Trace, TraceSample};
 
 /// A stage's name and its start and end, s.
 pub struct StageSpan<'a> {
@@ -51,9 +51,29 @@ struct PlottedCurve<'a> {
 pub fn svg(trace: &Trace, has_decay: bool, stages: &[StageSpan], flags: &[EventFlag], languages: &Languages) -> String {
     let Some(last) = trace.samples.last() else { return String::new() };
     let seconds = last.at.seconds();
-    let value = |f: fn(&typodont_exercise::score::TraceSample) -> f32| {
-        trace.samples.iter().map(|s| f64::from(f(s))).collect::<Vec<_>>()
-    };
+    let curves = plotted_curves(trace, has_decay);
+    let height = TOP + curves.len() as f64 * (BAND_HEIGHT + BAND_GAP) + 14.0;
+    let x = |s: f64| LEFT + (WIDTH - LEFT - RIGHT) * s / seconds.max(1e-9);
+    let mut svg = format!(
+        "<svg id=\"curves\" viewBox=\"0 0 {WIDTH} {height:.0}\" role=\"group\" aria-labelledby=\"curves-title\" \
+         data-seconds=\"{seconds:.3}\" data-left=\"{LEFT}\" data-right=\"{:.0}\" \
+         font-family=\"sans-serif\" font-size=\"12\">",
+        WIDTH - RIGHT
+    );
+    let bottom = height - 34.0;
+    draw_stages(&mut svg, stages, bottom, &x);
+    for (index, curve) in curves.iter().enumerate() {
+        let top = TOP + index as f64 * (BAND_HEIGHT + BAND_GAP);
+        draw_curve(&mut svg, curve, top, &|i| x(trace.samples[i].at.seconds()), languages);
+    }
+    draw_flags(&mut svg, flags, bottom, &x);
+    draw_time_axis(&mut svg, seconds, height - 8.0, &x);
+    svg + "</svg>"
+}
+
+/// The curves of a session, from top to bottom.
+fn plotted_curves(trace: &Trace, has_decay: bool) -> Vec<PlottedCurve<'static>> {
+    let value = |f: fn(&TraceSample) -> f32| trace.samples.iter().map(|s| f64::from(f(s))).collect::<Vec<_>>();
     let highest = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     let (force, speed) = (value(|s| s.force), value(|s| if s.touched { s.speed } else { 0.0 }));
     let mut curves = vec![
@@ -76,15 +96,11 @@ pub fn svg(trace: &Trace, has_decay: bool, stages: &[StageSpan], flags: &[EventF
         let values = value(|s| s.cleared);
         curves.push(PlottedCurve { key: "curve.cleared", unit: "%", scale_max: 100.0, values, color: "#22794f" });
     }
-    let height = TOP + curves.len() as f64 * (BAND_HEIGHT + BAND_GAP) + 14.0;
-    let x = |s: f64| LEFT + (WIDTH - LEFT - RIGHT) * s / seconds.max(1e-9);
-    let mut svg = format!(
-        "<svg id=\"curves\" viewBox=\"0 0 {WIDTH} {height:.0}\" role=\"group\" aria-labelledby=\"curves-title\" \
-         data-seconds=\"{seconds:.3}\" data-left=\"{LEFT}\" data-right=\"{:.0}\" \
-         font-family=\"sans-serif\" font-size=\"12\">",
-        WIDTH - RIGHT
-    );
-    let bottom = height - 34.0;
+    curves
+}
+
+/// A dashed line at the beginning of each stage, with its title if there is room.
+fn draw_stages(svg: &mut String, stages: &[StageSpan], bottom: f64, x: &dyn Fn(f64) -> f64) {
     for stage in stages {
         let (from, to) = (x(stage.from), x(stage.to));
         let _ = write!(
@@ -96,11 +112,10 @@ pub fn svg(trace: &Trace, has_decay: bool, stages: &[StageSpan], flags: &[EventF
             let _ = write!(svg, "<text x=\"{:.1}\" y=\"11\" fill=\"#444\">{title}</text>", from + 4.0);
         }
     }
-    for (index, curve) in curves.iter().enumerate() {
-        let top = TOP + index as f64 * (BAND_HEIGHT + BAND_GAP);
-        draw_curve(&mut svg, curve, top, &|i| x(trace.samples[i].at.seconds()), languages);
-    }
-    draw_flags(&mut svg, flags, bottom, &x);
+}
+
+/// Round moments below the curves.
+fn draw_time_axis(svg: &mut String, seconds: f64, y: f64, x: &dyn Fn(f64) -> f64) {
     for moment in time_ticks(seconds) {
         let at = x(moment);
         let label = if seconds < 60.0 {
@@ -108,13 +123,8 @@ pub fn svg(trace: &Trace, has_decay: bool, stages: &[StageSpan], flags: &[EventF
         } else {
             format!("{}:{:02}", moment as u64 / 60, moment as u64 % 60)
         };
-        let _ = write!(
-            svg,
-            "<text x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\" fill=\"#444\">{label}</text>",
-            height - 8.0
-        );
+        let _ = write!(svg, "<text x=\"{at:.1}\" y=\"{y:.1}\" text-anchor=\"middle\" fill=\"#444\">{label}</text>");
     }
-    svg + "</svg>"
 }
 
 /// A numbered flag over each moment that cost points, and a bar as long as it lasted.

@@ -85,16 +85,12 @@ fn append_override(
     if !errors.is_empty() {
         return app.error_page(context, 422, &errors);
     }
-    let machine = match form.item {
-        None => GivenPoints { points: grade.points, passed: Some(grade.passed) },
-        Some(index) => GivenPoints { points: grade.items[index].points, passed: None },
-    };
     let item = form.item.map(|index| rubric_item(index, &grade.items[index]));
     let draft = OverrideDraft {
         session: id.to_string(),
         recording: indexed.recording.clone(),
         item,
-        machine,
+        machine: machine_points(grade, form.item),
         examiner: given,
         reason: form.reason.clone(),
         name: form.name.clone(),
@@ -116,6 +112,14 @@ fn append_override(
             let response = app.error_page(context, 500, &[Message::text("complaint.unwritten", &[("why", why)])]);
             response.with_log(format!("unwritable-log: {error}"))
         }
+    }
+}
+
+/// Returns the scorer's points of an item, or of the whole grade.
+fn machine_points(grade: &GradeFile, item: Option<usize>) -> GivenPoints {
+    match item {
+        None => GivenPoints { points: grade.points, passed: Some(grade.passed) },
+        Some(index) => GivenPoints { points: grade.items[index].points, passed: None },
     }
 }
 

@@ -99,17 +99,8 @@ impl Recorder {
         let (density, label) = volume::bytes(&workpiece.volume).map_err(|e| failed(e.to_string()))?;
         let original = workpiece.original.as_ref().map(|o| volume::bytes(o)).transpose();
         let original = original.map_err(|e| failed(e.to_string()))?;
-        // One thread and chunks buffered in memory: equal sessions give equal bytes, and a killed one complete
-        // chunks.
-        let options = WriteOptions::new()
-            .profile("ros2")
-            .library(concat!("typodont ", env!("CARGO_PKG_VERSION")))
-            .chunk_size(None)
-            .disable_seeking(true);
-        #[cfg(not(target_family = "wasm"))]
-        let options = options.compression_threads(0);
         let attempt = || -> Result<Recorder, McapError> {
-            let mut writer = options.create(sink)?;
+            let mut writer = write_options().create(sink)?;
             let mut running = RunningDigest::new();
             running.part(HEAD, &json(head));
             writer.write_metadata(&metadata(HEAD, head))?;
@@ -179,6 +170,19 @@ impl Recorder {
         let done = ended.and_then(|()| self.writer.finish().map(drop));
         done.map_err(|e| self.failed(&e))
     }
+}
+
+/// Options of a recording's writer. One thread and chunks buffered in memory: equal sessions give equal bytes, and a
+/// killed one complete chunks.
+fn write_options() -> WriteOptions {
+    let options = WriteOptions::new()
+        .profile("ros2")
+        .library(concat!("typodont ", env!("CARGO_PKG_VERSION")))
+        .chunk_size(None)
+        .disable_seeking(true);
+    #[cfg(not(target_family = "wasm"))]
+    let options = options.compression_threads(0);
+    options
 }
 
 /// Returns the reason of a failed write; of an error of the system, not of the compression that met it.

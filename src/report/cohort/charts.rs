@@ -4,7 +4,7 @@ use super::progress::LearningCurves;
 use super::summary::SpreadFile;
 use crate::display_format;
 use std::collections::BTreeMap;
-use std::fmt::Write;
+use std::fmt::{Display, Write};
 
 /// Above this many, sessions are drawn as columns and no longer one by one.
 const DOTS_MAX: usize = 150;
@@ -21,8 +21,7 @@ pub fn strip_plot(values: &[f64], spread: &SpreadFile, alt: &str) -> String {
     let room = (spread.max - spread.min).max(1e-12);
     let x = |v: f64| EDGE + (width - 2.0 * EDGE) * ((v - spread.min) / room).clamp(0.0, 1.0);
     let middle = height - 9.0;
-    let mut svg =
-        format!("<svg class=\"strip\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">", escape(alt));
+    let mut svg = open_svg("strip", STRIP, alt);
     let [q1, q3] = spread.quartiles.map(x);
     let _ = write!(
         svg,
@@ -72,80 +71,95 @@ pub struct HistogramLabels {
     pub sessions: String,
 }
 
+/// Size of a histogram of points, and the room around its bars. In units of the SVG.
+const HISTOGRAM: (f64, f64) = (620.0, 220.0);
+const HISTOGRAM_LEFT: f64 = 44.0;
+const HISTOGRAM_RIGHT: f64 = 14.0;
+const HISTOGRAM_TOP: f64 = 40.0;
+
+/// Height at which the bars stand.
+const HISTOGRAM_BASE: f64 = HISTOGRAM.1 - 40.0;
+
+/// Number of classes of points.
+const CLASSES: usize = 20;
+
 /// Number of sessions by points in twenty equal classes, each from its lower bound to below the next, the last with its
 /// upper bound; a line at the pass mark.
 pub fn points_histogram(data: &PointsHistogram, labels: &HistogramLabels) -> String {
-    const SIZE: (f64, f64) = (620.0, 220.0);
-    const LEFT: f64 = 44.0;
-    const RIGHT: f64 = 14.0;
-    const TOP: f64 = 40.0;
-    const BOTTOM: f64 = 40.0;
-    const CLASSES: usize = 20;
     let PointsHistogram { points, most, mark, own } = *data;
     let most = if most > 0.0 { most } else { 1.0 };
     let mut counts = [0u32; CLASSES];
     for value in points {
         counts[((value / most * CLASSES as f64) as usize).min(CLASSES - 1)] += 1;
     }
-    let tallest = counts.iter().copied().max().unwrap_or(0).max(1);
-    let x = |value: f64| LEFT + (SIZE.0 - LEFT - RIGHT) * (value / most).clamp(0.0, 1.0);
-    let y = |count: f64| SIZE.1 - BOTTOM - (SIZE.1 - BOTTOM - TOP) * count / f64::from(tallest);
-    let mut svg = format!(
-        "<svg class=\"histogram\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
-        SIZE.0,
-        SIZE.1,
-        escape(&labels.alt)
-    );
+    let scale = HistogramScale { most, tallest: counts.iter().copied().max().unwrap_or(0).max(1) };
+    let mut svg = open_svg("histogram", HISTOGRAM, &labels.alt);
+    draw_classes(&mut svg, &counts, &scale);
+    draw_histogram_axes(&mut svg, &scale, labels);
+    if let (Some(mark), Some(text)) = (mark, &labels.mark) {
+        draw_flag(&mut svg, (scale.x(mark), HISTOGRAM_TOP - 6.0, HISTOGRAM_BASE), "mark", text, HISTOGRAM.0);
+    }
+    if let Some(own) = own {
+        draw_flag(&mut svg, (scale.x(own), HISTOGRAM_TOP - 22.0, HISTOGRAM_BASE), "own", &labels.own, HISTOGRAM.0);
+    }
+    svg + "</svg>"
+}
+
+/// Scale of a histogram of points: points to the right, numbers of sessions upwards.
+struct HistogramScale {
+    /// Most points that can be had; above 0.
+    most: f64,
+    /// Number of sessions in the fullest class; at least 1.
+    tallest: u32,
+}
+
+impl HistogramScale {
+    fn x(&self, points: f64) -> f64 {
+        HISTOGRAM_LEFT + (HISTOGRAM.0 - HISTOGRAM_LEFT - HISTOGRAM_RIGHT) * (points / self.most).clamp(0.0, 1.0)
+    }
+
+    fn y(&self, count: u32) -> f64 {
+        HISTOGRAM_BASE - (HISTOGRAM_BASE - HISTOGRAM_TOP) * f64::from(count) / f64::from(self.tallest)
+    }
+}
+
+fn draw_classes(svg: &mut String, counts: &[u32; CLASSES], scale: &HistogramScale) {
+    let bound = |class: usize| scale.x(scale.most * class as f64 / CLASSES as f64);
     for (class, &count) in counts.iter().enumerate().filter(|(_, c)| **c > 0) {
-        let (from, to) = (x(most * class as f64 / CLASSES as f64), x(most * (class + 1) as f64 / CLASSES as f64));
-        let top = y(f64::from(count));
+        let (from, to, top) = (bound(class), bound(class + 1), scale.y(count));
         let _ = write!(
             svg,
             "<rect x=\"{:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" class=\"dot\" fill-opacity=\".75\"/>",
             from + 1.0,
             to - from - 2.0,
-            SIZE.1 - BOTTOM - top,
+            HISTOGRAM_BASE - top,
         );
     }
-    let base = SIZE.1 - BOTTOM;
-    let _ =
-        write!(svg, "<line x1=\"{LEFT}\" x2=\"{:.1}\" y1=\"{base}\" y2=\"{base}\" class=\"axis\"/>", SIZE.0 - RIGHT);
-    for count in [0, tallest] {
-        let _ = write!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\" class=\"soft\">{count}</text>",
-            LEFT - 6.0,
-            y(f64::from(count)) + 4.0
-        );
-    }
-    for step in 0..=5 {
-        let value = most * f64::from(step) / 5.0;
-        let _ = write!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>",
-            x(value),
-            base + 15.0,
-            display_format::plain_number(value)
-        );
-    }
+}
+
+fn draw_histogram_axes(svg: &mut String, scale: &HistogramScale, labels: &HistogramLabels) {
     let _ = write!(
         svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>\
-         <text x=\"12\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\" transform=\"rotate(-90 12 {:.1})\">{}</text>",
-        0.5 * (LEFT + SIZE.0 - RIGHT),
-        SIZE.1 - 6.0,
-        escape(&labels.points),
-        0.5 * (TOP + base),
-        0.5 * (TOP + base),
-        escape(&labels.sessions)
+        "<line x1=\"{HISTOGRAM_LEFT}\" x2=\"{:.1}\" y1=\"{HISTOGRAM_BASE}\" y2=\"{HISTOGRAM_BASE}\" class=\"axis\"/>",
+        HISTOGRAM.0 - HISTOGRAM_RIGHT
     );
-    if let (Some(mark), Some(text)) = (mark, &labels.mark) {
-        draw_flag(&mut svg, (x(mark), TOP - 6.0, base), "mark", text, SIZE.0);
+    for count in [0, scale.tallest] {
+        draw_label(svg, (HISTOGRAM_LEFT - 6.0, scale.y(count) + 4.0), "end", count);
     }
-    if let Some(own) = own {
-        draw_flag(&mut svg, (x(own), TOP - 22.0, base), "own", &labels.own, SIZE.0);
+    for step in 0..=5 {
+        let value = scale.most * f64::from(step) / 5.0;
+        let text = display_format::plain_number(value);
+        draw_label(svg, (scale.x(value), HISTOGRAM_BASE + 15.0), "middle", text);
     }
-    svg + "</svg>"
+    let middle = 0.5 * (HISTOGRAM_LEFT + HISTOGRAM.0 - HISTOGRAM_RIGHT);
+    draw_label(svg, (middle, HISTOGRAM.1 - 6.0), "middle", escape(&labels.points));
+    let _ = write!(
+        svg,
+        "<text x=\"12\" y=\"{y:.1}\" text-anchor=\"middle\" class=\"soft\" \
+         transform=\"rotate(-90 12 {y:.1})\">{}</text>",
+        escape(&labels.sessions),
+        y = 0.5 * (HISTOGRAM_TOP + HISTOGRAM_BASE),
+    );
 }
 
 /// A vertical line with a text at its upper end, to the left of it in the right half of the drawing.
@@ -198,9 +212,7 @@ fn draw_histogram(svg: &mut String, values: &[f64], spread: &SpreadFile) {
 pub fn answer_histogram(counts: &BTreeMap<String, usize>, steps: usize, alt: &str) -> String {
     const WIDE: f64 = 18.0;
     let most = counts.values().copied().max().unwrap_or(1).max(1) as f64;
-    let width = WIDE * steps as f64;
-    let mut svg =
-        format!("<svg class=\"answers\" viewBox=\"0 0 {width} 40\" role=\"img\" aria-label=\"{}\">", escape(alt));
+    let mut svg = open_svg("answers", (WIDE * steps as f64, 40.0), alt);
     for step in 1..=steps {
         let count = counts.get(&step.to_string()).copied().unwrap_or(0);
         let (x, tall) = (WIDE * (step - 1) as f64, 14.0 * count as f64 / most);
@@ -234,57 +246,78 @@ pub struct CurveLabels {
     pub attempt: String,
 }
 
+/// Size of a drawing of learning curves, and the room around the curves. In units of the SVG.
+const CURVES: (f64, f64) = (440.0, 230.0);
+const CURVES_LEFT: f64 = 76.0;
+const CURVES_RIGHT: f64 = 16.0;
+const CURVES_TOP: f64 = 14.0;
+
+/// Height of the lowest value.
+const CURVES_BASE: f64 = CURVES.1 - 34.0;
+
 /// A thin line for each participant over their attempts, the mean of each attempt with its interval in bold.
 pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveLabels) -> String {
-    const SIZE: (f64, f64) = (440.0, 230.0);
-    const LEFT: f64 = 76.0;
-    const BOTTOM: f64 = 34.0;
-    const TOP: f64 = 14.0;
-    let all = || progress.participants.iter().flat_map(|p| p.values.iter().flatten().copied());
-    let (low, high) = all().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
-    let longest = progress.participants.iter().map(|p| p.values.len()).max().unwrap_or(1);
-    let room = if high > low { high - low } else { 1.0 };
-    let x = |n: usize| LEFT + (SIZE.0 - LEFT - 16.0) * n as f64 / (longest - 1).max(1) as f64;
-    let y = |v: f64| SIZE.1 - BOTTOM - (SIZE.1 - BOTTOM - TOP) * ((v - low) / room).clamp(-0.02, 1.02);
-    let mut svg = format!(
-        "<svg class=\"curves\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">",
-        SIZE.0,
-        SIZE.1,
-        escape(&labels.alt)
-    );
-    for value in [low, high] {
-        let at = y(value);
+    let scale = CurveScale::of(progress);
+    let mut svg = open_svg("curves", CURVES, &labels.alt);
+    draw_curve_axes(&mut svg, &scale, measure, labels);
+    draw_participants(&mut svg, progress, &scale);
+    draw_means(&mut svg, progress, &scale);
+    svg + "</svg>"
+}
+
+/// Scale of learning curves: attempts to the right, values upwards.
+struct CurveScale {
+    /// Most attempts of a participant.
+    longest: usize,
+    low: f64,
+    high: f64,
+}
+
+impl CurveScale {
+    fn of(progress: &LearningCurves) -> CurveScale {
+        let all = progress.participants.iter().flat_map(|p| p.values.iter().flatten().copied());
+        let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        let longest = progress.participants.iter().map(|p| p.values.len()).max().unwrap_or(1);
+        CurveScale { longest, low, high }
+    }
+
+    /// Place of an attempt, counted from 0.
+    fn x(&self, attempt: usize) -> f64 {
+        CURVES_LEFT + (CURVES.0 - CURVES_LEFT - CURVES_RIGHT) * attempt as f64 / (self.longest - 1).max(1) as f64
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        let room = if self.high > self.low { self.high - self.low } else { 1.0 };
+        CURVES_BASE - (CURVES_BASE - CURVES_TOP) * ((value - self.low) / room).clamp(-0.02, 1.02)
+    }
+}
+
+fn draw_curve_axes(svg: &mut String, scale: &CurveScale, measure: &str, labels: &CurveLabels) {
+    for value in [scale.low, scale.high] {
+        let at = scale.y(value);
         let label = escape(&display_format::measure(measure, Some(value)));
         let _ = write!(
             svg,
-            "<line x1=\"{LEFT}\" x2=\"{:.0}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"axis\"/>\
+            "<line x1=\"{CURVES_LEFT}\" x2=\"{:.0}\" y1=\"{at:.1}\" y2=\"{at:.1}\" class=\"axis\"/>\
              <text x=\"{:.0}\" y=\"{:.1}\" text-anchor=\"end\" class=\"soft\">{label}</text>",
-            SIZE.0 - 10.0,
-            LEFT - 6.0,
+            CURVES.0 - 10.0,
+            CURVES_LEFT - 6.0,
             at + 4.0
         );
     }
-    let every = longest.div_ceil(12);
-    for n in (0..longest).filter(|n| n % every == 0) {
-        let _ = write!(
-            svg,
-            "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>",
-            x(n),
-            SIZE.1 - 16.0,
-            n + 1
-        );
+    let every = scale.longest.div_ceil(12);
+    for attempt in (0..scale.longest).filter(|attempt| attempt % every == 0) {
+        draw_label(svg, (scale.x(attempt), CURVES.1 - 16.0), "middle", attempt + 1);
     }
-    let _ = write!(
-        svg,
-        "<text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\" class=\"soft\">{}</text>",
-        0.5 * (LEFT + SIZE.0),
-        SIZE.1 - 2.0,
-        escape(&labels.attempt)
-    );
+    draw_label(svg, (0.5 * (CURVES_LEFT + CURVES.0), CURVES.1 - 2.0), "middle", escape(&labels.attempt));
+}
+
+fn draw_participants(svg: &mut String, progress: &LearningCurves, scale: &CurveScale) {
     // Many lines stay a veil through which the mean is seen.
     let faint = (15.0 / progress.participants.len() as f64).clamp(0.05, 0.45);
     for person in &progress.participants {
-        let points = person.values.iter().enumerate().filter_map(|(n, v)| Some(format!("{:.1},{:.1}", x(n), y((*v)?))));
+        let values = person.values.iter().enumerate();
+        let points = values.filter_map(|(n, v)| Some(format!("{:.1},{:.1}", scale.x(n), scale.y((*v)?))));
         let name = escape(&display_format::sanitize_display(&person.participant, 60));
         let points = points.collect::<Vec<_>>().join(" ");
         let _ = write!(
@@ -292,22 +325,35 @@ pub fn learning_curves(progress: &LearningCurves, measure: &str, labels: &CurveL
             "<polyline points=\"{points}\" class=\"person\" stroke-opacity=\"{faint:.2}\"><title>{name}</title></polyline>"
         );
     }
-    let means: Vec<String> =
-        progress.by_attempt.iter().enumerate().map(|(n, s)| format!("{:.1},{:.1}", x(n), y(s.mean))).collect();
-    let _ = write!(svg, "<polyline points=\"{}\" class=\"mean line\" stroke-width=\"3\"/>", means.join(" "));
-    for (n, spread) in progress.by_attempt.iter().enumerate() {
-        let (at, mean) = (x(n), y(spread.mean));
+}
+
+fn draw_means(svg: &mut String, progress: &LearningCurves, scale: &CurveScale) {
+    let means = progress.by_attempt.iter().enumerate();
+    let points: Vec<String> = means.clone().map(|(n, s)| format!("{:.1},{:.1}", scale.x(n), scale.y(s.mean))).collect();
+    let _ = write!(svg, "<polyline points=\"{}\" class=\"mean line\" stroke-width=\"3\"/>", points.join(" "));
+    for (n, spread) in means {
+        let (at, mean) = (scale.x(n), scale.y(spread.mean));
         if let Some([low, high]) = spread.mean_interval {
             let _ = write!(
                 svg,
                 "<line x1=\"{at:.1}\" x2=\"{at:.1}\" y1=\"{:.1}\" y2=\"{:.1}\" class=\"mean\" stroke-width=\"1.5\"/>",
-                y(low),
-                y(high)
+                scale.y(low),
+                scale.y(high)
             );
         }
         let _ = write!(svg, "<circle cx=\"{at:.1}\" cy=\"{mean:.1}\" r=\"4\" class=\"mean\"/>");
     }
-    svg + "</svg>"
+}
+
+/// Beginning of a drawing: its class, its size and its description.
+fn open_svg(class: &str, (width, height): (f64, f64), alt: &str) -> String {
+    let alt = escape(alt);
+    format!("<svg class=\"{class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{alt}\">")
+}
+
+/// A number or a title beside an axis. The text is escaped already.
+fn draw_label(svg: &mut String, (x, y): (f64, f64), anchor: &str, text: impl Display) {
+    let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" class=\"soft\">{text}</text>");
 }
 
 fn escape(text: &str) -> String {

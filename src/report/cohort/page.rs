@@ -5,6 +5,7 @@ use super::charts::{CurveLabels, HistogramLabels};
 use super::loader::read_session;
 use super::measurement_error::{DoubtfulResult, MeasurementErrorFile};
 use super::pass_mark::PassMarkEstimate;
+use super::progress::LearningCurves;
 use super::questionnaire::{QuestionnaireStatement, QuestionnaireSummary};
 use super::ranges::FLAGS;
 use super::summary::{CohortSummary, ScenarioSummary, SpreadFile, summary_lines};
@@ -271,8 +272,50 @@ fn scenario(
     summary: &ScenarioSummary,
     links: &[String],
 ) -> Result<ScenarioPart, String> {
-    let columns: Vec<&str> = SESSION_MEASURES.into_iter().filter(|name| summary.metrics.contains_key(*name)).collect();
     let own = cohort.sessions_of(&summary.group);
+    let (columns, rows) = session_table(translator, cohort, summary, &own, links);
+    let own_removals: Vec<&RemovalMap> = cohort.removals.iter().filter(|r| r.group == summary.group).collect();
+    Ok(ScenarioPart {
+        title: sanitize(&summary.title),
+        conditions: summary.conditions.as_ref().map_or(String::new(), |message| translator.translate(message)),
+        histogram: histogram(translator, cohort, &own, None),
+        sessions: summary.sessions,
+        participants: summary.participants,
+        passed: summary.passed,
+        graded: summary.graded,
+        passed_interval: summary
+            .passed_interval
+            .map_or(String::new(), |i| interval(translator, &i.map(|v| 100.0 * v), |v| format!("{v:.0} %"))),
+        points_mean: summary.points_mean.map_or("–".into(), display_format::number),
+        words: summary_lines(summary, translator),
+        cautions: summary.cautions.iter().map(|caution| translator.translate(caution)).collect(),
+        columns,
+        rows,
+        metrics: spread_lines(translator, cohort, summary, &own),
+        progress: summary.progress.iter().map(|(name, curves)| progress(translator, name, curves)).collect(),
+        repeated: summary.repeated.iter().map(|(name, r)| repeated(translator, name, r)).collect(),
+        standard: summary.standard.as_ref().map(|s| standard(translator, s)),
+        agreement: summary.agreement.iter().map(|a| agreement(translator, a)).collect(),
+        measurement_error: summary.measurement_error.as_ref().map(|e| measurement_error(translator, e)),
+        more_maps: own_removals.len().saturating_sub(MAPS_MAX),
+        maps: own_removals
+            .into_iter()
+            .take(MAPS_MAX)
+            .zip(&summary.removals)
+            .map(|(r, s)| map_part(translator, r, s))
+            .collect(),
+    })
+}
+
+/// Table of an exercise's sessions: the titles of the columns that not every exercise has, and a row for each session.
+fn session_table(
+    translator: Translator,
+    cohort: &Cohort,
+    summary: &ScenarioSummary,
+    own: &[usize],
+    links: &[String],
+) -> (Vec<String>, Vec<CohortSessionRow>) {
+    let columns: Vec<&str> = SESSION_MEASURES.into_iter().filter(|name| summary.metrics.contains_key(*name)).collect();
     let distances = own.iter().any(|&i| cohort.distance_to_experts(i).is_some());
     let mut titles: Vec<String> = columns.iter().map(|c| measure_title(translator, c)).collect();
     if distances {
@@ -289,6 +332,11 @@ fn scenario(
         }
         row
     });
+    (titles, rows.collect())
+}
+
+/// Distributions of the points and of the measures of an exercise.
+fn spread_lines(translator: Translator, cohort: &Cohort, summary: &ScenarioSummary, own: &[usize]) -> Vec<SpreadLine> {
     let values =
         |name: &str| own.iter().filter_map(|&i| points_or_measure(&cohort.sessions[i].1, name)).collect::<Vec<f64>>();
     let with_experts =
@@ -310,46 +358,18 @@ fn scenario(
         let line = spread_line(translator, title, spread, to_text, &values(name));
         Some(with_experts(line, name, &to_text))
     };
-    let progress = summary.progress.iter().map(|(name, progress)| {
-        let title = measure_title(translator, name);
-        let labels = CurveLabels {
-            alt: translator.text("cohort.curves_alt", &[("title", title.clone())]),
-            attempt: translator.text("cohort.attempt", &[]),
-        };
-        let svg = charts::learning_curves(progress, name, &labels);
-        (title, svg)
-    });
-    let own_removals: Vec<&RemovalMap> = cohort.removals.iter().filter(|r| r.group == summary.group).collect();
-    Ok(ScenarioPart {
-        title: sanitize(&summary.title),
-        conditions: summary.conditions.as_ref().map_or(String::new(), |message| translator.translate(message)),
-        histogram: histogram(translator, cohort, &own, None),
-        sessions: summary.sessions,
-        participants: summary.participants,
-        passed: summary.passed,
-        graded: summary.graded,
-        passed_interval: summary
-            .passed_interval
-            .map_or(String::new(), |i| interval(translator, &i.map(|v| 100.0 * v), |v| format!("{v:.0} %"))),
-        points_mean: summary.points_mean.map_or("–".into(), display_format::number),
-        words: summary_lines(summary, translator),
-        cautions: summary.cautions.iter().map(|caution| translator.translate(caution)).collect(),
-        columns: titles,
-        rows: rows.collect(),
-        metrics: points.chain(cohort.metric_names().iter().filter_map(metric)).collect(),
-        progress: progress.collect(),
-        repeated: summary.repeated.iter().map(|(name, r)| repeated(translator, name, r)).collect(),
-        standard: summary.standard.as_ref().map(|s| standard(translator, s)),
-        agreement: summary.agreement.iter().map(|a| agreement(translator, a)).collect(),
-        measurement_error: summary.measurement_error.as_ref().map(|e| measurement_error(translator, e)),
-        more_maps: own_removals.len().saturating_sub(MAPS_MAX),
-        maps: own_removals
-            .into_iter()
-            .take(MAPS_MAX)
-            .zip(&summary.removals)
-            .map(|(r, s)| map_part(translator, r, s))
-            .collect(),
-    })
+    points.chain(cohort.metric_names().iter().filter_map(metric)).collect()
+}
+
+/// Title of a measure, and the drawing of its learning curves.
+fn progress(translator: Translator, name: &str, curves: &LearningCurves) -> (String, String) {
+    let title = measure_title(translator, name);
+    let labels = CurveLabels {
+        alt: translator.text("cohort.curves_alt", &[("title", title.clone())]),
+        attempt: translator.text("cohort.attempt", &[]),
+    };
+    let svg = charts::learning_curves(curves, name, &labels);
+    (title, svg)
 }
 
 /// Drawing of the points of sessions, with the pass mark if it is the same for all, and with one session's own points.

@@ -46,6 +46,10 @@ fn cut_off(at: usize) -> ScanError {
     wrong(format!("byte {at}: the file ends within an element"), "copy or export the file again")
 }
 
+/// First group of a data set; a directory file (DICOMDIR) has one of its own before it.
+const FIRST_GROUP: u32 = 8;
+const DIRECTORY_GROUP: u32 = 4;
+
 impl<'a> DicomElements<'a> {
     /// Reads the data elements of a DICOM file.
     ///
@@ -62,18 +66,29 @@ impl<'a> DicomElements<'a> {
         if bytes.get(128..132) == Some(b"DICM") {
             reader.at = 132;
         }
-        // The file meta group, which declares the transfer syntax of the rest, is itself always explicit VR little
-        // endian.
+        elements.read_meta_group(&mut reader)?;
+        elements.read_data_set(&mut reader)?;
+        match elements.values.len() {
+            0 => Err(wrong("the file contains no elements", "give a DICOM slice")),
+            _ => Ok(elements),
+        }
+    }
+
+    /// Reads the file meta group, if there is one, and prepares the reader for the data set that follows.
+    fn read_meta_group(&mut self, reader: &mut ElementReader<'a>) -> Result<(), ScanError> {
+        // The group, which declares the transfer syntax of the rest, is itself always explicit VR little endian.
         while reader.bytes.get(reader.at..reader.at + 2) == Some(&[2, 0]) {
             let (tag, length, _) = reader.element_header()?;
             let value = reader.take(length)?;
-            elements.values.insert(tag, value);
+            self.values.insert(tag, value);
         }
-        let syntax = elements.text(SYNTAX).unwrap_or_default();
+        let syntax = self.text(SYNTAX).unwrap_or_default();
         reader.is_explicit = match syntax.as_str() {
             // Files without a preamble, as in old archives: explicit when the two letters of a value representation
             // follow the tag.
-            "" => bytes.get(reader.at + 4..reader.at + 6).is_some_and(|vr| vr.iter().all(u8::is_ascii_uppercase)),
+            "" => {
+                reader.bytes.get(reader.at + 4..reader.at + 6).is_some_and(|vr| vr.iter().all(u8::is_ascii_uppercase))
+            }
             IMPLICIT => false,
             DEFLATED => {
                 return Err(wrong(
@@ -84,22 +99,28 @@ impl<'a> DicomElements<'a> {
             _ => true,
         };
         reader.is_big_endian = syntax == BIG;
-        elements.is_big_endian = reader.is_big_endian;
+        self.is_big_endian = reader.is_big_endian;
         let implied = if reader.is_explicit { EXPLICIT } else { IMPLICIT };
-        elements.syntax = if syntax.is_empty() { implied.to_string() } else { syntax };
+        self.syntax = if syntax.is_empty() { implied.to_string() } else { syntax };
+        Ok(())
+    }
+
+    /// Reads the elements of the data set, up to and including the pixels.
+    fn read_data_set(&mut self, reader: &mut ElementReader<'a>) -> Result<(), ScanError> {
         let mut last = 0;
-        while reader.at < bytes.len() {
+        while reader.at < reader.bytes.len() {
             let start = reader.at;
             let (tag, length, vr) = reader.element_header()?;
             // Elements are in ascending order; a violation means that the file is not DICOM or that the reader has
             // lost its position.
-            if tag <= last || tag >> 16 < 8 {
+            let group = tag >> 16;
+            if tag <= last || (group < FIRST_GROUP && group != DIRECTORY_GROUP) {
                 let what = format!("byte {start}: element {tag:08x} follows {last:08x}");
                 return Err(wrong(what, "copy or export the file again: its elements are out of order"));
             }
             last = tag;
             if tag == PIXELS && length == UNDEFINED_LENGTH {
-                elements.fragments = reader.fragments()?;
+                self.fragments = reader.fragments()?;
                 break;
             }
             match length {
@@ -112,17 +133,14 @@ impl<'a> DicomElements<'a> {
                 }
                 length => {
                     let value = reader.take(length)?;
-                    elements.values.insert(tag, value);
+                    self.values.insert(tag, value);
                 }
             }
             if tag == PIXELS {
                 break;
             }
         }
-        match elements.values.len() {
-            0 => Err(wrong("the file contains no elements", "give a DICOM slice")),
-            _ => Ok(elements),
-        }
+        Ok(())
     }
 
     pub fn bytes(&self, tag: Tag) -> Option<&'a [u8]> {
@@ -274,5 +292,29 @@ impl<'a> ElementReader<'a> {
             0 | 1 => Err(wrong("the file contains no pixel data", "copy or export the file again")),
             _ => Ok(fragments.split_off(1)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An element with explicit value representation, little endian.
+    fn element(tag: Tag, representation: &[u8; 2], value: &[u8]) -> Vec<u8> {
+        let [group, number] = [(tag >> 16) as u16, tag as u16].map(u16::to_le_bytes);
+        let length = (value.len() as u16).to_le_bytes();
+        [&group[..], &number, representation, &length, value].concat()
+    }
+
+    #[test]
+    fn a_directory_file_is_read_and_a_lost_position_is_noticed() {
+        // Aim: a hospital's disc holds a DICOMDIR beside its slices, whose elements are of group 4. Method: such a file; and
+        // the same with an element of a group that no data set has.
+        let file = |tag: Tag| {
+            let syntax = element(SYNTAX, b"UI", b"1.2.840.10008.1.2.1\0");
+            [&[0; 128][..], b"DICM", &syntax, &element(tag, b"CS", b"SERIES")].concat()
+        };
+        assert_eq!(DicomElements::read(&file(0x0004_1130)).unwrap().text(0x0004_1130).as_deref(), Some("SERIES"));
+        assert!(DicomElements::read(&file(0x0006_0010)).is_err());
     }
 }
