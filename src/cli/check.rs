@@ -5,11 +5,12 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use typodont_core::parallel::par_map;
 use typodont_exercise::scenario::ResolveMode;
 use typodont_exercise::scenario::file::ScenarioFile;
 use typodont_formats::diagnostic::{Diagnostic, SourceText};
 use typodont_formats::json;
-use typodont_lesson::{self as lesson, ExerciseWarning, scenario_files};
+use typodont_lesson::{self as lesson, ExerciseWarning, LessonError, scenario_files};
 
 #[derive(Args)]
 pub struct Arguments {
@@ -41,19 +42,36 @@ struct ComplaintFile<'a> {
     help: Option<&'a str>,
 }
 
+/// Number of files that are checked at the same time: each makes its teeth, some hundred megabytes.
+const PARALLEL_FILES: usize = 4;
+
 pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let mut found = Vec::new();
     let mut warnings = Vec::new();
-    let mut checked = 0;
+    let mut files = Vec::new();
     for path in &arguments.files {
-        let files = scenario_files(path)?;
-        checked += files.len();
-        for file in files {
-            let is_station = file.extension().is_some_and(|extension| extension == "toml");
-            match if is_station { station::check(&file) } else { check(&file) } {
-                Ok(unfair) => warnings.extend(unfair),
-                Err(complaints) => found.extend(complaints),
+        match scenario_files(path) {
+            Ok(own) => files.extend(own),
+            // The other files are checked all the same.
+            Err(LessonError::NoScenarios { folder, why }) => {
+                let (code, message) = match why {
+                    Some(error) => ("unreadable-folder", error.to_string()),
+                    None => ("no-scenarios", "the folder contains no scenario (*.json)".to_string()),
+                };
+                found.push(Diagnostic::about_file(&folder.display().to_string(), code, message, None));
             }
+            Err(error) => return Err(error.into()),
+        }
+    }
+    let check_file = |file: &PathBuf| {
+        let is_station = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+        if is_station { station::check(file) } else { check(file) }
+    };
+    let results = files.chunks(PARALLEL_FILES).flat_map(|some| par_map(some.len(), |index| check_file(&some[index])));
+    for result in results {
+        match result {
+            Ok(unfair) => warnings.extend(unfair),
+            Err(complaints) => found.extend(complaints),
         }
     }
     if arguments.format == Format::Text {
@@ -66,7 +84,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
                 1 => "no errors, 1 warning".to_string(),
                 count => format!("no errors, {count} warnings"),
             };
-            print_line(format!("{checked} files checked, {result}"))?;
+            print_line(format!("{} files checked, {result}", files.len()))?;
         }
         Format::Text => return Err(CliError::Complaints(found)),
         Format::Json => print_line(to_json(&found, &warnings))?,

@@ -31,10 +31,11 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
     if !path.is_dir() {
         return Ok(vec![path.to_path_buf()]);
     }
-    let wrong = |why: String| LessonError::NoScenarios { folder: path.to_path_buf(), why };
-    let entries = std::fs::read_dir(path).map_err(|e| wrong(format!("unreadable-folder: {e}")))?;
+    let wrong = |why| LessonError::NoScenarios { folder: path.to_path_buf(), why };
+    let entries = std::fs::read_dir(path).map_err(|error| wrong(Some(error)))?;
     let is_scenario = |p: &PathBuf| {
-        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        // Also of a name that is not UTF-8: a file that is passed over counts as a file without faults.
+        let name = p.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
         name.ends_with(".json") && !name.ends_with(".schema.json")
     };
     // With one kind of separator, also on Windows.
@@ -42,7 +43,7 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
     let mut files: Vec<PathBuf> = paths.filter(is_scenario).collect();
     files.sort_by_cached_key(|path| natural_key(path));
     match files.is_empty() {
-        true => Err(wrong("no-scenarios: the folder contains no scenario (*.json)".to_string())),
+        true => Err(wrong(None)),
         false => Ok(files),
     }
 }

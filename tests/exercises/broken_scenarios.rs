@@ -643,3 +643,41 @@ fn a_complaint_reads_like_this() {
         )
     );
 }
+
+#[test]
+fn a_folder_is_checked_as_its_files_are_one_by_one() {
+    // Aim: files are checked at the same time, and the answer is that of one after the other. Method: a folder with files
+    // of every kind, against each file alone; beside it a folder without exercises, which hides nothing.
+    let folder = crate::support::folder::folder("checked_folder");
+    let good = shipped("6-guided-tracing.json").replace("\"$schema\": \"scenario.schema.json\",", "");
+    fs::copy(
+        PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("scenarios/6-guided-tracing.csv"),
+        folder.join("6-guided-tracing.csv"),
+    )
+    .unwrap();
+    let names = ["1-good.json", "2-cut.json", "3-typo.json", "4-good.json", "5-cut.JSON", "10-typo.json"];
+    for name in names {
+        let text = match name.split(['-', '.']).nth(1) {
+            Some("cut") => good[..good.len() / 2].to_string(),
+            Some("typo") => good.replace("\"stages\"", "\"stagse\""),
+            _ => good.clone(),
+        };
+        fs::write(folder.join(name), text).unwrap();
+    }
+    let check = |paths: &[PathBuf]| {
+        let paths: Vec<&str> = paths.iter().map(|path| path.to_str().unwrap()).collect();
+        let output = crate::support::bundle::typodont(&[&["check", "--format", "json"], &paths[..]].concat());
+        let found: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+        (output.status.code(), found)
+    };
+    let (status, together) = check(std::slice::from_ref(&folder));
+    let alone: Vec<Value> = names.iter().flat_map(|name| check(&[folder.join(name)]).1).collect();
+    assert_eq!(status, Some(1));
+    assert!(alone.len() >= 4, "{alone:?}");
+    assert_eq!(together, alone, "natural order, and no file left out");
+    let empty = crate::support::folder::folder("checked_empty_folder");
+    let (status, found) = check(&[folder, empty]);
+    assert_eq!(status, Some(1));
+    assert_eq!(found.len(), alone.len() + 1);
+    assert!(found.iter().any(|complaint| complaint["code"] == "no-scenarios"), "{found:?}");
+}
