@@ -73,6 +73,9 @@ function fell(voxel) {
   await photograph('report-top.png');
   await page.evaluate(() => document.getElementById('explore').scrollIntoView());
 
+  // A hostile page is loaded, moved, translated and printed; what it shows is judged on the plain one.
+  let shown = 0, clicked = 0, fallen = 0, compared = 0;
+
   // The time slider changes every picture.
   const ids = ['solid', 'cut-0', 'cut-1', 'cut-2'];
   const seen = {};
@@ -98,70 +101,79 @@ function fell(voxel) {
     if (number === 1) await photograph('report-mark.png');
   }
 
-  // What a sentence shows is seen: its place lies in the picture, nothing of the tooth at that moment lies before it, and a ring
-  // is drawn around it. Regression: the tooth was turned by a rule that did not ask what covers the place.
-  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  let shown = 0;
-  for (const { number, at, place } of moments) {
-    await settled(() => page.locator(`.feedback .show[data-mark="${number}"]`).first().click());
-    const view = JSON.parse(await page.evaluate(() => document.getElementById('solid').dataset.view));
-    const { right, up, half, clips, ratio, middle } = view;
-    const back = [right[1] * up[2] - right[2] * up[1], right[2] * up[0] - right[0] * up[2], right[0] * up[1] - right[1] * up[0]];
-    const from = place.map((v, axis) => v - middle[axis]);
-    const [x, y] = [dot(from, right) / (half * ratio), dot(from, up) / half];
-    claim(Math.max(Math.abs(x), Math.abs(y)) < 0.8, `the place of mark ${number} lies at ${x}, ${y} of the picture`);
-    let covered = 0;
-    for (let mm = 0.5; mm < 30; mm += 0.03) {
-      const point = place.map((v, axis) => v + mm * back[axis]);
-      if (clips.some((clip, axis) => clip !== null && Math.sign(back[axis]) * (point[axis] - clip) > 1e-3)) continue;
-      const cell = point.map((v, axis) => Math.round((v - tissues.origin[axis]) / tissues.spacing[axis]));
-      if (!cell.every((v, axis) => v >= 0 && v < tissues.sizes[axis])) continue;
-      if (tissues.at(cell) !== 0 && !(fell(cell) <= (at ?? Infinity) + 5e-4)) covered += 0.03;
+  if (!hostile) {
+    // What a sentence shows is seen: its place lies in the picture, nothing of the tooth at that moment lies before it, and a ring
+    // is drawn around it. Regression: the tooth was turned by a rule that did not ask what covers the place.
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    for (const { number, at, place } of moments) {
+      await settled(() => page.locator(`.feedback .show[data-mark="${number}"]`).first().click());
+      const view = JSON.parse(await page.evaluate(() => document.getElementById('solid').dataset.view));
+      const { right, up, half, clips, ratio, middle } = view;
+      const back = [right[1] * up[2] - right[2] * up[1], right[2] * up[0] - right[0] * up[2], right[0] * up[1] - right[1] * up[0]];
+      const from = place.map((v, axis) => v - middle[axis]);
+      const [x, y] = [dot(from, right) / (half * ratio), dot(from, up) / half];
+      claim(Math.max(Math.abs(x), Math.abs(y)) < 0.8, `the place of mark ${number} lies at ${x}, ${y} of the picture`);
+      let covered = 0;
+      for (let mm = 0.5; mm < 30; mm += 0.03) {
+        const point = place.map((v, axis) => v + mm * back[axis]);
+        if (clips.some((clip, axis) => clip !== null && Math.sign(back[axis]) * (point[axis] - clip) > 1e-3)) continue;
+        const cell = point.map((v, axis) => Math.round((v - tissues.origin[axis]) / tissues.spacing[axis]));
+        if (!cell.every((v, axis) => v >= 0 && v < tissues.sizes[axis])) continue;
+        if (tissues.at(cell) !== 0 && !(fell(cell) <= (at ?? Infinity) + 5e-4)) covered += 0.03;
+      }
+      // A voxel that is less than half full has a tissue and is not drawn: one of them may lie in the line of sight.
+      claim(covered < 1.5 * Math.min(...tissues.spacing), `${covered.toFixed(2)} mm of the tooth cover the place of mark ${number}`);
+      const black = await page.evaluate(([x, y, radius]) => {
+        const canvas = document.getElementById('solid'), copy = document.createElement('canvas');
+        [copy.width, copy.height] = [canvas.width, canvas.height];
+        const context = copy.getContext('2d');
+        context.drawImage(canvas, 0, 0);
+        const middle = [(x + 1) / 2 * canvas.width, (1 - y) / 2 * canvas.height], pixels = radius * canvas.height / 2;
+        const isBlack = (u, v) => {
+          const [r, g, b, a] = context.getImageData(Math.floor(u), Math.floor(v), 1, 1).data;
+          return r + g + b === 0 && a === 255;
+        };
+        return Array.from({ length: 36 }, (_, i) => 2 * Math.PI * i / 36)
+          .filter(angle => [-1, 0, 1].some(off => isBlack(middle[0] + (pixels + off) * Math.cos(angle), middle[1] + (pixels + off) * Math.sin(angle)))).length;
+      }, [x, y, 0.35 / half]);
+      claim(black >= 24, `${black} of 36 parts of the ring around mark ${number} are seen`);
+      shown++;
     }
-    // A voxel that is less than half full has a tissue and is not drawn: one of them may lie in the line of sight.
-    claim(covered < 1.5 * Math.min(...tissues.spacing), `${covered.toFixed(2)} mm of the tooth cover the place of mark ${number}`);
-    const black = await page.evaluate(([x, y, radius]) => {
-      const canvas = document.getElementById('solid'), copy = document.createElement('canvas');
-      [copy.width, copy.height] = [canvas.width, canvas.height];
-      const context = copy.getContext('2d');
-      context.drawImage(canvas, 0, 0);
-      const middle = [(x + 1) / 2 * canvas.width, (1 - y) / 2 * canvas.height], pixels = radius * canvas.height / 2;
-      const isBlack = (u, v) => {
-        const [r, g, b, a] = context.getImageData(Math.floor(u), Math.floor(v), 1, 1).data;
-        return r + g + b === 0 && a === 255;
-      };
-      return Array.from({ length: 36 }, (_, i) => 2 * Math.PI * i / 36)
-        .filter(angle => [-1, 0, 1].some(off => isBlack(middle[0] + (pixels + off) * Math.cos(angle), middle[1] + (pixels + off) * Math.sin(angle)))).length;
-    }, [x, y, 0.35 / half]);
-    claim(black >= 24, `${black} of 36 parts of the ring around mark ${number} are seen`);
-    shown++;
-  }
-  claim(shown > 3, `${shown} places were shown`);
+    claim(shown > 3, `${shown} places were shown`);
 
-  // A voxel that is clicked says what the bundle's label maps say.
-  await slide(1);
-  await page.locator('[data-side="work"]').click();
-  let clicked = 0, fallen = 0;
-  for (const id of ids) {
-    const box = await page.locator(`#${id}`).boundingBox();
-    for (const [x, y] of [[0.5, 0.5], [0.42, 0.45], [0.55, 0.6], [0.3, 0.5], [0.62, 0.38], [0.5, 0.7]]) {
-      const before = await told();
-      await page.locator(`#${id}`).click({ position: { x: x * box.width, y: y * box.height } });
-      const { voxel, tissue, verdict, seconds, text } = await told();
-      if (text === before.text) continue;
-      clicked++;
-      const cell = voxel.split(' ').map(Number), time = fell(cell);
-      claim(Number(tissue) === tissues.at(cell), `voxel ${voxel}: tissue ${tissue}, the label map has ${tissues.at(cell)}`);
-      claim(Number(verdict) === verdicts.at(cell), `voxel ${voxel}: verdict ${verdict}, the map has ${verdicts.at(cell)}`);
-      if (Number.isNaN(time)) claim(seconds === '', `voxel ${voxel}: fell at ${seconds}, the map says never`);
-      else {
-        fallen++;
-        claim(Math.abs(Number(seconds) - time) < 5e-4, `voxel ${voxel}: fell at ${seconds}, the map says ${time}`);
-        claim(text.includes(`(${time.toFixed(3)} s)`), `voxel ${voxel}: told is ${text}`);
+    // A voxel that is clicked says what the bundle's label maps say.
+    await slide(1);
+    await page.locator('[data-side="work"]').click();
+    for (const id of ids) {
+      const box = await page.locator(`#${id}`).boundingBox();
+      for (const [x, y] of [[0.5, 0.5], [0.42, 0.45], [0.55, 0.6], [0.3, 0.5], [0.62, 0.38], [0.5, 0.7]]) {
+        const before = await told();
+        await page.locator(`#${id}`).click({ position: { x: x * box.width, y: y * box.height } });
+        const { voxel, tissue, verdict, seconds, text } = await told();
+        if (text === before.text) continue;
+        clicked++;
+        const cell = voxel.split(' ').map(Number), time = fell(cell);
+        claim(Number(tissue) === tissues.at(cell), `voxel ${voxel}: tissue ${tissue}, the label map has ${tissues.at(cell)}`);
+        claim(Number(verdict) === verdicts.at(cell), `voxel ${voxel}: verdict ${verdict}, the map has ${verdicts.at(cell)}`);
+        if (Number.isNaN(time)) claim(seconds === '', `voxel ${voxel}: fell at ${seconds}, the map says never`);
+        else {
+          fallen++;
+          claim(Math.abs(Number(seconds) - time) < 5e-4, `voxel ${voxel}: fell at ${seconds}, the map says ${time}`);
+          claim(text.includes(`(${time.toFixed(3)} s)`), `voxel ${voxel}: told is ${text}`);
+        }
       }
     }
+    claim(clicked >= 10 && fallen >= 3, `${clicked} voxels were told, ${fallen} of them fallen`);
   }
-  claim(clicked >= 10 && fallen >= 3, `${clicked} voxels were told, ${fallen} of them fallen`);
+
+  // What a click tells is shown as text, too.
+  if (hostile) {
+    await settled(() => page.locator('.feedback .show').first().click());
+    await slide(1);
+    const box = await page.locator('#cut-0').boundingBox();
+    await page.locator('#cut-0').click({ position: { x: 0.5 * box.width, y: 0.5 * box.height } });
+    claim((await told()).text.length > 0, 'a click on a voxel tells nothing');
+  }
 
   // All of it by keyboard: the tooth turns, the time moves.
   const before = await picture('solid');
@@ -175,23 +187,25 @@ function fell(voxel) {
   await settled(() => page.locator('[data-side="work"]').click());
   await photograph('report-clipped.png');
 
-  // An adapter that is lost and comes back shows the same picture. Regression: colours by verdict and hatching came back on.
-  // A slow adapter draws fewer pixels, by the time it took: with that time held, every picture has all of them.
-  await page.evaluate(() => { performance.now = () => 0; });
-  for (const share of [0.9, 1]) await slide(share);
-  for (const choice of ['tissue', 'verdict']) {
-    await settled(() => page.locator(`[name="colours"][value="${choice}"]`).check());
-    const shown = await picture('solid');
-    await page.evaluate(() => { window.lost = document.getElementById('solid').getContext('webgl2').getExtension('WEBGL_lose_context'); });
-    await page.evaluate(() => new Promise(done => {
-      document.getElementById('solid').addEventListener('webglcontextlost', done, { once: true });
-      window.lost.loseContext();
-    }));
-    await settled(() => page.evaluate(() => new Promise(done => {
-      document.getElementById('solid').addEventListener('webglcontextrestored', done, { once: true });
-      window.lost.restoreContext();
-    })));
-    claim(await picture('solid') === shown, `coloured by ${choice}, another picture comes back with the adapter`);
+  if (!hostile) {
+    // An adapter that is lost and comes back shows the same picture. Regression: colours by verdict and hatching came back on.
+    // A slow adapter draws fewer pixels, by the time it took: with that time held, every picture has all of them.
+    await page.evaluate(() => { performance.now = () => 0; });
+    for (const share of [0.9, 1]) await slide(share);
+    for (const choice of ['tissue', 'verdict']) {
+      await settled(() => page.locator(`[name="colours"][value="${choice}"]`).check());
+      const shown = await picture('solid');
+      await page.evaluate(() => { window.lost = document.getElementById('solid').getContext('webgl2').getExtension('WEBGL_lose_context'); });
+      await page.evaluate(() => new Promise(done => {
+        document.getElementById('solid').addEventListener('webglcontextlost', done, { once: true });
+        window.lost.loseContext();
+      }));
+      await settled(() => page.evaluate(() => new Promise(done => {
+        document.getElementById('solid').addEventListener('webglcontextrestored', done, { once: true });
+        window.lost.restoreContext();
+      })));
+      claim(await picture('solid') === shown, `coloured by ${choice}, another picture comes back with the adapter`);
+    }
   }
 
   // Whoever cannot see it is told names; nothing is a bare button.
@@ -212,43 +226,44 @@ function fell(voxel) {
   claim(!isLeft && english !== turkish && turkish.includes('Puanlar nasıl verildi'), 'the page does not change its language');
   await page.evaluate(() => window.scrollTo(0, 0));
   await photograph('report-turkish.png');
-
-  // The signed distance from the ideal cavity, by its definition: what was to be removed is the ideal cavity; of a place within
-  // it the distance to the nearest tissue that should stay, of another the distance to the ideal cavity, each to the border
-  // halfway between two voxels.
   await page.locator('[data-language="en"]').click();
-  const isIdeal = cell => [2, 5].includes(verdicts.at(cell));
-  const deviation = cell => {
-    const reach = 14, within = isIdeal(cell), own = Math.min(...tissues.spacing);
-    let least = Infinity;
-    for (let k = -reach; k <= reach; k++) for (let j = -reach; j <= reach; j++) for (let i = -reach; i <= reach; i++) {
-      const other = [cell[0] + i, cell[1] + j, cell[2] + k];
-      if (!other.every((v, axis) => v >= 0 && v < tissues.sizes[axis])) continue;
-      if (within ? isIdeal(other) || tissues.at(other) === 0 : !isIdeal(other)) continue;
-      least = Math.min(least, Math.hypot(i * tissues.spacing[0], j * tissues.spacing[1], k * tissues.spacing[2]));
+
+  if (!hostile) {
+    // The signed distance from the ideal cavity, by its definition: what was to be removed is the ideal cavity; of a place within
+    // it the distance to the nearest tissue that should stay, of another the distance to the ideal cavity, each to the border
+    // halfway between two voxels.
+    const isIdeal = cell => [2, 5].includes(verdicts.at(cell));
+    const deviation = cell => {
+      const reach = 14, within = isIdeal(cell), own = Math.min(...tissues.spacing);
+      let least = Infinity;
+      for (let k = -reach; k <= reach; k++) for (let j = -reach; j <= reach; j++) for (let i = -reach; i <= reach; i++) {
+        const other = [cell[0] + i, cell[1] + j, cell[2] + k];
+        if (!other.every((v, axis) => v >= 0 && v < tissues.sizes[axis])) continue;
+        if (within ? isIdeal(other) || tissues.at(other) === 0 : !isIdeal(other)) continue;
+        least = Math.min(least, Math.hypot(i * tissues.spacing[0], j * tissues.spacing[1], k * tissues.spacing[2]));
+      }
+      return { mm: within ? 0.5 * own - least : least - 0.5 * own, isNear: least < reach * own };
+    };
+    // The whole tooth from the working side: the sections that clip it were moved by what was clicked.
+    for (const number of [0, 1]) await page.locator(`[data-clip="${number}"]`).uncheck();
+    await settled(() => page.locator('[data-side="work"]').click());
+    await settled(() => page.locator('[name="colours"][value="deviation"]').check());
+    await photograph('report-deviation.png');
+    for (const id of ids) {
+      const box = await page.locator(`#${id}`).boundingBox();
+      for (const [x, y] of [[0.5, 0.5], [0.45, 0.55], [0.55, 0.45], [0.4, 0.5], [0.6, 0.55]]) {
+        await page.locator(`#${id}`).click({ position: { x: x * box.width, y: y * box.height } });
+        const shown = await told();
+        if (!shown.deviation) continue;
+        const expected = deviation(shown.voxel.split(' ').map(Number));
+        if (!expected.isNear) continue;
+        compared++;
+        claim(Math.abs(Number(shown.deviation) - expected.mm) < 0.002, `voxel ${shown.voxel}: deviation ${shown.deviation}, by its definition ${expected.mm}`);
+        claim(/beyond the ideal cavity|short of the ideal cavity/.test(shown.text), `voxel ${shown.voxel}: told is ${shown.text}`);
+      }
     }
-    return { mm: within ? 0.5 * own - least : least - 0.5 * own, isNear: least < reach * own };
-  };
-  // The whole tooth from the working side: the sections that clip it were moved by what was clicked.
-  for (const number of [0, 1]) await page.locator(`[data-clip="${number}"]`).uncheck();
-  await settled(() => page.locator('[data-side="work"]').click());
-  await settled(() => page.locator('[name="colours"][value="deviation"]').check());
-  await photograph('report-deviation.png');
-  let compared = 0;
-  for (const id of ids) {
-    const box = await page.locator(`#${id}`).boundingBox();
-    for (const [x, y] of [[0.5, 0.5], [0.45, 0.55], [0.55, 0.45], [0.4, 0.5], [0.6, 0.55]]) {
-      await page.locator(`#${id}`).click({ position: { x: x * box.width, y: y * box.height } });
-      const shown = await told();
-      if (!shown.deviation) continue;
-      const expected = deviation(shown.voxel.split(' ').map(Number));
-      if (!expected.isNear) continue;
-      compared++;
-      claim(Math.abs(Number(shown.deviation) - expected.mm) < 0.002, `voxel ${shown.voxel}: deviation ${shown.deviation}, by its definition ${expected.mm}`);
-      claim(/beyond the ideal cavity|short of the ideal cavity/.test(shown.text), `voxel ${shown.voxel}: told is ${shown.text}`);
-    }
+    claim(compared >= 5, `${compared} deviations were compared`);
   }
-  claim(compared >= 5, `${compared} deviations were compared`);
 
   // Walls that diverge by a known angle, and by none where they are round.
   const tapers = await page.evaluate(() => {
