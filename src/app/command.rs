@@ -21,6 +21,8 @@ pub enum AppCommand {
     /// Shows the instructions of the selected exercise.
     OpenBriefing,
     OpenFolder(PathBuf),
+    /// The text of a field as it is being typed.
+    TypeText(TextField, String),
     BackToList,
     /// Begins the lesson.
     BeginLesson,
@@ -56,11 +58,36 @@ pub enum AppCommand {
     LeaveKiosk,
 }
 
+impl AppCommand {
+    /// True for what the user saw or typed in the frame itself: it comes before every other command of that frame.
+    pub fn is_of_this_frame(&self) -> bool {
+        use PracticeCommand::{RecordView, TypeAnswer};
+        matches!(
+            self,
+            AppCommand::TypeText(..)
+                | AppCommand::Editor(EditorCommand::TypePath(_))
+                | AppCommand::Practice(TypeAnswer(..) | RecordView(_))
+        )
+    }
+}
+
+/// A text field that belongs to no single lesson.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TextField {
+    Participant,
+    ExaminerCode,
+    SupervisorCode,
+    /// Further folder with exercises.
+    ExerciseFolder,
+}
+
 /// A command of the practice screen, for the running lesson and its questionnaire.
 #[derive(Clone, Debug)]
 pub enum PracticeCommand {
     SelectInstrument(usize),
     AnswerQuestion(String, AnswerValue),
+    /// The answer to a question, by its id, as it is being typed.
+    TypeAnswer(String, String),
     /// Records an entry in the periodontal chart, at the site of the instrument.
     AddToChart(ChartInput),
     /// Asks whether the stage is finished; a second time, finishes it.
@@ -91,6 +118,10 @@ pub enum PracticeCommand {
     /// Opens the mouth further by this angle, degrees; negative closes it.
     AdjustMouthOpening(f32),
     SetCamera(CameraPreset),
+    /// Passes the view to the recording: width of the image divided by its height.
+    RecordView(f32),
+    /// The picture was drawn with all edits of the volume so far.
+    PictureDrawn,
     RateStatement(String, u8),
     SelectNextStatement(i32),
     /// Submits the questionnaire; asks first if statements are not rated.

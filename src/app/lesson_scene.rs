@@ -3,8 +3,7 @@
 use crate::transfer_function_draft::{DensityHistogram, TransferFunctionDraft};
 use std::cell::OnceCell;
 use std::sync::Arc;
-use typodont_core::frame::Vec3;
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::{Edit, Label, Volume};
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::{Scenario, SceneLayout, Stage, Workpiece};
 use typodont_formats::Library;
@@ -16,14 +15,6 @@ use typodont_scene::{self as scene, ContraAngle, Mouth};
 
 /// Maximum opening angle of the mouth, degrees: 50 mm between the incisors.
 const MAX_MOUTH_OPENING: f32 = 35.0;
-
-/// Image of a section through the working end, and what it depends on.
-pub struct SectionImage {
-    pub tip: Vec3,
-    pub azimuth: f32,
-    pub edit_count: u64,
-    pub texture: eframe::egui::TextureHandle,
-}
 
 /// The drawn scene of a lesson.
 pub struct LessonScene {
@@ -48,10 +39,8 @@ pub struct LessonScene {
     pub edit_count: u64,
     /// Number of changes of the tissues' colours, the jaws and the transfer function so far.
     pub appearance_count: u64,
-    /// Last image of the section through the working end.
-    pub section: Option<SectionImage>,
-    /// True until the renderer has received the volume.
-    pub is_new: bool,
+    /// Bricks of the volume that were edited and are not drawn yet, in ascending order.
+    pub undrawn: Vec<usize>,
     histogram: OnceCell<DensityHistogram>,
     pub transfer_function: TransferFunctionDraft,
     presets: TransferFunctionPresets,
@@ -98,10 +87,28 @@ impl LessonScene {
             workpiece,
             edit_count: 0,
             appearance_count: 0,
-            section: None,
-            is_new: true,
+            undrawn: Vec::new(),
         };
         (built, complaints.iter().flatten().map(Diagnostic::headline).collect())
+    }
+
+    /// Applies an edit of the session to the window's own copy of the volume.
+    pub fn apply_edit(&mut self, edit: &Edit) {
+        if let Some(particles) = &mut self.particles {
+            particles.record_removal(edit, self.volume.grid());
+        }
+        self.volume.apply_edit(edit);
+        self.edit_count += 1;
+    }
+
+    /// Notes the bricks that were edited since the last call as not drawn yet.
+    pub fn collect_undrawn(&mut self) {
+        let edited = self.volume.take_dirty();
+        if !edited.is_empty() {
+            self.undrawn.extend(edited);
+            self.undrawn.sort_unstable();
+            self.undrawn.dedup();
+        }
     }
 
     /// Sets the colours of the tissues anew, with or without visible decay.

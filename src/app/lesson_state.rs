@@ -11,7 +11,6 @@ use crate::lesson_thread::LessonThread;
 use crate::messages::{self, PauseReason, SecondHandStatus};
 use crate::pointer_hand::{PointedPlace, PointerHand};
 use crate::snapshot::LessonSnapshot;
-use crate::view_refresh::ViewRefresh;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer, SoundSender};
@@ -39,9 +38,6 @@ pub struct LessonState {
     player: SoundPlayer,
     /// Reason why there is no sound, if there is none.
     pub audio_error: Option<String>,
-    /// Mean time between frames, s.
-    mean_frame_time: f32,
-    pub frames_per_second: f32,
     /// The workpiece and its drawn scene; `None` until it is built.
     pub scene: Option<LessonScene>,
     pub snapshot: Option<LessonSnapshot>,
@@ -68,7 +64,6 @@ pub struct LessonState {
     pub controls: ControlsProgress,
     pub is_confirming_abort: bool,
     pub orbit: Orbit,
-    pub view_refresh: ViewRefresh,
     /// View of the trainee as the recording has it; `None` until the first image.
     recorded_view: Option<TraineeView>,
     /// Source of the instruments' models.
@@ -125,8 +120,6 @@ impl LessonState {
             backend,
             player: SoundPlayer::start(sound_receiver, output),
             audio_error: None,
-            mean_frame_time: 0.0,
-            frames_per_second: 0.0,
             scene: None,
             snapshot: None,
             stage: None,
@@ -144,7 +137,6 @@ impl LessonState {
             controls: ControlsProgress::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
-            view_refresh: ViewRefresh::default(),
             recorded_view: None,
             library,
             display_mode,
@@ -207,12 +199,6 @@ impl LessonState {
     ///
     /// `volume`: share of full scale, 0 to 1; `elapsed`: time since the last frame, s.
     pub fn poll(&mut self, volume: f32, elapsed: f32) {
-        /// Number of frames over which the frame rate is smoothed.
-        const SMOOTHED_FRAMES: f32 = 8.0;
-        if self.view_refresh.is_changing() {
-            self.mean_frame_time += (elapsed - self.mean_frame_time) / SMOOTHED_FRAMES;
-        }
-        self.frames_per_second = 1.0 / self.mean_frame_time.max(1e-3);
         self.player.set_volume(volume);
         while let Some(event) = self.player.next_event() {
             self.audio_error = match event {
@@ -224,12 +210,9 @@ impl LessonState {
         if let Some(scene) = &mut self.scene {
             for _ in 0..MAX_EDITS_PER_FRAME {
                 let Some(edit) = self.client.next_edit() else { break };
-                if let Some(particles) = &mut scene.particles {
-                    particles.record_removal(&edit, scene.volume.grid());
-                }
-                scene.volume.apply_edit(&edit);
-                scene.edit_count += 1;
+                scene.apply_edit(&edit);
             }
+            scene.collect_undrawn();
         }
         self.snapshot = self.client.snapshot().or(self.snapshot);
         if let Some(seen) = &self.snapshot {

@@ -26,13 +26,13 @@ mod app;
 mod platform;
 mod state_log;
 mod i18n;
-mod view_refresh;
 mod answer_draft;
 mod results;
 mod completion;
 mod session_history;
 mod snapshot;
 mod settings;
+mod user_folder;
 mod exercise_list;
 mod kiosk;
 mod supervisor_code;
@@ -46,16 +46,17 @@ mod camera_preset;
 #[cfg(not(target_family = "wasm"))]
 pub mod readiness;
 
+pub use app::App;
 pub use editor::OpenMode;
 pub use kiosk::{KioskOptions, StationOptions};
+pub use platform::LogSink;
 pub use supervisor_code::SupervisorCode;
+pub use user_folder::UserFolder;
 
-use app::App;
 #[cfg(not(target_family = "wasm"))]
 use eframe::egui;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
 use typodont_devices::servo::SecondHandRole;
 use typodont_formats::Library;
 use typodont_formats::diagnostic::SourceText;
@@ -101,10 +102,12 @@ pub struct AppOptions {
     /// Folder in which bundles are written.
     pub out: PathBuf,
     pub templates: Templates,
-    /// Delay of every frame, for tests that the session does not wait for frames.
-    pub frame_delay: Option<Duration>,
     /// The station that this machine is, if its administrator has made it one.
     pub station: Option<StationOptions>,
+    /// Folder of the user's own files, in place of the platform's.
+    pub user_folder: Option<UserFolder>,
+    /// Receiver of the state log's lines, in place of the file that the environment names.
+    pub state_log: Option<LogSink>,
 }
 
 impl AppOptions {
@@ -115,9 +118,8 @@ impl AppOptions {
 
     /// Options of a window that opens at the exercise list.
     pub fn at_exercise_list(out: impl Into<PathBuf>, templates: Templates) -> AppOptions {
-        let (exercise, seed, seed_code, frame_delay) = (None, None, None, None);
         AppOptions {
-            exercise,
+            exercise: None,
             given: None,
             language: None,
             on_bundle: None,
@@ -126,13 +128,14 @@ impl AppOptions {
             begins_at_once: false,
             editor_mode: None,
             device: None,
-            seed,
-            seed_code,
+            seed: None,
+            seed_code: None,
             participant: String::new(),
             out: out.into(),
             templates,
-            frame_delay,
             station: None,
+            user_folder: None,
+            state_log: None,
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Takes the system as it is. Gives, for each, a name or the reason why it cannot be used. Never changes a setting, plays
 //! nothing and opens no window.
 
+use crate::user_folder::UserFolder;
 use crate::{i18n, platform, settings};
 use std::path::PathBuf;
 use typodont_audio::AudioError;
@@ -45,14 +46,19 @@ pub struct SettingsReview {
     pub complaints: Vec<String>,
 }
 
+fn user_folder() -> UserFolder {
+    UserFolder::new(platform::config_folder())
+}
+
 /// Codes of the languages that the program and the user's folder have.
 pub fn language_codes() -> Vec<String> {
-    settings::load_with_languages().1.into_iter().map(|language| language.code).collect()
+    settings::load_with_languages(&user_folder()).1.into_iter().map(|language| language.code).collect()
 }
 
 /// Reads the settings and the languages as the window does.
 pub fn review_settings() -> SettingsReview {
-    let (settings, languages, mut complaints) = settings::load_with_languages();
+    let folder = user_folder();
+    let (settings, languages, mut complaints) = settings::load_with_languages(&folder);
     let language = i18n::select_language(&languages, &settings.language);
     let is_system_language = settings.language == i18n::system_language();
     if language.code != settings.language && !is_system_language {
@@ -62,7 +68,7 @@ pub fn review_settings() -> SettingsReview {
         ));
     }
     SettingsReview {
-        file: platform::settings_file(),
+        file: folder.settings_file(),
         device: settings.device,
         language: language.name().to_string(),
         exercises: settings.exercises,

@@ -2,6 +2,7 @@
 
 use crate::i18n::{self, Translations};
 use crate::platform;
+use crate::user_folder::UserFolder;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use typodont_render::{Stereo, StereoLayout};
@@ -69,22 +70,21 @@ impl Default for Settings {
 }
 
 /// Reads the settings, and the languages that the program and the user's folder have, with complaints about both.
-pub fn load_with_languages() -> (Settings, Vec<Translations>, Vec<String>) {
-    let (settings, complaint) = Settings::load();
-    let folder = platform::config_folder().map(|folder| folder.join("languages"));
-    let (languages, mut complaints) = i18n::load_all(folder.as_deref());
+pub fn load_with_languages(folder: &UserFolder) -> (Settings, Vec<Translations>, Vec<String>) {
+    let (settings, complaint) = Settings::load(folder);
+    let (languages, mut complaints) = i18n::load_all(folder.languages().as_deref());
     complaints.extend(complaint);
     (settings, languages, complaints)
 }
 
 impl Settings {
     /// Reads the kept settings; the defaults, with a complaint, if it cannot be read.
-    pub fn load() -> (Settings, Option<String>) {
-        let Some(text) = platform::read_settings() else { return (Settings::default(), None) };
+    pub fn load(folder: &UserFolder) -> (Settings, Option<String>) {
+        let Some(text) = platform::read_settings(folder) else { return (Settings::default(), None) };
         match serde_json::from_str::<Settings>(&text) {
             Ok(settings) => (settings.in_range(), None),
             Err(error) => {
-                let place = platform::settings_place();
+                let place = platform::settings_place(folder);
                 let what = format!("{place}: wrong-settings: {error}; the default settings are used");
                 (Settings::default(), Some(what))
             }
@@ -92,10 +92,10 @@ impl Settings {
     }
 
     /// Keeps the settings; returns a complaint if that fails.
-    pub fn save(&self) -> Option<String> {
+    pub fn save(&self, folder: &UserFolder) -> Option<String> {
         let text = serde_json::to_string_pretty(self).ok()?;
-        platform::write_settings(&(text + "\n")).map(|why| {
-            let place = platform::settings_place();
+        platform::write_settings(folder, &(text + "\n")).map(|why| {
+            let place = platform::settings_place(folder);
             format!("{place}: unwritable-file: {why}; the settings will be lost when the window is closed")
         })
     }

@@ -13,9 +13,9 @@ pub struct StateLog {
 }
 
 impl StateLog {
-    /// The log that is asked for; one that records nothing if none is.
-    pub fn from_environment() -> StateLog {
-        StateLog { sink: platform::open_log(), last: BTreeMap::new() }
+    /// A log that writes to `sink`; without one, to the one that is asked for, or nowhere if none is.
+    pub fn new(sink: Option<platform::LogSink>) -> StateLog {
+        StateLog { sink: sink.or_else(platform::open_log), last: BTreeMap::new() }
     }
 
     /// Writes `topic value` unless that was the topic's last line.

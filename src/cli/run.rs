@@ -91,9 +91,6 @@ pub struct Arguments {
     /// Begin at once, without showing the instructions
     #[arg(long, conflicts_with = "headless")]
     begin: bool,
-    /// Delay of each rendered frame in ms, to show that a session does not wait for rendering
-    #[arg(long, hide = true)]
-    slow_picture_ms: Option<u64>,
 }
 
 pub fn spacing(text: &str) -> Result<f32, String> {
@@ -266,7 +263,6 @@ fn open_in_window(
         seed: arguments.seed,
         seed_code: read_code(arguments.seed_sealed.as_deref())?,
         participant: arguments.participant.clone(),
-        frame_delay: arguments.slow_picture_ms.map(std::time::Duration::from_millis),
         ..typodont_app::AppOptions::at_exercise_list(out, super::load_templates()?)
     };
     match station {

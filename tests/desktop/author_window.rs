@@ -1,21 +1,20 @@
-//! The author's screen, driven as a curriculum designer drives it: a real mouse and real keys under a virtual display.
+//! The author's screen, driven as a curriculum designer drives it, in the test's own process.
 //!
-//! Without Xvfb or xdotool these tests print SKIPPED. `TYPODONT_TEST_PICTURES=DIR` keeps screenshots.
-use crate::support::bundle;
-use crate::support::folder;
-use crate::support::screen;
+//! `TYPODONT_TEST_PICTURES=DIR` keeps pictures.
 
-use bundle::*;
-use folder::folder;
-use screen::{Desk, Display};
+use crate::harness::{self, Window};
+use crate::support::bundle::{complained, session, typodont};
+use crate::support::folder::folder;
+use crate::support::window_driver::{PATIENCE, SHIPPED_EXERCISES, WindowDriver};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use typodont_app::{AppOptions, OpenMode};
 
 const DECAY: &str = "/scene/jaw/tooth/decay/0";
 
 /// The decay that is worked on, as the file has it.
-fn decay(desk: &Desk) -> Value {
+fn decay(desk: &Window) -> Value {
     serde_json::from_str(&desk.latest("decay").unwrap_or_default()).unwrap_or_default()
 }
 
@@ -27,9 +26,8 @@ fn pointer(value: &Value, at: &str) -> f64 {
 fn an_exercise_is_made_from_nothing_tried_saved_checked_run_and_reported() {
     // Aim: a designer who never programs gets from nothing to a marked session. Method: the program itself; the mouse chooses
     // a tooth on the chart, points at it and drags the decay's size; keys write; then the command line takes the file.
-    let Some(display) = Display::open() else { return };
     let place = folder("author");
-    let mut desk = Desk::sit_down(display, &place, &[]);
+    let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
     desk.until("screen", |screen| screen == "shelf");
     desk.picture("author-0-shelf");
     desk.click("shelf.new");
@@ -89,6 +87,7 @@ fn an_exercise_is_made_from_nothing_tried_saved_checked_run_and_reported() {
     desk.key("F8");
     desk.click("answer:close");
 
+    let before = desk.pixels();
     desk.key("F5");
     desk.until("screen", |screen| screen == "practice");
     desk.until("hand", |_| true);
@@ -98,12 +97,16 @@ fn an_exercise_is_made_from_nothing_tried_saved_checked_run_and_reported() {
     desk.until("bundle", |_| true);
     desk.picture("author-12-tried");
     desk.press("Return", "screen", "author");
+    // The renderer has drawn another tooth in between.
+    desk.turn();
+    let differing = before.iter().zip(desk.pixels()).filter(|(a, b)| a.abs_diff(*b) > 8).count();
+    assert!(differing * 100 < before.len(), "{differing} of {} samples of the screen differ", before.len());
 
     let file = place.join("my exercises").join("cheek-side.json");
     desk.key("ctrl+s");
     desk.click("where");
     desk.key("ctrl+a");
-    desk.display.xdotool(&["type", "--delay", "15", file.to_str().unwrap()]);
+    desk.type_text(file.to_str().unwrap());
     desk.turn();
     desk.picture("author-13-save");
     desk.key("Return");
@@ -141,15 +144,16 @@ fn an_exercise_is_made_from_nothing_tried_saved_checked_run_and_reported() {
 #[test]
 fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost() {
     // Aim: an editor and the window work on one file. Method: the file is written from outside while it is shown, broken, and
-    // mended; while it is edited; and the program is killed with a change unsaved.
-    let Some(display) = Display::open() else { return };
+    // mended; while it is edited; and the window goes without a chance to save, with a change unsaved.
     let place = folder("author-reload");
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
     let text = fs::read_to_string(shipped).unwrap().replace("\"id\": \"5-grinding\"", "\"id\": \"mine\"");
     let file = place.join("mine.json");
     fs::write(&file, &text).unwrap();
     let path = file.to_str().unwrap().to_string();
-    let mut desk = Desk::sit_down(display, &place, &["preview", &path, "--watch"]);
+    let watching =
+        AppOptions { exercise: Some(file.clone()), editor_mode: Some(OpenMode::ReadOnly), ..harness::options(&place) };
+    let Some(mut desk) = Window::open(&place, watching) else { return };
     desk.until("screen", |screen| screen == "author");
     desk.until("checked", |checked| checked == "true");
     let seen = desk.latest("teeth").unwrap();
@@ -167,13 +171,11 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     desk.until("complaints", |count| count == "0");
     drop(desk);
 
-    let Some(display) = Display::open() else { return };
-    let home = place.join("home/config/typodont");
-    fs::create_dir_all(&home).unwrap();
+    let home = harness::user_folder(&place);
     fs::write(home.join("settings.json"), format!("{{ \"exercises\": {:?}, \"language\": \"en\" }}", place)).unwrap();
-    let mut desk = Desk::sit_down(display, &place, &[]);
-    let edit = |desk: &mut Desk| {
-        for _ in 0..screen::SHIPPED_EXERCISES {
+    let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
+    let edit = |desk: &mut Window| {
+        for _ in 0..SHIPPED_EXERCISES {
             desk.key("Down");
         }
         desk.until("chosen", |chosen| chosen == "mine");
@@ -189,16 +191,15 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     desk.picture("author-16-elsewhere");
     desk.click("answer:mine");
     // One's own still stands, and is kept beside the settings: the machine may go out.
-    let drafts = place.join("home/config/typodont/drafts");
+    let drafts = home.join("drafts");
     let begun = std::time::Instant::now();
     while fs::read_dir(&drafts).map_or(0, |files| files.count()) == 0 {
-        assert!(begun.elapsed() < screen::PATIENCE, "no draft");
-        std::thread::sleep(screen::LOOK_EVERY);
+        assert!(begun.elapsed() < PATIENCE, "no draft");
+        desk.proceed();
     }
     drop(desk);
 
-    let Some(display) = Display::open() else { return };
-    let mut desk = Desk::sit_down(display, &place, &[]);
+    let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
     edit(&mut desk);
     desk.until("told", |told| told == "author.brought_back");
     desk.key("ctrl+s");
@@ -227,12 +228,11 @@ fn everything_can_be_reached_in_large_type_and_in_both_languages() {
     // Aim: whoever needs large type finds every part. Method: the largest type on a small screen; each part is clicked, and every
     // button of the bar lies in the window.
     for language in ["en", "tr"] {
-        let Some(display) = Display::open() else { return };
         let place = folder(&format!("author-large-{language}"));
-        let home = place.join("home/config/typodont");
+        let home = harness::user_folder(&place);
         fs::create_dir_all(&home).unwrap();
         fs::write(home.join("settings.json"), format!("{{ \"language\": {language:?}, \"font_size\": 1.6 }}")).unwrap();
-        let mut desk = Desk::sit_down(display, &place, &[]);
+        let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
         desk.picture(&format!("author-large-{language}-shelf"));
         desk.click("shelf.new");
         desk.until("screen", |screen| screen == "author");

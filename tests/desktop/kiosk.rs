@@ -1,13 +1,15 @@
 //! A kiosk: a station's window without a way out, driven with real keys and a real mouse.
 
+use crate::harness::{self, Window};
 use crate::support::bundle::{complained, told};
 use crate::support::folder::folder;
-use crate::support::screen::{Desk, Display, LOOK_EVERY, PATIENCE};
+use crate::support::screen::{Desk, Display, LOOK_EVERY, PATIENCE, WindowDriver};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+use typodont_app::{AppOptions, KioskOptions, StationOptions};
 
 const CODE: &str = "lab two, 1984";
 
@@ -136,14 +138,18 @@ fn a_kiosk_has_no_way_out_but_the_supervisors_code() {
 
 #[test]
 fn a_kiosk_that_nobody_uses_is_ready_for_the_next_participant() {
-    // Aim: nobody continues under the code of somebody who has left. Method: a briefing of a participant, and a minute
-    // without input.
-    let Some(display) = Display::open() else { return };
+    // Aim: nobody continues under the code of somebody who has left. Method: a briefing of a participant, and no input for
+    // longer than the kiosk allows.
     let place = folder("kiosk-idle");
-    let file = kiosk(&place);
-    let exercise = place.join("course/own.json");
-    let arguments = ["run", exercise.to_str().unwrap(), "--participant", "P-7", "--station", file.to_str().unwrap()];
-    let mut desk = Desk::sit_down(display, &place, &arguments);
+    let kiosk = KioskOptions { supervisor_code: None, idle: Duration::from_secs(12) };
+    let exercise = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
+    let options = AppOptions {
+        exercise: Some(exercise),
+        participant: "P-7".into(),
+        station: Some(StationOptions { kiosk: Some(kiosk), ..StationOptions::default() }),
+        ..harness::options(&place)
+    };
+    let Some(mut desk) = Window::open(&place, options) else { return };
     desk.until("screen", |screen| screen == "briefing");
     desk.until("screen", |screen| screen == "shelf");
     desk.until("chosen", |chosen| chosen == "1-introduction");

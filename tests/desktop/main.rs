@@ -1,12 +1,14 @@
-//! The window, driven with a real mouse and real keys.
+//! The window: most tests in their own process, a few with a real mouse and real keys.
 
 #[path = "../support/mod.rs"]
 mod support;
-#[cfg(all(unix, not(target_os = "macos")))]
 mod author_window;
+mod harness;
+mod lesson_window;
+mod trainee;
 #[cfg(all(unix, not(target_os = "macos")))]
 mod kiosk;
 #[cfg(all(unix, not(target_os = "macos")))]
-mod window;
-#[cfg(all(unix, not(target_os = "macos")))]
 mod page;
+#[cfg(all(unix, not(target_os = "macos")))]
+mod window;

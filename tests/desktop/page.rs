@@ -7,7 +7,7 @@ use crate::support::browser::browser;
 use crate::support::bundle::{complained, metric, session, typodont};
 use crate::support::folder::folder;
 use crate::support::tools::skip;
-use crate::window::lesion_in_world;
+use crate::trainee::lesion_in_world;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -1,4 +1,6 @@
-//! The desktop program, driven as a person drives it: real keys and a real mouse under a virtual display.
+//! The desktop program itself, driven as a person drives it: real keys and a real mouse under a virtual display. A whole
+//! lesson, and what needs a display, a sound server or a killed program; all else is tested in the test's own process
+//! (`lesson_window.rs`, `author_window.rs`).
 //!
 //! The program writes what is on its screen into a state log (`TYPODONT_STATE_LOG`), so that these tests wait for states and never
 //! for times. Where there is no Xvfb or xdotool they say SKIPPED.
@@ -12,102 +14,19 @@ use folder::folder;
 use glam::DVec3;
 use hearing::Spectrum;
 use hearing::server::{Recorder, server};
-use screen::{Desk, Display, LOOK_EVERY, PATIENCE};
+use screen::{Desk, Display, LOOK_EVERY, PATIENCE, WindowDriver};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use crate::trainee::{Trainee, lesion_in_world};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, Reading, Wrench};
-use typodont_core::frame::{Quat, Vec3};
+use typodont_core::frame::Vec3;
 use typodont_core::volume::Label;
 use typodont_devices::HandLink;
 use typodont_devices::servo::{SecondHandEvent, SecondHandServo};
-use typodont_exercise::scenario;
-use typodont_exercise::scenario::{ResolveMode, Workpiece};
-use typodont_formats::Library;
-use typodont_formats::diagnostic::SourceText;
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples};
-use typodont_render::Orbit;
-
-/// Maximum distance of one mouse movement, pixels.
-const STRETCH: f32 = 120.0;
-
-/// Pixels of the view to a millimetre, at least: the pointer then approaches a place without passing it.
-const PIXELS_PER_MM: f32 = 8.0;
-
-/// Distance across the line of sight at which the hand counts as arrived, mm.
-const NEAR: f32 = 0.4;
-
-/// Actions of a trainee at the window.
-impl Desk {
-    fn hand(&self) -> Vec3 {
-        let line = self.latest("hand").unwrap_or_default();
-        let numbers: Vec<f32> = line.split(' ').filter_map(|n| n.parse().ok()).collect();
-        Vec3::from_slice(&numbers)
-    }
-
-    fn rate_everything(&mut self) {
-        for rated in 1..=25 {
-            self.press("4", "rated", &rated.to_string());
-        }
-    }
-
-    /// Orientation of the view in world space.
-    fn world_from_view(&self) -> Quat {
-        let line = self.latest("view").unwrap_or_default();
-        let (turn, tilt) = line.split_once(' ').unwrap_or_default();
-        let orbit = Orbit {
-            azimuth: turn.parse().unwrap(),
-            elevation: tilt.parse().unwrap(),
-            ..Orbit::around(Vec3::ZERO, 1.0)
-        };
-        orbit.world_from_view()
-    }
-
-    /// Moves the mouse until the hand is over or under a place of world space, as one sees it in the picture.
-    fn point_at(&mut self, goal: Vec3) {
-        let begun = Instant::now();
-        loop {
-            let hand = self.hand();
-            let away = self.world_from_view().inverse() * (goal - hand);
-            if away.truncate().length() < NEAR {
-                return;
-            }
-            assert!(begun.elapsed() < PATIENCE, "the hand stays at {hand}, away from {goal}");
-            let pixels = [away.x, -away.y].map(|mm| (mm * PIXELS_PER_MM).clamp(-STRETCH, STRETCH).round());
-            let [right, down] = pixels.map(|px| px.to_string());
-            self.display.xdotool(&["mousemove_relative", "--", &right, &down]);
-            self.settle(hand);
-        }
-    }
-
-    /// Presses the instrument around a place, a little farther round each time, until something is true.
-    fn press_around(&mut self, place: Vec3, mut is_done: impl FnMut(&Desk, usize) -> bool) -> bool {
-        (0..40).any(|round| {
-            let (sin, cos) = (0.8 * round as f32).sin_cos();
-            self.point_at(place + Vec3::new(cos, 0.0, sin) * 0.6);
-            self.display.xdotool(&["mousedown", "1"]);
-            std::thread::sleep(Duration::from_millis(1500));
-            let is_enough = is_done(self, round);
-            self.display.xdotool(&["mouseup", "1"]);
-            is_enough
-        })
-    }
-
-    /// Until the hand that was somewhere has moved and come to rest, or does not move at all.
-    fn settle(&self, before: Vec3) {
-        let begun = Instant::now();
-        let mut last = before;
-        let mut calm = 0;
-        while calm < 6 && begun.elapsed() < Duration::from_secs(4) {
-            std::thread::sleep(Duration::from_millis(50));
-            let hand = self.hand();
-            calm = if hand == last && hand != before { calm + 1 } else { 0 };
-            last = hand;
-        }
-    }
-}
 
 /// Writes a settings file for the window that opens at `place`.
 fn keep_settings(place: &Path, settings: &str) {
@@ -132,15 +51,6 @@ fn asking_each_time(place: &Path) -> PathBuf {
     let path = place.join("asking.json");
     fs::write(&path, changed).unwrap();
     path
-}
-
-/// Centre of the decay of an exercise for a seed, world space, mm.
-pub fn lesion_in_world(exercise: &str, seed: u64) -> Vec3 {
-    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(exercise)).unwrap();
-    let scenario =
-        scenario::resolve(SourceText::new(exercise, text), &Library::shipped(), ResolveMode::MakeWorkpiece).unwrap();
-    let workpiece = Workpiece::make(&scenario, seed).unwrap();
-    workpiece.world_from_tooth * workpiece.lesions[0].centre
 }
 
 #[test]
@@ -207,68 +117,6 @@ fn a_trainee_grinds_with_the_mouse_and_leaves_a_bundle_that_holds() {
     desk.until("done", |done| done.starts_with("1 "));
     desk.picture("9-shelf-with-results");
     println!("late (p99, max, missed): {}", desk.latest("late").unwrap_or_default());
-}
-
-#[test]
-fn dust_flies_water_sprays_and_both_stand_still_with_the_lesson() {
-    // Aim: an exercise that asks for them has dust and water before the eye, at the window's own pace. Method: the shipped
-    // exercise with spray; the state log counts what is drawn.
-    let Some(display) = Display::open() else { return };
-    let place = folder("spray");
-    let exercise = "scenarios/7-spray.json";
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(exercise);
-    let begun = ["run", path.to_str().unwrap(), "--begin", "--seed", "1", "--out", "bundles"];
-    let mut desk = Desk::sit_down(display, &place, &begun);
-    desk.until("screen", |screen| screen == "practice");
-    desk.until("hand", |_| true);
-    let count = |text: &str| text.parse::<u32>().unwrap();
-    desk.until("water", |drops| count(drops) > 10);
-    desk.press("o", "pointer", "held");
-    let lesion = lesion_in_world(exercise, 1);
-    desk.point_at(lesion);
-    desk.picture("10-spray");
-    // Water soon takes it along again.
-    let has_flown = |desk: &Desk| {
-        let state_log = fs::read_to_string(&desk.state_log).unwrap();
-        state_log.lines().filter_map(|line| line.strip_prefix("dust ")).any(|chips| count(chips) > 5)
-    };
-    let flies = desk.press_around(lesion, |desk, round| {
-        desk.picture(&format!("11-dust-{round}"));
-        has_flown(desk)
-    });
-    assert!(flies, "no dust: {:?} % of the decay is gone", desk.latest("cleared"));
-    desk.press("p", "paused", "true");
-    let still = |desk: &Desk| ["dust", "water"].map(|topic| desk.latest(topic).unwrap());
-    std::thread::sleep(Duration::from_secs(1));
-    let before = still(&desk);
-    let frames = count(&desk.latest("frames").unwrap());
-    desk.until("frames", |now| count(now) >= frames + 4);
-    assert_eq!(still(&desk), before, "dust and water wait with the lesson");
-    desk.picture("12-paused");
-}
-
-#[test]
-fn the_servo_does_not_wait_for_the_picture() {
-    // Aim: with two pictures a second at most the session is turned as ever. Method: the hidden option that slows the window
-    // down; ticks are counted over pictures. Whoever waited for a picture would turn a few ticks each, not hundreds.
-    let Some(display) = Display::open() else { return };
-    let place = folder("slow_window");
-    let exercise = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json");
-    let slow = ["run", exercise.to_str().unwrap(), "--seed", "1", "--out", "bundles", "--slow-picture-ms", "500"];
-    let mut desk = Desk::sit_down(display, &place, &slow);
-    desk.until("screen", |screen| screen == "briefing");
-    desk.press("Return", "screen", "practice");
-    let count = |text: String| text.parse::<u64>().unwrap();
-    desk.until("clock", |clock| clock == "stopped");
-    desk.press("o", "pointer", "held");
-    desk.display.xdotool(&["mousemove_relative", "40", "20"]);
-    desk.until("clock", |clock| clock == "running");
-    let first = count(desk.until("ticks", |ticks| ticks != "0"));
-    let frames = count(desk.latest("frames").unwrap());
-    desk.until("frames", |now| now.parse::<u64>().unwrap() >= frames + 10);
-    let turned = count(desk.latest("ticks").unwrap()) - first;
-    println!("{turned} ticks in about 10 pictures; late (p99, max, missed): {}", desk.latest("late").unwrap());
-    assert!(turned > 10 * 100, "{turned} ticks in at least 10 pictures");
 }
 
 /// A CT of a tooth, as numbers alone: an upper premolar in 8 bits, with a little noise. Gives its voxels along each axis.
@@ -456,4 +304,20 @@ fn the_introduction_comes_first_and_an_interrupted_session_is_offered_again() {
     desk.press("Escape", "screen", "shelf");
     desk.until("done", |done| done == "1 false");
     desk.until("unfinished", |unfinished| unfinished == "0");
+}
+
+#[test]
+fn a_watched_file_is_shown_by_the_command_line() {
+    // Aim: `typodont preview FILE --watch` opens the author's screen with the file, and shows what another program makes
+    // of it.
+    let Some(display) = Display::open() else { return };
+    let place = folder("watched_window");
+    let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json")).unwrap();
+    let file = place.join("mine.json");
+    fs::write(&file, &text).unwrap();
+    let mut desk = Desk::sit_down(display, &place, &["preview", file.to_str().unwrap(), "--watch"]);
+    desk.until("screen", |screen| screen == "author");
+    desk.until("checked", |checked| checked == "true");
+    fs::write(&file, text.replace("\"pass_points\": 70", "\"pass_points\": 700")).unwrap();
+    desk.until("complaints", |count| count == "1");
 }

@@ -16,3 +16,4 @@ pub mod screen;
 pub mod shared_data;
 pub mod tools;
 pub mod volume_text;
+pub mod window_driver;

@@ -1,6 +1,7 @@
 //! The desktop program on a virtual display, operated by simulated mouse and keyboard input.
 //!
-//! The program writes the state of its screen to a log, so that tests wait for states and never for times.
+//! Only what needs a real display is tested with it: most tests of the window use `tests/desktop/harness.rs`. The program writes the state
+//! of its screen to a log, so that tests wait for states and never for times.
 #![allow(dead_code)]
 
 use std::fs;
@@ -9,17 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Size of the virtual display, pixels.
-const SCREEN_SIZE: [i32; 2] = [1280, 800];
-
-/// Maximum time to wait for a state on a busy computer; a test that exceeds it fails.
-pub const PATIENCE: Duration = Duration::from_secs(180);
-
-/// Number of exercises that the list shows before those of a school.
-pub const SHIPPED_EXERCISES: usize = 15;
-
-/// Poll interval of the state log.
-pub const LOOK_EVERY: Duration = Duration::from_millis(20);
+pub use super::window_driver::{LOOK_EVERY, PATIENCE, SHIPPED_EXERCISES, WindowDriver};
 
 /// A virtual display for one test.
 pub struct Display {
@@ -113,68 +104,60 @@ impl Desk {
         let focus = ["search", "--onlyvisible", "--name", "Typodont", "windowfocus", "--sync"];
         while let Err(said) = desk.display.tried(&focus) {
             desk.must_run();
-            assert!(begun.elapsed() < PATIENCE, "the window does not take the keys: {said}; {}", desk.complained());
+            assert!(begun.elapsed() < PATIENCE, "the window does not take the keys: {said}; {}", desk.complaints());
             std::thread::sleep(LOOK_EVERY);
         }
         desk.display.xdotool(&["mousemove", "640", "400"]);
         desk
     }
 
-    /// The newest line of a topic.
-    pub fn latest(&self, topic: &str) -> Option<String> {
+    fn must_run(&mut self) {
+        let ended = self.program.try_wait().unwrap();
+        assert!(ended.is_none(), "the program ended: {}", self.complaints());
+    }
+
+    fn operate(&self, arguments: &[&str]) {
+        assert!(self.display.xdotool(arguments), "xdotool {arguments:?}");
+    }
+}
+
+impl WindowDriver for Desk {
+    fn latest(&self, topic: &str) -> Option<String> {
         let text = fs::read_to_string(&self.state_log).unwrap_or_default();
         // A line that is being written is not one yet.
         let whole = &text[..text.rfind('\n').map_or(0, |end| end + 1)];
         whole.lines().rev().find_map(|line| Some(line.strip_prefix(topic)?.strip_prefix(' ')?.to_string()))
     }
 
-    /// Waits until a topic's newest line is as wanted.
-    pub fn until(&mut self, topic: &str, is_wanted: impl Fn(&str) -> bool) -> String {
-        let begun = Instant::now();
-        loop {
-            let latest = self.latest(topic);
-            if let Some(value) = latest.as_deref().filter(|value| is_wanted(value)) {
-                return value.to_string();
-            }
-            self.must_run();
-            assert!(begun.elapsed() < PATIENCE, "{topic} stays {latest:?}; {}", self.complained());
-            std::thread::sleep(LOOK_EVERY);
-        }
+    fn proceed(&mut self) {
+        self.must_run();
+        std::thread::sleep(LOOK_EVERY);
     }
 
-    fn must_run(&mut self) {
-        let ended = self.program.try_wait().unwrap();
-        assert!(ended.is_none(), "the program ended: {}", self.complained());
+    fn send_key(&mut self, key: &str) {
+        self.operate(&["key", "--clearmodifiers", key]);
     }
 
-    fn complained(&self) -> String {
-        fs::read_to_string(&self.complaints).unwrap_or_default()
+    fn type_text(&mut self, text: &str) {
+        self.operate(&["type", "--delay", "15", text]);
     }
 
-    /// Presses a key until a topic is as wanted: a key that comes before the window listens is lost.
-    pub fn press(&mut self, key: &str, topic: &str, wanted: &str) {
-        assert!(self.display.xdotool(&["key", "--clearmodifiers", key]));
-        self.until(topic, |value| value == wanted);
-        println!("{key}: {topic} {wanted}");
+    fn move_to(&mut self, place: [i32; 2]) {
+        let [x, y] = place.map(|pixels| pixels.to_string());
+        self.operate(&["mousemove", &x, &y]);
     }
 
-    /// Screen position of an anchor, pixels; waits until the anchor appears. Positions off the screen do not count: the
-    /// first frame may be laid out before the window has its size.
-    pub fn place_of(&mut self, name: &str) -> [i32; 2] {
-        let start = format!("{name}=");
-        let position = |marks: &str| -> Option<[i32; 2]> {
-            let mark = marks.split(' ').find_map(|mark| mark.strip_prefix(&start))?;
-            let (x, y) = mark.split_once(',')?;
-            let at = [x.parse().ok()?, y.parse().ok()?];
-            (0..2).all(|axis| (0..SCREEN_SIZE[axis]).contains(&at[axis])).then_some(at)
-        };
-        let marks = self.until("marks", |marks| position(marks).is_some());
-        position(&marks).unwrap()
+    fn move_by(&mut self, by: [i32; 2]) {
+        let [right, down] = by.map(|pixels| pixels.to_string());
+        self.operate(&["mousemove_relative", "--", &right, &down]);
     }
 
-    /// Waits until the author's screen has been drawn several times more, so that earlier input has taken effect. On
-    /// other screens, waits for a fixed time.
-    pub fn turn(&mut self) {
+    fn set_button(&mut self, is_down: bool) {
+        self.operate(&[if is_down { "mousedown" } else { "mouseup" }, "1"]);
+    }
+
+    /// Waits until the author's screen has been drawn several times more. On other screens, waits for a fixed time.
+    fn turn(&mut self) {
         let count = |desk: &Desk| desk.latest("turn").and_then(|turn| turn.parse::<u64>().ok()).unwrap_or_default();
         let is_at_author = |desk: &Desk| desk.latest("screen").as_deref() == Some("author");
         if !is_at_author(self) {
@@ -187,56 +170,11 @@ impl Desk {
         }
     }
 
-    /// Clicks on something by its name.
-    pub fn click(&mut self, name: &str) {
-        let at = self.place_of(name);
-        self.click_at(at);
-        println!("click: {name}");
+    fn complaints(&self) -> String {
+        fs::read_to_string(&self.complaints).unwrap_or_default()
     }
 
-    pub fn click_at(&mut self, [x, y]: [i32; 2]) {
-        self.display.xdotool(&["mousemove", &x.to_string(), &y.to_string()]);
-        // The window hears of the way before the press.
-        self.turn();
-        self.display.xdotool(&["click", "1"]);
-        self.turn();
-    }
-
-    /// Drags an anchor by some pixels.
-    pub fn drag(&mut self, name: &str, [right, down]: [i32; 2]) {
-        const STEPS: i32 = 4;
-        let [x, y] = self.place_of(name);
-        self.display.xdotool(&["mousemove", &x.to_string(), &y.to_string()]);
-        self.turn();
-        self.display.xdotool(&["mousedown", "1"]);
-        self.turn();
-        for step in 1..=STEPS {
-            let to = [x + right * step / STEPS, y + down * step / STEPS].map(|px| px.to_string());
-            self.display.xdotool(&["mousemove", &to[0], &to[1]]);
-            self.turn();
-        }
-        self.display.xdotool(&["mouseup", "1"]);
-        self.turn();
-        println!("drag: {name}");
-    }
-
-    /// Writes over what stands in a field, and leaves it by a key.
-    pub fn write(&mut self, name: &str, text: &str) {
-        self.click(name);
-        self.key("ctrl+a");
-        self.display.xdotool(&["type", "--delay", "15", text]);
-        self.turn();
-        self.key("Tab");
-        println!("write: {name} {text}");
-    }
-
-    pub fn key(&mut self, key: &str) {
-        self.display.xdotool(&["key", "--clearmodifiers", key]);
-        self.turn();
-    }
-
-    /// Saves a screenshot if screenshots were requested.
-    pub fn picture(&self, name: &str) {
+    fn picture(&mut self, name: &str) {
         if let Some(folder) = std::env::var_os("TYPODONT_TEST_PICTURES") {
             // The state log is a picture or two ahead of the screen.
             std::thread::sleep(Duration::from_secs(2));

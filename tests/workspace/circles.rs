@@ -206,3 +206,19 @@ fn what_is_drawn_is_known_only_to_the_application() {
     let wrong: Vec<_> = importers.iter().filter(|from| !of(from, "app") && !of(from, "ui")).collect();
     assert!(wrong.is_empty(), "only `app` may use the screens: {wrong:?}");
 }
+
+#[test]
+fn a_screen_only_reads_the_state_that_it_shows() {
+    // Aim: each change of state is a command, carried out in one place. Method: no function of `ui` takes the state of a
+    // screen to change it.
+    let changed = Regex::new(
+        r"&mut (LessonState|LessonScene|EditorState|PreviewState|ExerciseList|LessonResults|KioskExit|OverlayState|String)\b",
+    );
+    let changed = changed.unwrap();
+    let files = sources();
+    let screens: Vec<&SourceFile> =
+        files.iter().filter(|file| file.krate == "app" && file.path.contains("/ui/")).collect();
+    assert!(screens.len() > 20, "{} files of screens", screens.len());
+    let wrong: Vec<_> = screens.iter().filter(|file| changed.is_match(&file.text)).map(|file| &file.path).collect();
+    assert!(wrong.is_empty(), "screens that change state themselves: {wrong:?}");
+}

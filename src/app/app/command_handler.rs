@@ -1,7 +1,7 @@
 //! The commands of every screen, each carried out in one place.
 
 use super::{App, CloseState, repaint_waker};
-use crate::command::{AppCommand, CameraCommand, PracticeCommand};
+use crate::command::{AppCommand, CameraCommand, PracticeCommand, TextField};
 use crate::completion::Completion;
 use crate::editor::{EditorCommand, EditorState, OpenMode};
 use crate::exercise_list::{self, ExerciseList};
@@ -91,6 +91,7 @@ impl App {
                 self.exercise_list = ExerciseList::load(&folder);
                 self.apply_settings(Settings { exercises: folder, ..self.settings.clone() }, ctx);
             }
+            AppCommand::TypeText(field, text) => self.set_text(field, text),
             AppCommand::BackToList => self.go_back(),
             AppCommand::BeginLesson => self.begin_lesson(ctx),
             AppCommand::NewExercise => self.create_exercise(ctx),
@@ -150,10 +151,8 @@ impl App {
     pub(super) fn go_back(&mut self) {
         self.leave_results();
         self.examiner_code.clear();
-        if let Some(mut editor) = self.test_run_origin.take() {
-            editor.invalidate_preview();
-            self.screen = Screen::Editor(editor);
-            return;
+        if let Some(editor) = self.test_run_origin.take() {
+            return self.show_editor(editor);
         }
         self.exercise_list.scroll_to_selected = true;
         self.screen = Screen::ExerciseList;
@@ -227,7 +226,7 @@ impl App {
         let [title, stage, instruction] =
             ["author.new_title", "author.new_stage", "author.new_instruction"].map(|key| words.get(key));
         let text = new_exercise(title, stage, instruction, lines, words.get("author.new_fail"));
-        self.screen = Screen::Editor(Box::new(EditorState::new(text, repaint_waker(ctx))));
+        self.show_editor(Box::new(EditorState::new(text, self.user_folder.drafts(), repaint_waker(ctx))));
     }
 
     /// Opens the selected exercise at the author's screen; a shipped exercise is opened as a copy.
@@ -236,17 +235,34 @@ impl App {
         match (exercise.path.clone(), exercise_list::shipped_text(&exercise.name)) {
             (Some(path), _) => self.open_editor(&path, OpenMode::Edit, ctx),
             (None, Some(text)) => {
-                self.screen = Screen::Editor(Box::new(EditorState::copy(&exercise.name, text, repaint_waker(ctx))));
+                let editor = EditorState::copy(&exercise.name, text, self.user_folder.drafts(), repaint_waker(ctx));
+                self.show_editor(Box::new(editor));
             }
             (None, None) => {}
         }
     }
 
     pub(super) fn open_editor(&mut self, path: &Path, mode: OpenMode, ctx: &egui::Context) {
-        self.screen = match EditorState::open(path, mode, repaint_waker(ctx)) {
-            Ok(editor) => Screen::Editor(Box::new(editor)),
-            Err(complaint) => Screen::Failed(complaint.headline()),
-        };
+        match EditorState::open(path, mode, self.user_folder.drafts(), repaint_waker(ctx)) {
+            Ok(editor) => self.show_editor(Box::new(editor)),
+            Err(complaint) => self.screen = Screen::Failed(complaint.headline()),
+        }
+    }
+
+    /// Shows the author's screen; what was drawn on another screen is drawn anew.
+    fn show_editor(&mut self, editor: Box<EditorState>) {
+        self.screen = Screen::Editor(editor);
+        self.views.forget();
+    }
+
+    /// Takes over the text of a field as it is being typed.
+    fn set_text(&mut self, field: TextField, text: String) {
+        *match field {
+            TextField::Participant => &mut self.participant,
+            TextField::ExaminerCode => &mut self.examiner_code,
+            TextField::SupervisorCode => &mut self.kiosk_exit.code,
+            TextField::ExerciseFolder => &mut self.exercise_list.folder,
+        } = text;
     }
 
     /// Returns to the exercise list, which now includes the edited exercise. Unsaved changes are kept as a draft.
@@ -275,7 +291,7 @@ impl App {
             Err(_) => return editor.execute(EditorCommand::Check),
         };
         let library = editor.library.clone();
-        let out = platform::config_folder().unwrap_or_else(std::env::temp_dir).join("tried");
+        let out = self.user_folder.test_runs();
         let _ = std::fs::remove_dir_all(&out);
         let left = std::mem::replace(&mut self.screen, Screen::ExerciseList);
         if let Screen::Editor(editor) = left {
@@ -352,6 +368,7 @@ impl App {
         let output =
             PlaybackOptions { seed: shown_seed, replacements: self.replacements.clone(), ..PlaybackOptions::default() };
         let mode = if self.has_graphics { DisplayMode::Iso } else { DisplayMode::Surface };
+        self.views.forget();
         self.screen = match LessonState::begin(config, library, output, mode) {
             Ok(lesson) => Screen::Lesson(Box::new(lesson)),
             Err(why) => Screen::Failed(why),
@@ -373,6 +390,7 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
     match command {
         PracticeCommand::SelectInstrument(instrument) => lesson.submit(Input::Take { instrument }),
         PracticeCommand::AnswerQuestion(question, value) => lesson.answer_question(question, value),
+        PracticeCommand::TypeAnswer(question, text) => _ = lesson.drafts.insert(question, text),
         PracticeCommand::AddToChart(sign) => lesson.add_to_chart(sign),
         PracticeCommand::FinishStage => lesson.finish_stage(),
         PracticeCommand::ContinueStage => lesson.is_confirming_finish = false,
@@ -402,6 +420,12 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SetCamera(view) => {
             if let Some(orbit) = lesson.scene.as_ref().and_then(|matter| view.orbit(matter)) {
                 lesson.orbit = orbit;
+            }
+        }
+        PracticeCommand::RecordView(aspect) => lesson.record_view(aspect),
+        PracticeCommand::PictureDrawn => {
+            if let Some(scene) = &mut lesson.scene {
+                scene.undrawn.clear();
             }
         }
         PracticeCommand::RateStatement(item, value) => {

@@ -198,12 +198,13 @@ impl App {
         if ctx.input(|input| !input.events.is_empty()) {
             self.last_input = now;
         }
+        let is_view_active = self.views.lesson.is_active(now);
         match &self.screen {
             Screen::Lesson(lesson) if lesson.needs_frames() => Duration::ZERO,
             // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
             Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
             Screen::Lesson(lesson) if !lesson.are_stages_over => {
-                match lesson.view_refresh.is_active(now) || lesson.pointer_hand.is_pressing {
+                match is_view_active || lesson.pointer_hand.is_pressing {
                     true => LESSON_FRAME_INTERVAL,
                     // Only the clock moves. Movement of the hand requests a frame at once.
                     false => lesson.time_to_next_second(),

@@ -9,7 +9,6 @@ use crate::ui::briefing::BriefingFields;
 use crate::ui::exercise_list::{ListContext, exercise_list_ui};
 use crate::ui::results::{ResultTexts, results_ui};
 use crate::ui::settings_screen::{kiosk_settings_ui, settings_ui};
-use crate::ui::viewport::Viewport;
 use crate::ui::{briefing, kiosk_exit, practice, questionnaire, shortcuts, theme, ui_anchors};
 use eframe::egui;
 
@@ -27,18 +26,19 @@ impl App {
     fn screen_ui(&mut self, ui: &mut egui::Ui, frame: &eframe::Frame, commands: &mut Vec<AppCommand>) {
         let is_test_run = self.test_run_origin.is_some();
         let completion = self.background_progress();
-        let App { screen, exercise_list, history, options, words, settings, participant, viewport, .. } = self;
-        let examiner_code = options.seed_code.is_none().then_some(&mut self.examiner_code);
+        if matches!(self.screen, Screen::Editor(_) | Screen::Lesson(_)) {
+            self.views.prepare(frame.wgpu_render_state());
+        }
+        let App { screen, exercise_list, history, options, words, settings, participant, views, .. } = self;
+        let examiner_code = options.seed_code.is_none().then_some(self.examiner_code.as_str());
         match screen {
             Screen::ExerciseList => {
                 let context = ListContext { history, settings, words, is_kiosk: options.kiosk().is_some() };
                 exercise_list_ui(ui, exercise_list, participant, &context, commands);
+                exercise_list.scroll_to_selected = false;
             }
             Screen::Editor(editor) => {
-                if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
-                    *viewport = Some(Viewport::new(state));
-                }
-                crate::ui::editor::editor_ui(ui, editor, viewport.as_mut(), words, commands);
+                crate::ui::editor::editor_ui(ui, editor, views, words, commands);
             }
             Screen::Briefing => {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
@@ -58,10 +58,7 @@ impl App {
             }
             Screen::Completion(completion) => scoring_ui(ui, completion.state().progress, None, words),
             Screen::Lesson(lesson) => {
-                if let (None, Some(state)) = (&viewport, frame.wgpu_render_state()) {
-                    *viewport = Some(Viewport::new(state));
-                }
-                practice::practice_ui(ui, lesson, settings, viewport.as_mut(), words, commands);
+                practice::practice_ui(ui, lesson, settings, views, words, commands);
             }
             Screen::Results(results) => {
                 let texts = ResultTexts { words, languages: options.templates.languages() };
@@ -82,7 +79,7 @@ impl App {
     fn overlay_ui(&mut self, ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
         let words = &self.words;
         if let Some(kiosk) = self.options.kiosk().filter(|_| self.kiosk_exit.is_asked) {
-            let exit = &mut self.kiosk_exit;
+            let exit = &self.kiosk_exit;
             modal_page(ctx, words.get("kiosk.close_title"), |ui| kiosk_exit::exit_ui(ui, exit, kiosk, words, commands));
         }
         if self.overlay.shortcuts {
@@ -91,7 +88,15 @@ impl App {
         if self.overlay.settings {
             modal_page(ctx, words.get("settings.title"), |ui| match self.options.kiosk() {
                 Some(_) => kiosk_settings_ui(ui, &self.settings, &self.languages, words, commands),
-                None => settings_ui(ui, &self.settings, self.has_graphics, &self.languages, words, commands),
+                None => settings_ui(
+                    ui,
+                    &self.settings,
+                    self.user_folder.settings_file().as_deref(),
+                    self.has_graphics,
+                    &self.languages,
+                    words,
+                    commands,
+                ),
             });
         }
         if self.closing == CloseState::Asked {

@@ -7,12 +7,14 @@ use crate::messages::SecondHandStatus;
 use crate::results::BundleState;
 use crate::screen::Screen;
 use crate::state_log::StateLog;
+use typodont_scene::particles::ParticleField;
 
 impl App {
     /// Writes the state of the screen to the state log, a line per change.
     pub(super) fn log_state(&mut self) {
         let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, kiosk_exit, .. } = self;
         state_log.record("kiosk", kiosk_exit.state());
+        let is_drawn = self.views.lesson.has_volume();
         let (history, participant, settings) = (&self.history, &self.participant, &self.settings);
         state_log.record(
             "over",
@@ -42,7 +44,7 @@ impl App {
                 state_log.record("turn", *frame_count);
             }
             Screen::Briefing => state_log.record("screen", "briefing"),
-            Screen::Lesson(lesson) => log_lesson(state_log, lesson),
+            Screen::Lesson(lesson) => log_lesson(state_log, lesson, is_drawn),
             Screen::Completion(_) => state_log.record("screen", "scoring"),
             Screen::Results(results) => {
                 if let BundleState::Finished(bundle) = &results.state {
@@ -68,7 +70,8 @@ fn log_editor(log: &mut StateLog, editor: &EditorState) {
     log.record("screen", "author");
 }
 
-fn log_lesson(log: &mut StateLog, lesson: &LessonState) {
+/// `is_drawn`: the tooth has been drawn.
+fn log_lesson(log: &mut StateLog, lesson: &LessonState, is_drawn: bool) {
     if lesson.is_scoring {
         log.record("screen", "scoring");
     } else if lesson.are_stages_over {
@@ -88,11 +91,11 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState) {
     log.record("view", format!("{:.4} {:.4}", lesson.orbit.azimuth, lesson.orbit.elevation));
     if let Some(scene) = &lesson.scene {
         log.record("open", scene.mouth_opening);
-        let specks = scene.particles.as_ref().map_or((0, 0), |field| (field.opaque().len(), field.translucent().len()));
-        log.record("dust", specks.0);
-        log.record("water", specks.1);
-        log.record("tooth", if scene.is_new { "made" } else { "drawn" });
+        let [dust, water] = scene.particles.as_ref().map_or([0, 0], ParticleField::counts);
+        log.record("dust", dust);
+        log.record("water", water);
     }
+    log.record("tooth", if is_drawn { "drawn" } else { "made" });
     log.record("shown", format!("{:?}", lesson.display_mode));
     if let Some(snapshot) = lesson.snapshot {
         let [x, y, z] = snapshot.hand.to_array();

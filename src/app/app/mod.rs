@@ -19,8 +19,9 @@ use crate::screen::Screen;
 use crate::session_history::SessionHistory;
 use crate::settings::{self, Settings};
 use crate::state_log::StateLog;
-use crate::ui::viewport::Viewport;
+use crate::ui::views::Views;
 use crate::ui::{shortcuts, theme, ui_anchors, viewport};
+use crate::user_folder::UserFolder;
 use eframe::egui;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -30,6 +31,7 @@ use typodont_formats::diagnostic::{Diagnostic, headlines};
 
 pub struct App {
     options: AppOptions,
+    user_folder: UserFolder,
     settings: Settings,
     languages: Vec<Translations>,
     words: Translations,
@@ -60,8 +62,8 @@ pub struct App {
     has_graphics: bool,
     /// Sound files with which the school replaces the built-in sounds.
     replacements: Replacements,
-    /// Created for the first lesson and kept for the next.
-    viewport: Option<Viewport>,
+    /// Pictures of a tooth as they were last drawn.
+    views: Views,
     frame_count: u64,
     /// Time of the last input, s.
     last_input: f64,
@@ -83,7 +85,8 @@ const HIDDEN_INTERVAL: Duration = Duration::from_millis(100);
 impl App {
     pub fn new(context: &eframe::CreationContext, mut options: AppOptions) -> App {
         let ctx = &context.egui_ctx;
-        let (mut settings, languages, mut complaints) = settings::load_with_languages();
+        let folder = options.user_folder.take().unwrap_or_else(|| UserFolder::new(platform::config_folder()));
+        let (mut settings, languages, mut complaints) = settings::load_with_languages(&folder);
         if let Some(station) = &options.station {
             settings = station.settings(settings);
             complaints.extend(station.complaint.clone());
@@ -92,26 +95,12 @@ impl App {
         if let Some(code) = options.language.take().filter(is_known) {
             settings.language = code;
         }
-        let (replacements, broken) = read_sounds();
+        let (replacements, broken) = read_sounds(&folder);
         complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
         theme::apply(ctx, &settings);
-        let is_given = options.given.is_some();
-        let mut exercise_list = match options.given.take() {
-            Some(given) => ExerciseList::only(given),
-            None => ExerciseList::load(&settings.exercises),
-        };
-        let mut screen = Screen::ExerciseList;
-        if let Some(path) = &options.exercise {
-            exercise_list.add_and_select(path);
-            if let Some(scan) = &options.tooth {
-                exercise_list.replace_teeth(scan);
-            }
-        }
-        let is_one_selected = is_given || options.exercise.is_some();
-        if is_one_selected && exercise_list.selected_exercise().is_some_and(|e| e.scenario.is_ok()) {
-            screen = Screen::Briefing;
-        }
+        let (exercise_list, screen) = first_screen(&mut options, &settings);
         let begins = options.begins_at_once;
+        let state_log = StateLog::new(options.state_log.take());
         let history = SessionHistory::read(&options.out, options.templates.clone(), repaint_waker(ctx));
         let mut app = App {
             history,
@@ -120,6 +109,7 @@ impl App {
             participant: options.participant.clone(),
             examiner_code: String::new(),
             options,
+            user_folder: folder,
             first_settings: settings.clone(),
             kiosk_exit: KioskExit::default(),
             settings,
@@ -132,10 +122,10 @@ impl App {
             had_focus: false,
             has_unsaved_settings: false,
             complaints,
-            state_log: StateLog::from_environment(),
+            state_log,
             replacements,
             has_graphics: context.wgpu_render_state.as_ref().is_some_and(viewport::has_graphics),
-            viewport: None,
+            views: Views::default(),
             frame_count: 0,
             last_input: 0.0,
         };
@@ -154,13 +144,31 @@ impl App {
             theme::apply(ctx, &self.settings);
             let own = match &self.options.station {
                 Some(station) if station.kiosk.is_some() => None,
-                Some(station) => Some(station.own_settings(&self.settings, Settings::load().0)),
+                Some(station) => Some(station.own_settings(&self.settings, Settings::load(&self.user_folder).0)),
                 None => Some(self.settings.clone()),
             };
-            self.complaints.extend(own.and_then(|own| own.save()));
+            self.complaints.extend(own.and_then(|own| own.save(&self.user_folder)));
             self.has_unsaved_settings = false;
         }
     }
+}
+
+/// The exercises, and the screen that is shown first: the instructions of the exercise that was asked for, or the list.
+fn first_screen(options: &mut AppOptions, settings: &Settings) -> (ExerciseList, Screen) {
+    let is_one_selected = options.given.is_some() || options.exercise.is_some();
+    let mut exercise_list = match options.given.take() {
+        Some(given) => ExerciseList::only(given),
+        None => ExerciseList::load(&settings.exercises),
+    };
+    if let Some(path) = &options.exercise {
+        exercise_list.add_and_select(path);
+        if let Some(scan) = &options.tooth {
+            exercise_list.replace_teeth(scan);
+        }
+    }
+    let is_valid = exercise_list.selected_exercise().is_some_and(|exercise| exercise.scenario.is_ok());
+    let screen = if is_one_selected && is_valid { Screen::Briefing } else { Screen::ExerciseList };
+    (exercise_list, screen)
 }
 
 /// A function that makes the window draw a new frame; callable from another thread.
@@ -170,20 +178,17 @@ fn repaint_waker(ctx: &egui::Context) -> Box<dyn Fn() + Send + Sync> {
 }
 
 /// The school's own sounds, and the files that are not sounds. A page has no folder for them.
-fn read_sounds() -> (Replacements, Vec<Diagnostic>) {
+fn read_sounds(folder: &UserFolder) -> (Replacements, Vec<Diagnostic>) {
     match platform::IS_PAGE {
         true => Default::default(),
-        false => wav_files::read_folder(&sounds_folder()),
+        false => wav_files::read_folder(&sounds_folder(folder)),
     }
 }
 
-/// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the settings folder.
-fn sounds_folder() -> PathBuf {
+/// Folder of the school's own sounds: `content/sounds` in the working folder, else `sounds` in the user's.
+fn sounds_folder(folder: &UserFolder) -> PathBuf {
     let beside = PathBuf::from("content/sounds");
-    match platform::config_folder() {
-        Some(folder) if !beside.is_dir() => folder.join("sounds"),
-        _ => beside,
-    }
+    folder.sounds().filter(|_| !beside.is_dir()).unwrap_or(beside)
 }
 
 impl eframe::App for App {
@@ -207,6 +212,8 @@ impl eframe::App for App {
         let mut commands = Vec::new();
         shortcuts::collect_commands(&ctx, &self.screen, self.overlay, self.had_focus, &mut commands);
         self.frame_ui(ui, frame, &mut commands);
+        // What was seen and typed in this frame counts before what a key asked for in it.
+        commands.sort_by_key(|command| !command.is_of_this_frame());
         for command in commands {
             self.execute(command, &ctx);
         }
@@ -215,9 +222,6 @@ impl eframe::App for App {
         self.state_log.record("frames", self.frame_count);
         self.log_state();
         ui_anchors::log_anchors(&ctx, &mut self.state_log);
-        if let Some(wait) = self.options.frame_delay {
-            std::thread::sleep(wait);
-        }
         ctx.request_repaint_after(self.frame_interval(&ctx));
     }
 }

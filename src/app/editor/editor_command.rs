@@ -34,6 +34,8 @@ pub enum EditorCommand {
     Save,
     /// Opens or closes the dialog that asks for a path.
     ShowSaveAs(bool),
+    /// The path to save to as it is being typed.
+    TypePath(String),
     SaveAs(PathBuf),
     /// Saves even if the file exists.
     SaveOverExisting(PathBuf),

@@ -37,6 +37,8 @@ pub struct EditorState {
     file_stamp: Option<FileStamp>,
     /// Finds the files that the exercise names.
     pub library: Library,
+    /// Folder of the automatically saved drafts; without one none are saved.
+    drafts_folder: Option<PathBuf>,
     pub form: SchemaForm,
     pub tissues: Vec<TissueEntry>,
     pub instruments: Vec<InstrumentEntry>,
@@ -87,13 +89,13 @@ pub enum OpenMode {
 
 impl EditorState {
     /// A new exercise with this text; an unsaved draft of an earlier run is restored.
-    pub fn new(text: String, wake: Box<dyn Fn() + Send>) -> EditorState {
-        EditorState::from_text(text, None, Library::shipped(), wake).with_restored_draft()
+    pub fn new(text: String, drafts_folder: Option<PathBuf>, wake: Box<dyn Fn() + Send>) -> EditorState {
+        EditorState::from_text(text, None, Library::shipped(), drafts_folder, wake).with_restored_draft()
     }
 
     /// A copy of a shipped exercise, which is saved elsewhere; an unsaved draft of an earlier run is restored.
-    pub fn copy(name: &str, text: &str, wake: Box<dyn Fn() + Send>) -> EditorState {
-        let mut editor = EditorState::from_text(text.to_string(), None, Library::shipped(), wake);
+    pub fn copy(name: &str, text: &str, drafts_folder: Option<PathBuf>, wake: Box<dyn Fn() + Send>) -> EditorState {
+        let mut editor = EditorState::from_text(text.to_string(), None, Library::shipped(), drafts_folder, wake);
         editor.copied_from = Some(Path::new("/shipped").join(name));
         editor.with_restored_draft()
     }
@@ -102,9 +104,15 @@ impl EditorState {
     ///
     /// # Errors
     /// The complaint if the file cannot be read.
-    pub fn open(path: &Path, mode: OpenMode, wake: Box<dyn Fn() + Send>) -> Result<EditorState, Diagnostic> {
+    pub fn open(
+        path: &Path,
+        mode: OpenMode,
+        drafts_folder: Option<PathBuf>,
+        wake: Box<dyn Fn() + Send>,
+    ) -> Result<EditorState, Diagnostic> {
         let (text, stamp) = read(path)?;
-        let mut editor = EditorState::from_text(text.clone(), Some(path.to_path_buf()), library_for(path), wake);
+        let mut editor =
+            EditorState::from_text(text.clone(), Some(path.to_path_buf()), library_for(path), drafts_folder, wake);
         (editor.saved_text, editor.file_stamp) = (Some(text), Some(stamp));
         editor.is_read_only = mode == OpenMode::ReadOnly;
         Ok(if editor.is_read_only { editor } else { editor.with_restored_draft() })
@@ -112,7 +120,7 @@ impl EditorState {
 
     /// Restores the automatically saved draft, if there is one, as a step that can be undone.
     fn with_restored_draft(mut self) -> EditorState {
-        let draft = drafts_folder().and_then(|folder| autosave::load(&folder, self.draft_path()));
+        let draft = self.drafts_folder.as_deref().and_then(|folder| autosave::load(folder, self.draft_path()));
         if let Some(kept) = draft.filter(|kept| kept != self.draft.text()) {
             self.draft.replace(kept);
             self.notice = Some(("author.brought_back", String::new()));
@@ -126,7 +134,13 @@ impl EditorState {
         self.path.as_deref().or(self.copied_from.as_deref())
     }
 
-    fn from_text(text: String, path: Option<PathBuf>, library: Library, wake: Box<dyn Fn() + Send>) -> EditorState {
+    fn from_text(
+        text: String,
+        path: Option<PathBuf>,
+        library: Library,
+        drafts_folder: Option<PathBuf>,
+        wake: Box<dyn Fn() + Send>,
+    ) -> EditorState {
         let mut editor = EditorState {
             draft: ExerciseDraft::new(text),
             path,
@@ -137,6 +151,7 @@ impl EditorState {
             instruments: InstrumentTable::read(&library).map(|t| t.entries().to_vec()).unwrap_or_default(),
             questionnaires: questionnaire_names(),
             library,
+            drafts_folder,
             form: SchemaForm::default(),
             section: EditorSection::Exercise,
             selected_decay: (0, 0),
@@ -259,7 +274,7 @@ impl EditorState {
 
     /// Saves unsaved changes as a draft beside the settings. Also called when the window closes.
     pub fn autosave(&mut self) {
-        let Some(folder) = drafts_folder().filter(|_| !self.is_read_only) else { return };
+        let Some(folder) = self.drafts_folder.clone().filter(|_| !self.is_read_only) else { return };
         self.is_autosaved = true;
         if self.is_unsaved() && self.draft.can_undo() {
             if let Err(why) = autosave::store(&folder, self.draft_path(), self.draft.text()) {
@@ -273,8 +288,8 @@ impl EditorState {
     fn discard_autosave(&mut self) {
         self.is_autosaved = true;
         // A read-only view has no draft of its own: an existing one belongs to the author.
-        if let Some(folder) = drafts_folder().filter(|_| !self.is_read_only) {
-            autosave::remove(&folder, self.draft_path());
+        if let Some(folder) = self.drafts_folder.as_deref().filter(|_| !self.is_read_only) {
+            autosave::remove(folder, self.draft_path());
         }
     }
 
@@ -301,6 +316,11 @@ impl EditorState {
             EditorCommand::Redo => self.draft.redo(),
             EditorCommand::Save => self.save_or_ask_path(),
             EditorCommand::ShowSaveAs(true) => self.show_save_as(),
+            EditorCommand::TypePath(path) => {
+                if let Some(Dialog::SaveAs(typed)) = &mut self.dialog {
+                    *typed = path;
+                }
+            }
             EditorCommand::SaveAs(path) => self.save(path, false),
             EditorCommand::SaveOverExisting(path) => self.save(path, true),
             EditorCommand::ReloadFromDisk => self.reload_from_disk(),
@@ -423,11 +443,6 @@ impl EditorState {
         }
     }
 
-    /// Marks the preview as outdated, because the renderer has drawn another scene since.
-    pub fn invalidate_preview(&mut self) {
-        self.preview.invalidate();
-    }
-
     /// Name and title of each tissue, of the table and of the exercise itself.
     pub fn tissue_names(&self) -> Vec<(String, String)> {
         let own = self.draft.value_at("/new_tissues").and_then(Value::as_array).into_iter().flatten();
@@ -450,11 +465,6 @@ impl EditorState {
         let stages = self.draft.value_at("/stages").and_then(|stages| stages.as_array()).into_iter().flatten();
         stages.filter_map(|stage| stage.pointer("/draw/id")?.as_str().map(str::to_string)).collect()
     }
-}
-
-/// Folder of the automatically saved drafts.
-fn drafts_folder() -> Option<PathBuf> {
-    platform::config_folder().map(|folder| folder.join("drafts"))
 }
 
 /// Folder that is suggested for an author's new exercises.

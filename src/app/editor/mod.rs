@@ -12,4 +12,4 @@ mod preview;
 pub use editor_command::EditorCommand;
 pub use editor_section::EditorSection;
 pub use editor_state::{Dialog, EditorState, OpenMode};
-pub use preview::{PreviewFrame, PreviewMode, SliceImage};
+pub use preview::PreviewMode;

@@ -1,7 +1,6 @@
 //! The author's view of the tooth: camera, display mode and slice position.
 
 use crate::editor::build_worker::BuildResult;
-use eframe::egui;
 use std::sync::Arc;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::Label;
@@ -28,24 +27,6 @@ impl PreviewMode {
     ];
 }
 
-/// Inputs of a rendered image; an image with equal inputs need not be drawn again.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PreviewFrame {
-    pub orbit: Orbit,
-    pub mode: PreviewMode,
-    pub shows_surroundings: bool,
-    pub size: [u32; 2],
-    pub generation: u64,
-}
-
-/// A slice as it was last drawn: generation of the build, position along its axis, mm, and size, pixels.
-pub struct SliceImage {
-    pub generation: u64,
-    pub position: f32,
-    pub size: [u32; 2],
-    pub texture: egui::TextureHandle,
-}
-
 pub struct PreviewState {
     pub orbit: Orbit,
     pub mode: PreviewMode,
@@ -54,10 +35,6 @@ pub struct PreviewState {
     pub slice_point: Vec3,
     /// Number of builds taken over so far.
     pub generation: u64,
-    /// True until the renderer has received this volume.
-    pub is_new: bool,
-    pub last_frame: Option<(PreviewFrame, egui::TextureId)>,
-    pub slices: [Option<SliceImage>; 3],
     pub palette: LabelPalette,
     pub surroundings: Vec<MeshInstance>,
     glass: Arc<TransferFunction>,
@@ -75,9 +52,6 @@ impl Default for PreviewState {
             shows_surroundings: false,
             slice_point: Vec3::ZERO,
             generation: 0,
-            is_new: true,
-            last_frame: None,
-            slices: [None, None, None],
             glass: Arc::new(TransferFunction::tissue(&palette)),
             decay: Arc::new(TransferFunction::highlighting(&[], &palette)),
             palette,
@@ -106,13 +80,6 @@ impl PreviewState {
             self.teeth = teeth;
         }
         self.generation += 1;
-        self.invalidate();
-    }
-
-    /// Forces a redraw, because the renderer may have drawn another scene since.
-    pub fn invalidate(&mut self) {
-        self.is_new = true;
-        self.last_frame = None;
     }
 
     pub fn render_mode(&self) -> RenderMode {

@@ -1,6 +1,7 @@
 //! A computer: settings in a file of the user's configuration folder, bundles in a folder.
 
 use super::LogSink;
+use crate::user_folder::UserFolder;
 use directories::{ProjectDirs, UserDirs};
 use std::fs;
 use std::fs::File;
@@ -14,7 +15,7 @@ pub const IS_PAGE: bool = false;
 /// Environment variable that names the file of the state log; without it nothing is written.
 const LOG_VARIABLE: &str = "TYPODONT_STATE_LOG";
 
-/// Folder of the settings on this platform; `None` if the user has no home folder.
+/// Folder of the user's own files on this platform; `None` if the user has no home folder.
 pub fn config_folder() -> Option<PathBuf> {
     ProjectDirs::from("", "", "typodont").map(|dirs| dirs.config_dir().to_path_buf())
 }
@@ -39,25 +40,20 @@ pub fn download(_: &BundleFolder) -> Option<String> {
     None
 }
 
-pub fn settings_file() -> Option<PathBuf> {
-    config_folder().map(|folder| folder.join("settings.json"))
-}
-
 /// Name of the place where settings are kept, for messages.
-pub fn settings_place() -> String {
-    settings_file().map(|path| path.display().to_string()).unwrap_or_default()
+pub fn settings_place(folder: &UserFolder) -> String {
+    folder.settings_file().map(|path| path.display().to_string()).unwrap_or_default()
 }
 
 /// Text of the settings; `None` if none are kept.
-pub fn read_settings() -> Option<String> {
-    fs::read_to_string(settings_file()?).ok()
+pub fn read_settings(folder: &UserFolder) -> Option<String> {
+    fs::read_to_string(folder.settings_file()?).ok()
 }
 
 /// Keeps the text of the settings; returns the reason if that fails.
-pub fn write_settings(text: &str) -> Option<String> {
-    let path = settings_file()?;
-    let folder = path.parent()?;
-    fs::create_dir_all(folder).and_then(|()| fs::write(&path, text)).err().map(|e| e.to_string())
+pub fn write_settings(folder: &UserFolder, text: &str) -> Option<String> {
+    let path = folder.settings_file()?;
+    fs::create_dir_all(folder.path()?).and_then(|()| fs::write(&path, text)).err().map(|e| e.to_string())
 }
 
 /// Sessions are in folders here, and their results are read from there.

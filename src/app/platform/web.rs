@@ -1,6 +1,7 @@
 //! A page in a browser: settings in the page's own storage, bundles in memory and as downloads.
 
 use super::LogSink;
+use crate::user_folder::UserFolder;
 use std::path::PathBuf;
 use typodont_report::bundle::{BundleFolder, REPORT_FILE};
 use wasm_bindgen::{JsCast, JsValue};
@@ -17,7 +18,7 @@ const HISTORY_KEY: &str = "typodont.history";
 /// Part of the page's address after the `?` that asks for the state log in the browser's console.
 const LOG_QUERY: &str = "state-log";
 
-/// A page has no folder for settings.
+/// A page has no folder for the user's own files.
 pub fn config_folder() -> Option<PathBuf> {
     None
 }
@@ -72,22 +73,18 @@ fn object_url(bytes: &[u8], media_type: &str) -> Result<String, JsValue> {
     web_sys::Url::create_object_url_with_blob(&blob)
 }
 
-pub fn settings_file() -> Option<PathBuf> {
-    None
-}
-
 /// Name of the place where settings are kept, for messages.
-pub fn settings_place() -> String {
+pub fn settings_place(_: &UserFolder) -> String {
     format!("localStorage/{SETTINGS_KEY}")
 }
 
 /// Text of the settings; `None` if none are kept, or if the browser keeps nothing for this page.
-pub fn read_settings() -> Option<String> {
+pub fn read_settings(_: &UserFolder) -> Option<String> {
     read(SETTINGS_KEY)
 }
 
 /// Keeps the text of the settings; returns the reason if that fails.
-pub fn write_settings(text: &str) -> Option<String> {
+pub fn write_settings(_: &UserFolder, text: &str) -> Option<String> {
     write(SETTINGS_KEY, text)
 }
 

@@ -1,6 +1,6 @@
 //! The briefing before an exercise: the task, the time allowed and the instruments.
 
-use crate::command::AppCommand;
+use crate::command::{AppCommand, TextField};
 use crate::completion::CompletionProgress;
 use crate::i18n::Translations;
 use crate::ui::theme;
@@ -11,11 +11,11 @@ use typodont_lesson as lesson;
 
 /// Texts typed before an exercise.
 pub struct BriefingFields<'a> {
-    pub participant: &'a mut String,
+    pub participant: &'a str,
     /// True if a session needs a participant's code, as in a kiosk.
     pub is_code_required: bool,
     /// Examiner's code, empty for a session without one; `None` where the code was given at the command line.
-    pub examiner_code: Option<&'a mut String>,
+    pub examiner_code: Option<&'a str>,
 }
 
 /// Returns true if a session with this examiner's code, which may be empty, can begin.
@@ -49,8 +49,7 @@ pub fn briefing_ui(
         ui.add_space(16.0);
         ui.horizontal(|ui| {
             let label = ui.label(words.get("briefing.participant")).id;
-            let edit = egui::TextEdit::singleline(participant).char_limit(64).desired_width(180.0);
-            ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
+            participant_field(ui, participant, label, words, commands);
         });
         if !lesson::is_valid_participant_code(participant) {
             ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
@@ -59,9 +58,9 @@ pub fn briefing_ui(
         if is_code_missing {
             ui.label(words.get("kiosk.code_required"));
         }
-        let has_valid_code = examiner_code.as_ref().is_none_or(|code| is_valid_examiner_code(code.as_str()));
+        let has_valid_code = examiner_code.is_none_or(is_valid_examiner_code);
         if let Some(code) = examiner_code {
-            examiner_code_ui(ui, code, words);
+            examiner_code_ui(ui, code, words, commands);
         }
         ui.add_space(8.0);
         if let Some(progress) = completion {
@@ -84,12 +83,50 @@ pub fn briefing_ui(
     });
 }
 
+/// Draws the field for the participant code, after its label.
+pub fn participant_field(
+    ui: &mut egui::Ui,
+    participant: &str,
+    label: egui::Id,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    let mut typed = participant.to_string();
+    let id = field_id(ui, TextField::Participant, participant);
+    let edit = egui::TextEdit::singleline(&mut typed).id(id).char_limit(64).desired_width(180.0);
+    ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
+    push_typed(TextField::Participant, participant, typed, commands);
+}
+
+/// Id of a field whose text the application keeps. While the text is empty, undoing brings nothing back: it may have been
+/// a code of somebody else.
+pub fn field_id(ui: &egui::Ui, field: TextField, text: &str) -> egui::Id {
+    let id = egui::Id::unique(field);
+    if text.is_empty()
+        && let Some(mut state) = egui::TextEdit::load_state(ui.ctx(), id)
+    {
+        state.clear_undoer();
+        state.store(ui.ctx(), id);
+    }
+    id
+}
+
+/// Pushes the text of a field if it has been changed.
+pub fn push_typed(field: TextField, text: &str, typed: String, commands: &mut Vec<AppCommand>) {
+    if typed != text {
+        commands.push(AppCommand::TypeText(field, typed));
+    }
+}
+
 /// Draws the field for the code that makes an examination of the session.
-fn examiner_code_ui(ui: &mut egui::Ui, code: &mut String, words: &Translations) {
+fn examiner_code_ui(ui: &mut egui::Ui, code: &str, words: &Translations, commands: &mut Vec<AppCommand>) {
     ui.horizontal(|ui| {
         let label = ui.label(words.get("briefing.code")).id;
-        let edit = egui::TextEdit::singleline(code).password(true).char_limit(200).desired_width(180.0);
+        let mut typed = code.to_string();
+        let id = field_id(ui, TextField::ExaminerCode, code);
+        let edit = egui::TextEdit::singleline(&mut typed).id(id).password(true).char_limit(200).desired_width(180.0);
         ui.add(edit.hint_text(words.get("briefing.code_hint"))).labelled_by(label);
+        push_typed(TextField::ExaminerCode, code, typed, commands);
     });
     match is_valid_examiner_code(code) {
         true => ui.weak(words.get("briefing.code_about")),

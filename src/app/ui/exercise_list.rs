@@ -1,11 +1,12 @@
 //! The list of exercises as it is drawn: cards with results, the participant, an interrupted session.
 
-use crate::command::AppCommand;
+use crate::command::{AppCommand, TextField};
 use crate::exercise_list::{Exercise, ExerciseList};
 use crate::i18n::Translations;
 use crate::platform;
 use crate::session_history::{AttemptSummary, SessionHistory};
 use crate::settings::Settings;
+use crate::ui::briefing::{participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;
@@ -23,8 +24,8 @@ pub struct ListContext<'a> {
 /// Draws the list. Pushes a command when the user selects an exercise or another folder.
 pub fn exercise_list_ui(
     ui: &mut egui::Ui,
-    list: &mut ExerciseList,
-    participant: &mut String,
+    list: &ExerciseList,
+    participant: &str,
     context: &ListContext,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -51,7 +52,6 @@ pub fn exercise_list_ui(
                     card.scroll_to_me(None);
                 }
             }
-            list.scroll_to_selected = false;
         });
         ui.add_space(12.0);
         let is_valid = list.can_open_selected(context.history, participant, context.settings);
@@ -75,7 +75,7 @@ pub fn exercise_list_ui(
             return;
         }
         if !context.is_kiosk {
-            folder_ui(ui, &mut list.folder, words, commands);
+            folder_ui(ui, &list.folder, words, commands);
         }
         if let Some(complaint) = &list.complaint {
             ui.colored_label(theme::ERROR, complaint);
@@ -84,23 +84,24 @@ pub fn exercise_list_ui(
 }
 
 /// The field for a further folder with exercises.
-fn folder_ui(ui: &mut egui::Ui, folder: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
+fn folder_ui(ui: &mut egui::Ui, folder: &str, words: &Translations, commands: &mut Vec<AppCommand>) {
     ui.horizontal_wrapped(|ui| {
         let label = ui.label(words.get("shelf.folder")).id;
-        let edit = egui::TextEdit::singleline(folder).desired_width(260.0);
-        let typed = ui.add(edit.hint_text(words.get("shelf.folder_hint"))).labelled_by(label);
-        if typed.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
-            commands.push(AppCommand::OpenFolder(folder.clone().into()));
+        let mut typed = folder.to_string();
+        let edit = egui::TextEdit::singleline(&mut typed).desired_width(260.0);
+        let line = ui.add(edit.hint_text(words.get("shelf.folder_hint"))).labelled_by(label);
+        if line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter)) {
+            commands.push(AppCommand::OpenFolder(typed.clone().into()));
         }
+        push_typed(TextField::ExerciseFolder, folder, typed, commands);
     });
 }
 
 /// The field for the participant code, whose results the list shows.
-fn participant_ui(ui: &mut egui::Ui, participant: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
+fn participant_ui(ui: &mut egui::Ui, participant: &str, words: &Translations, commands: &mut Vec<AppCommand>) {
     ui.horizontal_wrapped(|ui| {
         let label = ui.label(words.get("briefing.participant")).id;
-        let edit = egui::TextEdit::singleline(participant).char_limit(64).desired_width(180.0);
-        ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
+        participant_field(ui, participant, label, words, commands);
         if !participant.is_empty() && ui.button(words.get("shelf.someone_else")).clicked() {
             commands.push(AppCommand::ChangeParticipant);
         }

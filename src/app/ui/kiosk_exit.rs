@@ -1,15 +1,16 @@
 //! The page on which a supervisor closes a kiosk.
 
-use crate::command::AppCommand;
+use crate::command::{AppCommand, TextField};
 use crate::i18n::Translations;
 use crate::kiosk::{KioskExit, KioskOptions};
+use crate::ui::briefing::{field_id, push_typed};
 use crate::ui::theme;
 use eframe::egui;
 
 /// The question for the supervisor's code.
 pub fn exit_ui(
     ui: &mut egui::Ui,
-    exit: &mut KioskExit,
+    exit: &KioskExit,
     kiosk: &KioskOptions,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
@@ -22,12 +23,15 @@ pub fn exit_ui(
         return;
     }
     let label = ui.label(words.get("kiosk.code")).id;
-    let typed = ui.add(egui::TextEdit::singleline(&mut exit.code).password(true).desired_width(220.0));
-    let is_entered = typed.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-    if !is_entered && !typed.has_focus() && exit.code.is_empty() {
-        typed.request_focus();
+    let mut typed = exit.code.clone();
+    let id = field_id(ui, TextField::SupervisorCode, &exit.code);
+    let line = ui.add(egui::TextEdit::singleline(&mut typed).id(id).password(true).desired_width(220.0));
+    push_typed(TextField::SupervisorCode, &exit.code, typed, commands);
+    let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
+    if !is_entered && !line.has_focus() && exit.code.is_empty() {
+        line.request_focus();
     }
-    typed.labelled_by(label);
+    line.labelled_by(label);
     if ui.input(|input| input.key_pressed(egui::Key::Escape)) {
         commands.push(AppCommand::AskToLeaveKiosk(false));
     }

@@ -2,21 +2,18 @@
 
 use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
-use crate::lesson_scene::DisplayMode;
 use crate::lesson_state::LessonState;
 use crate::settings::Settings;
-use crate::snapshot::{InstrumentPose, LessonSnapshot};
-use crate::ui::viewport::{EyeWindow, Viewport};
+use crate::snapshot::LessonSnapshot;
+use crate::ui::lesson_view::PictureFrame;
+use crate::ui::viewport::Viewport;
+use crate::ui::views::Views;
 use crate::ui::{controls_guide, periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
-use crate::view_refresh::{Redraw, ViewInputs};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
-use typodont_core::frame::{Pose, Vec3};
+use typodont_core::frame::Vec3;
 use typodont_exercise::catalog::TissueRole;
-use typodont_render::{
-    Background, Changes, Eye, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
-};
+use typodont_render::Eye;
 use typodont_scene as scene;
-use typodont_scene::particles::ParticleField;
 
 /// Full width of the force bar, N: the maximum force of a PHANTOM Omni.
 const BAR_FULL: f32 = 3.3;
@@ -34,9 +31,9 @@ pub fn format_time(seconds: f64) -> String {
 /// The whole screen.
 pub fn practice_ui(
     ui: &mut egui::Ui,
-    lesson: &mut LessonState,
+    lesson: &LessonState,
     settings: &Settings,
-    viewport: Option<&mut Viewport>,
+    views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -44,25 +41,26 @@ pub fn practice_ui(
     // is no graphics processor.
     let side = egui::Frame::side_top_panel(ui.style()).inner_margin(16).fill(Color32::TRANSPARENT);
     let width = ui.available_width();
+    let frames_per_second = views.lesson.frames_per_second();
     egui::Panel::left("task").exact_size(310.0f32.min(0.28 * width)).resizable(false).frame(side).show(ui, |ui| {
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| task_ui(ui, lesson, words, commands));
     });
     egui::Panel::right("menu").exact_size(250.0f32.min(0.24 * width)).resizable(false).frame(side).show(ui, |ui| {
         egui::ScrollArea::vertical()
             .auto_shrink([false, false])
-            .show(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, words, commands));
+            .show(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, frames_per_second, words, commands));
     });
     egui::Panel::bottom("force")
         .exact_size(64.0)
         .resizable(false)
         .frame(side)
         .show(ui, |ui| force_ui(ui, lesson, words));
-    egui::CentralPanel::no_frame().show(ui, |ui| view_ui(ui, lesson, settings, viewport, words, commands));
+    egui::CentralPanel::no_frame().show(ui, |ui| view_ui(ui, lesson, settings, views, words, commands));
 }
 
 /// The stage, its time, its questions and its end.
-fn task_ui(ui: &mut egui::Ui, lesson: &mut LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
-    let scenario = lesson.scenario.clone();
+fn task_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let scenario = &lesson.scenario;
     let Some(stage) = lesson.stage.and_then(|stage| scenario.stages.get(stage)) else {
         ui.label(words.get("practice.making"));
         theme::progress_dots(ui);
@@ -221,9 +219,9 @@ fn warning(lesson: &LessonState, snapshot: &LessonSnapshot) -> Option<&'static s
 /// The view of the tooth and the instrument, with the state of the pointer.
 fn view_ui(
     ui: &mut egui::Ui,
-    lesson: &mut LessonState,
+    lesson: &LessonState,
     settings: &Settings,
-    viewport: Option<&mut Viewport>,
+    views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -233,24 +231,22 @@ fn view_ui(
     viewport_input::collect_commands(ui, &view, lesson.is_pointer_captured, commands);
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
-    let mut viewport = viewport;
-    let now = ui.input(|input| input.time);
-    if lesson.scene.is_some() && viewport.is_some() {
-        lesson.record_view(size[0] as f32 / size[1] as f32);
+    if lesson.scene.is_some() && views.viewport.is_some() {
+        let aspect = size[0] as f32 / size[1] as f32;
+        commands.push(AppCommand::Practice(PracticeCommand::RecordView(aspect)));
     }
-    match viewport.as_deref_mut().map(|viewport| refresh_view(lesson, settings, viewport, size, now)) {
+    let frame = PictureFrame { size, now: ui.input(|input| input.time) };
+    let Views { viewport, lesson: view, .. } = views;
+    let drawn = viewport.as_mut().map(|viewport| view.draw(lesson, settings, viewport, frame, commands));
+    match drawn {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, Color32::WHITE);
             if settings.stereo().is_none() {
                 pointer_ring(ui, lesson, rect);
             }
-            let is_section_allowed = is_section_allowed(lesson);
-            if let (Some(scene), Some(snapshot)) = (&mut lesson.scene, &lesson.snapshot)
-                && let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize)
-                && is_section_allowed
-            {
-                section_view::section_ui(ui, rect, scene, &lesson.orbit, snapshot, instrument);
+            if is_section_allowed(lesson) {
+                section_view::section_ui(ui, rect, lesson, &mut view.section);
             }
             controls_guide::controls_guide_ui(ui, lesson, rect, words);
         }
@@ -267,8 +263,8 @@ fn view_ui(
             ui.put(rect.shrink(40.0), egui::Label::new(words.get("practice.no_picture")));
         }
     }
-    if let Some(viewport) = viewport.filter(|_| settings.second_eye().is_some()) {
-        second_eye_window(ui.ctx(), viewport, words);
+    if let Some(viewport) = viewport.as_mut().filter(|_| settings.second_eye().is_some()) {
+        second_eye_window(ui.ctx(), viewport, view.has_volume(), words);
     }
     if lesson.has_mouse() && lesson.scene.is_some() {
         pointer_hint_ui(ui, rect, lesson.is_pointer_captured, words, commands);
@@ -314,125 +310,9 @@ fn is_section_allowed(lesson: &LessonState) -> bool {
     lesson.has_mouse() && lesson.is_pointer_captured && lesson.stage().is_some_and(|stage| stage.show_decay)
 }
 
-/// Draws the lesson's scene if the last image is not right any more; `None` before it is built. `now`: s.
-fn refresh_view(
-    lesson: &mut LessonState,
-    settings: &Settings,
-    viewport: &mut Viewport,
-    size: [u32; 2],
-    now: f64,
-) -> Result<Option<egui::TextureId>, RenderError> {
-    let Some(scene) = &lesson.scene else { return Ok(None) };
-    let particles = scene.particles.as_ref();
-    let particle_count = particles.map_or(0, ParticleField::count);
-    let stereo = [settings.stereo(), settings.second_eye()];
-    let inputs = ViewInputs {
-        size,
-        orbit: lesson.orbit,
-        mode: lesson.display_mode,
-        instrument: lesson.snapshot.as_ref().map(InstrumentPose::from),
-        edit_count: scene.edit_count,
-        appearance_count: scene.appearance_count,
-        stereo,
-        second_size: viewport.second_eye_size(),
-        is_smooth: settings.is_smooth(viewport.has_graphics()),
-        particle_count,
-    };
-    let is_moving = particle_count > 0 && !lesson.is_standing_still();
-    // In stereo each pixel may belong to one eye.
-    let may_be_coarse = stereo == [None, None];
-    let share = match lesson.view_refresh.plan(inputs, is_moving, may_be_coarse, now) {
-        Redraw::Keep if let Some(texture) = viewport.texture() => return Ok(Some(texture)),
-        Redraw::Keep => 1.0,
-        Redraw::At(share) => share,
-    };
-    let drawn = draw_view(lesson, settings, viewport, size.map(|pixels| (share * pixels as f32).ceil() as u32));
-    if drawn.is_err() {
-        lesson.view_refresh.invalidate();
-    }
-    drawn
-}
-
-/// Draws the lesson's scene; `None` before it is built.
-fn draw_view(
-    lesson: &mut LessonState,
-    settings: &Settings,
-    viewport: &mut Viewport,
-    size: [u32; 2],
-) -> Result<Option<egui::TextureId>, RenderError> {
-    let (viewpoint, mode, snapshot) = (lesson.orbit.viewpoint(), lesson.display_mode, lesson.snapshot);
-    let is_pointer = lesson.has_mouse();
-    let Some(lesson_scene) = &mut lesson.scene else { return Ok(None) };
-    let changed = lesson_scene.volume.take_dirty();
-    let is_radiograph = mode == DisplayMode::Xray;
-    // On the film neither gingiva nor neighbours cover the tooth; the instrument stays.
-    let mut solids = if is_radiograph { Vec::new() } else { lesson_scene.surroundings.clone() };
-    solids.extend(lesson_scene.ejector.clone().filter(|_| !is_radiograph));
-    if let Some(field) = &mut lesson_scene.particles {
-        field.sort_for_view(&viewpoint);
-    }
-    let mut mirror = None;
-    if let Some(snapshot) = snapshot
-        && let Some(instrument) = lesson_scene.instruments.get(snapshot.instrument as usize)
-    {
-        let world_from_tip = Pose { position: snapshot.tip, orientation: snapshot.orientation };
-        let index = snapshot.instrument as usize;
-        let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
-        match lesson_scene.contra_angles.get(index).and_then(Option::as_ref).filter(|_| is_pointer) {
-            Some(held) => {
-                solids.push(placed(&held.bur));
-                if !hides_tip(&viewpoint, world_from_tip) {
-                    solids.push(placed(&held.handpiece));
-                }
-            }
-            None => solids.push(placed(instrument)),
-        }
-        mirror = lesson
-            .scenario
-            .instruments
-            .get(snapshot.instrument as usize)
-            .and_then(|entry| scene::mirror_face(entry, world_from_tip));
-    }
-    let mut scene = RenderScene {
-        tooth: Some(VolumeInstance {
-            volume: &lesson_scene.volume,
-            changes: if lesson_scene.is_new { Changes::All } else { Changes::Bricks(&changed) },
-            world_from_tooth: lesson_scene.workpiece.world_from_tooth,
-            palette: &lesson_scene.palette,
-            mode: lesson_scene.render_mode(mode),
-        }),
-        solids,
-        opaque_particles: lesson_scene.particles.as_ref().map(ParticleField::opaque).unwrap_or_default(),
-        translucent_particles: lesson_scene.particles.as_ref().map(ParticleField::translucent).unwrap_or_default(),
-        mirror,
-        lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
-        background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
-        is_antialiased: settings.is_smooth(viewport.has_graphics()),
-    };
-    let mut drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, settings.stereo(), size);
-    if let Some(second_eye) = settings.second_eye()
-        && drawn.is_ok()
-    {
-        // Nothing has changed between the two eyes.
-        scene.tooth.iter_mut().for_each(|tooth| tooth.changes = Changes::Bricks(&[]));
-        let other =
-            viewport.draw(EyeWindow::SecondEye, &scene, &viewpoint, Some(second_eye), viewport.second_eye_size());
-        drawn = other.and(drawn);
-    }
-    // After a failed frame the whole volume is sent to the renderer again, since its changes were lost.
-    lesson_scene.is_new = drawn.is_err();
-    drawn.map(Some)
-}
-
-/// True if a handpiece over the working end would hide the work: it is seen from above, within 42° of its axis.
-fn hides_tip(viewpoint: &Viewpoint, world_from_tip: Pose) -> bool {
-    const COSINE: f32 = 0.74;
-    let to_eye = (viewpoint.position - world_from_tip.position).normalize_or(Vec3::Y);
-    to_eye.dot(world_from_tip.rotate(Vec3::Z)) > COSINE
-}
-
-/// The window of the right eye; if the system supports only one window, a panel within it.
-fn second_eye_window(ctx: &egui::Context, viewport: &mut Viewport, words: &Translations) {
+/// The window of the right eye; if the system supports only one window, a panel within it. Without a picture of this
+/// lesson it is empty: the last one may show another person's work.
+fn second_eye_window(ctx: &egui::Context, viewport: &mut Viewport, has_picture: bool, words: &Translations) {
     let title = words.get("practice.right_eye");
     let builder =
         egui::ViewportBuilder::default().with_title(format!("Typodont · {title}")).with_inner_size([640.0, 480.0]);
@@ -442,7 +322,7 @@ fn second_eye_window(ctx: &egui::Context, viewport: &mut Viewport, words: &Trans
         let scale = ui.pixels_per_point();
         viewport
             .set_second_eye_size([rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32));
-        if let Some(picture) = viewport.second_eye_texture() {
+        if let Some(picture) = viewport.second_eye_texture().filter(|_| has_picture) {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(picture, rect, whole, Color32::WHITE);
         }

@@ -14,22 +14,21 @@ use typodont_exercise::session::AnswerValue;
 pub fn questions_ui(
     ui: &mut egui::Ui,
     stage: &Stage,
-    lesson: &mut LessonState,
+    lesson: &LessonState,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
-    let scenario = lesson.scenario.clone();
+    let scenario = &lesson.scenario;
     let teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
     for (place, question) in stage.ask.iter().enumerate() {
         let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
         ui.add_space(10.0);
         ui.strong(words.own(&scenario.texts, &question.text));
-        let draft = lesson.drafts.entry(question.id.clone()).or_default();
+        let draft = lesson.drafts.get(&question.id).map_or("", String::as_str);
         let current = lesson.answers.get(&question.id);
         ui.push_id(place, |ui| {
-            if let Some(answer) =
-                (QuestionUi { question, current, texts: &scenario.texts, words }).answer_ui(ui, &teeth, draft)
-            {
+            let shown = QuestionUi { question, current, texts: &scenario.texts, words };
+            if let Some(answer) = shown.answer_ui(ui, &teeth, draft, commands) {
                 commands.push(AppCommand::Practice(PracticeCommand::AnswerQuestion(question.id.clone(), answer)));
             }
         });
@@ -56,7 +55,13 @@ struct QuestionUi<'a> {
 
 impl QuestionUi<'_> {
     /// Draws the controls of the question; returns the answer given in this frame, if any.
-    fn answer_ui(&self, ui: &mut egui::Ui, teeth: &[(String, u8)], draft: &mut String) -> Option<AnswerValue> {
+    fn answer_ui(
+        &self,
+        ui: &mut egui::Ui,
+        teeth: &[(String, u8)],
+        draft: &str,
+        commands: &mut Vec<AppCommand>,
+    ) -> Option<AnswerValue> {
         let words = self.words;
         match &self.question.kind {
             QuestionKind::ToothWith { .. } => {
@@ -83,8 +88,8 @@ impl QuestionUi<'_> {
                     options.into_iter().map(|(yes, key)| (AnswerValue::YesNo(yes), words.get(key).to_string())),
                 )
             }
-            QuestionKind::Number { unit, .. } => self.line(ui, draft, unit),
-            QuestionKind::Text => self.line(ui, draft, ""),
+            QuestionKind::Number { unit, .. } => self.line(ui, draft, unit, commands),
+            QuestionKind::Text => self.line(ui, draft, "", commands),
         }
     }
 
@@ -130,10 +135,11 @@ impl QuestionUi<'_> {
     }
 
     /// A text field; returns its answer when the user submits it.
-    fn line(&self, ui: &mut egui::Ui, draft: &mut String, unit: &str) -> Option<AnswerValue> {
+    fn line(&self, ui: &mut egui::Ui, draft: &str, unit: &str, commands: &mut Vec<AppCommand>) -> Option<AnswerValue> {
         let mut is_submitted = false;
+        let mut typed = draft.to_string();
         ui.horizontal(|ui| {
-            let line = ui.add(egui::TextEdit::singleline(draft).desired_width(150.0));
+            let line = ui.add(egui::TextEdit::singleline(&mut typed).desired_width(150.0));
             line.widget_info(|| {
                 egui::WidgetInfo::labeled(egui::Role::TextInput, true, self.words.own(self.texts, &self.question.text))
             });
@@ -141,6 +147,11 @@ impl QuestionUi<'_> {
             let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
             is_submitted = ui.button(self.words.get("questions.say")).clicked() || is_entered;
         });
-        parse_draft(self.question, draft).flatten().filter(|_| is_submitted)
+        let answer = parse_draft(self.question, &typed).flatten().filter(|_| is_submitted);
+        if typed != draft {
+            let id = self.question.id.clone();
+            commands.push(AppCommand::Practice(PracticeCommand::TypeAnswer(id, typed)));
+        }
+        answer
     }
 }

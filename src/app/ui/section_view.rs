@@ -1,11 +1,10 @@
 //! A section through the working end, beside the picture: how deep the instrument is, which the picture does not show.
 
-use crate::lesson_scene::{LessonScene, SectionImage};
-use crate::snapshot::{LessonSnapshot, is_still};
+use crate::lesson_scene::LessonScene;
+use crate::lesson_state::LessonState;
+use crate::snapshot::is_still;
 use eframe::egui::{self, Color32, Pos2, Rect, Stroke, vec2};
 use typodont_core::frame::{Quat, Vec3};
-use typodont_exercise::catalog::InstrumentEntry;
-use typodont_render::Orbit;
 use typodont_report::raycast::{self, ImagePlane, OrthographicCamera, PixelBuffer};
 use typodont_scene::pointing::ring_radius;
 
@@ -23,23 +22,26 @@ const MARGIN: f32 = 12.0;
 const BACKGROUND: [f32; 3] = [0.11, 0.14, 0.16];
 const SURROUNDINGS: [f32; 3] = [0.69, 0.42, 0.41];
 
+/// Image of a section, and what it depends on.
+pub struct SectionImage {
+    tip: Vec3,
+    azimuth: f32,
+    edit_count: u64,
+    texture: egui::TextureHandle,
+}
+
 const LINE: Color32 = Color32::from_rgba_premultiplied(190, 190, 190, 190);
 
 /// Draws the section in the lower right corner of the view. The section plane is upright, contains the tip, and is
 /// parallel to the picture's horizontal.
-pub fn section_ui(
-    ui: &egui::Ui,
-    view: Rect,
-    scene: &mut LessonScene,
-    orbit: &Orbit,
-    snapshot: &LessonSnapshot,
-    instrument: &InstrumentEntry,
-) {
+pub fn section_ui(ui: &egui::Ui, view: Rect, lesson: &LessonState, section: &mut Option<SectionImage>) {
+    let (Some(scene), Some(snapshot)) = (&lesson.scene, &lesson.snapshot) else { return };
+    let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize) else { return };
     if view.width() < 3.0 * SIDE || view.height() < 2.0 * SIDE {
         return;
     }
     let rect = Rect::from_min_size(view.right_bottom() - vec2(SIDE + MARGIN, SIDE + MARGIN + 36.0), vec2(SIDE, SIDE));
-    let texture = section_texture(ui, scene, orbit.azimuth, snapshot.tip);
+    let texture = section_texture(ui, scene, section, lesson.orbit.azimuth, snapshot.tip);
     let painter = ui.painter().with_clip_rect(rect);
     let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     painter.image(texture, rect, whole, Color32::WHITE);
@@ -73,18 +75,24 @@ fn scale_ui(painter: &egui::Painter, rect: Rect, points_per_mm: f32) {
 }
 
 /// Texture of the section, drawn again only if one of its inputs has changed visibly, as the view is.
-fn section_texture(ui: &egui::Ui, scene: &mut LessonScene, azimuth: f32, tip: Vec3) -> egui::TextureId {
+fn section_texture(
+    ui: &egui::Ui,
+    scene: &LessonScene,
+    section: &mut Option<SectionImage>,
+    azimuth: f32,
+    tip: Vec3,
+) -> egui::TextureId {
     let edit_count = scene.edit_count;
     let is_same =
         |image: &&SectionImage| is_still(image.tip, tip) && image.azimuth == azimuth && image.edit_count == edit_count;
-    if let Some(image) = scene.section.as_ref().filter(is_same) {
+    if let Some(image) = section.as_ref().filter(is_same) {
         return image.texture.id();
     }
     let size = [PIXELS as usize; 2];
     let image = egui::ColorImage::from_rgb(size, &section_picture(scene, azimuth, tip).rgb8());
     let texture = ui.ctx().load_texture("section", image, egui::TextureOptions::LINEAR);
     let id = texture.id();
-    scene.section = Some(SectionImage { tip, azimuth, edit_count, texture });
+    *section = Some(SectionImage { tip, azimuth, edit_count, texture });
     id
 }
 

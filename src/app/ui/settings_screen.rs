@@ -6,6 +6,7 @@ use crate::platform;
 use crate::settings::{FONT_SIZES, Settings, StereoMode};
 use crate::ui::ui_anchors;
 use eframe::egui;
+use std::path::Path;
 use typodont_devices::DRIVERS;
 
 const STEREO_MODES: [(StereoMode, &str); 6] = [
@@ -21,6 +22,7 @@ const STEREO_MODES: [(StereoMode, &str); 6] = [
 pub fn settings_ui(
     ui: &mut egui::Ui,
     settings: &Settings,
+    settings_file: Option<&Path>,
     has_graphics: bool,
     languages: &[Translations],
     words: &Translations,
@@ -54,7 +56,7 @@ pub fn settings_ui(
         commands.push(AppCommand::ApplySettings(Box::new(new)));
     }
     ui.add_space(12.0);
-    if let Some(path) = platform::settings_file() {
+    if let Some(path) = settings_file {
         ui.weak(words.format("settings.kept", path.display()));
     }
     ui.add_space(8.0);

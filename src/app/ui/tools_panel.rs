@@ -13,7 +13,13 @@ use typodont_core::touch::{Coefficient, CuttingLaw};
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::TissueEntry;
 
-pub fn tools_panel_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
+pub fn tools_panel_ui(
+    ui: &mut egui::Ui,
+    lesson: &LessonState,
+    frames_per_second: f64,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
     instruments_ui(ui, lesson, words, commands);
     section_heading(ui, words.get("menu.rendering"));
     for (mode, key) in DisplayMode::available(lesson.stage()) {
@@ -42,13 +48,14 @@ pub fn tools_panel_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translati
         let choice = egui::ComboBox::from_id_salt("views")
             .selected_text(words.get("views.choose"))
             .width(ui.available_width().min(200.0));
-        choice.height(400.0).show_ui(ui, |ui| {
+        let shown = choice.height(400.0).show_ui(ui, |ui| {
             for (view, key) in CameraPreset::available(scene) {
                 if ui.selectable_label(false, words.get(key)).clicked() {
                     commands.push(AppCommand::Practice(PracticeCommand::SetCamera(view)));
                 }
             }
         });
+        shown.response.accessible_name(words.get("menu.views"));
     }
     section_heading(ui, words.get("menu.haptics"));
     let mut is_on = !lesson.is_paused;
@@ -62,7 +69,7 @@ pub fn tools_panel_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translati
     }
     ui.add_space(14.0);
     egui::CollapsingHeader::new(words.get("menu.beat")).show(ui, |ui| {
-        performance_ui(ui, lesson, words);
+        performance_ui(ui, lesson, frames_per_second, words);
         if let Some(why) = &lesson.audio_error {
             ui.small(words.get("menu.sound"));
             ui.small(why);
@@ -182,9 +189,9 @@ fn slider_of(which: Coefficient, value: &mut f32) -> egui::Slider<'_> {
 }
 
 /// Pictures a second, and how late the servo's ticks come.
-fn performance_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
+fn performance_ui(ui: &mut egui::Ui, lesson: &LessonState, frames_per_second: f64, words: &Translations) {
     let timing = lesson.snapshot.unwrap_or_default().timing;
-    ui.small(words.format("menu.pictures", format!("{:.0}", lesson.frames_per_second)));
+    ui.small(words.format("menu.pictures", format!("{:.0}", frames_per_second)));
     ui.small(words.format("menu.ticks", timing.ticks));
     ui.small(words.format("menu.late", format!("{:.2}", f64::from(timing.late_p99) / 1000.0)));
     ui.small(words.format("menu.missed", timing.missed));

@@ -46,8 +46,6 @@ pub struct ParticleField {
     rng: Xorshift32,
     /// Time that is not yet a whole step, s.
     pending_time: f32,
-    opaque: Vec<Particle>,
-    translucent: Vec<Particle>,
 }
 
 /// Geometry of an instrument's bur and spray.
@@ -89,8 +87,6 @@ impl ParticleField {
             water: Water::new(),
             rng: Xorshift32::new(),
             pending_time: 0.0,
-            opaque: Vec::with_capacity(dust::MAX_CHIPS),
-            translucent: Vec::with_capacity(water::MAX_PARTICLES),
         }
     }
 
@@ -127,29 +123,45 @@ impl ParticleField {
         }
     }
 
-    /// Number of particles in flight.
-    pub fn count(&self) -> usize {
-        self.dust.particles().count() + self.water.particles().count()
+    /// Number of chips of dust, and of drops and patches of water.
+    pub fn counts(&self) -> [usize; 2] {
+        [self.dust.particles().count(), self.water.particles().count()]
     }
+}
 
-    /// Updates the lists of particles, sorted for a viewpoint.
-    pub fn sort_for_view(&mut self, viewpoint: &Viewpoint) {
-        let ParticleField { dust, water, opaque, translucent, .. } = self;
-        opaque.clear();
-        opaque.extend(dust.particles());
-        translucent.clear();
-        translucent.extend(water.particles());
+/// The particles of a field as one viewpoint sees them, in buffers that are kept from image to image.
+pub struct VisibleParticles {
+    opaque: Vec<Particle>,
+    translucent: Vec<Particle>,
+}
+
+impl Default for VisibleParticles {
+    fn default() -> VisibleParticles {
+        VisibleParticles {
+            opaque: Vec::with_capacity(dust::MAX_CHIPS),
+            translucent: Vec::with_capacity(water::MAX_PARTICLES),
+        }
+    }
+}
+
+impl VisibleParticles {
+    /// Takes over the particles of a field, sorted for a viewpoint. Does not allocate.
+    pub fn update(&mut self, field: &ParticleField, viewpoint: &Viewpoint) {
+        self.opaque.clear();
+        self.opaque.extend(field.dust.particles());
+        self.translucent.clear();
+        self.translucent.extend(field.water.particles());
         let forward = viewpoint.focus - viewpoint.position;
-        let depth = |speck: &Particle| (speck.position - viewpoint.position).dot(forward);
-        translucent.sort_unstable_by(|a, b| depth(b).total_cmp(&depth(a)));
+        let depth = |particle: &Particle| (particle.position - viewpoint.position).dot(forward);
+        self.translucent.sort_unstable_by(|a, b| depth(b).total_cmp(&depth(a)));
     }
 
-    /// The dust, as of the last [`ParticleField::sort_for_view`].
+    /// The dust.
     pub fn opaque(&self) -> &[Particle] {
         &self.opaque
     }
 
-    /// The water, the farthest first, as of the last [`ParticleField::sort_for_view`].
+    /// The water, the farthest first.
     pub fn translucent(&self) -> &[Particle] {
         &self.translucent
     }
@@ -170,6 +182,16 @@ mod tests {
 
     const ALL: OperatingField = OperatingField { dust: true, water_spray: true, suction: true };
     const DUST: OperatingField = OperatingField { dust: true, water_spray: false, suction: false };
+
+    fn viewpoint() -> Viewpoint {
+        Viewpoint::look_at(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y)
+    }
+
+    fn visible(field: &ParticleField) -> VisibleParticles {
+        let mut visible = VisibleParticles::default();
+        visible.update(field, &viewpoint());
+        visible
+    }
 
     fn tray() -> Vec<InstrumentEntry> {
         let table = InstrumentTable::read(&Library::shipped()).unwrap();
@@ -249,10 +271,10 @@ mod tests {
         let bur = field.bur(0, upright(AT_WORK)).unwrap();
         carve(&mut volume, &mut field, AT_WORK, 1.0);
         field.advance(0.0, Some(&bur), &ground(&volume), &palette());
-        field.sort_for_view(&Viewpoint::look_at(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y));
-        assert!(field.opaque().len() > 20);
+        let seen = visible(&field);
+        assert!(seen.opaque().len() > 20);
         let shown = palette().appearance(Label(1)).colour;
-        for grain in field.opaque() {
+        for grain in seen.opaque() {
             let colour = grain.appearance.colour;
             assert!((0..3).all(|c| (0.0..0.3).contains(&(colour[c] - shown[c]))), "{colour:?}");
         }
@@ -292,7 +314,7 @@ mod tests {
         // Over a flat place, where water spreads.
         let bur = wet.bur(0, upright(Vec3::new(6.0, 0.6, 0.0))).unwrap();
         let palette = palette();
-        let viewpoint = Viewpoint::look_at(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
+        let (viewpoint, mut seen) = (viewpoint(), VisibleParticles::default());
         let counted = allocation_counter::measure(|| {
             for round in 0..100 {
                 for field in [&mut wet, &mut dry] {
@@ -301,14 +323,15 @@ mod tests {
                         field.record_removal(&Edit { index, before, after: Voxel::AIR }, &grid);
                     }
                     field.advance(0.1, Some(&bur), &ground(&volume), &palette);
-                    field.sort_for_view(&viewpoint);
+                    seen.update(field, &viewpoint);
                 }
             }
         });
         assert_eq!(counted.count_total, 0, "allocations");
-        let chips = dry.opaque().len();
+        let [chips, _] = dry.counts();
         assert!((1800..=dust::MAX_CHIPS).contains(&chips), "{chips} chips of nearly ten thousand");
-        assert!((50..=water::MAX_PARTICLES).contains(&wet.translucent().len()), "{} drops", wet.translucent().len());
+        let [_, drops] = wet.counts();
+        assert!((50..=water::MAX_PARTICLES).contains(&drops), "{drops} drops");
     }
 
     #[test]
@@ -363,8 +386,8 @@ mod tests {
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             carve(&mut volume, &mut field, AT_WORK, 1.0);
             times.iter().for_each(|s| field.advance(*s, Some(&bur), &ground(&volume), &palette()));
-            field.sort_for_view(&Viewpoint::look_at(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y));
-            (field.opaque().to_vec(), field.translucent().to_vec())
+            let seen = visible(&field);
+            (seen.opaque().to_vec(), seen.translucent().to_vec())
         };
         // Whole sixteenths, so that no time is lost by rounding.
         let seldom = run(&[0.0625; 2]);

@@ -177,7 +177,7 @@ pub fn choice_ui(
     });
     let response = match named {
         Some(named) => response.response.labelled_by(named.id),
-        None => response.response,
+        None => response.response.accessible_name(name),
     };
     anchor(ui, pointer, response.rect);
     if let Some((word, holds)) = chosen.and_then(|v| Some((v.name, v.schema?))) {

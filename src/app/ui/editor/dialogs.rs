@@ -12,9 +12,9 @@ use crate::ui::ui_anchors::anchor;
 use eframe::egui;
 use std::path::PathBuf;
 
-pub fn dialog_ui(ctx: &egui::Context, editor: &mut EditorState, words: &Translations, commands: &mut Vec<AppCommand>) {
-    let Some(mut dialog) = editor.dialog.take() else { return };
-    let title = match &dialog {
+pub fn dialog_ui(ctx: &egui::Context, editor: &EditorState, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let Some(dialog) = &editor.dialog else { return };
+    let title = match dialog {
         Dialog::SaveAs(_) => "author.save_as",
         Dialog::ConfirmOverwrite(_) => "author.over_title",
         Dialog::FileChanged(_) => "author.changed_title",
@@ -27,7 +27,7 @@ pub fn dialog_ui(ctx: &egui::Context, editor: &mut EditorState, words: &Translat
         ui.heading(words.get(title));
         ui.add_space(8.0);
         let scroll = egui::ScrollArea::vertical().max_height((room.y - 200.0).max(140.0));
-        scroll.show(ui, |ui| match &mut dialog {
+        scroll.show(ui, |ui| match dialog {
             Dialog::SaveAs(path) => save_as_ui(ui, path, words, commands),
             Dialog::ConfirmOverwrite(path) => {
                 ui.add(egui::Label::new(words.format("author.over", path.display())).wrap());
@@ -47,7 +47,6 @@ pub fn dialog_ui(ctx: &egui::Context, editor: &mut EditorState, words: &Translat
             Dialog::CheckResults => check_results_ui(ui, &mut FormContext { editor, words, commands }),
         });
     });
-    editor.dialog = Some(dialog);
 }
 
 fn answers_ui<const N: usize>(
@@ -67,12 +66,17 @@ fn answers_ui<const N: usize>(
     });
 }
 
-fn save_as_ui(ui: &mut egui::Ui, path: &mut String, words: &Translations, commands: &mut Vec<AppCommand>) {
+fn save_as_ui(ui: &mut egui::Ui, path: &str, words: &Translations, commands: &mut Vec<AppCommand>) {
     let named = ui.label(words.get("author.where")).id;
-    let line = ui.add(egui::TextEdit::singleline(path).desired_width(f32::INFINITY)).labelled_by(named);
+    let mut typed = path.to_string();
+    let line = ui.add(egui::TextEdit::singleline(&mut typed).desired_width(f32::INFINITY)).labelled_by(named);
+    if typed != path {
+        commands.push(AppCommand::Editor(EditorCommand::TypePath(typed.clone())));
+    }
+    let path = typed.trim();
     anchor(ui, "where", line.rect);
     let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
-    let is_json = path.trim().ends_with(".json");
+    let is_json = path.ends_with(".json");
     if !is_json {
         ui.colored_label(theme::ERROR, words.get("author.where_json"));
     }
@@ -81,7 +85,7 @@ fn save_as_ui(ui: &mut egui::Ui, path: &mut String, words: &Translations, comman
         let save = ui.add_enabled(is_json, egui::Button::new(words.get("author.save")));
         anchor(ui, "answer:save", save.rect);
         if save.clicked() || (is_entered && is_json) {
-            commands.push(AppCommand::Editor(EditorCommand::SaveAs(PathBuf::from(path.trim()))));
+            commands.push(AppCommand::Editor(EditorCommand::SaveAs(PathBuf::from(path))));
         }
         if ui.button(words.get("author.cancel")).clicked() {
             commands.push(AppCommand::Editor(EditorCommand::ShowSaveAs(false)));

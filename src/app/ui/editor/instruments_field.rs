@@ -54,9 +54,9 @@ pub fn instruments_ui(ui: &mut egui::Ui, form: &mut FormContext, pointer: &str) 
     }
     let more: Vec<String> = all.into_iter().filter(|id| !own.contains(id)).collect();
     if !more.is_empty() {
-        let shown = form.words.get("author.add_instrument").to_string();
+        let name = form.words.get("author.add_instrument").to_string();
         let width = (ui.available_width() - 8.0).clamp(80.0, 280.0);
-        let combo = egui::ComboBox::from_id_salt("more").width(width).height(360.0).truncate().selected_text(&shown);
+        let combo = egui::ComboBox::from_id_salt("more").width(width).height(360.0).truncate().selected_text(&name);
         let shown = combo.show_ui(ui, |ui| {
             for id in &more {
                 let option = ui.selectable_label(false, title(id));
@@ -66,7 +66,8 @@ pub fn instruments_ui(ui: &mut egui::Ui, form: &mut FormContext, pointer: &str) 
                 }
             }
         });
-        anchor(ui, format!("add:{pointer}"), shown.response.rect);
+        let response = shown.response.accessible_name(name);
+        anchor(ui, format!("add:{pointer}"), response.rect);
     }
     if is_stages && ui.small_button(form.words.get("author.whole_tray")).clicked() {
         form.send(EditorCommand::RemoveValue(pointer.into()));

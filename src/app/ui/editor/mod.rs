@@ -22,7 +22,7 @@ mod tooth_view;
 use crate::command::AppCommand;
 use crate::editor::{EditorCommand, EditorState};
 use crate::i18n::Translations;
-use crate::ui::viewport::Viewport;
+use crate::ui::views::Views;
 use eframe::egui;
 use serde_json::Value;
 
@@ -46,8 +46,8 @@ impl FormContext<'_> {
 /// The whole screen.
 pub fn editor_ui(
     ui: &mut egui::Ui,
-    editor: &mut EditorState,
-    viewport: Option<&mut Viewport>,
+    editor: &EditorState,
+    views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -66,7 +66,7 @@ pub fn editor_ui(
         });
     let view = egui::Frame::NONE.inner_margin(0);
     egui::Panel::right("author view").exact_size(0.42 * width).resizable(false).frame(view).show(ui, |ui| {
-        tooth_view::tooth_view_ui(ui, editor, viewport, words, commands);
+        tooth_view::tooth_view_ui(ui, editor, views, words, commands);
     });
     let middle = egui::Frame::NONE.inner_margin(14);
     egui::CentralPanel::default().frame(middle).show(ui, |ui| {

@@ -3,8 +3,8 @@
 use crate::command::AppCommand;
 use crate::editor::EditorCommand;
 use crate::editor::EditorState;
-use crate::editor::SliceImage;
 use crate::i18n::Translations;
+use crate::ui::preview_view::SliceImage;
 use crate::ui::ui_anchors::anchor;
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::Vec3;
@@ -21,7 +21,14 @@ const SLICES: [(ViewSide, usize, &str); 3] = [
 /// Background colour of a slice.
 const BACKGROUND: [f32; 3] = [0.20, 0.24, 0.27];
 
-pub fn slices_ui(ui: &mut egui::Ui, editor: &mut EditorState, words: &Translations, commands: &mut Vec<AppCommand>) {
+/// The three slices, with their last images.
+pub fn slices_ui(
+    ui: &mut egui::Ui,
+    editor: &EditorState,
+    images: &mut [Option<SliceImage>; 3],
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
     if editor.build.is_none() {
         return;
     }
@@ -30,10 +37,10 @@ pub fn slices_ui(ui: &mut egui::Ui, editor: &mut EditorState, words: &Translatio
     let height = (ui.available_height() - 62.0).max(60.0);
     ui.spacing_mut().item_spacing = egui::vec2(gap, 4.0);
     ui.horizontal_top(|ui| {
-        for place in 0..SLICES.len() {
+        for (place, image) in images.iter_mut().enumerate() {
             ui.vertical(|ui| {
                 ui.set_width(width);
-                slice_ui(ui, editor, place, egui::vec2(width, height), words, commands);
+                slice_ui(ui, editor, (place, image), egui::vec2(width, height), words, commands);
             });
         }
     });
@@ -41,8 +48,8 @@ pub fn slices_ui(ui: &mut egui::Ui, editor: &mut EditorState, words: &Translatio
 
 fn slice_ui(
     ui: &mut egui::Ui,
-    editor: &mut EditorState,
-    which: usize,
+    editor: &EditorState,
+    (which, image): (usize, &mut Option<SliceImage>),
     size: egui::Vec2,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
@@ -61,7 +68,7 @@ fn slice_ui(
         width: pixels[0],
         height: pixels[1],
     };
-    let id = slice_texture(ui, editor, which, &shot);
+    let id = slice_texture(ui, editor, (which, image), &shot);
     let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     ui.painter().image(id, rect, whole, Color32::WHITE);
     let distal_is_plus = editor.build.as_ref().is_none_or(|made| made.workpiece.distal().y > 0.0);
@@ -91,12 +98,17 @@ fn slice_ui(
 }
 
 /// Image of a slice, drawn again only if one of its inputs has changed.
-fn slice_texture(ui: &egui::Ui, editor: &mut EditorState, which: usize, shot: &ImagePlane) -> egui::TextureId {
+fn slice_texture(
+    ui: &egui::Ui,
+    editor: &EditorState,
+    (which, last): (usize, &mut Option<SliceImage>),
+    shot: &ImagePlane,
+) -> egui::TextureId {
     let (_, axis, key) = SLICES[which];
     let (generation, position) = (editor.preview.generation, editor.preview.slice_point[axis]);
     let size = [shot.width, shot.height];
     let is_same = |cut: &&SliceImage| cut.generation == generation && cut.position == position && cut.size == size;
-    if let Some(cut) = editor.preview.slices[which].as_ref().filter(is_same) {
+    if let Some(cut) = last.as_ref().filter(is_same) {
         return cut.texture.id();
     }
     let palette = &editor.preview.palette;
@@ -109,7 +121,7 @@ fn slice_texture(ui: &egui::Ui, editor: &mut EditorState, which: usize, shot: &I
     let image = egui::ColorImage::from_rgb(size.map(|n| n as usize), &picture.unwrap_or_default());
     let texture = ui.ctx().load_texture(key, image, egui::TextureOptions::LINEAR);
     let id = texture.id();
-    editor.preview.slices[which] = Some(SliceImage { generation, position, size, texture });
+    *last = Some(SliceImage { generation, position, size, texture });
     id
 }
 

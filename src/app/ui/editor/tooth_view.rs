@@ -4,24 +4,24 @@ use crate::command::AppCommand;
 use crate::editor::EditorCommand;
 use crate::editor::EditorSection;
 use crate::editor::EditorState;
-use crate::editor::{PreviewFrame, PreviewMode};
+use crate::editor::PreviewMode;
 use crate::i18n::Translations;
 use crate::ui::editor::decay;
 use crate::ui::editor::slice_views::slices_ui;
 use crate::ui::ui_anchors::anchor;
-use crate::ui::viewport::{EyeWindow, Viewport};
+use crate::ui::views::Views;
 use crate::ui::{theme, viewport_input};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense};
 use typodont_core::frame::Vec3;
-use typodont_render::{Changes, Eye, Lamp, Lights, RenderScene, VolumeInstance};
+use typodont_render::Eye;
 
 /// Height of the slices with their sliders, as a share of the column.
 const SLICES_SHARE: f32 = 0.36;
 
 pub fn tooth_view_ui(
     ui: &mut egui::Ui,
-    editor: &mut EditorState,
-    viewport: Option<&mut Viewport>,
+    editor: &EditorState,
+    views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -32,9 +32,9 @@ pub fn tooth_view_ui(
         .show(ui, |ui| preview_options_ui(ui, editor, words, commands));
     let height = (SLICES_SHARE * ui.available_height()).max(150.0);
     egui::Panel::bottom("author cuts").exact_size(height).resizable(false).frame(frame).show(ui, |ui| {
-        slices_ui(ui, editor, words, commands);
+        slices_ui(ui, editor, &mut views.preview.slices, words, commands);
     });
-    egui::CentralPanel::no_frame().show(ui, |ui| tooth_ui(ui, editor, viewport, words, commands));
+    egui::CentralPanel::no_frame().show(ui, |ui| tooth_ui(ui, editor, views, words, commands));
 }
 
 /// Display options of the preview, in one row while there is room.
@@ -69,8 +69,8 @@ fn preview_options_ui(ui: &mut egui::Ui, editor: &EditorState, words: &Translati
 
 fn tooth_ui(
     ui: &mut egui::Ui,
-    editor: &mut EditorState,
-    viewport: Option<&mut Viewport>,
+    editor: &EditorState,
+    views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -82,7 +82,8 @@ fn tooth_ui(
     ui.painter().rect_filled(rect, 0, Color32::from_rgb(0xd5, 0xdc, 0xe0));
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
-    match viewport.map(|viewport| draw_preview(editor, viewport, size)) {
+    let Views { viewport, preview, .. } = views;
+    match viewport.as_mut().map(|viewport| preview.draw(editor, viewport, size)) {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, Color32::WHITE);
@@ -134,41 +135,6 @@ fn hint_ui(ui: &mut egui::Ui, editor: &EditorState, rect: Rect, words: &Translat
     let place = Rect::from_center_size(rect.center_bottom() - egui::vec2(0.0, 0.5 * size.y + 8.0), size);
     ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
     ui.painter().galley(place.min + egui::vec2(8.0, 4.0), galley, Color32::WHITE);
-}
-
-/// Draws the tooth unless nothing has changed; `None` before the first build.
-fn draw_preview(
-    editor: &mut EditorState,
-    viewport: &mut Viewport,
-    size: [u32; 2],
-) -> Result<Option<egui::TextureId>, typodont_render::RenderError> {
-    let Some(build) = &editor.build else { return Ok(None) };
-    let view = &mut editor.preview;
-    let (orbit, mode, shows_surroundings, generation) =
-        (view.orbit, view.mode, view.shows_surroundings, view.generation);
-    let current = PreviewFrame { orbit, mode, shows_surroundings, size, generation };
-    if let Some((drawn, id)) = &view.last_frame
-        && *drawn == current
-    {
-        return Ok(Some(*id));
-    }
-    let viewpoint = orbit.viewpoint();
-    let scene = RenderScene {
-        tooth: Some(VolumeInstance {
-            volume: &build.workpiece.volume,
-            changes: if view.is_new { Changes::All } else { Changes::Bricks(&[]) },
-            world_from_tooth: build.workpiece.world_from_tooth,
-            palette: &view.palette,
-            mode: view.render_mode(),
-        }),
-        solids: if shows_surroundings { view.surroundings.clone() } else { Vec::new() },
-        lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
-        ..RenderScene::empty()
-    };
-    let drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, None, size);
-    view.is_new = drawn.is_err();
-    view.last_frame = drawn.as_ref().ok().map(|id| (current, *id));
-    drawn.map(Some)
 }
 
 /// Point of the tooth's surface under a screen position, tooth space, mm, with the outward direction there.

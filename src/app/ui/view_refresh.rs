@@ -12,6 +12,9 @@ const FAST_FRAME: f64 = 1.0 / 45.0;
 /// Number of slow or fast frames in a row after which the resolution changes.
 const FRAMES_TO_CHANGE: u32 = 4;
 
+/// Number of frames over which the frame rate is smoothed.
+const SMOOTHED_FRAMES: f64 = 8.0;
+
 /// Shares of the view's width and height at which a changing view is drawn.
 const RESOLUTIONS: [f32; 5] = [1.0, 0.8, 0.65, 0.55, 0.45];
 
@@ -59,6 +62,8 @@ pub struct ViewRefresh {
     is_coarse: bool,
     slow_frames: u32,
     fast_frames: u32,
+    /// Time between two frames of a changing view, smoothed, s.
+    mean_frame_time: f64,
 }
 
 impl ViewRefresh {
@@ -95,9 +100,9 @@ impl ViewRefresh {
         now - self.changed_at >= SETTLING_TIME
     }
 
-    /// True if the view changed in the last frame.
-    pub fn is_changing(&self) -> bool {
-        self.last_changing_frame.is_some()
+    /// Number of frames per second of a changing view, smoothed.
+    pub fn frames_per_second(&self) -> f64 {
+        1.0 / self.mean_frame_time.max(1e-3)
     }
 
     /// Draws the next frame in any case, for instance after one has failed.
@@ -105,10 +110,12 @@ impl ViewRefresh {
         self.drawn = None;
     }
 
-    /// Lowers or raises the resolution by the time between two frames of a changing view.
+    /// Lowers or raises the resolution by the time between two frames of a changing view, and updates the mean of that
+    /// time.
     fn adapt(&mut self, now: f64) {
         let Some(last) = self.last_changing_frame else { return };
         let frame_time = now - last;
+        self.mean_frame_time += (frame_time - self.mean_frame_time) / SMOOTHED_FRAMES;
         self.slow_frames = if frame_time > SLOW_FRAME { self.slow_frames + 1 } else { 0 };
         self.fast_frames = if frame_time < FAST_FRAME { self.fast_frames + 1 } else { 0 };
         if self.slow_frames >= FRAMES_TO_CHANGE {

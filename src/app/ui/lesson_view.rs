@@ -1,0 +1,173 @@
+//! The picture of a lesson: drawn again only when something in it has changed.
+
+use crate::command::{AppCommand, PracticeCommand};
+use crate::lesson_scene::{DisplayMode, LessonScene};
+use crate::lesson_state::LessonState;
+use crate::settings::Settings;
+use crate::snapshot::{InstrumentPose, LessonSnapshot};
+use crate::ui::section_view::SectionImage;
+use crate::ui::view_refresh::{Redraw, ViewInputs, ViewRefresh};
+use crate::ui::viewport::{EyeWindow, Viewport};
+use eframe::egui;
+use typodont_core::frame::{Pose, Vec3};
+use typodont_render::{
+    Background, Changes, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
+};
+use typodont_scene as scene;
+use typodont_scene::particles::VisibleParticles;
+
+/// The last picture of a lesson.
+#[derive(Default)]
+pub struct LessonView {
+    refresh: ViewRefresh,
+    /// True if the renderer has the volume, but for the edits that the scene lists as not drawn.
+    has_volume: bool,
+    particles: VisibleParticles,
+    /// Last image of the section through the working end.
+    pub section: Option<SectionImage>,
+}
+
+/// The picture that a frame asks for: its size, pixels, and the time of the frame, s.
+#[derive(Clone, Copy)]
+pub struct PictureFrame {
+    pub size: [u32; 2],
+    pub now: f64,
+}
+
+impl LessonView {
+    /// True if the tooth has been drawn.
+    pub fn has_volume(&self) -> bool {
+        self.has_volume
+    }
+
+    /// True if the view has changed a moment before `now`, s, so that the next frame should come soon.
+    pub fn is_active(&self, now: f64) -> bool {
+        self.refresh.is_active(now)
+    }
+
+    /// Number of pictures per second of a changing view, smoothed.
+    pub fn frames_per_second(&self) -> f64 {
+        self.refresh.frames_per_second()
+    }
+
+    /// Draws the lesson's scene if the last picture is not right any more; `None` before it is built.
+    ///
+    /// # Errors
+    /// When the picture cannot be drawn; the next frame tries again.
+    pub fn draw(
+        &mut self,
+        lesson: &LessonState,
+        settings: &Settings,
+        viewport: &mut Viewport,
+        frame: PictureFrame,
+        commands: &mut Vec<AppCommand>,
+    ) -> Result<Option<egui::TextureId>, RenderError> {
+        let Some(scene) = &lesson.scene else { return Ok(None) };
+        let particle_count = scene.particles.as_ref().map_or(0, |field| field.counts().iter().sum());
+        let stereo = [settings.stereo(), settings.second_eye()];
+        let inputs = ViewInputs {
+            size: frame.size,
+            orbit: lesson.orbit,
+            mode: lesson.display_mode,
+            instrument: lesson.snapshot.as_ref().map(InstrumentPose::from),
+            edit_count: scene.edit_count,
+            appearance_count: scene.appearance_count,
+            stereo,
+            second_size: viewport.second_eye_size(),
+            is_smooth: settings.is_smooth(viewport.has_graphics()),
+            particle_count,
+        };
+        let is_moving = particle_count > 0 && !lesson.is_standing_still();
+        // In stereo each pixel may belong to one eye.
+        let may_be_coarse = stereo == [None, None];
+        let share = match self.refresh.plan(inputs, is_moving, may_be_coarse, frame.now) {
+            Redraw::Keep if let Some(texture) = viewport.texture() => return Ok(Some(texture)),
+            Redraw::Keep => 1.0,
+            Redraw::At(share) => share,
+        };
+        let size = frame.size.map(|pixels| (share * pixels as f32).ceil() as u32);
+        let drawn = self.draw_scene(lesson, scene, settings, viewport, size);
+        // After a failed frame the whole volume is sent to the renderer again, since its changes were lost.
+        self.has_volume = drawn.is_ok();
+        match drawn {
+            Ok(_) => commands.push(AppCommand::Practice(PracticeCommand::PictureDrawn)),
+            Err(_) => self.refresh.invalidate(),
+        }
+        drawn.map(Some)
+    }
+
+    fn draw_scene(
+        &mut self,
+        lesson: &LessonState,
+        lesson_scene: &LessonScene,
+        settings: &Settings,
+        viewport: &mut Viewport,
+        size: [u32; 2],
+    ) -> Result<egui::TextureId, RenderError> {
+        let (viewpoint, mode) = (lesson.orbit.viewpoint(), lesson.display_mode);
+        let is_radiograph = mode == DisplayMode::Xray;
+        let particles = lesson_scene.particles.as_ref();
+        if let Some(field) = particles {
+            self.particles.update(field, &viewpoint);
+        }
+        let entry = |seen: LessonSnapshot| lesson.scenario.instruments.get(seen.instrument as usize);
+        let mut scene = RenderScene {
+            tooth: Some(VolumeInstance {
+                volume: &lesson_scene.volume,
+                changes: if self.has_volume { Changes::Bricks(&lesson_scene.undrawn) } else { Changes::All },
+                world_from_tooth: lesson_scene.workpiece.world_from_tooth,
+                palette: &lesson_scene.palette,
+                mode: lesson_scene.render_mode(mode),
+            }),
+            solids: solids(lesson, lesson_scene, &viewpoint),
+            opaque_particles: particles.map(|_| self.particles.opaque()).unwrap_or_default(),
+            translucent_particles: particles.map(|_| self.particles.translucent()).unwrap_or_default(),
+            mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
+            lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
+            is_antialiased: settings.is_smooth(viewport.has_graphics()),
+        };
+        let drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, settings.stereo(), size)?;
+        if let Some(second_eye) = settings.second_eye() {
+            // Nothing has changed between the two eyes.
+            scene.tooth.iter_mut().for_each(|tooth| tooth.changes = Changes::Bricks(&[]));
+            let size = viewport.second_eye_size();
+            viewport.draw(EyeWindow::SecondEye, &scene, &viewpoint, Some(second_eye), size)?;
+        }
+        Ok(drawn)
+    }
+}
+
+fn world_from_tip(seen: &LessonSnapshot) -> Pose {
+    Pose { position: seen.tip, orientation: seen.orientation }
+}
+
+/// Whatever stands around the tooth, and the instrument in use.
+fn solids(lesson: &LessonState, scene: &LessonScene, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
+    // On a radiograph neither gingiva nor neighbours cover the tooth; the instrument stays.
+    let mut solids = Vec::new();
+    if lesson.display_mode != DisplayMode::Xray {
+        solids.extend(scene.surroundings.iter().chain(&scene.ejector).cloned());
+    }
+    let Some(seen) = &lesson.snapshot else { return solids };
+    let index = seen.instrument as usize;
+    let world_from_tip = world_from_tip(seen);
+    let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
+    match scene.contra_angles.get(index).and_then(Option::as_ref).filter(|_| lesson.has_mouse()) {
+        Some(held) => {
+            solids.push(placed(&held.bur));
+            if !hides_tip(viewpoint, world_from_tip) {
+                solids.push(placed(&held.handpiece));
+            }
+        }
+        None => solids.extend(scene.instruments.get(index).map(placed)),
+    }
+    solids
+}
+
+/// True if a handpiece over the working end would hide the work: it is seen from above, within 42° of its axis.
+fn hides_tip(viewpoint: &Viewpoint, world_from_tip: Pose) -> bool {
+    const COSINE: f32 = 0.74;
+    let to_eye = (viewpoint.position - world_from_tip.position).normalize_or(Vec3::Y);
+    to_eye.dot(world_from_tip.rotate(Vec3::Z)) > COSINE
+}

@@ -1,0 +1,76 @@
+//! The pictures of the author's screen: the tooth and its three slices, drawn again only when something has changed.
+
+use crate::editor::{EditorState, PreviewMode};
+use crate::ui::viewport::{EyeWindow, Viewport};
+use eframe::egui;
+use typodont_render::{Changes, Lamp, Lights, Orbit, RenderError, RenderScene, VolumeInstance};
+
+/// The last pictures of the author's screen.
+#[derive(Default)]
+pub struct PreviewView {
+    last: Option<(PreviewInputs, egui::TextureId)>,
+    pub slices: [Option<SliceImage>; 3],
+}
+
+/// Everything that the picture of the tooth depends on.
+#[derive(Clone, Copy, PartialEq)]
+struct PreviewInputs {
+    orbit: Orbit,
+    mode: PreviewMode,
+    shows_surroundings: bool,
+    size: [u32; 2],
+    generation: u64,
+}
+
+/// A slice as it was last drawn: generation of the build, position along its axis, mm, and size, pixels.
+pub struct SliceImage {
+    pub generation: u64,
+    pub position: f32,
+    pub size: [u32; 2],
+    pub texture: egui::TextureHandle,
+}
+
+impl PreviewView {
+    /// Draws the tooth unless nothing has changed; `None` before the first build.
+    ///
+    /// # Errors
+    /// When the picture cannot be drawn; the next frame tries again.
+    pub fn draw(
+        &mut self,
+        editor: &EditorState,
+        viewport: &mut Viewport,
+        size: [u32; 2],
+    ) -> Result<Option<egui::TextureId>, RenderError> {
+        let Some(build) = &editor.build else { return Ok(None) };
+        let preview = &editor.preview;
+        let inputs = PreviewInputs {
+            orbit: preview.orbit,
+            mode: preview.mode,
+            shows_surroundings: preview.shows_surroundings,
+            size,
+            generation: preview.generation,
+        };
+        let last = self.last.take();
+        if let Some((drawn, id)) = last.filter(|(drawn, _)| *drawn == inputs) {
+            self.last = Some((drawn, id));
+            return Ok(Some(id));
+        }
+        let has_volume = last.is_some_and(|(drawn, _)| drawn.generation == inputs.generation);
+        let viewpoint = preview.orbit.viewpoint();
+        let scene = RenderScene {
+            tooth: Some(VolumeInstance {
+                volume: &build.workpiece.volume,
+                changes: if has_volume { Changes::Bricks(&[]) } else { Changes::All },
+                world_from_tooth: build.workpiece.world_from_tooth,
+                palette: &preview.palette,
+                mode: preview.render_mode(),
+            }),
+            solids: if preview.shows_surroundings { preview.surroundings.clone() } else { Vec::new() },
+            lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            ..RenderScene::empty()
+        };
+        let id = viewport.draw(EyeWindow::Main, &scene, &viewpoint, None, size)?;
+        self.last = Some((inputs, id));
+        Ok(Some(id))
+    }
+}

@@ -1,0 +1,229 @@
+//! The window in the test's own process, without a display (`egui_kittest`).
+//!
+//! Its lesson runs on a thread of its own and in real time, as in the program. Every widget must have a name that a screen
+//! reader can say, and no text may contain a character that the fonts lack.
+
+use crate::support::tools::skip;
+use crate::support::window_driver::{SCREEN_SIZE, WindowDriver};
+use eframe::egui::accesskit::Role;
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Theme, Vec2};
+use eframe::egui_wgpu::WgpuSetup;
+use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, Node};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+use typodont_app::{App, AppOptions, UserFolder};
+use typodont_report::Templates;
+
+/// Time between two frames while the window runs.
+const FRAME: Duration = Duration::from_millis(15);
+
+/// Lines of the state log: all of them, and the newest of each topic.
+#[derive(Default)]
+struct Lines {
+    all: Vec<String>,
+    latest: BTreeMap<String, String>,
+}
+
+/// The window, and its state log in memory.
+pub struct Window {
+    harness: Harness<'static, App>,
+    lines: Rc<RefCell<Lines>>,
+    opened: Instant,
+    /// Position of the pointer, pixels.
+    pointer: Pos2,
+}
+
+/// Size of the screen, pixels.
+fn screen() -> Vec2 {
+    Vec2::from(SCREEN_SIZE.map(|pixels| pixels as f32))
+}
+
+/// Folder of the user's own files, for a window whose home is in `place`.
+pub fn user_folder(place: &Path) -> PathBuf {
+    place.join("home/config/typodont")
+}
+
+/// Options of a window at the exercise list, which writes into `place`.
+pub fn options(place: &Path) -> AppOptions {
+    AppOptions::at_exercise_list(place.join("bundles"), Templates::shipped())
+}
+
+impl Window {
+    /// Opens the window; prints the reason and returns `None` where nothing can draw its pictures.
+    pub fn open(place: &Path, options: AppOptions) -> Option<Window> {
+        // OpenGL would look for a display.
+        let mut setup = egui_kittest::wgpu::default_wgpu_setup();
+        if let WgpuSetup::CreateNew(new) = &mut setup {
+            new.instance_descriptor.backends = wgpu::Backends::PRIMARY;
+        }
+        let instance = pollster::block_on(setup.new_instance());
+        if pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default())).is_err() {
+            skip("there is no graphics adapter: the window is not opened");
+            return None;
+        }
+        let folder = user_folder(place);
+        if !folder.join("settings.json").exists() {
+            fs::create_dir_all(&folder).unwrap();
+            fs::write(folder.join("settings.json"), "{ \"language\": \"en\" }").unwrap();
+        }
+        let lines = Rc::new(RefCell::new(Lines::default()));
+        let log = lines.clone();
+        let options = AppOptions {
+            user_folder: Some(UserFolder::new(Some(folder))),
+            state_log: Some(Box::new(move |line| {
+                let mut lines = log.borrow_mut();
+                let (topic, value) = line.split_once(' ').unwrap_or((line, ""));
+                lines.latest.insert(topic.into(), value.into());
+                lines.all.push(line.into());
+            })),
+            ..options
+        };
+        let builder = Harness::builder()
+            .with_theme(Theme::Light)
+            .with_size(screen())
+            .with_step_dt(FRAME.as_secs_f32())
+            .wgpu_setup(setup);
+        let harness = builder.build_eframe(|context| App::new(context, options));
+        let opened = Instant::now() - Duration::from_secs(1);
+        let mut window = Window { harness, lines, opened, pointer: Pos2::ZERO };
+        window.move_to(SCREEN_SIZE.map(|pixels| pixels / 2));
+        Some(window)
+    }
+
+    /// All lines of a topic of the state log, oldest first.
+    pub fn history(&self, topic: &str) -> Vec<String> {
+        let lines = self.lines.borrow();
+        let values = lines.all.iter().filter_map(|line| line.split_once(' ').filter(|(name, _)| *name == topic));
+        values.map(|(_, value)| value.to_string()).collect()
+    }
+
+    /// Writes into a text field, by the name that a screen reader says.
+    pub fn write_into(&mut self, label: &str, text: &str) {
+        let middle = self.field(label).rect().center();
+        let scale = self.harness.ctx.pixels_per_point();
+        self.click_at([middle.x, middle.y].map(|points| (points * scale).round() as i32));
+        self.type_text(text);
+        self.turn();
+    }
+
+    /// Clicks on a button, by the name that a screen reader says.
+    pub fn click_button(&mut self, label: &str) {
+        let middle = self.harness.get_by_role_and_label(Role::Button, label).rect().center();
+        let scale = self.harness.ctx.pixels_per_point();
+        self.click_at([middle.x, middle.y].map(|points| (points * scale).round() as i32));
+    }
+
+    /// Text of a field, by the name that a screen reader says.
+    pub fn text_of(&self, label: &str) -> String {
+        self.field(label).value().unwrap_or_default()
+    }
+
+    fn field<'a>(&'a self, label: &'a str) -> Node<'a> {
+        let secret = || self.harness.get_by_role_and_label(Role::PasswordInput, label);
+        self.harness.query_by_role_and_label(Role::TextInput, label).unwrap_or_else(secret)
+    }
+
+    /// The screen as it is now: red, green, blue and alpha of each pixel, row by row.
+    pub fn pixels(&mut self) -> Vec<u8> {
+        self.harness.set_render_cursor(false);
+        self.harness.render().expect("the window can be drawn").into_raw()
+    }
+
+    /// Draws one frame, with this input.
+    fn send(&mut self, event: Event) {
+        self.harness.event(event);
+        self.frame();
+    }
+
+    /// Position of the pointer, in the points of the present text size.
+    fn pointer(&self) -> Pos2 {
+        self.pointer / self.harness.ctx.pixels_per_point()
+    }
+
+    fn frame(&mut self) {
+        let size = screen() / self.harness.ctx.pixels_per_point();
+        self.harness.set_size(size);
+        self.harness.input_mut().time = Some(self.opened.elapsed().as_secs_f64());
+        self.harness.step();
+        self.harness.check_accessibility();
+    }
+}
+
+impl WindowDriver for Window {
+    fn latest(&self, topic: &str) -> Option<String> {
+        self.lines.borrow().latest.get(topic).cloned()
+    }
+
+    fn proceed(&mut self) {
+        let begun = Instant::now();
+        self.frame();
+        std::thread::sleep(FRAME.saturating_sub(begun.elapsed()));
+    }
+
+    fn send_key(&mut self, key: &str) {
+        let (modifiers, name) = match key.strip_prefix("ctrl+") {
+            Some(name) => (Modifiers::CTRL | Modifiers::COMMAND, name),
+            None => (Modifiers::NONE, key),
+        };
+        let key = Key::from_name(name).unwrap_or_else(|| panic!("no key {name}"));
+        self.send(Event::ModifiersChanged(modifiers));
+        for pressed in [true, false] {
+            self.send(Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
+            // As from a system, which tells the key and the character that it writes.
+            if pressed && modifiers.is_none() && name.chars().count() == 1 {
+                self.send(Event::Text(name.into()));
+            }
+        }
+        self.send(Event::ModifiersChanged(Modifiers::NONE));
+    }
+
+    fn type_text(&mut self, text: &str) {
+        for character in text.chars() {
+            self.send(Event::Text(character.into()));
+        }
+    }
+
+    fn move_to(&mut self, place: [i32; 2]) {
+        self.pointer = Pos2::from(place.map(|pixels| pixels as f32));
+        self.send(Event::PointerMoved(self.pointer()));
+    }
+
+    fn move_by(&mut self, by: [i32; 2]) {
+        self.pointer += Vec2::from(by.map(|pixels| pixels as f32));
+        self.send(Event::PointerMoved(self.pointer()));
+    }
+
+    fn set_button(&mut self, is_down: bool) {
+        let (pos, button, modifiers) = (self.pointer(), PointerButton::Primary, Modifiers::NONE);
+        self.send(Event::PointerButton { pos, button, pressed: is_down, modifiers });
+    }
+
+    fn turn(&mut self) {
+        for _ in 0..3 {
+            self.frame();
+        }
+    }
+
+    fn complaints(&self) -> String {
+        String::new()
+    }
+
+    fn picture(&mut self, name: &str) {
+        if let Some(folder) = std::env::var_os("TYPODONT_TEST_PICTURES") {
+            self.harness.set_render_cursor(false);
+            let mut image = self.harness.render().expect("the window can be drawn");
+            // A window is filled with the colour of its panels first.
+            let fill = self.harness.ctx.global_style().visuals.panel_fill.to_array();
+            for pixel in image.pixels_mut() {
+                let rest = 255 - u32::from(pixel[3]);
+                pixel.0 = std::array::from_fn(|i| pixel[i].saturating_add((rest * u32::from(fill[i]) / 255) as u8));
+            }
+            image.save(Path::new(&folder).join(format!("{name}.png"))).unwrap();
+        }
+    }
+}

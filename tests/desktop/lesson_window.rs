@@ -1,0 +1,125 @@
+//! Lessons in the window, in the test's own process.
+
+use crate::harness::{self, Window};
+use crate::support::folder::folder;
+use crate::support::window_driver::{SHIPPED_EXERCISES, WindowDriver};
+use crate::trainee::{Trainee, lesion_in_world};
+use std::path::Path;
+use std::time::Duration;
+use typodont_app::AppOptions;
+
+/// Options of a window that shows an exercise of the project, with seed 1.
+fn exercise_options(place: &Path, exercise: &str) -> AppOptions {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(exercise);
+    AppOptions { exercise: Some(path), seed: Some(1), ..harness::options(place) }
+}
+
+#[test]
+fn dust_flies_water_sprays_and_both_stand_still_with_the_lesson() {
+    // Aim: an exercise that asks for them has dust and water before the eye, at the window's own pace. Method: the shipped
+    // exercise with spray; the state log counts the particles.
+    let place = folder("spray");
+    let exercise = "scenarios/7-spray.json";
+    let options = AppOptions { begins_at_once: true, ..exercise_options(&place, exercise) };
+    let Some(mut desk) = Window::open(&place, options) else { return };
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("hand", |_| true);
+    let count = |text: &str| text.parse::<u32>().unwrap();
+    desk.until("water", |drops| count(drops) > 10);
+    desk.press("o", "pointer", "held");
+    let lesion = lesion_in_world(exercise, 1);
+    desk.point_at(lesion);
+    desk.picture("10-spray");
+    // Water soon takes it along again.
+    let has_flown = |desk: &Window| desk.history("dust").iter().any(|chips| count(chips) > 5);
+    let flies = desk.press_around(lesion, |desk, round| {
+        desk.picture(&format!("11-dust-{round}"));
+        has_flown(desk)
+    });
+    assert!(flies, "no dust: {:?} % of the decay is gone", desk.latest("cleared"));
+    desk.press("p", "paused", "true");
+    let still = |desk: &Window| ["dust", "water"].map(|topic| desk.latest(topic).unwrap());
+    desk.wait(Duration::from_secs(1));
+    let before = still(&desk);
+    let frames = count(&desk.latest("frames").unwrap());
+    desk.until("frames", |now| count(now) >= frames + 4);
+    assert_eq!(still(&desk), before, "dust and water wait with the lesson");
+    desk.picture("12-paused");
+}
+
+#[test]
+fn the_servo_does_not_wait_for_the_picture() {
+    // Aim: with two pictures a second at most the session is turned as ever. Method: half a second between two frames; the
+    // ticks in ten of them are counted. Whoever waited for a picture would turn a few ticks each, not hundreds.
+    let place = folder("slow_window");
+    let Some(mut desk) = Window::open(&place, exercise_options(&place, "scenarios/5-grinding.json")) else { return };
+    desk.until("screen", |screen| screen == "briefing");
+    desk.press("Return", "screen", "practice");
+    let count = |text: String| text.parse::<u64>().unwrap();
+    desk.until("clock", |clock| clock == "stopped");
+    desk.press("o", "pointer", "held");
+    desk.move_by([40, 20]);
+    desk.until("clock", |clock| clock == "running");
+    let first = count(desk.until("ticks", |ticks| ticks != "0"));
+    for _ in 0..10 {
+        std::thread::sleep(Duration::from_millis(500));
+        desk.proceed();
+    }
+    let turned = count(desk.latest("ticks").unwrap()) - first;
+    println!("{turned} ticks in 10 pictures; late (p99, max, missed): {}", desk.latest("late").unwrap());
+    assert!(turned > 10 * 100, "{turned} ticks in 10 pictures");
+}
+
+#[test]
+fn what_is_typed_on_one_screen_holds_on_the_next() {
+    // Aim: screens only read, and a typed text is a command: none is lost on its way. Method: a folder and a code are typed
+    // in the list; the code stands in the instructions, and the folder's exercise in the list.
+    let place = folder("typed");
+    let exercises = place.join("course");
+    std::fs::create_dir_all(&exercises).unwrap();
+    let text =
+        std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/5-grinding.json")).unwrap();
+    std::fs::write(exercises.join("own.json"), text.replace("\"5-grinding\"", "\"own-grinding\"")).unwrap();
+    let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
+    desk.until("screen", |screen| screen == "shelf");
+    desk.write_into("Your school’s exercises:", exercises.to_str().unwrap());
+    desk.key("Return");
+    desk.write_into("Participant code", "P-7");
+    assert_eq!(desk.text_of("Participant code"), "P-7");
+    desk.key("Escape");
+    for _ in 0..SHIPPED_EXERCISES {
+        desk.key("Down");
+    }
+    desk.until("chosen", |chosen| chosen == "own-grinding");
+    desk.press("Return", "screen", "briefing");
+    assert_eq!(desk.text_of("Participant code"), "P-7");
+    desk.press("Escape", "screen", "shelf");
+    assert_eq!(desk.text_of("Your school’s exercises:"), exercises.to_str().unwrap());
+}
+
+#[test]
+fn a_code_that_was_cleared_is_not_brought_back_by_undoing() {
+    // Aim: nobody gets at the code of an examiner or of another participant. Undoing once brought it back. Method: both
+    // codes are typed and cleared by the program; then Ctrl+Z in the empty fields.
+    let place = folder("cleared_codes");
+    let Some(mut desk) = Window::open(&place, exercise_options(&place, "scenarios/4-diagnosis.json")) else { return };
+    desk.until("screen", |screen| screen == "briefing");
+    desk.write_into("Participant code", "P-7");
+    desk.write_into("Examiner's code", "a long code of an examiner");
+    assert_ne!(desk.text_of("Examiner's code"), "");
+    // A field notes what may be brought back when its text has stayed the same for a second.
+    desk.wait(Duration::from_secs(2));
+    desk.key("Escape");
+    desk.press("Escape", "screen", "shelf");
+    desk.click("shelf.open");
+    desk.until("screen", |screen| screen == "briefing");
+    desk.write_into("Examiner's code", "");
+    desk.key("ctrl+z");
+    assert_eq!(desk.text_of("Examiner's code"), "");
+    desk.key("Escape");
+    desk.press("Escape", "screen", "shelf");
+    desk.click_button("Someone else");
+    desk.write_into("Participant code", "");
+    desk.key("ctrl+z");
+    assert_eq!(desk.text_of("Participant code"), "");
+}
