@@ -210,7 +210,7 @@ pub fn gradebook(cohort: &Cohort, options: &GradebookOptions) -> Gradebook {
     for person in people {
         let Some(mut line) = columns.identity_cells(person, options.students) else {
             warnings.push(format!(
-                "\"{}\" is not identified by the table of students and was left out",
+                "\"{}\" is not in the table of students, or not identified by it, and was left out",
                 sanitize_display(person, 40)
             ));
             continue;
