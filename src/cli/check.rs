@@ -53,13 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
         match scenario_files(path) {
             Ok(own) => files.extend(own),
             // The other files are checked all the same.
-            Err(LessonError::NoScenarios { folder, why }) => {
-                let (code, message) = match why {
-                    Some(error) => ("unreadable-folder", error.to_string()),
-                    None => ("no-scenarios", "the folder contains no scenario (*.json)".to_string()),
-                };
-                found.push(Diagnostic::about_file(&folder.display().to_string(), code, message, None));
-            }
+            Err(LessonError::NoScenarios(complaint)) => found.push(*complaint),
             Err(error) => return Err(error.into()),
         }
     }

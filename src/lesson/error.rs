@@ -39,8 +39,8 @@ pub enum LessonError {
     WrongVolume { path: PathBuf, why: String },
     /// A file that cannot be read.
     Unreadable(Diagnostic),
-    /// A folder that holds no exercise, or cannot be read, with the system's reason.
-    NoScenarios { folder: PathBuf, why: Option<io::Error> },
+    /// A folder that holds no exercise, or cannot be read.
+    NoScenarios(Box<Diagnostic>),
 }
 
 impl LessonError {
@@ -94,12 +94,7 @@ impl fmt::Display for LessonError {
             }
             LessonError::WrongVolume { path, why } => write!(f, "{}: wrong-volume: {why}", path.display()),
             LessonError::Unreadable(found) => f.write_str(&found.headline()),
-            LessonError::NoScenarios { folder, why: Some(error) } => {
-                write!(f, "{}: unreadable-folder: {error}", folder.display())
-            }
-            LessonError::NoScenarios { folder, why: None } => {
-                write!(f, "{}: no-scenarios: the folder contains no scenario (*.json)", folder.display())
-            }
+            LessonError::NoScenarios(found) => f.write_str(&found.headline()),
         }
     }
 }

@@ -31,8 +31,10 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
     if !path.is_dir() {
         return Ok(vec![path.to_path_buf()]);
     }
-    let wrong = |why| LessonError::NoScenarios { folder: path.to_path_buf(), why };
-    let entries = std::fs::read_dir(path).map_err(|error| wrong(Some(error)))?;
+    let wrong = |code, why: String| {
+        LessonError::NoScenarios(Box::new(Diagnostic::about_file(&path.display().to_string(), code, why, None)))
+    };
+    let entries = std::fs::read_dir(path).map_err(|error| wrong("unreadable-folder", error.to_string()))?;
     let is_scenario = |p: &PathBuf| {
         // Also of a name that is not UTF-8: a file that is passed over counts as a file without faults.
         let name = p.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -43,7 +45,7 @@ pub fn scenario_files(path: &Path) -> Result<Vec<PathBuf>, LessonError> {
     let mut files: Vec<PathBuf> = paths.filter(is_scenario).collect();
     files.sort_by_cached_key(|path| natural_key(path));
     match files.is_empty() {
-        true => Err(wrong(None)),
+        true => Err(wrong("no-scenarios", "the folder contains no scenario (*.json)".into())),
         false => Ok(files),
     }
 }

@@ -1,7 +1,7 @@
 //! The desktop program on a virtual display, operated by simulated mouse and keyboard input.
 //!
-//! Only what needs a real display is tested with it: most tests of the window use `tests/desktop/harness.rs`. The program writes the state
-//! of its screen to a log, so that tests wait for states and never for times.
+//! Only what needs a real display is tested with it: most tests of the window use `tests/desktop/harness.rs`. The program
+//! writes the state of its screen to a log, so that tests wait for states and never for times.
 #![allow(dead_code)]
 
 use std::fs;
