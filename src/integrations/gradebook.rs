@@ -144,18 +144,21 @@ impl StudentTable {
         }
         let cell =
             |row: &Vec<String>, column: usize| row.get(column).map_or_else(String::new, |c| c.trim().to_string());
-        let mut cells: BTreeMap<String, Vec<String>> = BTreeMap::new();
+        let mut cells = BTreeMap::new();
+        let mut students: BTreeMap<Vec<String>, String> = BTreeMap::new();
         for (number, row) in (2..).zip(lines) {
+            let participant = cell(row, code);
             let own: Vec<String> = others.iter().map(|c| cell(row, *c)).collect();
-            let is_same = |other: &Vec<String>| *other == own && own.iter().any(|text| !text.is_empty());
-            if let Some((other, _)) = cells.iter().find(|(who, other)| **who != cell(row, code) && is_same(other)) {
-                let [one, two] = [other, &cell(row, code)].map(|code| sanitize_display(code, 40));
+            let is_identified = own.iter().any(|text| !text.is_empty());
+            let same = students.insert(own.clone(), participant.clone()).filter(|_| is_identified);
+            if let Some(other) = same.filter(|other| *other != participant) {
+                let [one, two] = [&other, &participant].map(|code| sanitize_display(code, 40));
                 return Err(format!(
                     "{name}: row {number}: duplicate-student: \"{one}\" and \"{two}\" are the same student"
                 ));
             }
-            if cells.insert(cell(row, code), own).is_some() {
-                let duplicate = sanitize_display(&cell(row, code), 40);
+            let duplicate = sanitize_display(&participant, 40);
+            if cells.insert(participant, own).is_some() {
                 return Err(format!("{name}: row {number}: duplicate-participant: \"{duplicate}\" is listed twice"));
             }
         }
