@@ -172,7 +172,7 @@ fn a_file_that_changes_elsewhere_is_shown_anew_and_nothing_of_ones_own_is_lost()
     drop(desk);
 
     let home = harness::user_folder(&place);
-    fs::write(home.join("settings.json"), format!("{{ \"exercises\": {:?}, \"language\": \"en\" }}", place)).unwrap();
+    harness::keep_settings(&place, &format!("{{ \"exercises\": {place:?}, \"language\": \"en\" }}"));
     let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
     let edit = |desk: &mut Window| {
         for _ in 0..SHIPPED_EXERCISES {
@@ -229,9 +229,7 @@ fn everything_can_be_reached_in_large_type_and_in_both_languages() {
     // button of the bar lies in the window.
     for language in ["en", "tr"] {
         let place = folder(&format!("author-large-{language}"));
-        let home = harness::user_folder(&place);
-        fs::create_dir_all(&home).unwrap();
-        fs::write(home.join("settings.json"), format!("{{ \"language\": {language:?}, \"font_size\": 1.6 }}")).unwrap();
+        harness::keep_settings(&place, &format!("{{ \"language\": {language:?}, \"font_size\": 1.6 }}"));
         let Some(mut desk) = Window::open(&place, harness::options(&place)) else { return };
         desk.picture(&format!("author-large-{language}-shelf"));
         desk.click("shelf.new");

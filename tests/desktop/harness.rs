@@ -48,6 +48,13 @@ pub fn user_folder(place: &Path) -> PathBuf {
     place.join("home/config/typodont")
 }
 
+/// Writes a settings file for the window that opens at `place`.
+pub fn keep_settings(place: &Path, settings: &str) {
+    let folder = user_folder(place);
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("settings.json"), settings).unwrap();
+}
+
 /// Options of a window at the exercise list, which writes into `place`.
 pub fn options(place: &Path) -> AppOptions {
     AppOptions::at_exercise_list(place.join("bundles"), Templates::shipped())
@@ -68,8 +75,7 @@ impl Window {
         }
         let folder = user_folder(place);
         if !folder.join("settings.json").exists() {
-            fs::create_dir_all(&folder).unwrap();
-            fs::write(folder.join("settings.json"), "{ \"language\": \"en\" }").unwrap();
+            keep_settings(place, "{ \"language\": \"en\" }");
         }
         let lines = Rc::new(RefCell::new(Lines::default()));
         let log = lines.clone();
@@ -104,18 +110,20 @@ impl Window {
 
     /// Writes into a text field, by the name that a screen reader says.
     pub fn write_into(&mut self, label: &str, text: &str) {
-        let middle = self.field(label).rect().center();
-        let scale = self.harness.ctx.pixels_per_point();
-        self.click_at([middle.x, middle.y].map(|points| (points * scale).round() as i32));
+        self.click_on(self.field(label).rect().center());
         self.type_text(text);
         self.turn();
     }
 
     /// Clicks on a button, by the name that a screen reader says.
     pub fn click_button(&mut self, label: &str) {
-        let middle = self.harness.get_by_role_and_label(Role::Button, label).rect().center();
-        let scale = self.harness.ctx.pixels_per_point();
-        self.click_at([middle.x, middle.y].map(|points| (points * scale).round() as i32));
+        self.click_on(self.harness.get_by_role_and_label(Role::Button, label).rect().center());
+    }
+
+    /// Clicks on a place in the points of the present text size.
+    fn click_on(&mut self, place: Pos2) {
+        let pixels = place * self.harness.ctx.pixels_per_point();
+        self.click_at([pixels.x, pixels.y].map(|at| at.round() as i32));
     }
 
     /// Text of a field, by the name that a screen reader says.

@@ -133,7 +133,7 @@ fn a_kiosk_has_no_way_out_but_the_supervisors_code() {
         std::thread::sleep(LOOK_EVERY);
     };
     assert!(status.success(), "{status}");
-    assert!(!place.join("home/config/typodont/settings.json").exists(), "the station's settings are not the user's");
+    assert!(!harness::user_folder(&place).join("settings.json").exists(), "the station's settings are not the user's");
 }
 
 #[test]

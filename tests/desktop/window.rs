@@ -19,6 +19,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::harness::keep_settings;
 use crate::trainee::{Trainee, lesion_in_world};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, Reading, Wrench};
 use typodont_core::frame::Vec3;
@@ -27,13 +28,6 @@ use typodont_devices::HandLink;
 use typodont_devices::servo::{SecondHandEvent, SecondHandServo};
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples};
-
-/// Writes a settings file for the window that opens at `place`.
-fn keep_settings(place: &Path, settings: &str) {
-    let kept = place.join("home/config/typodont");
-    fs::create_dir_all(&kept).unwrap();
-    fs::write(kept.join("settings.json"), settings).unwrap();
-}
 
 /// Settings with the language and the text size that pictures are requested in, and others.
 fn large(others: &str) -> String {

@@ -7,14 +7,14 @@ use crate::messages::SecondHandStatus;
 use crate::results::BundleState;
 use crate::screen::Screen;
 use crate::state_log::StateLog;
-use typodont_scene::particles::ParticleField;
+use crate::ui::lesson_view::LessonView;
 
 impl App {
     /// Writes the state of the screen to the state log, a line per change.
     pub(super) fn log_state(&mut self) {
         let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, kiosk_exit, .. } = self;
         state_log.record("kiosk", kiosk_exit.state());
-        let is_drawn = self.views.lesson.has_volume();
+        let view = &self.views.lesson;
         let (history, participant, settings) = (&self.history, &self.participant, &self.settings);
         state_log.record(
             "over",
@@ -44,7 +44,7 @@ impl App {
                 state_log.record("turn", *frame_count);
             }
             Screen::Briefing => state_log.record("screen", "briefing"),
-            Screen::Lesson(lesson) => log_lesson(state_log, lesson, is_drawn),
+            Screen::Lesson(lesson) => log_lesson(state_log, lesson, view),
             Screen::Completion(_) => state_log.record("screen", "scoring"),
             Screen::Results(results) => {
                 if let BundleState::Finished(bundle) = &results.state {
@@ -70,8 +70,7 @@ fn log_editor(log: &mut StateLog, editor: &EditorState) {
     log.record("screen", "author");
 }
 
-/// `is_drawn`: the tooth has been drawn.
-fn log_lesson(log: &mut StateLog, lesson: &LessonState, is_drawn: bool) {
+fn log_lesson(log: &mut StateLog, lesson: &LessonState, view: &LessonView) {
     if lesson.is_scoring {
         log.record("screen", "scoring");
     } else if lesson.are_stages_over {
@@ -91,11 +90,10 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState, is_drawn: bool) {
     log.record("view", format!("{:.4} {:.4}", lesson.orbit.azimuth, lesson.orbit.elevation));
     if let Some(scene) = &lesson.scene {
         log.record("open", scene.mouth_opening);
-        let [dust, water] = scene.particles.as_ref().map_or([0, 0], ParticleField::counts);
-        log.record("dust", dust);
-        log.record("water", water);
+        log.record("dust", view.particles().opaque().len());
+        log.record("water", view.particles().translucent().len());
     }
-    log.record("tooth", if is_drawn { "drawn" } else { "made" });
+    log.record("tooth", if view.has_volume() { "drawn" } else { "made" });
     log.record("shown", format!("{:?}", lesson.display_mode));
     if let Some(snapshot) = lesson.snapshot {
         let [x, y, z] = snapshot.hand.to_array();

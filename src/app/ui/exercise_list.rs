@@ -6,7 +6,7 @@ use crate::i18n::Translations;
 use crate::platform;
 use crate::session_history::{AttemptSummary, SessionHistory};
 use crate::settings::Settings;
-use crate::ui::briefing::{participant_field, push_typed};
+use crate::ui::text_field::{participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;

@@ -3,7 +3,7 @@
 use crate::command::{AppCommand, TextField};
 use crate::i18n::Translations;
 use crate::kiosk::{KioskExit, KioskOptions};
-use crate::ui::briefing::{field_id, push_typed};
+use crate::ui::text_field::{field_id, push_typed};
 use crate::ui::theme;
 use eframe::egui;
 

@@ -14,7 +14,7 @@ use typodont_render::{
     Background, Changes, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
 };
 use typodont_scene as scene;
-use typodont_scene::particles::VisibleParticles;
+use typodont_scene::particles::{ParticleField, VisibleParticles};
 
 /// The last picture of a lesson.
 #[derive(Default)]
@@ -40,6 +40,11 @@ impl LessonView {
         self.has_volume
     }
 
+    /// The particles of the last picture.
+    pub fn particles(&self) -> &VisibleParticles {
+        &self.particles
+    }
+
     /// True if the view has changed a moment before `now`, s, so that the next frame should come soon.
     pub fn is_active(&self, now: f64) -> bool {
         self.refresh.is_active(now)
@@ -63,7 +68,7 @@ impl LessonView {
         commands: &mut Vec<AppCommand>,
     ) -> Result<Option<egui::TextureId>, RenderError> {
         let Some(scene) = &lesson.scene else { return Ok(None) };
-        let particle_count = scene.particles.as_ref().map_or(0, |field| field.counts().iter().sum());
+        let particle_count = scene.particles.as_ref().map_or(0, ParticleField::count);
         let stereo = [settings.stereo(), settings.second_eye()];
         let inputs = ViewInputs {
             size: frame.size,
@@ -106,8 +111,7 @@ impl LessonView {
     ) -> Result<egui::TextureId, RenderError> {
         let (viewpoint, mode) = (lesson.orbit.viewpoint(), lesson.display_mode);
         let is_radiograph = mode == DisplayMode::Xray;
-        let particles = lesson_scene.particles.as_ref();
-        if let Some(field) = particles {
+        if let Some(field) = &lesson_scene.particles {
             self.particles.update(field, &viewpoint);
         }
         let entry = |seen: LessonSnapshot| lesson.scenario.instruments.get(seen.instrument as usize);
@@ -120,8 +124,8 @@ impl LessonView {
                 mode: lesson_scene.render_mode(mode),
             }),
             solids: solids(lesson, lesson_scene, &viewpoint),
-            opaque_particles: particles.map(|_| self.particles.opaque()).unwrap_or_default(),
-            translucent_particles: particles.map(|_| self.particles.translucent()).unwrap_or_default(),
+            opaque_particles: self.particles.opaque(),
+            translucent_particles: self.particles.translucent(),
             mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
             lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },

@@ -123,9 +123,9 @@ impl ParticleField {
         }
     }
 
-    /// Number of chips of dust, and of drops and patches of water.
-    pub fn counts(&self) -> [usize; 2] {
-        [self.dust.particles().count(), self.water.particles().count()]
+    /// Number of particles in flight.
+    pub fn count(&self) -> usize {
+        self.dust.particles().count() + self.water.particles().count()
     }
 }
 
@@ -328,9 +328,9 @@ mod tests {
             }
         });
         assert_eq!(counted.count_total, 0, "allocations");
-        let [chips, _] = dry.counts();
+        let chips = visible(&dry).opaque().len();
         assert!((1800..=dust::MAX_CHIPS).contains(&chips), "{chips} chips of nearly ten thousand");
-        let [_, drops] = wet.counts();
+        let drops = visible(&wet).translucent().len();
         assert!((50..=water::MAX_PARTICLES).contains(&drops), "{drops} drops");
     }
 
