@@ -15,19 +15,18 @@ pub struct PressPoint {
     pub contour: Vec3,
     /// Last known height of the surface there.
     pub height: f32,
-    /// Column of the point.
-    column: usize,
-    /// Columns of the cavity under the instrument's face.
-    under_face: Vec<usize>,
+    /// Columns of the cavity that are closer to this point than to any other, each with the height of the original
+    /// contour.
+    columns: Vec<(usize, f32)>,
 }
 
 impl PressPoint {
-    /// Returns true if the filling under the face is seen to reach a height, mm, or to stand so far above it that more
-    /// would only pile up: a corner that no face reaches stays low.
-    pub fn is_full(&self, surface: &[f32], height: f32) -> bool {
-        /// Height above the target from which a point gets no more, mm.
-        const PILED: f32 = 0.3;
-        surface[self.column] >= height + PILED || self.under_face.iter().all(|&column| surface[column] >= height)
+    /// Returns the depth, mm, of the surface around the point below a height above the contour (mm): the root mean
+    /// square, in which one hole counts more than a surface slightly low. Columns that reach the height count as 0.
+    pub fn deficit(&self, surface: &[f32], height: f32) -> f32 {
+        let depth = |&(column, contour): &(usize, f32)| (contour + height - surface[column]).max(0.0);
+        let squares = self.columns.iter().map(|column| depth(column).powi(2)).sum::<f32>();
+        (squares / self.columns.len().max(1) as f32).sqrt()
     }
 }
 
@@ -101,20 +100,21 @@ impl CavityMap {
             }
             places.extend(ys.into_iter().filter(|&y| is_meant(x, y)).map(|y| {
                 let (at, i) = (self.grid.centre([x, y, 0]), self.grid.index([x, y, 0]));
-                let under_face = self.open_columns_near(at, radius);
-                PressPoint { contour: at.with_z(self.contour[i]), height: self.start[i], column: i, under_face }
+                PressPoint { contour: at.with_z(self.contour[i]), height: self.start[i], columns: Vec::new() }
             }));
         }
+        self.divide_columns(&mut places);
         places
     }
 
-    /// Returns the columns of the cavity within a distance of a place.
-    fn open_columns_near(&self, place: Vec3, radius: f32) -> Vec<usize> {
-        let is_near = |&i: &usize| {
-            let centre = self.grid.centre(self.grid.cell(i));
-            self.depth_inside[i] > 0.0 && centre.truncate().distance(place.truncate()) <= radius
-        };
-        (0..self.depth_inside.len()).filter(is_near).collect()
+    /// Gives every column of the cavity to the point next to it.
+    fn divide_columns(&self, places: &mut [PressPoint]) {
+        for column in (0..self.grid.len()).filter(|&i| self.depth_inside[i] > 0.0 && self.contour[i].is_finite()) {
+            let centre = self.grid.centre(self.grid.cell(column)).truncate();
+            let distance = |place: &PressPoint| place.contour.truncate().distance_squared(centre);
+            let nearest = places.iter_mut().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+            nearest.into_iter().for_each(|place| place.columns.push((column, self.contour[column])));
+        }
     }
 
     /// Returns the path of an instrument's tip over the contour on which no part of its end cuts below the intended
@@ -258,14 +258,20 @@ mod tests {
         }
         let places = cavity_map.press_points(0.4, 0.3);
         assert!(!places.is_empty());
-        // A face finds a point full once nothing under it is low, and never before.
+        // Every column counts by its own contour, and belongs to one point: the cavity is 1 mm deep, less in the depression.
+        let open = cavity_map.depth_inside.iter().filter(|d| **d > 0.0).count();
+        assert_eq!(places.iter().map(|p| p.columns.len()).sum::<usize>(), open);
         let mut seen = heights(&workpiece.volume);
-        assert!(!places[0].is_full(&seen, 0.0));
-        places[0].under_face.iter().skip(1).for_each(|&column| seen[column] = 0.1);
-        assert!(!places[0].is_full(&seen, 0.0), "one column is still low");
-        seen[places[0].under_face[0]] = 0.1;
-        assert!(places[0].is_full(&seen, 0.0));
-        assert!(!places[0].is_full(&seen, 0.2));
+        let deficit = places[0].deficit(&seen, 0.0);
+        assert!((deficit - 1.0).abs() < 0.2, "{deficit}");
+        assert!(places[0].deficit(&seen, 0.2) > deficit + 0.19);
+        places[0].columns.iter().skip(1).for_each(|&(column, contour)| seen[column] = contour + 1.0);
+        let (column, contour) = places[0].columns[0];
+        seen[column] = contour - 0.6;
+        let of_one = 0.6 / (places[0].columns.len() as f32).sqrt();
+        assert!((places[0].deficit(&seen, 0.0) - of_one).abs() < 1e-4, "one column is still low");
+        seen[column] = contour;
+        assert_eq!(places[0].deficit(&seen, 0.0), 0.0);
         for PressPoint { contour, height, .. } in places {
             assert!(contour.x.abs() <= 0.55 && contour.y.abs() <= 0.55 && surface(contour).abs() < 0.03, "{contour}");
             assert!((height + 1.0).abs() < 0.06, "{height}");

@@ -12,8 +12,10 @@ pub(super) struct FillingTask {
     places: Vec<PressPoint>,
     /// Radius of the instrument's face, mm.
     radius: f32,
-    /// Index of the point pressed on last.
-    last: Option<usize>,
+    /// Index of the point pressed on last, with its deficit before, mm.
+    last: Option<(usize, f32)>,
+    /// Indices of points at which a press did not help: what is high beside them holds the face up.
+    given_up: Vec<usize>,
     /// Number of presses so far.
     presses: u32,
 }
@@ -41,31 +43,38 @@ impl Operator {
             places,
             radius,
             last: None,
+            given_up: Vec::new(),
             presses: 0,
         }));
         self.lift_off();
     }
 
-    /// Plans the next press of a filling; plans nothing once the surface is high enough everywhere.
+    /// Plans the next press of a filling, where it is lowest; plans nothing once the surface is high enough everywhere.
     pub(super) fn continue_filling(&mut self, mut filling: FillingTask) {
-        let tooth_from_world = self.workpiece.world_from_tooth.inverse();
-        if let Some(last) = filling.last {
-            filling.places[last].height = (tooth_from_world * self.tip).z;
-        }
+        /// Deficit from which a point is seen to be low, mm.
+        const VISIBLE_DEFICIT: f32 = 0.05;
+        /// Least gain of a press that is worth another one, mm.
+        const WORTHWHILE: f32 = 0.02;
         let Some(surface) = self.visible_volume.as_ref().map(heights) else { return };
-        let count = filling.places.len();
-        // A press lays some tenths of a millimetre: whoever presses on a point to find out whether it is full overfills it.
-        let is_low = |p: &PressPoint| !p.is_full(&surface, p.contour.z + filling.file.to_mm);
-        let after = filling.last.map_or(0, |last| last + 1);
-        let next = (0..count).map(|i| (after + i) % count).find(|&i| is_low(&filling.places[i]));
-        let Some(next) = next.filter(|_| filling.presses < filling.file.presses) else { return };
+        let deficit = |p: &PressPoint| p.deficit(&surface, filling.file.to_mm);
+        if let Some((last, before)) = filling.last {
+            let tooth_from_world = self.workpiece.world_from_tooth.inverse();
+            filling.places[last].height = (tooth_from_world * self.tip).z;
+            if before - deficit(&filling.places[last]) < WORTHWHILE {
+                filling.given_up.push(last);
+            }
+        }
+        let hopeful = (0..filling.places.len()).filter(|i| !filling.given_up.contains(i));
+        let deficits = hopeful.map(|i| (i, deficit(&filling.places[i])));
+        let lowest = deficits.filter(|&(_, mm)| mm > VISIBLE_DEFICIT).max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((next, mm)) = lowest.filter(|_| filling.presses < filling.file.presses) else { return };
         let PressPoint { contour, height, .. } = filling.places[next];
         // Filling placed beside the point may be higher, and the rim of the face would meet it.
         let reach = 2.0 * filling.radius + TOUCH_HEIGHT;
         let beside = filling.places.iter().filter(|p| p.contour.truncate().distance(contour.truncate()) < reach);
         let height = beside.map(|p| p.height).fold(height, f32::max);
         let moves = self.press_down(contour, height, filling.file.press_n, filling.file.hold_s);
-        (filling.last, filling.presses) = (Some(next), filling.presses + 1);
+        (filling.last, filling.presses) = (Some((next, mm)), filling.presses + 1);
         self.do_next(moves.into_iter().map(OperatorTask::Move).chain([OperatorTask::Fill(filling)]));
     }
 
