@@ -125,6 +125,9 @@ pub fn save(path: &Path, text: &str, overwrite: Overwrite) -> Result<FileStamp, 
     if !is_free {
         return Err(SaveError::Taken(path.to_path_buf()));
     }
+    if target.parent().is_some_and(|folder| !folder.as_os_str().is_empty() && !folder.is_dir()) {
+        return Err(unwritable(&"its folder does not exist"));
+    }
     // A byte order mark is preserved.
     let has_byte_order_mark = existing.as_ref().is_some_and(|bytes| bytes.starts_with(MARK.as_bytes()));
     let bytes = if has_byte_order_mark { format!("{MARK}{text}") } else { text.to_string() };

@@ -423,9 +423,10 @@ impl EditorState {
             Some(stand) if is_own => Overwrite::IfUnchanged(stand),
             _ => Overwrite::Never,
         };
-        if let Some(folder) = path.parent().filter(|_| !is_own) {
-            // If the folder cannot be created, writing the file fails and reports it.
-            let _ = std::fs::create_dir_all(folder);
+        // Only the folder that was suggested is created: a mistyped path shall not leave folders behind. If it cannot be
+        // created, writing the file fails and reports it.
+        if path.parent() == Some(&exercises_folder()) {
+            let _ = std::fs::create_dir_all(exercises_folder());
         }
         self.dialog = None;
         match save(&path, self.draft.text(), overwrite) {

@@ -195,7 +195,10 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
                 let text = egui::RichText::new(format!("! {}", words.get(key))).strong().color(theme::ERROR);
                 ui.add(egui::Label::new(text).wrap());
             }
-            (None, Some(strength)) => _ = ui.weak(words.format("practice.strength", format!("{strength:.1}"))),
+            (None, Some(strength)) => {
+                let text = egui::RichText::new(words.format("practice.strength", format!("{strength:.1}"))).weak();
+                ui.add(egui::Label::new(text).wrap());
+            }
             (None, None) => {}
         }
     });

@@ -26,7 +26,9 @@ pub fn dialog_ui(ctx: &egui::Context, editor: &EditorState, words: &Translations
         ui.set_width((room.x - 120.0).clamp(240.0, 620.0));
         ui.heading(words.get(title));
         ui.add_space(8.0);
-        let scroll = egui::ScrollArea::vertical().max_height((room.y - 200.0).max(140.0));
+        // Without the second bound the area would keep the height of its first pass, and hide the buttons.
+        let height = (room.y - 200.0).max(140.0);
+        let scroll = egui::ScrollArea::vertical().max_height(height).min_scrolled_height(height);
         scroll.show(ui, |ui| match dialog {
             Dialog::SaveAs(path) => save_as_ui(ui, path, words, commands),
             Dialog::ConfirmOverwrite(path) => {
@@ -73,6 +75,7 @@ fn save_as_ui(ui: &mut egui::Ui, path: &str, words: &Translations, commands: &mu
     if typed != path {
         commands.push(AppCommand::Editor(EditorCommand::TypePath(typed.clone())));
     }
+    focus_at_first(ui, &line);
     let path = typed.trim();
     anchor(ui, "where", line.rect);
     let is_entered = line.lost_focus() && ui.input(|input| input.key_pressed(egui::Key::Enter));
@@ -91,6 +94,15 @@ fn save_as_ui(ui: &mut egui::Ui, path: &str, words: &Translations, commands: &mu
             commands.push(AppCommand::Editor(EditorCommand::ShowSaveAs(false)));
         }
     });
+}
+
+/// Moves the focus to a field in the first pass in which it is shown.
+fn focus_at_first(ui: &egui::Ui, field: &egui::Response) {
+    let pass = ui.ctx().cumulative_pass_nr();
+    let shown_in = ui.data_mut(|data| std::mem::replace(data.get_temp_mut_or(field.id, 0), pass));
+    if shown_in + 1 < pass {
+        field.request_focus();
+    }
 }
 
 /// Every complaint, with the section in which it can be corrected.
