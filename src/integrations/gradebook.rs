@@ -261,15 +261,12 @@ impl<'a> GradebookColumns<'a> {
                 exercises.push(session);
             }
         }
-        let column = |exercise: &'a SessionFile| {
+        let titles = unique_titles(&exercises, options.lms);
+        let column = |(exercise, title): (&'a SessionFile, String)| {
             let own = graded.iter().filter(|g| g.session.scenario.id == exercise.scenario.id && !g.status.differs());
-            ExerciseColumn {
-                exercise,
-                title: unique_title(exercise, &exercises, options.lms),
-                max_points: own.map(|g| g.grade.max_points).collect(),
-            }
+            ExerciseColumn { exercise, title, max_points: own.map(|g| g.grade.max_points).collect() }
         };
-        GradebookColumns { identity, exercises: exercises.iter().copied().map(column).collect() }
+        GradebookColumns { identity, exercises: exercises.into_iter().zip(titles).map(column).collect() }
     }
 
     /// Returns the row of titles, and for Canvas that of the possible points.
@@ -396,15 +393,21 @@ impl DoubtfulGrades {
     }
 }
 
-/// Returns the column title of an exercise, with its id where others have the same title: a learning management system
-/// would treat two columns of the same name as one assignment.
-fn unique_title(exercise: &SessionFile, exercises: &[&SessionFile], lms: Lms) -> String {
-    let plain = title(exercise, lms);
-    let is_alone = exercises.iter().filter(|e| title(e, lms) == plain).count() == 1;
-    match is_alone {
-        true => plain,
-        false => format!("{plain} · {}", sanitize_display(&exercise.scenario.id, TITLE_MAX)),
+/// Returns a column title for each exercise: with its id where others have the same title, and with a number where even
+/// that is another's title. A learning management system would treat two columns of the same name as one assignment.
+fn unique_titles(exercises: &[&SessionFile], lms: Lms) -> Vec<String> {
+    let plain: Vec<String> = exercises.iter().map(|exercise| title(exercise, lms)).collect();
+    let mut titles: Vec<String> = Vec::new();
+    for (exercise, own) in exercises.iter().zip(&plain) {
+        let is_alone = plain.iter().filter(|title| *title == own).count() == 1;
+        let with_id = || format!("{own} · {}", sanitize_display(&exercise.scenario.id, TITLE_MAX));
+        let wanted = if is_alone { own.clone() } else { with_id() };
+        let numbered = (2..).map(|number| format!("{wanted} · {number}"));
+        let is_free = |title: &String| !titles.contains(title) && (*title == *own || !plain.contains(title));
+        let free = std::iter::once(wanted.clone()).chain(numbered).find(is_free);
+        titles.extend(free);
     }
+    titles
 }
 
 /// Returns the column title of an exercise; for Canvas, a final number in round brackets is put in square brackets.
@@ -507,6 +510,20 @@ mod tests {
         let excused = GradeFile { passed: true, ..failed };
         assert_eq!(policies.map(|p| p.points(&excused)), [82.5; 3]);
         assert!(CriticalErrorPolicy::Keep.warning(2).contains("unchanged"));
+    }
+
+    #[test]
+    fn no_two_columns_have_the_same_title() {
+        // Aim: a learning management system takes columns of one name for one assignment. Method: two exercises of the same
+        // title, a third whose title is what the first becomes with its id, and one that stands alone.
+        let session = |id: &str, title: &str| {
+            let text = serde_json::json!({ "version": 1, "scenario": { "id": id, "title": title }, "metrics": {} });
+            SessionFile::from_json(&text.to_string()).unwrap()
+        };
+        let sessions =
+            [session("a", "Caries"), session("b", "Caries"), session("c", "Caries · a"), session("d", "Amalgam")];
+        let titles = unique_titles(&sessions.iter().collect::<Vec<_>>(), Lms::Moodle);
+        assert_eq!(titles, ["Caries · a · 2", "Caries · b", "Caries · a", "Amalgam"]);
     }
 
     #[test]

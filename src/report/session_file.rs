@@ -33,6 +33,10 @@ const ID_MAX: usize = 256;
 /// Maximum number of measures, and of places and times of measures.
 const METRICS_MAX: usize = 2000;
 
+/// Greatest magnitude of a measure, in any unit: far above every measure that can occur, and small enough for sums of squares
+/// over a cohort.
+const MEASURE_MAX: f64 = 1e15;
+
 /// Maximum number of rubric items, critical errors, stages, answers, statements, sites and digests, each.
 const ENTRIES_MAX: usize = 1000;
 
@@ -420,6 +424,11 @@ impl SessionFile {
             return Err(format!("the name \"{beginning}…\" has more than {ID_MAX} characters"));
         }
         self.grade.as_ref().map_or(Ok(()), check_points)?;
+        let is_measured = |value: f64| value.abs() <= MEASURE_MAX;
+        if let Some((name, value)) = self.metrics.iter().find(|(_, value)| !value.is_none_or(is_measured)) {
+            let value = value.unwrap_or_default();
+            return Err(format!("the measure \"{name}\" is {value:e}, and the greatest possible is {MEASURE_MAX:e}"));
+        }
         let year: String = self.started.chars().take_while(char::is_ascii_digit).collect();
         let is_date = year.len() >= 4 && self.started.as_bytes().get(year.len()) == Some(&b'-');
         if is_date && !year.parse().is_ok_and(|year| YEARS.contains(&year)) {

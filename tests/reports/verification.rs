@@ -224,13 +224,15 @@ fn a_session_with_too_much_in_it_is_refused_at_once() {
     assert_eq!(plain(&|_| ()), Ok(()));
     assert_eq!(plain(&|one| one["metrics"] = many(2000)), Ok(()));
     assert_eq!(plain(&|one| one["participant"] = json!("x".repeat(64))), Ok(()));
-    let cases: [(Change, &str); 9] = [
+    let cases: [(Change, &str); 11] = [
         (|one| one["metrics"] = many(2001), "it has 2001 measures, and the maximum is 2000"),
         (|one| one["metrics"] = many(1_000_000), "MiB, and the maximum is 4 MiB"),
         (|one| one["participant"] = json!("x".repeat(65)), "participant's code has more than 64 characters"),
         (|one| one["scenario"]["id"] = json!("x".repeat(300)), "has more than 256 characters"),
         (|one| one["metrics"]["y".repeat(300)] = json!(1.0), "has more than 256 characters"),
         (|one| one["stages"] = (0..1001).map(|n| stage(&n.to_string())).collect(), "it has 1001 stages"),
+        (|one| one["metrics"]["a"] = json!(1e308), "the measure \"a\" is 1e308"),
+        (|one| one["metrics"]["a"] = json!(-1.1e15), "the measure \"a\" is -1.1e15"),
         (|one| one["grade"]["points"] = json!(1e308), "points of its grade are invalid"),
         (|one| one["grade"]["points"] = json!(-1), "points of its grade are invalid"),
         (|one| one["started"] = json!("9999-99-99"), "it began in the year 9999"),
