@@ -50,6 +50,8 @@ pub enum StereoMode {
     Anaglyph,
     /// The left eye in this window, the right one in a window of its own, for two projectors.
     TwoWindows,
+    /// The eyes by turns, frame after frame, for shutter glasses.
+    FrameSequential,
 }
 
 impl Default for Settings {
@@ -115,7 +117,7 @@ impl Settings {
             StereoMode::TopBottom => StereoLayout::TopBottom,
             StereoMode::Rows => StereoLayout::Rows,
             StereoMode::Anaglyph => StereoLayout::Anaglyph,
-            StereoMode::TwoWindows => StereoLayout::Left,
+            StereoMode::TwoWindows | StereoMode::FrameSequential => StereoLayout::Left,
         };
         Some(Stereo { layout, eye_distance: self.eye_distance_mm })
     }
@@ -126,9 +128,19 @@ impl Settings {
         self.smooth_edges.unwrap_or(has_graphics)
     }
 
-    /// Stereo view of the second window; `None` if there is only one window.
+    /// Stereo view of the right eye, if it has a picture of its own.
     pub fn second_eye(&self) -> Option<Stereo> {
-        let has_two = self.stereo == StereoMode::TwoWindows;
+        let has_two = self.has_second_window() || self.is_frame_sequential();
         has_two.then_some(Stereo { layout: StereoLayout::Right, eye_distance: self.eye_distance_mm })
+    }
+
+    /// True if the right eye's picture has a window of its own.
+    pub fn has_second_window(&self) -> bool {
+        self.stereo == StereoMode::TwoWindows
+    }
+
+    /// True if the eyes are shown by turns.
+    pub fn is_frame_sequential(&self) -> bool {
+        self.stereo == StereoMode::FrameSequential
     }
 }

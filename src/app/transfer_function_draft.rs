@@ -10,14 +10,25 @@ pub struct TransferFunctionDraft {
     pub function: Arc<TransferFunction>,
     /// Tissue to which the curve applies; air stands for all tissues.
     pub tissue: Label,
-    pub channel: usize,
+    /// The channels that are drawn, by their place in a table's entries: red, green, blue, alpha.
+    pub channels: [bool; 4],
     /// Density at which the keys draw.
     pub cursor: u8,
 }
 
 impl TransferFunctionDraft {
     pub fn new(function: TransferFunction) -> TransferFunctionDraft {
-        TransferFunctionDraft { function: Arc::new(function), tissue: Label::AIR, channel: 3, cursor: 128 }
+        TransferFunctionDraft {
+            function: Arc::new(function),
+            tissue: Label::AIR,
+            channels: [false, false, false, true],
+            cursor: 128,
+        }
+    }
+
+    /// The first of the channels that are drawn; `None` if all are switched off.
+    pub fn first_channel(&self) -> Option<usize> {
+        self.channels.iter().position(|is_drawn| *is_drawn)
     }
 
     /// The table that is drawn.
@@ -25,7 +36,7 @@ impl TransferFunctionDraft {
         self.function.table(self.tissue)
     }
 
-    /// The same with a line drawn from one density and share to another.
+    /// The same with a line drawn from one density and share to another, in every channel that is switched on.
     pub fn with_line(&self, from: [u8; 2], to: [u8; 2]) -> TransferFunctionDraft {
         let [low, high] = if from[0] <= to[0] { [from, to] } else { [to, from] };
         let span = f32::from(high[0] - low[0]).max(1.0);
@@ -37,7 +48,8 @@ impl TransferFunctionDraft {
         let draw = |table: &TransferTable| {
             let mut table = *table;
             for density in low[0]..=high[0] {
-                table[usize::from(density)][self.channel] = value(density);
+                let drawn = table[usize::from(density)].iter_mut().zip(self.channels).filter(|(_, is_drawn)| *is_drawn);
+                drawn.for_each(|(entry, _)| *entry = value(density));
             }
             table
         };

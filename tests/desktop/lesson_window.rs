@@ -2,7 +2,7 @@
 
 use crate::harness::{self, Window};
 use crate::support::folder::folder;
-use crate::support::window_driver::{SHIPPED_EXERCISES, WindowDriver};
+use crate::support::window_driver::{SCREEN_SIZE, SHIPPED_EXERCISES, WindowDriver};
 use crate::trainee::{Trainee, lesion_in_world};
 use std::path::Path;
 use std::time::Duration;
@@ -45,6 +45,43 @@ fn dust_flies_water_sprays_and_both_stand_still_with_the_lesson() {
     desk.until("frames", |now| count(now) >= frames + 4);
     assert_eq!(still(&desk), before, "dust and water wait with the lesson");
     desk.picture("12-paused");
+}
+
+#[test]
+fn shutter_glasses_get_one_eye_after_the_other_with_its_mark() {
+    // Aim: each frame shows one eye, and the line code at the lower edge says which one. Method: frames of a lesson at rest;
+    // the white part of the last row is a quarter of the width or three quarters, by turns; frames of one mark are equal in
+    // the middle of the view, and those of the two marks differ as two eyes do.
+    let place = folder("shutter_glasses");
+    harness::keep_settings(&place, r#"{ "language": "en", "stereo": "frame_sequential", "eye_distance_mm": 6.0 }"#);
+    let options = AppOptions { begins_at_once: true, ..exercise_options(&place, "scenarios/5-grinding.json") };
+    let Some(mut desk) = Window::open(&place, options) else { return };
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("hand", |_| true);
+    desk.wait(Duration::from_secs(1));
+    let [width, height] = SCREEN_SIZE.map(|pixels| pixels as usize);
+    let view = |pixels: &[u8]| -> Vec<u8> {
+        let rows = (height / 4..height / 2).map(|y| &pixels[4 * (y * width + width / 4)..4 * (y * width + width / 2)]);
+        rows.flatten().copied().collect()
+    };
+    let mut frames = Vec::new();
+    for frame in 0..6 {
+        desk.turn();
+        desk.picture(&format!("shutter-{frame}"));
+        let pixels = desk.pixels();
+        let last_row = &pixels[4 * (height - 1) * width..];
+        let white = last_row.chunks(4).filter(|pixel| pixel[..3] == [255; 3]).count();
+        assert!(last_row.chunks(4).all(|pixel| pixel[..3] == [255; 3] || pixel[..3] == [0; 3]), "the mark is sharp");
+        frames.push((white, view(&pixels)));
+    }
+    let marks: Vec<usize> = frames.iter().map(|(white, _)| 4 * white / width).collect();
+    assert!(marks == [1, 3, 1, 3, 1, 3] || marks == [3, 1, 3, 1, 3, 1], "{marks:?}");
+    let difference = |a: usize, b: usize| {
+        let pairs = frames[a].1.iter().zip(&frames[b].1);
+        pairs.filter(|(a, b)| a.abs_diff(**b) > 8).count() as f64 / frames[a].1.len() as f64
+    };
+    assert!(difference(2, 4) < 0.001 && difference(3, 5) < 0.001, "{} {}", difference(2, 4), difference(3, 5));
+    assert!(difference(4, 5) > 0.02, "{}", difference(4, 5));
 }
 
 #[test]

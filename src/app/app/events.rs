@@ -203,6 +203,8 @@ impl App {
             Screen::Lesson(lesson) if lesson.needs_frames() => Duration::ZERO,
             // Building the workpiece needs the processors; when it is built, the lesson's thread requests a frame.
             Screen::Lesson(lesson) if lesson.scene.is_none() => theme::PROGRESS_DOT_INTERVAL,
+            // The eyes change with every frame of the screen.
+            Screen::Lesson(lesson) if !lesson.are_stages_over && self.settings.is_frame_sequential() => Duration::ZERO,
             Screen::Lesson(lesson) if !lesson.are_stages_over => {
                 match is_view_active || lesson.pointer_hand.is_pressing {
                     true => LESSON_FRAME_INTERVAL,

@@ -64,6 +64,8 @@ pub struct App {
     replacements: Replacements,
     /// Pictures of a tooth as they were last drawn.
     views: Views,
+    /// True once the window was asked to fill the screen for shutter glasses, which read the screen's last rows.
+    fills_screen: bool,
     frame_count: u64,
     /// Time of the last input, s.
     last_input: f64,
@@ -126,6 +128,7 @@ impl App {
             replacements,
             has_graphics: context.wgpu_render_state.as_ref().is_some_and(viewport::has_graphics),
             views: Views::default(),
+            fills_screen: false,
             frame_count: 0,
             last_input: 0.0,
         };
@@ -135,6 +138,15 @@ impl App {
             app.begin_lesson(ctx);
         }
         app
+    }
+
+    /// Fills the screen, or no longer, when stereo for shutter glasses is switched; a kiosk fills it anyway.
+    fn fill_screen_for_glasses(&mut self, ctx: &egui::Context) {
+        let fills = self.settings.is_frame_sequential();
+        if fills != self.fills_screen && self.options.kiosk().is_none() {
+            self.fills_screen = fills;
+            ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(fills));
+        }
     }
 
     /// Applies and saves changed settings once the mouse button is released: a text size that changed during a drag
@@ -200,6 +212,7 @@ impl eframe::App for App {
         self.poll(ctx);
         self.handle_close_request(ctx);
         self.save_settings(ctx);
+        self.fill_screen_for_glasses(ctx);
         platform::set_unsaved_work(self.has_unsaved_work());
         // A hidden window has no frame that would ask for the next one.
         if events::is_hidden(ctx) {

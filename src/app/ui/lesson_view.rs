@@ -78,7 +78,7 @@ impl LessonView {
             edit_count: scene.edit_count,
             appearance_count: scene.appearance_count,
             stereo,
-            second_size: viewport.second_eye_size(),
+            second_size: second_size(settings, viewport, frame.size),
             is_smooth: settings.is_smooth(viewport.has_graphics()),
             particle_count,
         };
@@ -135,11 +135,16 @@ impl LessonView {
         if let Some(second_eye) = settings.second_eye() {
             // Nothing has changed between the two eyes.
             scene.tooth.iter_mut().for_each(|tooth| tooth.changes = Changes::Bricks(&[]));
-            let size = viewport.second_eye_size();
+            let size = second_size(settings, viewport, size);
             viewport.draw(EyeWindow::SecondEye, &scene, &viewpoint, Some(second_eye), size)?;
         }
         Ok(drawn)
     }
+}
+
+/// Size of the right eye's own picture, pixels: that of its window, or of the main picture, in whose place it is shown.
+fn second_size(settings: &Settings, viewport: &Viewport, main: [u32; 2]) -> [u32; 2] {
+    if settings.has_second_window() { viewport.second_eye_size() } else { main }
 }
 
 fn world_from_tip(seen: &LessonSnapshot) -> Pose {

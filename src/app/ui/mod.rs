@@ -18,6 +18,7 @@ pub mod results;
 pub mod section_view;
 pub mod settings_screen;
 pub mod shortcuts;
+pub mod shutter_glasses;
 pub mod text_field;
 pub mod theme;
 pub mod tools_panel;

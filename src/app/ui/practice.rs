@@ -8,7 +8,9 @@ use crate::snapshot::LessonSnapshot;
 use crate::ui::lesson_view::PictureFrame;
 use crate::ui::viewport::Viewport;
 use crate::ui::views::Views;
-use crate::ui::{controls_guide, periodontal_chart, questions, section_view, theme, tools_panel, viewport_input};
+use crate::ui::{
+    controls_guide, periodontal_chart, questions, section_view, shutter_glasses, theme, tools_panel, viewport_input,
+};
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::Vec3;
 use typodont_exercise::catalog::TissueRole;
@@ -244,7 +246,12 @@ fn view_ui(
     match drawn {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
-            ui.painter().image(id, rect, whole, Color32::WHITE);
+            let takes_turn = settings.is_frame_sequential() && shutter_glasses::is_right_eye(ui.ctx());
+            let right = viewport.as_ref().and_then(Viewport::second_eye_texture).filter(|_| takes_turn);
+            ui.painter().image(right.unwrap_or(id), rect, whole, Color32::WHITE);
+            if settings.is_frame_sequential() {
+                shutter_glasses::eye_mark_ui(ui.ctx());
+            }
             if settings.stereo().is_none() {
                 pointer_ring(ui, lesson, rect);
             }
@@ -266,7 +273,7 @@ fn view_ui(
             ui.put(rect.shrink(40.0), egui::Label::new(words.get("practice.no_picture")));
         }
     }
-    if let Some(viewport) = viewport.as_mut().filter(|_| settings.second_eye().is_some()) {
+    if let Some(viewport) = viewport.as_mut().filter(|_| settings.has_second_window()) {
         second_eye_window(ui.ctx(), viewport, view.has_volume(), words);
     }
     if lesson.has_mouse() && lesson.scene.is_some() {

@@ -9,13 +9,14 @@ use eframe::egui;
 use std::path::Path;
 use typodont_devices::DRIVERS;
 
-const STEREO_MODES: [(StereoMode, &str); 6] = [
+const STEREO_MODES: [(StereoMode, &str); 7] = [
     (StereoMode::Off, "settings.stereo_off"),
     (StereoMode::SideBySide, "settings.stereo_side"),
     (StereoMode::TopBottom, "settings.stereo_top"),
     (StereoMode::Rows, "settings.stereo_rows"),
     (StereoMode::Anaglyph, "settings.stereo_anaglyph"),
     (StereoMode::TwoWindows, "settings.stereo_two"),
+    (StereoMode::FrameSequential, "settings.stereo_shutter"),
 ];
 
 /// Draws all settings. Pushes commands for changes, and changes nothing itself.

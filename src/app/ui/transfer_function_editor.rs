@@ -51,8 +51,9 @@ pub fn transfer_function_ui(
         .labelled_by(label);
     channels_ui(ui, &mut new, words);
     let (rect, response) = ui.allocate_exact_size(egui::vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
-    let name =
-        format!("{}, {}, {}", words.get("transfer.curve"), title(new.tissue), words.get(CHANNELS[new.channel].0));
+    let drawn = CHANNELS.iter().zip(new.channels).filter(|(_, is_drawn)| *is_drawn);
+    let drawn: Vec<&str> = drawn.map(|((key, _), _)| words.get(key)).collect();
+    let name = format!("{}, {}, {}", words.get("transfer.curve"), title(new.tissue), drawn.join(" + "));
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, &name));
     if response.clicked() {
         response.request_focus();
@@ -83,10 +84,13 @@ fn presets_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, palette: &La
         if ui.small_button(words.get("menu.xray")).clicked() {
             *draft = TransferFunctionDraft::new(TransferFunction::x_ray());
         }
+        if ui.small_button(words.get("transfer.straight")).clicked() {
+            *draft = TransferFunctionDraft::new(TransferFunction::proportional());
+        }
     });
 }
 
-/// Choice of the channel that is drawn.
+/// Switches of the channels that are drawn.
 fn channels_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, words: &Translations) {
     // A row that is wider than the menu would push it out of the window.
     ui.horizontal_wrapped(|ui| {
@@ -94,7 +98,7 @@ fn channels_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, words: &Tra
         ui.spacing_mut().button_padding.x = 6.0;
         for (channel, (key, ink)) in CHANNELS.into_iter().enumerate() {
             let text = egui::RichText::new(words.get(key)).small().color(ink);
-            ui.selectable_value(&mut draft.channel, channel, text);
+            ui.toggle_value(&mut draft.channels[channel], text);
         }
     });
 }
@@ -104,7 +108,8 @@ fn edit_by_keys(ui: &egui::Ui, draft: &TransferFunctionDraft, response: &egui::R
     let filter = egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
     ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
     let pressed = |key| ui.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key));
-    let here = draft.table()[usize::from(draft.cursor)][draft.channel];
+    let Some(channel) = draft.first_channel() else { return draft.clone() };
+    let here = draft.table()[usize::from(draft.cursor)][channel];
     let to = if pressed(Key::ArrowLeft) {
         return TransferFunctionDraft { cursor: draft.cursor.saturating_sub(KEY_STEP), ..draft.clone() };
     } else if pressed(Key::ArrowRight) {
@@ -138,16 +143,17 @@ fn paint(ui: &egui::Ui, draft: &TransferFunctionDraft, heights: &[f32; 256], rec
         let line = [place(density, 0.0), place(density, *height)];
         painter.line_segment(line, Stroke::new(1.5, Color32::from_gray(0xdd)));
     }
-    // The drawn one last, above the others.
-    let order = (0..CHANNELS.len()).filter(|&c| c != draft.channel).chain([draft.channel]);
+    // Those that are drawn come last, above the others.
+    let mut order: Vec<usize> = (0..CHANNELS.len()).collect();
+    order.sort_by_key(|&channel| draft.channels[channel]);
     for channel in order {
         let value = |density: usize| f32::from(draft.table()[density][channel]) / 255.0;
         let points: Vec<Pos2> = (0..256).map(|density| place(density, value(density))).collect();
-        let width = if channel == draft.channel { 2.5 } else { 1.0 };
+        let width = if draft.channels[channel] { 2.5 } else { 1.0 };
         painter.add(egui::Shape::line(points, Stroke::new(width, CHANNELS[channel].1)));
     }
-    if has_focus {
-        let here = draft.table()[usize::from(draft.cursor)][draft.channel];
+    if let Some(channel) = draft.first_channel().filter(|_| has_focus) {
+        let here = draft.table()[usize::from(draft.cursor)][channel];
         painter.circle_stroke(
             place(usize::from(draft.cursor), f32::from(here) / 255.0),
             5.0,
@@ -167,7 +173,7 @@ mod tests {
         // from right to left; its ends, its middle, the other channels and the other labels.
         let before = TransferFunctionDraft {
             tissue: Label(2),
-            channel: 0,
+            channels: [true, false, false, false],
             ..TransferFunctionDraft::new(TransferFunction::x_ray())
         };
         let after = before.with_line([200, 150], [100, 50]);
@@ -179,5 +185,21 @@ mod tests {
         assert_eq!(after.cursor, 100);
         let all = TransferFunctionDraft { tissue: Label::AIR, ..before }.with_line([0, 7], [255, 7]);
         assert!([0, 2, 255].iter().all(|&label| all.function.table(Label(label)).iter().all(|entry| entry[0] == 7)));
+    }
+
+    #[test]
+    fn several_channels_are_drawn_at_once_from_a_straight_line() {
+        // Aim: the thesis's way to a translucent tooth (4.2.2.3): all channels begin at y = x, and those that are switched on
+        // are drawn together. Method: red and green are drawn; blue and opacity stay where they began.
+        let before = TransferFunctionDraft {
+            channels: [true, true, false, false],
+            ..TransferFunctionDraft::new(TransferFunction::proportional())
+        };
+        assert!((0..=255u8).all(|d| before.table()[usize::from(d)] == [d; 4]));
+        let after = before.with_line([60, 200], [80, 220]);
+        assert_eq!(after.table()[70], [210, 210, 70, 70]);
+        assert_eq!(after.table()[81], [81; 4]);
+        let off = TransferFunctionDraft { channels: [false; 4], ..before.clone() };
+        assert_eq!(off.with_line([0, 9], [255, 9]).table(), before.table());
     }
 }
