@@ -32,7 +32,7 @@ const language = {
 };
 
 class Page {
-  constructor(session, voxels, begun) {
+  constructor(session, voxels, motion, begun) {
     this.session = session;
     this.voxels = voxels;
     this.palette = new Palette(session.tissues, session.verdicts);
@@ -48,7 +48,8 @@ class Page {
     this.solid = this.inSpace(begun);
     if (this.solid && this.deviation) this.solid.take(this.deviation);
     for (const part of document.querySelectorAll('.of-deviation')) part.hidden = !this.deviation;
-    this.playing = 0;
+    if (this.solid && motion) this.solid.carry(motion.about.shapes);
+    this.player = new Player(this, motion);
     /** Part of the canvas's pixels along each side while things move. */
     this.share = 0.22;
     this.wire();
@@ -79,8 +80,8 @@ class Page {
 
   setMoment(seconds) {
     this.moment = Math.min(Math.max(seconds, 0), this.session.seconds);
-    this.voxels.standAt(this.moment);
-    if (this.solid) this.solid.refresh();
+    const isOther = this.voxels.standAt(this.moment);
+    if (this.solid && isOther) this.solid.refresh();
     const slider = byId('moment');
     slider.value = this.moment;
     slider.setAttribute('aria-valuetext', duration(this.moment));
@@ -91,31 +92,8 @@ class Page {
       now.setAttribute('x1', x);
       now.setAttribute('x2', x);
     }
-    this.drawSoon();
-  }
-
-  /** Plays from here to the end, or all of it, within twenty seconds or at the session's own pace. */
-  play() {
-    const isPlaying = this.playing !== 0;
-    cancelAnimationFrame(this.playing);
-    this.playing = 0;
-    if (!isPlaying) {
-      if (this.moment >= this.session.seconds) this.setMoment(0);
-      let before = performance.now();
-      const pace = Math.max(1, this.session.seconds / 20);
-      const turn = now => {
-        this.setMoment(this.moment + pace * (now - before) / 1000);
-        before = now;
-        this.playing = this.moment < this.session.seconds ? requestAnimationFrame(turn) : 0;
-        this.showPlaying();
-      };
-      this.playing = requestAnimationFrame(turn);
-    }
-    this.showPlaying();
-  }
-
-  showPlaying() {
-    byId('play-sign').textContent = this.playing ? '❚❚' : '▶';
+    this.player.show();
+    this.drawSoon(isOther);
   }
 
   // Places.
@@ -162,11 +140,20 @@ class Page {
     Object.assign(told.dataset, { voxel: voxels.inBundle(cell).join(' '), tissue, verdict, seconds: fall ? fall.tick / 1000 : '', deviation: mm === null || !isSeen ? '' : mm.toFixed(3) });
   }
 
-  /** Shows a place of tooth space, mm, as it was at a moment. */
+  /** Shows a place of tooth space, mm, as it was at a moment, from where it is seen. */
   visit(place, seconds, mark) {
-    this.mark = mark;
+    this.player.pause();
     this.setMoment(seconds ?? this.session.seconds);
     if (this.solid) this.turnTo(place);
+    this.point(place, seconds, mark);
+    const view = byId('explore'), { top, bottom } = byId('solid').getBoundingClientRect();
+    if (top < 0 || bottom > window.innerHeight) view.scrollIntoView({ block: 'start' });
+  }
+
+  /** Marks a place of tooth space, mm, at a moment, in the view that the reader has. */
+  point(place, seconds, mark) {
+    this.mark = mark;
+    this.setMoment(seconds ?? this.session.seconds);
     const cell = this.matterNear(this.voxels.cellOf(place));
     if (cell) this.ask(cell, place);
     else {
@@ -175,8 +162,6 @@ class Page {
       this.tell();
       this.drawSoon();
     }
-    const view = byId('explore'), { top, bottom } = byId('solid').getBoundingClientRect();
-    if (top < 0 || bottom > window.innerHeight) view.scrollIntoView({ block: 'start' });
   }
 
   /**
@@ -281,7 +266,8 @@ class Page {
   drawForPaper() {
     const { solid } = this;
     if (!solid) return;
-    const { byVerdict, byDeviation } = solid;
+    const { byVerdict, byDeviation, held } = solid;
+    solid.held = null;
     for (const [id, deviates] of [['solid-print', false], ['deviation-print', true]]) {
       if (deviates && !this.deviation) continue;
       solid.byVerdict = true;
@@ -291,7 +277,7 @@ class Page {
       [paper.width, paper.height] = [solid.canvas.width, solid.canvas.height];
       paper.getContext('2d').drawImage(solid.canvas, 0, 0);
     }
-    Object.assign(solid, { byVerdict, byDeviation });
+    Object.assign(solid, { byVerdict, byDeviation, held });
     this.drawSoon(false);
   }
 
@@ -300,6 +286,7 @@ class Page {
     const began = performance.now();
     this.solid.ring = this.ring;
     this.solid.draw(share);
+    this.player.drawForce();
     if (share > this.share) return;
     // A slow adapter gets fewer pixels while things move: the next frame comes when this one is done.
     requestAnimationFrame(() => {
@@ -323,7 +310,6 @@ class Page {
     const slider = byId('moment');
     slider.max = this.session.seconds;
     slider.oninput = () => this.setMoment(Number(slider.value));
-    byId('play').onclick = () => this.play();
     this.wireCuts();
     if (this.solid) this.wireSolid();
     this.wireCurves();
@@ -488,6 +474,9 @@ class Page {
   const session = JSON.parse(byId('session').textContent);
   const begun = Solid.begin(byId('solid'), byId('solid-shader').textContent);
   const voxels = new Voxels(session.voxels, await unpacked(packed.textContent));
+  const moved = byId('motion');
+  const motion = session.motion ? new Motion(session.motion, await unpacked(moved.textContent)) : null;
   packed.remove();
-  new Page(session, voxels, begun);
+  moved.remove();
+  new Page(session, voxels, motion, begun);
 })();
