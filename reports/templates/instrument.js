@@ -80,12 +80,13 @@ void main() {
   vec3 n = normalize(normal);
   // The tooth's lamp.
   vec3 lamp = normalize(back + 0.45 * up - 0.35 * right);
-  float facing = max(dot(n, back), 0.0), light = 0.34 + 0.66 * max(dot(n, lamp), 0.0);
-  vec3 c = base() * relief() * light;
-  float shine = kind == GRIT ? 0.05 : 0.45;
+  // A bright room on one side, which polished steel shows wherever it does not face the lamp.
+  float facing = max(dot(n, back), 0.0), room = 0.5 + 0.5 * dot(n, normalize(0.5 * up - right));
+  vec3 c = base() * relief() * (0.40 + 0.26 * max(dot(n, lamp), 0.0) + 0.46 * room);
+  float shine = kind == GRIT ? 0.05 : 0.4;
   c += shine * pow(max(dot(n, normalize(lamp + back)), 0.0), 30.0);
   // A dark rim keeps steel apart from enamel.
-  c *= mix(1.0, 0.35, pow(1.0 - facing, 2.5));
+  c *= mix(1.0, 0.45, pow(1.0 - facing, 5.0));
   float a = opacity * (1.0 - smoothstep(ends - fade, ends, in_handle.z));
   colour = vec4(c * a, a);
 }`;

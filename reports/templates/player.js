@@ -1,10 +1,10 @@
 // The hand played back: time, pace, stops, the force on the instrument, and what is said about a moment.
 
 /** Length of the arrow of one newton, pixels; it does not depend on the zoom. As in report.html. */
-const NEWTON = 36;
+const NEWTON = 50;
 
 /** Least force that is shown, N. */
-const FORCE_LEAST = 0.02;
+const FORCE_LEAST = 0.05;
 
 /** Two times are the same moment within half a tick, s. */
 const SAME_MOMENT = 0.0005;
@@ -17,8 +17,8 @@ const STILL = 1;
 
 /** An arrow along x from the origin, or less than its head; half widths of shaft and head, and length of the head, pixels. */
 function arrowPath(length) {
-  const head = Math.min(14, length), wide = Math.min(8, 0.6 * head), neck = length - head;
-  return `M0,-2.5L${neck},-2.5V${-wide}L${length},0L${neck},${wide}V2.5H0Z`;
+  const head = Math.min(15, length), wide = 0.6 * head, neck = length - head;
+  return `M0,-3L${neck},-3V${-wide}L${length},0L${neck},${wide}V3H0Z`;
 }
 
 /** The sign for an arrow that points at the eye (a dot in a circle) or away from it (a cross in a circle). */
@@ -35,7 +35,8 @@ class Player {
     byId('stops').closest('label').hidden = !hasMoments;
     byId('play').onclick = () => this.toggle();
     for (const id of ['show-instrument', 'show-force']) byId(id).onchange = () => { this.show(); page.drawSoon(false); };
-    document.addEventListener('language', () => this.show());
+    document.addEventListener('language', () => { this.show(); this.showBound(); });
+    this.showBound();
   }
 
   // Time.
@@ -117,6 +118,13 @@ class Player {
     this.showCaption();
   }
 
+  /** Says how near the instrument is to the recording. */
+  showBound() {
+    if (!this.motion) return;
+    const { tolerance_mm: mm, tolerance_deg: degrees, force_ticks: ms } = this.motion.about;
+    byId('bound').textContent = this.page.say('script.bound', { mm, degrees, ms });
+  }
+
   /** Shows the sentences about a moment at which time stands still. */
   showCaption() {
     const { page } = this, caption = byId('caption');
@@ -148,12 +156,12 @@ class Player {
     const { position, force } = this.held, { right, up, back } = solid.eye;
     const [x, y] = solid.placeOf(position);
     const [across, down] = [NEWTON * dot(force, right), -NEWTON * dot(force, up)], length = Math.hypot(across, down);
-    const isAlongSight = length < 0.2 * NEWTON * newtons || length < 5;
+    const isAlongSight = length < 0.3 * NEWTON * newtons;
     const angle = Math.atan2(down, across);
     arrow.setAttribute('d', isAlongSight ? (dot(force, back) > 0 ? TOWARD : AWAY) : arrowPath(length));
     arrow.setAttribute('transform', `translate(${x} ${y}) rotate(${isAlongSight ? 0 : angle * 180 / Math.PI})`);
     // The number stands beyond the arrow's end, within the picture.
-    const beyond = isAlongSight ? 0 : length + 20, lift = isAlongSight ? -16 : 5;
+    const beyond = isAlongSight ? 0 : length + 14 + 20 * Math.abs(Math.cos(angle)), lift = isAlongSight ? -14 : 5;
     const { clientWidth, clientHeight } = solid.canvas;
     const kept = (at, least, most) => Math.min(Math.max(at, least), most);
     text.setAttribute('x', kept(x + beyond * Math.cos(angle), 24, clientWidth - 24));

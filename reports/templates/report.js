@@ -3,6 +3,9 @@
 /** Factor by which the tooth is drawn finer along each side at rest; with a fast adapter, at full resolution. */
 const FINER = 3;
 
+/** Direction from which the working area is looked at: from above and a little from the side. */
+const WORK_VIEW = [0.25, -0.35, 1];
+
 const byId = id => document.getElementById(id);
 
 /** A duration as the page writes it: 9.5 s, 1:10.3. */
@@ -203,17 +206,29 @@ class Page {
   look(side) {
     const { solid, voxels } = this;
     if (!solid) return;
-    if (side === 'work') {
-      solid.eye.lookFrom([0.25, -0.35, 1]);
-      solid.eye.middle = voxels.pointOf(voxels.low.map((v, axis) => v + 0.5 * (voxels.size[axis] - 1)));
-      solid.eye.half = 0.75 * Math.max(...voxels.size.map((n, axis) => n * voxels.spacing[axis]), 2);
+    const { eye } = solid, isWorked = voxels.size.some(n => n > 1);
+    if (side === 'work' && isWorked) {
+      eye.lookFrom(WORK_VIEW);
+      eye.middle = voxels.pointOf(voxels.low.map((v, axis) => v + 0.5 * (voxels.size[axis] - 1)));
+      eye.half = 0.75 * Math.max(...voxels.size.map((n, axis) => n * voxels.spacing[axis]), 2);
     } else {
-      [solid.eye.right, solid.eye.up] = SIDES[voxels.mirrored ? { mesial: 'distal', distal: 'mesial' }[side] || side : side];
-      solid.eye.middle = voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1)));
+      // Where nothing was removed, the crowns are the working area.
+      if (side === 'work') eye.lookFrom(WORK_VIEW);
+      else [eye.right, eye.up] = SIDES[voxels.mirrored ? { mesial: 'distal', distal: 'mesial' }[side] || side : side];
+      eye.middle = voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1)));
       const size = voxels.dims.map((n, axis) => n * voxels.spacing[axis]);
-      solid.eye.half = 0.52 * Math.max(...[solid.eye.right, solid.eye.up].map(way => Math.abs(dot(way, size))));
+      eye.half = 0.52 * Math.max(...[eye.right, eye.up].map(way => Math.abs(dot(way.map(Math.abs), size))));
+      this.makeRoom();
     }
     this.drawSoon(false);
+  }
+
+  /** Makes room for the instrument above the crown, in views in which the crown is up. */
+  makeRoom() {
+    const { eye } = this.solid;
+    if (!this.player.motion || eye.up[2] < 0.9) return;
+    eye.middle = added(eye.middle, scaled(eye.up, 0.15 * eye.half));
+    eye.half *= 1.17;
   }
 
   // Drawing: coarse while something moves, fine when it rests.

@@ -170,7 +170,10 @@ fn explorer_parts(wire: &BentExplorerEntry) -> Vec<InstrumentPart> {
     let rings = wire.rings();
     let end = rings.last().map_or(Vec3::ZERO, |ring| ring.0);
     let rings = rings.iter().map(|(at, radius)| [at.x, at.y, at.z, *radius].map(rounded)).collect();
-    let handle = lathe(PartSurface::Steel, &[[SHANK, 0.0], [HANDLE_RADIUS, 5.0], [HANDLE_RADIUS, SHAFT_LENGTH]]);
+    let handle = lathe(
+        PartSurface::Steel,
+        &[[0.0, -0.3], [1.1 * SHANK, 0.0], [HANDLE_RADIUS, 5.0], [HANDLE_RADIUS, SHAFT_LENGTH]],
+    );
     let wire = WirePart { surface: PartSurface::Steel, rings };
     vec![InstrumentPart::Wire(wire), InstrumentPart::Lathe(handle.placed(Pose::at(end)))]
 }

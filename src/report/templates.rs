@@ -43,16 +43,8 @@ const SESSION_FILES: [(&str, &str); 12] = [
     (FEEDBACK, include_str!("../../reports/templates/feedback.json")),
 ];
 /// Parts of the page's script, in the order in which they are joined.
-const SCRIPTS: [&str; 8] = [
-    "voxels.js",
-    "motion.js",
-    "deviation.js",
-    "solid.js",
-    "instrument.js",
-    "cuts.js",
-    "player.js",
-    "report.js",
-];
+const SCRIPTS: [&str; 8] =
+    ["voxels.js", "motion.js", "deviation.js", "solid.js", "instrument.js", "cuts.js", "player.js", "report.js"];
 
 const REPORT: &str = "report.html";
 const FEEDBACK: &str = "feedback.json";

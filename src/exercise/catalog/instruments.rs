@@ -379,9 +379,8 @@ impl InstrumentEntry {
     }
 
     fn with_working_end(&self) -> Instrument {
-        let revolved = |(profile, shank): (Profile, Shank)| {
-            Instrument::with_body(Body::revolved(profile, Some(shank)), self.cuts)
-        };
+        let revolved =
+            |(profile, shank): (Profile, Shank)| Instrument::with_body(Body::revolved(profile, Some(shank)), self.cuts);
         match &self.end {
             WorkingEndEntry::Point | WorkingEndEntry::Bent(_) => Instrument::new(WorkingEnd::Point, self.cuts),
             // The rod behind the end of a probe is not simulated: it passes freely between gingiva and tooth, since a
