@@ -3,6 +3,9 @@
 /** Factor by which the tooth is drawn finer along each side at rest; with a fast adapter, at full resolution. */
 const FINER = 3;
 
+/** Direction from which the working area is looked at: from above and a little from the side. */
+const WORK_VIEW = [0.25, -0.35, 1];
+
 const byId = id => document.getElementById(id);
 
 /** A duration as the page writes it: 9.5 s, 1:10.3. */
@@ -32,7 +35,7 @@ const language = {
 };
 
 class Page {
-  constructor(session, voxels, begun) {
+  constructor(session, voxels, motion, begun) {
     this.session = session;
     this.voxels = voxels;
     this.palette = new Palette(session.tissues, session.verdicts);
@@ -48,7 +51,8 @@ class Page {
     this.solid = this.inSpace(begun);
     if (this.solid && this.deviation) this.solid.take(this.deviation);
     for (const part of document.querySelectorAll('.of-deviation')) part.hidden = !this.deviation;
-    this.playing = 0;
+    if (this.solid && motion) this.solid.carry(motion.about.shapes);
+    this.player = new Player(this, motion);
     /** Part of the canvas's pixels along each side while things move. */
     this.share = 0.22;
     this.wire();
@@ -79,8 +83,8 @@ class Page {
 
   setMoment(seconds) {
     this.moment = Math.min(Math.max(seconds, 0), this.session.seconds);
-    this.voxels.standAt(this.moment);
-    if (this.solid) this.solid.refresh();
+    const isOther = this.voxels.standAt(this.moment);
+    if (this.solid && isOther) this.solid.refresh();
     const slider = byId('moment');
     slider.value = this.moment;
     slider.setAttribute('aria-valuetext', duration(this.moment));
@@ -91,31 +95,8 @@ class Page {
       now.setAttribute('x1', x);
       now.setAttribute('x2', x);
     }
-    this.drawSoon();
-  }
-
-  /** Plays from here to the end, or all of it, within twenty seconds or at the session's own pace. */
-  play() {
-    const isPlaying = this.playing !== 0;
-    cancelAnimationFrame(this.playing);
-    this.playing = 0;
-    if (!isPlaying) {
-      if (this.moment >= this.session.seconds) this.setMoment(0);
-      let before = performance.now();
-      const pace = Math.max(1, this.session.seconds / 20);
-      const turn = now => {
-        this.setMoment(this.moment + pace * (now - before) / 1000);
-        before = now;
-        this.playing = this.moment < this.session.seconds ? requestAnimationFrame(turn) : 0;
-        this.showPlaying();
-      };
-      this.playing = requestAnimationFrame(turn);
-    }
-    this.showPlaying();
-  }
-
-  showPlaying() {
-    byId('play-sign').textContent = this.playing ? '❚❚' : '▶';
+    this.player.show();
+    this.drawSoon(isOther);
   }
 
   // Places.
@@ -162,11 +143,20 @@ class Page {
     Object.assign(told.dataset, { voxel: voxels.inBundle(cell).join(' '), tissue, verdict, seconds: fall ? fall.tick / 1000 : '', deviation: mm === null || !isSeen ? '' : mm.toFixed(3) });
   }
 
-  /** Shows a place of tooth space, mm, as it was at a moment. */
+  /** Shows a place of tooth space, mm, as it was at a moment, from where it is seen. */
   visit(place, seconds, mark) {
-    this.mark = mark;
+    this.player.pause();
     this.setMoment(seconds ?? this.session.seconds);
     if (this.solid) this.turnTo(place);
+    this.point(place, seconds, mark);
+    const view = byId('explore'), { top, bottom } = byId('solid').getBoundingClientRect();
+    if (top < 0 || bottom > window.innerHeight) view.scrollIntoView({ block: 'start' });
+  }
+
+  /** Marks a place of tooth space, mm, at a moment, in the view that the reader has. */
+  point(place, seconds, mark) {
+    this.mark = mark;
+    this.setMoment(seconds ?? this.session.seconds);
     const cell = this.matterNear(this.voxels.cellOf(place));
     if (cell) this.ask(cell, place);
     else {
@@ -175,8 +165,6 @@ class Page {
       this.tell();
       this.drawSoon();
     }
-    const view = byId('explore'), { top, bottom } = byId('solid').getBoundingClientRect();
-    if (top < 0 || bottom > window.innerHeight) view.scrollIntoView({ block: 'start' });
   }
 
   /**
@@ -218,17 +206,29 @@ class Page {
   look(side) {
     const { solid, voxels } = this;
     if (!solid) return;
-    if (side === 'work') {
-      solid.eye.lookFrom([0.25, -0.35, 1]);
-      solid.eye.middle = voxels.pointOf(voxels.low.map((v, axis) => v + 0.5 * (voxels.size[axis] - 1)));
-      solid.eye.half = 0.75 * Math.max(...voxels.size.map((n, axis) => n * voxels.spacing[axis]), 2);
+    const { eye } = solid, isWorked = voxels.size.some(n => n > 1);
+    if (side === 'work' && isWorked) {
+      eye.lookFrom(WORK_VIEW);
+      eye.middle = voxels.pointOf(voxels.low.map((v, axis) => v + 0.5 * (voxels.size[axis] - 1)));
+      eye.half = 0.75 * Math.max(...voxels.size.map((n, axis) => n * voxels.spacing[axis]), 2);
     } else {
-      [solid.eye.right, solid.eye.up] = SIDES[voxels.mirrored ? { mesial: 'distal', distal: 'mesial' }[side] || side : side];
-      solid.eye.middle = voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1)));
+      // Where nothing was removed, the crowns are the working area.
+      if (side === 'work') eye.lookFrom(WORK_VIEW);
+      else [eye.right, eye.up] = SIDES[voxels.mirrored ? { mesial: 'distal', distal: 'mesial' }[side] || side : side];
+      eye.middle = voxels.pointOf(voxels.dims.map(n => 0.5 * (n - 1)));
       const size = voxels.dims.map((n, axis) => n * voxels.spacing[axis]);
-      solid.eye.half = 0.52 * Math.max(...[solid.eye.right, solid.eye.up].map(way => Math.abs(dot(way, size))));
+      eye.half = 0.52 * Math.max(...[eye.right, eye.up].map(way => Math.abs(dot(way.map(Math.abs), size))));
+      this.makeRoom();
     }
     this.drawSoon(false);
+  }
+
+  /** Makes room for the instrument above the crown, in views in which the crown is up. */
+  makeRoom() {
+    const { eye } = this.solid;
+    if (!this.player.motion || eye.up[2] < 0.9) return;
+    eye.middle = added(eye.middle, scaled(eye.up, 0.15 * eye.half));
+    eye.half *= 1.17;
   }
 
   // Drawing: coarse while something moves, fine when it rests.
@@ -281,7 +281,8 @@ class Page {
   drawForPaper() {
     const { solid } = this;
     if (!solid) return;
-    const { byVerdict, byDeviation } = solid;
+    const { byVerdict, byDeviation, held } = solid;
+    solid.held = null;
     for (const [id, deviates] of [['solid-print', false], ['deviation-print', true]]) {
       if (deviates && !this.deviation) continue;
       solid.byVerdict = true;
@@ -291,7 +292,7 @@ class Page {
       [paper.width, paper.height] = [solid.canvas.width, solid.canvas.height];
       paper.getContext('2d').drawImage(solid.canvas, 0, 0);
     }
-    Object.assign(solid, { byVerdict, byDeviation });
+    Object.assign(solid, { byVerdict, byDeviation, held });
     this.drawSoon(false);
   }
 
@@ -300,6 +301,7 @@ class Page {
     const began = performance.now();
     this.solid.ring = this.ring;
     this.solid.draw(share);
+    this.player.drawForce();
     if (share > this.share) return;
     // A slow adapter gets fewer pixels while things move: the next frame comes when this one is done.
     requestAnimationFrame(() => {
@@ -323,7 +325,6 @@ class Page {
     const slider = byId('moment');
     slider.max = this.session.seconds;
     slider.oninput = () => this.setMoment(Number(slider.value));
-    byId('play').onclick = () => this.play();
     this.wireCuts();
     if (this.solid) this.wireSolid();
     this.wireCurves();
@@ -488,6 +489,9 @@ class Page {
   const session = JSON.parse(byId('session').textContent);
   const begun = Solid.begin(byId('solid'), byId('solid-shader').textContent);
   const voxels = new Voxels(session.voxels, await unpacked(packed.textContent));
+  const moved = byId('motion');
+  const motion = session.motion ? new Motion(session.motion, await unpacked(moved.textContent)) : null;
   packed.remove();
-  new Page(session, voxels, begun);
+  moved.remove();
+  new Page(session, voxels, motion, begun);
 })();

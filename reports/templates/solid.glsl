@@ -35,6 +35,7 @@ out vec4 colour;
 const float BRICK = 8.0;
 const float STEP = 0.7;
 const float RING = 0.35;        // radius of the ring, mm
+const float REACH = 200.0;      // depth of the picture before and behind its middle, mm
 const float RING_DEPTH = 0.4;   // how far before the place something may lie and not hide it, mm
 const uint OUTSIDE = 0u, RIGHTLY = 2u, LEEWAY = 3u, OVERCUT = 4u, LEFT = 5u, VULNERABLE = 6u, KEPT = 7u;
 
@@ -105,11 +106,13 @@ vec3 shown(vec3 p, vec3 n) {
 }
 
 // The ring around a place, as it is seen from the eye; hidden where something lies before the place. `t` is the distance of
-// what the ray meets, mm. Black within white: seen on every ground.
+// what the ray meets, mm. Black within white: seen on every ground, and over the instrument. Sets the depth of the picture.
 vec4 marked(vec4 seen, vec3 origin, float t) {
+  gl_FragDepth = clamp(0.5 + 0.5 * t / REACH, 0.0, 1.0);
   vec3 to = (ring - origin) * spacing, forward = away * spacing;
   float along = dot(to, forward), off = abs(length(to - along * forward) - RING);
   if (!hasRing || t < along - RING_DEPTH || off > 0.1) return seen;
+  gl_FragDepth = 0.0;
   return off < 0.06 ? vec4(0.0, 0.0, 0.0, 1.0) : vec4(1.0);
 }
 

@@ -3,6 +3,8 @@
 const BRICK = 8;
 /** Radius of the ring around a place, mm; as in the shader. */
 const RING = 0.35;
+/** Depth of the picture before and behind its middle, mm; as in the shader. */
+const REACH = 200;
 
 const VERTEX = `#version 300 es
 out vec2 place;
@@ -79,7 +81,7 @@ class Eye {
 class Solid {
   /** Asks for the adapter and begins to translate the shader, which takes a while and needs no voxels yet. */
   static begin(canvas, shader) {
-    const gl = canvas.getContext('webgl2', { antialias: false, preserveDrawingBuffer: true, premultipliedAlpha: true });
+    const gl = canvas.getContext('webgl2', { antialias: false, depth: true, stencil: true, preserveDrawingBuffer: true, premultipliedAlpha: true });
     if (!gl) return null;
     const program = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, shader]]) {
@@ -104,7 +106,8 @@ class Solid {
       throw new Error(`shader of the tooth: ${gl.getProgramInfoLog(program)} ${logs.join(' ')}`);
     }
     gl.useProgram(program);
-    gl.bindVertexArray(gl.createVertexArray());
+    this.vertices = gl.createVertexArray();
+    gl.bindVertexArray(this.vertices);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     this.textures(palette);
     const size = voxels.dims.map((n, axis) => n * voxels.spacing[axis]);
@@ -112,6 +115,9 @@ class Solid {
     this.clips = [null, null, null];
     /** The place that is marked by a ring, mm of tooth space. */
     this.ring = null;
+    /** The instrument that is drawn, with its pose; null for none. */
+    this.held = null;
+    this.instruments = null;
     this.byVerdict = true;
     this.byDeviation = false;
     this.patterns = true;
@@ -121,9 +127,21 @@ class Solid {
   }
 
   /** Shows what another one showed: after an adapter was lost and a new one begins with nothing in it. */
-  resume({ eye, clips, ring, byVerdict, byDeviation, patterns, deviation }) {
+  resume({ eye, clips, ring, held, byVerdict, byDeviation, patterns, deviation, instruments }) {
     if (deviation) this.take(deviation);
-    return Object.assign(this, { eye, clips, ring, byVerdict, byDeviation, patterns });
+    if (instruments) this.carry(instruments.shapes);
+    return Object.assign(this, { eye, clips, ring, held, byVerdict, byDeviation, patterns });
+  }
+
+  /** Takes the shapes of the tray's instruments. */
+  carry(shapes) {
+    this.instruments = new InstrumentMeshes(this.gl, shapes);
+    this.useTooth();
+  }
+
+  useTooth() {
+    this.gl.useProgram(this.program);
+    this.gl.bindVertexArray(this.vertices);
   }
 
   /** Takes the signed distances from the ideal cavity. */
@@ -247,8 +265,20 @@ class Solid {
     gl.uniform1i(this.uniforms.byDeviation, this.byDeviation);
     gl.uniform1i(this.uniforms.patterns, this.patterns);
     gl.clearColor(0, 0, 0, 0);
-    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST);
+    gl.depthFunc(gl.ALWAYS);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
+    if (!this.held || !this.instruments) return;
+    this.instruments.draw(this.held, eye, this.ring, width / height, REACH);
+    this.useTooth();
+  }
+
+  /** The place of the picture, in pixels of the page from its upper left corner, of a point of tooth space. */
+  placeOf(point) {
+    const { eye, canvas: { clientWidth, clientHeight } } = this;
+    const from = added(point, scaled(eye.middle, -1)), pixels = 0.5 * clientHeight / eye.half;
+    return [0.5 * clientWidth + pixels * dot(from, eye.right), 0.5 * clientHeight - pixels * dot(from, eye.up)];
   }
 
   /**

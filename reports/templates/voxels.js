@@ -49,6 +49,8 @@ class Voxels {
     /** The changed part of it, ready to be sent to a graphics adapter. */
     this.changed = new Uint8Array(this.end.length);
     this.moment = -1;
+    /** Number of the ticks in which voxels fell until now; -1 before the first moment. */
+    this.fallen = -1;
   }
 
   index(cell) {
@@ -113,11 +115,12 @@ class Voxels {
         for (let i = Math.max(x - 1, 0); i <= Math.min(x + 1, nx - 1); i++) visit((k * ny + j) * nx + i, i - x, j - y, k - z);
   }
 
-  /** Sets the tooth to its state at a moment, s. */
+  /** Sets the tooth to its state at a moment, s. False where it has this state already. */
   standAt(seconds) {
-    const tick = Math.round(seconds * 1000);
-    if (tick === this.moment) return;
+    const tick = Math.round(seconds * 1000), fallen = this.fallenUntil(tick);
     this.moment = tick;
+    if (fallen === this.fallen) return false;
+    this.fallen = fallen;
     const steps = this.changed;
     this.eachChanged((own, whole) => {
       steps[own] = this.thinned[own] <= tick ? this.end[own] : this.start[whole];
@@ -126,6 +129,17 @@ class Voxels {
     this.eachChanged((own, whole) => {
       steps[own] = this.density[whole] = FULL[steps[own]];
     });
+    return true;
+  }
+
+  /** Number of the ticks up to one in which voxels fell. */
+  fallenUntil(tick) {
+    let low = 0, high = this.ticks.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (this.ticks[middle] <= tick) low = middle + 1; else high = middle;
+    }
+    return low;
   }
 
   /** Smooths the density along the cut at intermediate moments, for which no density ramp is stored. */

@@ -9,6 +9,7 @@ use super::display_format;
 use super::feedback::{self, Feedback, FeedbackFinding, FeedbackMoment};
 use super::first_result::{self, LegendEntry, shown_verdicts};
 use super::language::{Languages, Message};
+use super::motion::{self, MotionHeader};
 use super::phrases;
 use super::pictures::{EncodedPicture, ViewKind};
 use super::templates::Templates;
@@ -62,9 +63,11 @@ struct SessionPage<'a> {
     shader: Value,
     /// Content security policy: only the page's own script may run.
     policy: Value,
-    /// Data of the script, as JSON; and the packed voxels, empty if there is no matter.
+    /// Data of the script, as JSON; the packed voxels, empty if there is no matter; and the packed motion of the
+    /// instrument, empty if there is no tick.
     data: Value,
     voxels: Value,
+    motion: Value,
 }
 
 #[derive(Serialize)]
@@ -220,7 +223,12 @@ pub fn render(
     let feedback = feedback::build(session, &recording.scenario, templates.rules());
     let script = templates.script();
     let packed_voxels = voxels::pack(scored);
-    let data = script_data(templates, recording, scored, session, &feedback, packed_voxels.as_ref().map(|v| &v.header));
+    let packed_motion = motion::pack(recording, scored);
+    let headers = PackedHeaders {
+        voxels: packed_voxels.as_ref().map(|v| &v.header),
+        motion: packed_motion.as_ref().map(|m| &m.header),
+    };
+    let data = script_data(templates, recording, scored, session, &feedback, headers);
     let page = SessionPage {
         session,
         title: localizer.own(&session.scenario.title),
@@ -259,6 +267,7 @@ pub fn render(
         shader: Value::from_safe_string(templates.session_file("solid.glsl").into()),
         data: Value::from_safe_string(data),
         voxels: Value::from_safe_string(packed_voxels.map(|v| v.packed).unwrap_or_default()),
+        motion: Value::from_safe_string(packed_motion.map(|m| m.packed).unwrap_or_default()),
     };
     templates.render_session(&page)
 }
@@ -295,13 +304,21 @@ fn time_plot(scored: &Scored, session: &SessionFile, feedback: &Feedback, langua
 struct ScriptData<'a> {
     /// Length of the session, s.
     seconds: f64,
-    voxels: Option<&'a VoxelHeader>,
+    #[serde(flatten)]
+    headers: PackedHeaders<'a>,
     tissues: Vec<LabelRow>,
     verdicts: Vec<LabelRow>,
     tools: Vec<InstrumentName>,
     moments: Vec<ScriptMoment>,
     /// Texts of the script by language and key.
     words: BTreeMap<&'a str, BTreeMap<&'a str, &'a str>>,
+}
+
+/// Descriptions of the packed parts of the page.
+#[derive(Serialize)]
+struct PackedHeaders<'a> {
+    voxels: Option<&'a VoxelHeader>,
+    motion: Option<&'a MotionHeader>,
 }
 
 /// An instrument of the tray.
@@ -338,7 +355,7 @@ fn script_data(
     scored: &Scored,
     session: &SessionFile,
     feedback: &Feedback,
-    voxels: Option<&VoxelHeader>,
+    headers: PackedHeaders,
 ) -> String {
     let languages = templates.languages();
     let tissue = |t: &typodont_exercise::catalog::TissueEntry| LabelRow {
@@ -358,7 +375,7 @@ fn script_data(
     let moment = |m: &FeedbackMoment| ScriptMoment { number: m.number, at: m.at, place: m.place };
     let data = ScriptData {
         seconds: session.servo.ticks as f64 * typodont_core::tick::TICK_S,
-        voxels,
+        headers,
         tissues: recording.scenario.tissues.entries().iter().map(tissue).collect(),
         verdicts: shown_verdicts(scored).map(verdict).collect(),
         tools: recording

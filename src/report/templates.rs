@@ -28,19 +28,23 @@ const COHORT_STYLE: &str = "cohort.css";
 
 /// Files from which a session's page is made, by name: the page, its style sheet, its scripts and shader, and the rules
 /// of the feedback.
-const SESSION_FILES: [(&str, &str); 9] = [
+const SESSION_FILES: [(&str, &str); 12] = [
     (REPORT, include_str!("../../reports/templates/report.html")),
     ("report.css", include_str!("../../reports/templates/report.css")),
     ("voxels.js", include_str!("../../reports/templates/voxels.js")),
     ("deviation.js", include_str!("../../reports/templates/deviation.js")),
+    ("motion.js", include_str!("../../reports/templates/motion.js")),
     ("solid.js", include_str!("../../reports/templates/solid.js")),
+    ("instrument.js", include_str!("../../reports/templates/instrument.js")),
     ("solid.glsl", include_str!("../../reports/templates/solid.glsl")),
     ("cuts.js", include_str!("../../reports/templates/cuts.js")),
+    ("player.js", include_str!("../../reports/templates/player.js")),
     ("report.js", include_str!("../../reports/templates/report.js")),
     (FEEDBACK, include_str!("../../reports/templates/feedback.json")),
 ];
 /// Parts of the page's script, in the order in which they are joined.
-const SCRIPTS: [&str; 5] = ["voxels.js", "deviation.js", "solid.js", "cuts.js", "report.js"];
+const SCRIPTS: [&str; 8] =
+    ["voxels.js", "motion.js", "deviation.js", "solid.js", "instrument.js", "cuts.js", "player.js", "report.js"];
 
 const REPORT: &str = "report.html";
 const FEEDBACK: &str = "feedback.json";

@@ -127,7 +127,8 @@ fn byte_planes(numbers: impl Iterator<Item = u32> + Clone, bytes: u32) -> Vec<u8
     (0..bytes).flat_map(|b| numbers.clone().map(move |n| (n >> (8 * b)) as u8)).collect()
 }
 
-fn compress<'a>(parts: impl Iterator<Item = &'a [u8]>) -> String {
+/// Parts joined, compressed (zlib, RFC 1950), in base64.
+pub(super) fn compress<'a>(parts: impl Iterator<Item = &'a [u8]>) -> String {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     for part in parts {
         encoder.write_all(part).expect("memory takes every byte");

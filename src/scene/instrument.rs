@@ -101,45 +101,16 @@ fn probe_solid(probe: &ProbeEntry) -> MeshInstance {
 
 /// An explorer's bent wire with its handle.
 fn explorer_mesh(wire: &BentExplorerEntry) -> Mesh {
-    /// Radius at the tip, of the shank and over which way it grows, mm.
-    const FINE: f32 = 0.07;
-    const SHANK: f32 = 0.75;
-    const GROWS: f32 = 16.0;
-    /// Between two rings, mm.
-    const STEP: f32 = 0.4;
-    let corners: Vec<Vec3> = wire.wire_mm.iter().map(|p| Vec3::from(p.map(|c| c.0))).collect();
-    let line = catmull_rom(&corners, STEP);
-    let mut length = 0.0;
-    let mut rings = Vec::new();
-    for (i, at) in line.iter().enumerate() {
-        let (before, after) = (line[i.saturating_sub(1)], line[(i + 1).min(line.len() - 1)]);
-        length += before.distance(*at);
-        let radius = FINE + (SHANK - FINE) * (length / GROWS).clamp(0.0, 1.0);
-        rings.push((*at, (after - before).normalize_or(Vec3::Z), radius));
-    }
+    let line = wire.rings();
+    let direction = |i: usize| line[(i + 1).min(line.len() - 1)].0 - line[i.saturating_sub(1)].0;
+    let ring = |(i, &(at, radius)): (usize, &(Vec3, f32))| (at, direction(i).normalize_or(Vec3::Z), radius);
+    let rings: Vec<_> = line.iter().enumerate().map(ring).collect();
     let mut mesh = tube(&rings);
-    let end = *line.last().unwrap_or(&Vec3::ZERO);
-    let handle = [[0.0, -0.2], [SHANK, 0.0], [2.8, 5.0], [2.8, 95.0], [0.0, 97.0]];
+    let end = line.last().map_or(Vec3::ZERO, |ring| ring.0);
+    let handle = [[0.0, -0.2], [BentExplorerEntry::SHANK_RADIUS, 0.0], [2.8, 5.0], [2.8, 95.0], [0.0, 97.0]];
     let handle = transformed(revolve(&handle), Pose::at(end));
     mesh.append(handle);
     mesh
-}
-
-/// A line through corners with its bends rounded (Catmull and Rom's spline), in steps.
-fn catmull_rom(corners: &[Vec3], step: f32) -> Vec<Vec3> {
-    let at = |i: isize| corners[i.clamp(0, corners.len() as isize - 1) as usize];
-    let mut line = Vec::new();
-    for i in 0..corners.len() as isize - 1 {
-        let [a, b, c, d] = [at(i - 1), at(i), at(i + 1), at(i + 2)];
-        let steps = (b.distance(c) / step).ceil().max(1.0) as usize;
-        line.extend((0..steps).map(|s| {
-            let t = s as f32 / steps as f32;
-            let slope = (c - a) * t + (a * 2.0 - b * 5.0 + c * 4.0 - d) * (t * t);
-            b + (slope + (b * 3.0 - a - c * 3.0 + d) * (t * t * t)) * 0.5
-        }));
-    }
-    line.extend(corners.last());
-    line
 }
 
 /// A tube along rings: middle, way, radius.

@@ -2,6 +2,8 @@
 //
 //     node report_page.js PLAYWRIGHT-CORE CHROMIUM BUNDLE PICTURES [hostile]
 //
+// PICTURES may have poses.json: poses of the recording at some ticks, which the page must hold.
+//
 // Prints what it measured as JSON. Exits with 1 and a line per claim that does not hold.
 
 const fs = require('fs');
@@ -208,6 +210,87 @@ function fell(voxel) {
     }
   }
 
+  // The hand is played back: at any tick the page holds the recorded pose, within 0.01 mm and 0.1°, and draws it.
+  const recorded = hostile ? [] : JSON.parse(fs.readFileSync(path.join(pictures, 'poses.json')));
+  const heldPose = () => page.evaluate(() => JSON.parse(document.getElementById('held').dataset.pose || 'null'));
+  const slideTo = seconds => settled(() => page.evaluate(seconds => {
+    const slider = document.getElementById('moment'), { step } = slider;
+    slider.step = 'any';
+    slider.value = seconds;
+    slider.dispatchEvent(new Event('input'));
+    slider.step = step;
+  }, seconds));
+  const off = { mm: 0, degrees: 0 };
+  for (const { tick, tool, position, orientation } of recorded) {
+    await page.evaluate(() => { delete document.documentElement.dataset.shown; });
+    await slideTo(tick / 1000);
+    const pose = await heldPose();
+    const along = Math.abs(pose.orientation.reduce((sum, v, part) => sum + v * orientation[part], 0));
+    const sine = Math.sqrt(Math.max(1 - along * along, 0));
+    off.mm = Math.max(off.mm, Math.hypot(...position.map((v, axis) => v - pose.position[axis])));
+    off.degrees = Math.max(off.degrees, 2 * Math.atan2(sine, along) * 180 / Math.PI);
+    claim(pose.tool === tool, `tick ${tick}: instrument ${pose.tool}, the recording has ${tool}`);
+  }
+  claim(hostile || recorded.length >= 20, `${recorded.length} poses were compared`);
+  claim(off.mm <= 0.0101 && off.degrees <= 0.1001, `a pose is off by ${off.mm} mm and ${off.degrees}°`);
+
+  // By keyboard: play, pause, pace, and a stop at each flag with its sentences.
+  const isPaused = () => page.evaluate(() => document.getElementById('play').getAttribute('aria-labelledby') === 'play-name');
+  const paused = () => page.waitForFunction(() => document.getElementById('play').getAttribute('aria-labelledby') === 'play-name', null, { timeout: 60000 });
+  const passes = seconds => page.waitForFunction(seconds => Number(document.getElementById('moment').value) > seconds, seconds, { timeout: 60000 });
+  const press = async (id, key) => { await page.locator(`#${id}`).focus(); await page.keyboard.press(key); };
+  const captions = () => page.evaluate(() => (document.getElementById('caption').hidden ? '' : document.getElementById('caption').innerText));
+  if (!hostile) {
+    const first = Math.min(...timed.map(m => m.at)), flags = timed.filter(m => Math.abs(m.at - first) < 5e-4);
+    await slideTo(first - 0.3);
+    claim(await captions() === '', `between the flags it says: ${await captions()}`);
+    await press('play', 'Space');
+    await paused();
+    claim(Math.abs((await heldPose()).seconds - first) < 1e-9, `it stopped at ${(await heldPose()).seconds} s, not at the flag at ${first} s`);
+    for (const { number } of flags) {
+      const sentence = await page.evaluate(number => document.querySelector(`.feedback .show[data-mark="${number}"]`).parentElement.firstElementChild.textContent, number);
+      claim((await captions()).includes(sentence.trim()), `flag ${number} says: ${await captions()}, not: ${sentence}`);
+    }
+    await photograph('report-flag.png');
+    await press('play', 'Space');
+    await passes(first + 0.02);
+    claim(await captions() === '', `while it plays it says: ${await captions()}`);
+    await press('play', 'Space');
+    claim(await isPaused(), 'a second press does not pause');
+    const rested = await moment();
+    await page.waitForTimeout(400);
+    claim(await moment() === rested, 'a paused page moves on');
+    await press('stops', 'Space');
+    await slideTo(first - 0.1);
+    await press('play', 'Space');
+    await passes(first + 0.02);
+    await press('play', 'Space');
+    await press('stops', 'Space');
+    await press('pace', 'ArrowDown');
+    claim(await page.evaluate(() => document.getElementById('pace').value) === '2', 'an arrow key does not choose the pace');
+    await slideTo((await moment()) - 0.1);
+
+    // The instrument and its force are in the picture, and never on paper.
+    await slideTo(first);
+    await settled(() => page.locator('[data-side="occlusal"]').click());
+    const paper = () => page.evaluate(() => {
+      window.dispatchEvent(new Event('beforeprint'));
+      return document.getElementById('solid-print').toDataURL();
+    });
+    const [drawn, printed] = [await picture('solid'), await paper()];
+    claim(await page.locator('#force-arrow').isVisible(), 'the force is not shown');
+    claim(/^[\d.]+ N$/.test(await page.evaluate(() => document.getElementById('force-text').textContent)), 'the force has no number');
+    await settled(() => page.locator('#show-instrument').click());
+    claim(await picture('solid') !== drawn, 'the instrument is not in the picture');
+    claim(await paper() === printed, 'the instrument is on paper');
+    await settled(() => page.locator('#show-instrument').click());
+    await page.locator('#show-force').click();
+    await page.waitForFunction(() => getComputedStyle(document.getElementById('force-arrow')).visibility === 'hidden');
+    await page.locator('#show-force').click();
+    await slide(1);
+    claim(await heldPose() === null, 'the instrument is shown over the result');
+  }
+
   // Whoever cannot see it is told names; nothing is a bare button.
   const unnamed = await page.evaluate(() => [...document.querySelectorAll('button, input, canvas, [role=button]')].filter(element => {
     if (element.closest('[hidden]')) return false;
@@ -301,7 +384,7 @@ function fell(voxel) {
   const first = await page.evaluate(() => document.getElementById('explore').getBoundingClientRect().top + window.scrollY);
   // Titles of ninety letters without a space fill more than one sheet, and are broken.
   claim(hostile || first <= 273 / 25.4 * 96, `the summary is ${Math.round(first)} pixels high on paper`);
-  const unwanted = await page.evaluate(() => [...document.querySelectorAll('.screen, .formula, .time')].filter(e => e.offsetParent !== null).map(e => e.textContent.trim().slice(0, 40)));
+  const unwanted = await page.evaluate(() => [...document.querySelectorAll('.screen, .formula, .time, .player, .force')].filter(e => e.offsetParent !== null).map(e => e.textContent.trim().slice(0, 40)));
   claim(unwanted.length === 0, `printed: ${unwanted.join(' | ')}`);
   await page.emulateMedia({ media: null });
   wrong.push(...(await appearance(page)).filter(line => !hostile || !line.startsWith('a word is broken')));
@@ -310,9 +393,33 @@ function fell(voxel) {
   await page.setViewportSize({ width: 400, height: 800 });
   const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
   claim(beyond <= 0, `${beyond} pixels stand out of a window of 400`);
+
+  // Without WebGL, and with still pictures for whoever prefers them: the hand is told, and time goes on in steps of a second.
+  const plain = await browser.newContext({ viewport: { width: 1280, height: 1000 }, reducedMotion: 'reduce' });
+  const bare = await plain.newPage();
+  bare.on('pageerror', error => wrong.push(`thrown without WebGL: ${error.message}`));
+  await bare.addInitScript(() => {
+    const given = HTMLCanvasElement.prototype.getContext;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind === 'webgl2' ? null : given.call(this, kind, ...more); };
+  });
+  await bare.goto(`file://${file}`, { timeout: 120000 });
+  await bare.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
+  claim(!(await bare.locator('#solid').isVisible()), 'an empty picture is shown without WebGL');
+  await bare.locator('#stops').uncheck({ force: true });
+  await bare.evaluate(() => {
+    window.times = [];
+    new MutationObserver(() => window.times.push(document.getElementById('moment').value)).observe(document.getElementById('moment'), { attributeFilter: ['aria-valuetext'] });
+  });
+  await bare.locator('#play').click();
+  await bare.waitForTimeout(2600);
+  await bare.locator('#play').click();
+  const steps = await bare.evaluate(() => [...new Set(window.times)]);
+  claim(steps.length >= 2 && steps.length <= 4, `${steps.length} pictures in 2.6 s: ${steps.join(' ')}`);
+  claim((await bare.locator('#held').textContent()).includes(' N') || hostile, `told without WebGL: ${await bare.locator('#held').textContent()}`);
+  await plain.close();
   claim(asked.length === 0, `asked of a network: ${asked.join(' ')}`);
   await browser.close();
-  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, shown, clicked, fallen, compared, sheets, summary_px: Math.round(first) }));
+  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, shown, clicked, fallen, compared, poses: recorded.length, off, sheets, summary_px: Math.round(first) }));
   for (const line of wrong) console.error(line);
   process.exit(wrong.length ? 1 : 0);
 })().catch(error => { console.error(error); process.exit(1); });

@@ -11,6 +11,7 @@ use bundle::*;
 use folder::folder;
 use std::path::Path;
 use std::process::Command;
+use typodont_exercise::record::Recording;
 
 fn opens(bundle: &Path, pictures: &Path, more: &[&str]) {
     let Some([playwright, chromium]) = browser() else { return };
@@ -25,7 +26,8 @@ fn opens(bundle: &Path, pictures: &Path, more: &[&str]) {
 #[test]
 fn a_report_is_explored_in_a_browser() {
     // Aim: time, marks, sections, voxels, keyboard and languages do in Chromium what they promise, at the voxel size of a
-    // micro-CT (0.067 mm, some 10 million voxels), and every voxel that is clicked says what the label maps say.
+    // micro-CT (0.067 mm, some 10 million voxels), every voxel that is clicked says what the label maps say, and the hand
+    // that is played back is the recorded one.
     if browser().is_none() {
         return;
     }
@@ -38,7 +40,26 @@ fn a_report_is_explored_in_a_browser() {
     let scenario = out.join("fine.json");
     std::fs::write(&scenario, fine).unwrap();
     let bundle = run(scenario.to_str().unwrap(), "hasty", &out, &["--participant", "P07"]);
+    std::fs::write(out.join("poses.json"), recorded_poses(&bundle).to_string()).unwrap();
     opens(&bundle, &out, &[]);
+}
+
+/// Poses of the instrument in tooth space at some thirty ticks of a recording, in no regular order.
+fn recorded_poses(bundle: &Path) -> serde_json::Value {
+    let recording = Recording::read(&bundle.join("recording.mcap")).unwrap();
+    let tooth_from_world = recording.workpiece().unwrap().world_from_tooth.inverse();
+    let count = recording.ticks.len();
+    let pose = |number: usize| {
+        let record = &recording.ticks[number * 7919 % (count - 1)];
+        let orientation = tooth_from_world.orientation * record.reading.pose.orientation.normalize();
+        serde_json::json!({
+            "tick": record.tick.0,
+            "tool": record.instrument,
+            "position": (tooth_from_world * record.tip).to_array(),
+            "orientation": orientation.to_array(),
+        })
+    };
+    (0..30).map(pose).collect()
 }
 
 #[test]

@@ -199,6 +199,23 @@ impl Profile {
         self.pieces.iter().filter(|p| p.to().z > p.from().z).map(slab).sum()
     }
 
+    /// Returns the profile as a polyline from the tip to the top, of which no point is farther than `sag` mm from it.
+    pub fn outline(&self, sag: f32) -> Vec<ProfilePoint> {
+        let first = self.pieces.first().map(ProfilePiece::from);
+        let steps = |piece: &ProfilePiece| match *piece {
+            ProfilePiece::Line { .. } => 1,
+            // The chord of an angle a is radius · (1 − cos(a/2)) ≈ radius · a²/8 from its arc.
+            ProfilePiece::Arc { radius, .. } => {
+                (piece.sweep_angle() / (8.0 * sag / radius).sqrt()).ceil().max(1.0) as usize
+            }
+        };
+        let along = |piece: &'_ ProfilePiece| {
+            let (piece, count) = (*piece, steps(piece));
+            (1..=count).map(move |i| piece.at(i as f32 / count as f32))
+        };
+        first.into_iter().chain(self.pieces.iter().flat_map(along)).collect()
+    }
+
     /// Samples the profile at a spacing of about `apart` mm.
     pub(super) fn samples(&self, apart: f32) -> Vec<ProfileSample> {
         let mut all = Vec::new();
@@ -412,6 +429,22 @@ mod tests {
                     "{profile:?}: {back:?} {at:?}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn an_outline_is_as_near_to_its_profile_as_it_promises() {
+        // Aim: pictures show the shape that is felt. Method: the middle of every chord, and both ends of the whole.
+        for profile in shapes() {
+            let [low, high] = profile.span();
+            let outline = profile.outline(0.005);
+            for pair in outline.windows(2) {
+                let middle = ProfilePoint { r: 0.5 * (pair[0].r + pair[1].r), z: 0.5 * (pair[0].z + pair[1].z) };
+                let off = profile.nearest(middle).distance.abs();
+                assert!(off < 0.0055, "{profile:?}: {off} at {middle:?}");
+            }
+            let (first, last) = (outline[0], outline[outline.len() - 1]);
+            assert!(first.r < 1e-4 && last.r < 1e-4 && (first.z - low).abs() < 1e-4 && (last.z - high).abs() < 1e-4);
         }
     }
 

@@ -5,7 +5,7 @@
 
 use schemars::JsonSchema;
 use serde::Deserialize;
-use typodont_core::frame::{Quat, Vec3};
+use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Body, Profile, Shank};
 use typodont_core::volume::{Grid, Label, Volume, surface};
@@ -35,12 +35,12 @@ pub struct PluggerEntry {
 }
 
 impl PluggerEntry {
-    pub(super) fn body(&self) -> Body {
+    pub(super) fn profile(&self) -> (Profile, Shank) {
         /// Height of the part with the face, mm.
         const HEIGHT: f32 = 2.0;
         let radius = 0.5 * self.diameter_mm;
         let profile = Profile::frustum(radius, 0.9 * radius, HEIGHT, [EDGE_ROUNDING; 2]);
-        Body::revolved(profile, Some(shank_behind(1.6 * radius, HEIGHT)))
+        (profile, shank_behind(1.6 * radius, HEIGHT))
     }
 }
 
@@ -60,7 +60,28 @@ impl SpoonEntry {
     /// The face of the bowl points sideways and slightly upward, as that of a contra-angled excavator.
     pub(super) fn body(&self) -> Body {
         let (distance, half, top) = self.solid();
-        Body::with_shaft(&voxels(distance, half, top), shank_behind(NECK.min(0.7 * self.diameter_mm), 0.7 * top))
+        Body::with_shaft(&voxels(distance, half, top), self.shank())
+    }
+
+    /// Returns the neck and the shaft behind the bowl.
+    pub fn shank(&self) -> Shank {
+        let (_, _, top) = self.solid();
+        shank_behind(NECK.min(0.7 * self.diameter_mm), 0.7 * top)
+    }
+
+    /// Returns the pose of the bowl in handle space. The bowl is an ellipsoid that is thin along its own z.
+    pub fn handle_from_bowl(&self) -> Pose {
+        /// Angle between the face and the shaft, radians: 55°.
+        const TILT: f32 = 0.96;
+        let orientation = Quat::from_rotation_y(TILT);
+        // Extent of the tilted ellipsoid below its centre (its support function).
+        let low = (orientation.conjugate() * Vec3::Z * self.half_axes()).length();
+        Pose { position: Vec3::Z * low, orientation }
+    }
+
+    /// Returns half the axes of the bowl, mm.
+    pub fn half_axes(&self) -> Vec3 {
+        Vec3::new(0.5 * self.diameter_mm, 0.5 * self.diameter_mm, 0.5 * self.thickness_mm)
     }
 
     /// Returns the surface of the working end, for display; handle space, mm.
@@ -70,14 +91,10 @@ impl SpoonEntry {
     }
 
     fn solid(&self) -> (impl Fn(Vec3) -> f32 + use<>, Vec3, f32) {
-        /// Angle between the face and the shaft, radians: 55°.
-        const TILT: f32 = 0.96;
-        let half = Vec3::new(0.5 * self.diameter_mm, 0.5 * self.diameter_mm, 0.5 * self.thickness_mm);
-        let face = Quat::from_rotation_y(TILT);
-        // Extent of the tilted ellipsoid below its centre (its support function).
-        let low = (face.conjugate() * Vec3::Z * half).length();
-        let distance = move |p: Vec3| ellipsoid_distance(face.conjugate() * (p - Vec3::Z * low), half);
-        (distance, Vec3::splat(0.5 * self.diameter_mm), 2.0 * low)
+        let half = self.half_axes();
+        let Pose { position: centre, orientation: face } = self.handle_from_bowl();
+        let distance = move |p: Vec3| ellipsoid_distance(face.conjugate() * (p - centre), half);
+        (distance, Vec3::splat(0.5 * self.diameter_mm), 2.0 * centre.z)
     }
 }
 
@@ -97,10 +114,10 @@ pub struct CleoidEntry {
 }
 
 impl CleoidEntry {
-    pub(super) fn body(&self) -> Body {
+    pub(super) fn profile(&self) -> (Profile, Shank) {
         let (point, wide) = (0.5 * self.point_mm, 0.5 * self.width_mm);
         let profile = Profile::round_ended(point, wide, self.length_mm);
-        Body::revolved(profile, Some(shank_behind(self.width_mm.min(NECK), self.length_mm)))
+        (profile, shank_behind(self.width_mm.min(NECK), self.length_mm))
     }
 }
 
@@ -121,7 +138,19 @@ impl BladeEntry {
     /// presses.
     pub(super) fn body(&self) -> Body {
         let (distance, half, top) = self.solid();
-        Body::with_shaft(&voxels(distance, half, top), shank_behind(NECK, 0.7 * top))
+        Body::with_shaft(&voxels(distance, half, top), self.shank())
+    }
+
+    /// Returns the neck and the shaft behind the blade.
+    pub fn shank(&self) -> Shank {
+        shank_behind(NECK, 0.7 * (2.0 * self.half_extent().z))
+    }
+
+    /// Returns half the length (handle space, along x), the width (y) and the thickness (z) of the blade, mm.
+    pub fn half_extent(&self) -> Vec3 {
+        /// Ratio of a blade's length to its width.
+        const LONG: f32 = 1.6;
+        Vec3::new(0.5 * self.width_mm * LONG, 0.5 * self.width_mm, 0.5 * self.thickness_mm)
     }
 
     /// Returns the surface of the working end, for display; handle space, mm.
@@ -131,9 +160,7 @@ impl BladeEntry {
     }
 
     fn solid(&self) -> (impl Fn(Vec3) -> f32 + use<>, Vec3, f32) {
-        /// Ratio of a blade's length to its width.
-        const LONG: f32 = 1.6;
-        let half = Vec3::new(0.5 * self.width_mm * LONG, 0.5 * self.width_mm, 0.5 * self.thickness_mm);
+        let half = self.half_extent();
         let rounding = 0.9 * half.z;
         let distance = move |p: Vec3| {
             let q = (p - Vec3::Z * half.z).abs() - (half - rounding);

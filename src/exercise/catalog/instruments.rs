@@ -178,6 +178,48 @@ pub struct BentExplorerEntry {
     pub wire_mm: Vec<[WireCoordinateEntry; 3]>,
 }
 
+impl BentExplorerEntry {
+    /// Returns the wire for display as points of its centre line with the radius there, mm: its bends rounded (Catmull
+    /// and Rom's spline), from the fine tip to the end of the shank, where the handle begins.
+    pub fn rings(&self) -> Vec<(Vec3, f32)> {
+        /// Radius at the tip, radius of the shank, and length over which one becomes the other, mm.
+        const FINE: f32 = 0.07;
+        const GROWS: f32 = 16.0;
+        /// Distance between two rings, mm.
+        const STEP: f32 = 0.4;
+        let corners: Vec<Vec3> = self.wire_mm.iter().map(|p| Vec3::from(p.map(|c| c.0))).collect();
+        let line = catmull_rom(&corners, STEP);
+        let mut length = 0.0;
+        let mut before = line.first().copied().unwrap_or_default();
+        let ring = |at: Vec3| {
+            length += before.distance(at);
+            before = at;
+            (at, FINE + (Self::SHANK_RADIUS - FINE) * (length / GROWS).clamp(0.0, 1.0))
+        };
+        line.into_iter().map(ring).collect()
+    }
+
+    /// Radius of an explorer's shank, mm.
+    pub const SHANK_RADIUS: f32 = 0.75;
+}
+
+/// Returns a line through corners with its bends rounded (Catmull and Rom's spline), in steps of at most `step` mm.
+fn catmull_rom(corners: &[Vec3], step: f32) -> Vec<Vec3> {
+    let at = |i: isize| corners[i.clamp(0, corners.len() as isize - 1) as usize];
+    let mut line = Vec::new();
+    for i in 0..corners.len() as isize - 1 {
+        let [a, b, c, d] = [at(i - 1), at(i), at(i + 1), at(i + 2)];
+        let steps = (b.distance(c) / step).ceil().max(1.0) as usize;
+        line.extend((0..steps).map(|s| {
+            let t = s as f32 / steps as f32;
+            let slope = (c - a) * t + (a * 2.0 - b * 5.0 + c * 4.0 - d) * (t * t);
+            b + (slope + (b * 3.0 - a - c * 3.0 + d) * (t * t * t)) * 0.5
+        }));
+    }
+    line.extend(corners.last());
+    line
+}
+
 /// Coordinate, mm: -20 to 40.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(transparent)]
@@ -337,10 +379,8 @@ impl InstrumentEntry {
     }
 
     fn with_working_end(&self) -> Instrument {
-        let bur = |profile: Profile, top: f32| {
-            let [_, length] = profile.span();
-            Instrument::with_body(Body::revolved(profile, Some(Shank::friction_grip(top, length))), self.cuts)
-        };
+        let revolved =
+            |(profile, shank): (Profile, Shank)| Instrument::with_body(Body::revolved(profile, Some(shank)), self.cuts);
         match &self.end {
             WorkingEndEntry::Point | WorkingEndEntry::Bent(_) => Instrument::new(WorkingEnd::Point, self.cuts),
             // The rod behind the end of a probe is not simulated: it passes freely between gingiva and tooth, since a
@@ -351,29 +391,67 @@ impl InstrumentEntry {
             WorkingEndEntry::Ball(ball) => {
                 Instrument::new(WorkingEnd::Ball { radius: 0.5 * ball.diameter_mm }, self.cuts)
             }
-            WorkingEndEntry::Pear(e) => {
-                let profile = Profile::round_ended(0.5 * e.diameter_mm, 0.5 * e.top_diameter_mm, e.length_mm);
-                bur(profile, e.top_diameter_mm)
-            }
-            WorkingEndEntry::Cylinder(e) => {
-                bur(fissure(e.diameter_mm, e.diameter_mm, e.length_mm, e.tip), e.diameter_mm)
-            }
-            WorkingEndEntry::Tapered(e) => {
-                bur(fissure(e.tip_diameter_mm, e.diameter_mm, e.length_mm, e.tip), e.diameter_mm)
-            }
-            WorkingEndEntry::InvertedCone(e) => {
-                bur(fissure(e.diameter_mm, e.top_diameter_mm, e.length_mm, TipEntry::Flat), e.top_diameter_mm)
-            }
+            WorkingEndEntry::Pear(e) => revolved(e.profile()),
+            WorkingEndEntry::Cylinder(e) => revolved(e.profile()),
+            WorkingEndEntry::Tapered(e) => revolved(e.profile()),
+            WorkingEndEntry::InvertedCone(e) => revolved(e.profile()),
+            WorkingEndEntry::Flame(e) => revolved(e.profile()),
             WorkingEndEntry::Mirror(mirror) => Instrument::with_body(mirror.body(), self.cuts),
-            WorkingEndEntry::Plugger(e) => Instrument::with_body(e.body(), self.cuts),
+            WorkingEndEntry::Plugger(e) => revolved(e.profile()),
             WorkingEndEntry::Spoon(e) => Instrument::with_body(e.body(), self.cuts),
-            WorkingEndEntry::Cleoid(e) => Instrument::with_body(e.body(), self.cuts),
+            WorkingEndEntry::Cleoid(e) => revolved(e.profile()),
             WorkingEndEntry::Blade(e) => Instrument::with_body(e.body(), self.cuts),
-            WorkingEndEntry::Flame(e) => {
-                bur(Profile::flame(0.5 * e.diameter_mm, e.length_mm, FLAME_TIP), 2.0 * FLAME_TIP)
-            }
         }
     }
+}
+
+impl BallEntry {
+    /// Returns the outline of the ball, whose centre is at the device's tip, and the shank behind it, which is only
+    /// drawn.
+    fn profile(&self) -> (Profile, Shank) {
+        /// Diameter of the neck at the ball, as a share of the ball's.
+        const NECK_SHARE: f32 = 0.6;
+        let radius = 0.5 * self.diameter_mm;
+        (Profile::ball(radius, -radius), Shank::friction_grip(NECK_SHARE * self.diameter_mm, radius))
+    }
+}
+
+impl PearEntry {
+    fn profile(&self) -> (Profile, Shank) {
+        let profile = Profile::round_ended(0.5 * self.diameter_mm, 0.5 * self.top_diameter_mm, self.length_mm);
+        behind(profile, self.top_diameter_mm)
+    }
+}
+
+impl CylinderEntry {
+    fn profile(&self) -> (Profile, Shank) {
+        behind(fissure(self.diameter_mm, self.diameter_mm, self.length_mm, self.tip), self.diameter_mm)
+    }
+}
+
+impl TaperedEntry {
+    fn profile(&self) -> (Profile, Shank) {
+        behind(fissure(self.tip_diameter_mm, self.diameter_mm, self.length_mm, self.tip), self.diameter_mm)
+    }
+}
+
+impl InvertedConeEntry {
+    fn profile(&self) -> (Profile, Shank) {
+        let profile = fissure(self.diameter_mm, self.top_diameter_mm, self.length_mm, TipEntry::Flat);
+        behind(profile, self.top_diameter_mm)
+    }
+}
+
+impl FlameEntry {
+    fn profile(&self) -> (Profile, Shank) {
+        behind(Profile::flame(0.5 * self.diameter_mm, self.length_mm, FLAME_TIP), 2.0 * FLAME_TIP)
+    }
+}
+
+/// Returns a bur's profile with the shank behind it; `top` is the diameter at the top of the cutting part, mm.
+fn behind(profile: Profile, top: f32) -> (Profile, Shank) {
+    let [_, length] = profile.span();
+    (profile, Shank::friction_grip(top, length))
 }
 
 fn fissure(tip_diameter: f32, top_diameter: f32, length: f32, tip: TipEntry) -> Profile {
@@ -385,6 +463,27 @@ fn fissure(tip_diameter: f32, top_diameter: f32, length: f32, tip: TipEntry) -> 
 }
 
 impl WorkingEndEntry {
+    /// Returns the profile of a working end and the shank behind it, in handle space with its z along the shaft; `None`
+    /// for an end that is not a body of revolution, for a point and for a probe.
+    pub fn profile(&self) -> Option<(Profile, Shank)> {
+        match self {
+            WorkingEndEntry::Ball(e) => Some(e.profile()),
+            WorkingEndEntry::Pear(e) => Some(e.profile()),
+            WorkingEndEntry::Cylinder(e) => Some(e.profile()),
+            WorkingEndEntry::Tapered(e) => Some(e.profile()),
+            WorkingEndEntry::InvertedCone(e) => Some(e.profile()),
+            WorkingEndEntry::Flame(e) => Some(e.profile()),
+            WorkingEndEntry::Plugger(e) => Some(e.profile()),
+            WorkingEndEntry::Cleoid(e) => Some(e.profile()),
+            WorkingEndEntry::Point
+            | WorkingEndEntry::Spoon(_)
+            | WorkingEndEntry::Blade(_)
+            | WorkingEndEntry::Mirror(_)
+            | WorkingEndEntry::Probe(_)
+            | WorkingEndEntry::Bent(_) => None,
+        }
+    }
+
     /// Returns the rule that a shape violates although each of its lengths is in range; `None` for a possible shape.
     fn contradiction(&self) -> Option<&'static str> {
         let (is_wrong, what) = match self {

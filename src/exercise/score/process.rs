@@ -129,11 +129,18 @@ pub struct TraceSample {
 pub struct Trace {
     /// Samples, one every [`Trace::SPAN_TICKS`] ticks.
     pub samples: Vec<TraceSample>,
+    /// Mean forces on the instrument, N, tooth space, without those of guidance: one for every
+    /// [`Trace::FORCE_TICKS`] ticks.
+    pub forces: Vec<Vec3>,
 }
 
 impl Trace {
     /// Number of ticks from one sample to the next.
     pub const SPAN_TICKS: u64 = 100;
+
+    /// Number of ticks over which a force is averaged: whole periods of a bur's vibration (500 Hz in the thesis), and
+    /// shorter than a press of the hand. 10–40 looks alike.
+    pub const FORCE_TICKS: u64 = 20;
 }
 
 /// Collects the process statistics during a replay.
@@ -155,6 +162,8 @@ pub struct ProcessObserver {
     /// The last contact since the speed was last measured: the touched tissue and the force, N.
     last_touch: Option<(Label, f32)>,
     now: TraceSample,
+    /// Sum of the forces since the last mean, N, tooth space.
+    force_sum: Vec3,
     /// Positions of the tip in contact, every [`SPAN`] ticks, by uninterrupted period of contact.
     contact_runs: Vec<Vec<Vec3>>,
     /// Voxels that became air, in order of time.
@@ -203,6 +212,7 @@ impl ProcessObserver {
             last_place: None,
             last_touch: None,
             now,
+            force_sum: Vec3::ZERO,
             contact_runs: Vec::new(),
             removal_log: Vec::new(),
         }
@@ -217,6 +227,7 @@ impl ProcessObserver {
         let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
         let removal = VoxelRemoval { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
         self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
+        self.observe_force(tick, pressed);
         self.observe_visibility(tick, edits, session);
         self.stats.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
@@ -258,6 +269,15 @@ impl ProcessObserver {
             let cleared = session.cleared_pct().unwrap_or(0.0) as f32;
             self.stats.trace.samples.push(TraceSample { at: tick.next(), cleared, ..self.now });
             self.now = TraceSample { force: 0.0, touched: false, cutting: false, ..self.now };
+        }
+    }
+
+    /// Averages the force on the instrument (N, world space).
+    fn observe_force(&mut self, tick: Tick, pressed: Vec3) {
+        self.force_sum += self.tooth_from_world.rotate(pressed);
+        if (tick.0 + 1).is_multiple_of(Trace::FORCE_TICKS) {
+            self.stats.trace.forces.push(self.force_sum / Trace::FORCE_TICKS as f32);
+            self.force_sum = Vec3::ZERO;
         }
     }
 
