@@ -5,7 +5,7 @@
 
 use crate::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent};
 use crate::lesson_sound::LessonSound;
-use crate::snapshot::{LessonSnapshot, SNAPSHOT_WORDS};
+use crate::snapshot::{LessonSnapshot, LimitWarning, SNAPSHOT_WORDS};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use typodont_audio::SoundSender;
@@ -234,9 +234,13 @@ impl LessonPort {
                 session.cleared_pct(),
                 live.timing(),
             );
+            let limits = lesson.limits();
+            let snapshot = LessonSnapshot { warning: limits.warning(step.tick).map(LimitWarning::from), ..snapshot };
             self.snapshot.write(snapshot.encode());
             match session.stage() {
-                Some((_, stage)) if !self.is_paused && !live.is_suspended() => self.sound.update(step, stage.cutting),
+                Some((_, stage)) if !self.is_paused && !live.is_suspended() => {
+                    self.sound.update(step, stage.cutting, limits);
+                }
                 _ => self.sound.silence(),
             }
             if self.is_worth_a_frame(snapshot) {

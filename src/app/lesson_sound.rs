@@ -4,10 +4,11 @@ use std::f32::consts::PI;
 use typodont_audio::{DrillLoad, SoundSender, Tool};
 use typodont_core::frame::Vec3;
 use typodont_core::sim::Step;
-use typodont_core::tick::TICK_S;
+use typodont_core::tick::{TICK_S, Tick};
 use typodont_core::touch::CuttingLaw;
 use typodont_exercise::catalog::{TissueRole, ToolKind};
 use typodont_exercise::scenario::{Scenario, anatomy_tissues};
+use typodont_exercise::score::LimitMonitor;
 
 /// Speed of a bur for which the scenario gives none, 1/min: an air turbine under light load, and a contra-angle with
 /// round steel burs. Handpieces of ISO 14457.
@@ -18,12 +19,9 @@ const LOW_SPEED_RPM: f32 = 20_000.0;
 const ELECTRIC_FROM_RPM: f32 = 40_000.0;
 const TURBINE_FROM_RPM: f32 = 220_000.0;
 
-/// Contact force above which the patient feels pain, N. The thesis (6.3) gives no number; its dentists cut with less
-/// than 2 N, above which the window warns (`HIGH_FORCE` in `ui::practice`).
-const PAINFUL_FORCE: f32 = 2.5;
-
-/// Excess over [`PAINFUL_FORCE`] at which a cry reaches its full loudness, N.
-const PAINFUL_SPAN: f32 = 2.0;
+/// Excess over a limit at which a cry reaches its full loudness, as a share of the limit: 4.5 N for the limit of an
+/// exercise that has none of its own.
+const PAINFUL_SPAN: f32 = 0.8;
 
 /// Time without pain after which the next pain causes a new cry, s.
 const RELIEF: f32 = 0.6;
@@ -94,14 +92,16 @@ impl LessonSound {
         sound
     }
 
-    /// Updates the sound from the newest tick. `is_running`: the foot pedal is pressed.
-    pub fn update(&mut self, step: &Step, is_running: bool) {
+    /// Updates the sound from the newest tick. `is_running`: the foot pedal is pressed; `limits`: the limits of the
+    /// exercise as of that tick.
+    pub fn update(&mut self, step: &Step, is_running: bool, limits: &LimitMonitor) {
         let Some(&voice) = self.tools.get(step.instrument) else { return };
+        let excess = limits.painful_excess(self.last.map_or(Tick::ZERO, |(tick, _)| Tick(tick)));
         let seconds = self.update_speed(step);
         let load = self.load(step, voice, is_running);
         self.sender.set_load(&load);
         let is_soft = step.touch.is_some_and(|touch| self.is_soft[usize::from(touch.label.0)]);
-        if let Some(strength) = self.pain_strength(is_soft && load.is_running, load.force, seconds) {
+        if let Some(strength) = self.pain_strength(is_soft && load.is_running, excess, seconds) {
             // If the queue is full, this cry is dropped; the lesson does not depend on it.
             self.sender.cry(strength);
         }
@@ -150,15 +150,17 @@ impl LessonSound {
     }
 
     /// Loudness of the patient's cry, 0 to 1, if this is a new pain.
-    fn pain_strength(&mut self, is_drilled: bool, force: f32, seconds: f32) -> Option<f32> {
+    ///
+    /// `excess`: excess over a limit that causes cries, as a share of it.
+    fn pain_strength(&mut self, is_drilled: bool, excess: Option<f32>, seconds: f32) -> Option<f32> {
         self.time_since_pain += seconds;
-        if !is_drilled && force <= PAINFUL_FORCE {
+        if !is_drilled && excess.is_none() {
             return None;
         }
         let is_new = self.time_since_pain >= RELIEF;
         self.time_since_pain = 0.0;
-        let by_force = 0.4 + 0.6 * ((force - PAINFUL_FORCE) / PAINFUL_SPAN).clamp(0.0, 1.0);
-        is_new.then_some(if is_drilled { 1.0 } else { by_force })
+        let by_excess = 0.4 + 0.6 * (excess.unwrap_or(0.0) / PAINFUL_SPAN).clamp(0.0, 1.0);
+        is_new.then_some(if is_drilled { 1.0 } else { by_excess })
     }
 }
 
@@ -224,13 +226,13 @@ mod tests {
     fn each_pain_is_one_cry() {
         // Aim: a patient cries when hurt, louder when hurt more, and not at every tick of one pain.
         let (mut treatment, _) = grinding();
-        assert_eq!(treatment.pain_strength(false, 2.0, 0.004), None, "light force");
-        let light = treatment.pain_strength(false, 3.0, 0.004).unwrap();
-        assert_eq!(treatment.pain_strength(false, 3.0, 0.004), None, "the same pain");
-        assert_eq!(treatment.pain_strength(false, 0.0, RELIEF), None);
-        let hard = treatment.pain_strength(false, 4.5, 0.004).unwrap();
+        assert_eq!(treatment.pain_strength(false, None, 0.004), None, "light force");
+        let light = treatment.pain_strength(false, Some(0.2), 0.004).unwrap();
+        assert_eq!(treatment.pain_strength(false, Some(0.2), 0.004), None, "the same pain");
+        assert_eq!(treatment.pain_strength(false, None, RELIEF), None);
+        let hard = treatment.pain_strength(false, Some(0.8), 0.004).unwrap();
         assert!(light < hard && hard <= 1.0, "{light} {hard}");
-        assert_eq!(treatment.pain_strength(false, 0.0, RELIEF), None);
-        assert_eq!(treatment.pain_strength(true, 0.2, 0.004), Some(1.0), "drilled gum");
+        assert_eq!(treatment.pain_strength(false, None, RELIEF), None);
+        assert_eq!(treatment.pain_strength(true, None, 0.004), Some(1.0), "drilled gum");
     }
 }

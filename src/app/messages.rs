@@ -4,6 +4,7 @@ use crate::i18n::Translations;
 use std::net::SocketAddr;
 use typodont_core::device::{DeviceError, DeviceState};
 use typodont_devices::servo::SecondHandEvent;
+use typodont_exercise::scenario::{ContactLimit, LimitPlace, LimitedQuantity, Scenario};
 use typodont_exercise::session::InputError;
 
 /// Text key of the reason why an input was not accepted.
@@ -28,6 +29,31 @@ pub fn refusal_key(why: InputError) -> &'static str {
         InputError::NoProbe => "refused.no_probe",
         InputError::NotInSulcus => "refused.not_in_sulcus",
     }
+}
+
+/// Warning of a value above a limit of the exercise, with its place, the value and the limit. `peak`: N or mm/s.
+pub fn limit_text(limit: &ContactLimit, peak: f32, scenario: &Scenario, words: &Translations) -> String {
+    let ContactLimit { place, quantity, most, .. } = limit;
+    let advice = match quantity {
+        LimitedQuantity::Force => words.get("practice.warn_force"),
+        LimitedQuantity::Speed => words.get("practice.warn_speed"),
+    };
+    let place = match *place {
+        LimitPlace::Anywhere => None,
+        LimitPlace::Zone(zone) => Some(words.own(&scenario.texts, &scenario.zones[zone].title)),
+        LimitPlace::Tissue(label) => scenario.tissues.by_label(label).map(|entry| entry.title.in_language(&words.code)),
+    };
+    let advice = match place {
+        Some(place) => words.format("practice.warn_near", place).replacen("{}", advice, 1),
+        None => advice.to_string(),
+    };
+    // Rounded up, so that a value above its limit is not shown as equal to it.
+    let (peak, unit) = match quantity {
+        LimitedQuantity::Force => (format!("{:.2}", (peak * 100.0).ceil() / 100.0), "N"),
+        LimitedQuantity::Speed => (format!("{:.0}", peak.ceil()), "mm/s"),
+    };
+    let [peak, most] = [peak, most.to_string()].map(|value| format!("{value} {unit}"));
+    format!("{advice}: {}", words.format("practice.warn_values", peak).replacen("{}", &most, 1))
 }
 
 /// Text key for inputs after the end of a lesson.

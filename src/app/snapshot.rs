@@ -4,6 +4,7 @@ use typodont_core::frame::{Quat, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::volume::Label;
 use typodont_devices::servo::TimingSummary;
+use typodont_exercise::score::Exceedance;
 
 /// The newest tick, and the progress of the session. World space, mm, N, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -23,6 +24,23 @@ pub struct LessonSnapshot {
     /// Share of the decay that has been removed, %.
     pub cleared_pct: Option<f32>,
     pub timing: ServoTiming,
+    /// The limit of which a warning is shown.
+    pub warning: Option<LimitWarning>,
+}
+
+/// Warning of a value above a limit of the exercise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitWarning {
+    /// Index into the scenario's limits.
+    pub limit: u32,
+    /// Greatest value, N or mm/s.
+    pub peak: f32,
+}
+
+impl From<Exceedance> for LimitWarning {
+    fn from(exceedance: Exceedance) -> LimitWarning {
+        LimitWarning { limit: exceedance.limit as u32, peak: exceedance.peak }
+    }
 }
 
 /// Pose of the instrument in use; equal to another if the eye cannot tell them apart.
@@ -67,10 +85,13 @@ const STILL_DISTANCE: f32 = 0.01;
 const STILL_ROTATION: f32 = 1e-6;
 
 /// Number of words in the mailbox.
-pub const SNAPSHOT_WORDS: usize = 24;
+pub const SNAPSHOT_WORDS: usize = 26;
 
 /// Encodes an absent share.
 const NO_SHARE: f32 = -1.0;
+
+/// Encodes an absent warning.
+const NO_LIMIT: u32 = u32::MAX;
 
 impl LessonSnapshot {
     pub fn new(
@@ -92,6 +113,7 @@ impl LessonSnapshot {
             stage_seconds: stage_seconds as f32,
             cleared_pct: cleared_pct.map(|pct| pct as f32),
             timing: timing.map(ServoTiming::from).unwrap_or_default(),
+            warning: None,
         }
     }
 
@@ -101,6 +123,7 @@ impl LessonSnapshot {
         const VISIBLE_FORCE: f32 = 0.05;
         InstrumentPose::from(self) != InstrumentPose::from(other)
             || (self.touch, self.cutting, self.cleared_pct) != (other.touch, other.cutting, other.cleared_pct)
+            || self.warning != other.warning
             || (self.spring - other.spring).abs() > VISIBLE_FORCE
     }
 
@@ -114,6 +137,7 @@ impl LessonSnapshot {
         let cleared = self.cleared_pct.unwrap_or(NO_SHARE).to_bits();
         let ServoTiming { ticks, late_p99, late_max, missed, dropped } = self.timing;
         let cutting = u32::from(self.cutting);
+        let [limit, peak] = self.warning.map_or([NO_LIMIT, 0], |warning| [warning.limit, warning.peak.to_bits()]);
         [
             a,
             b,
@@ -139,6 +163,8 @@ impl LessonSnapshot {
             q,
             r,
             s,
+            limit,
+            peak,
         ]
     }
 
@@ -163,6 +189,8 @@ impl LessonSnapshot {
                 missed: words[18],
                 dropped: words[19],
             },
+            warning: (words[24] != NO_LIMIT)
+                .then(|| LimitWarning { limit: words[24], peak: f32::from_bits(words[25]) }),
         }
     }
 }
@@ -198,9 +226,10 @@ mod tests {
             stage_seconds: 12.5,
             cleared_pct: Some(33.0),
             timing: ServoTiming { ticks: 9, late_p99: 8, late_max: 7, missed: 6, dropped: 5 },
+            warning: Some(LimitWarning { limit: 3, peak: 2.75 }),
         };
         assert_eq!(LessonSnapshot::decode(seen.encode()), seen);
-        let nothing = LessonSnapshot { touch: None, cleared_pct: None, ..seen };
+        let nothing = LessonSnapshot { touch: None, cleared_pct: None, warning: None, ..seen };
         assert_eq!(LessonSnapshot::decode(nothing.encode()), nothing);
     }
 }

@@ -1,8 +1,9 @@
 //! The transfer function that the user draws, and the histogram it is drawn over.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use typodont_core::volume::{Label, Volume};
-use typodont_render::{TransferFunction, TransferTable};
+use typodont_render::{LabelPalette, TransferFunction, TransferTable};
 
 /// A transfer function drawn by the user, starting from a preset.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,7 +11,7 @@ pub struct TransferFunctionDraft {
     pub function: Arc<TransferFunction>,
     /// Tissue to which the curve applies; air stands for all tissues.
     pub tissue: Label,
-    /// The channels that are drawn, by their place in a table's entries: red, green, blue, alpha.
+    /// The channels that are drawn together: red, green, blue and opacity.
     pub channels: [bool; 4],
     /// Density at which the keys draw.
     pub cursor: u8,
@@ -18,17 +19,16 @@ pub struct TransferFunctionDraft {
 
 impl TransferFunctionDraft {
     pub fn new(function: TransferFunction) -> TransferFunctionDraft {
-        TransferFunctionDraft {
-            function: Arc::new(function),
-            tissue: Label::AIR,
-            channels: [false, false, false, true],
-            cursor: 128,
-        }
+        let channels = [false, false, false, true];
+        TransferFunctionDraft { function: Arc::new(function), tissue: Label::AIR, channels, cursor: 128 }
     }
 
-    /// The first of the channels that are drawn; `None` if all are switched off.
-    pub fn first_channel(&self) -> Option<usize> {
-        self.channels.iter().position(|is_drawn| *is_drawn)
+    /// The draft with which the study's editor begins: y = x in all channels of all tissues, which shows a colourless tooth
+    /// by its density. All channels are drawn together.
+    pub fn straight_line(palette: &LabelPalette) -> TransferFunctionDraft {
+        let preset = TransferFunctionDraft::new(TransferFunction::tissue(palette));
+        let drawn = TransferFunctionDraft { channels: [true; 4], ..preset }.with_line([0, 0], [255, 255]);
+        TransferFunctionDraft { cursor: 128, ..drawn }
     }
 
     /// The table that is drawn.
@@ -36,7 +36,7 @@ impl TransferFunctionDraft {
         self.function.table(self.tissue)
     }
 
-    /// The same with a line drawn from one density and share to another, in every channel that is switched on.
+    /// The same with a line drawn from one density and share to another, in all drawn channels.
     pub fn with_line(&self, from: [u8; 2], to: [u8; 2]) -> TransferFunctionDraft {
         let [low, high] = if from[0] <= to[0] { [from, to] } else { [to, from] };
         let span = f32::from(high[0] - low[0]).max(1.0);
@@ -45,17 +45,24 @@ impl TransferFunctionDraft {
             let rise = f32::from(high[1]) - f32::from(low[1]);
             (f32::from(low[1]) + share * rise).round() as u8
         };
+        TransferFunctionDraft { cursor: to[0], ..self.with_values(low[0]..=high[0], |density, _| value(density)) }
+    }
+
+    /// The same with new values of all drawn channels at some densities; `value` is given the density and the channel.
+    pub fn with_values(&self, densities: RangeInclusive<u8>, value: impl Fn(u8, usize) -> u8) -> TransferFunctionDraft {
         let draw = |table: &TransferTable| {
             let mut table = *table;
-            for density in low[0]..=high[0] {
-                let drawn = table[usize::from(density)].iter_mut().zip(self.channels).filter(|(_, is_drawn)| *is_drawn);
-                drawn.for_each(|(entry, _)| *entry = value(density));
+            for density in densities.clone() {
+                let entry = &mut table[usize::from(density)];
+                for (channel, own) in entry.iter_mut().enumerate().filter(|(channel, _)| self.channels[*channel]) {
+                    *own = value(density, channel);
+                }
             }
             table
         };
         let labels = if self.tissue == Label::AIR { 0..=255 } else { self.tissue.0..=self.tissue.0 };
         let function = self.function.with_changed_tables(labels.map(Label), draw);
-        TransferFunctionDraft { function: Arc::new(function), cursor: to[0], ..self.clone() }
+        TransferFunctionDraft { function: Arc::new(function), ..self.clone() }
     }
 }
 
@@ -81,5 +88,43 @@ impl DensityHistogram {
         let logs: [f32; 256] = std::array::from_fn(|d| libm::log1pf(count(d) as f32));
         let most = logs.iter().fold(1.0, |most: f32, &log| most.max(log));
         logs.map(|log| log / most)
+    }
+
+    /// The density that most voxels of each tissue have, in the order of the labels; tissues without voxels have none.
+    pub fn peaks(&self) -> Vec<TissuePeak> {
+        let peak = |(label, counts): (usize, &[u32; 256])| {
+            let most = counts.iter().copied().max().filter(|most| *most > 0)?;
+            let density = counts.iter().position(|count| *count == most)?;
+            Some(TissuePeak { tissue: Label(label as u8), density: density as u8 })
+        };
+        self.0.iter().enumerate().filter_map(peak).collect()
+    }
+}
+
+/// Peak of a tissue in the histogram.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TissuePeak {
+    pub tissue: Label,
+    pub density: u8,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_is_drawn_into_all_channels_that_are_switched_on() {
+        // Aim: several channels are drawn by one stroke, and those switched off stay. Method: from y = x, red and green off.
+        let palette = LabelPalette::from_colours(|_| [0.5; 3], 0.1);
+        let first = TransferFunctionDraft::straight_line(&palette);
+        for label in [0, 1, 255] {
+            let table = first.function.table(Label(label));
+            assert!((0..256).all(|density| table[density] == [density as u8; 4]), "label {label}");
+        }
+        let blue_and_opacity = TransferFunctionDraft { channels: [false, false, true, true], ..first.clone() };
+        let drawn = blue_and_opacity.with_line([100, 20], [200, 20]);
+        assert_eq!([99, 150, 201].map(|density| drawn.table()[density]), [[99; 4], [150, 150, 20, 20], [201; 4]]);
+        let none = TransferFunctionDraft { channels: [false; 4], ..first.clone() };
+        assert_eq!(none.with_line([0, 9], [255, 9]).function.table(Label(1)), first.function.table(Label(1)));
     }
 }

@@ -11,6 +11,7 @@ use typodont_core::tick::Tick;
 use typodont_core::volume::Edit;
 use typodont_devices::servo::{SecondHandEvent, SecondHandServo};
 use typodont_exercise::record::{Recorder, RecorderError, RecordingEndFile};
+use typodont_exercise::score::LimitMonitor;
 use typodont_exercise::session::{Effect, Input, Observer, Session};
 use typodont_report::Templates;
 use typodont_report::bundle::PartialBundle;
@@ -36,8 +37,9 @@ impl Lesson {
         second: Option<PendingSecondHand>,
     ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
         let PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, .. } = prepared;
+        let limits = LimitMonitor::new(&scenario, &workpiece);
         let mut session = Session::new(scenario, &workpiece);
-        let mut observer = RecordingObserver { recorder, edits: Vec::new(), handle_orientation: UPRIGHT };
+        let mut observer = RecordingObserver { recorder, edits: Vec::new(), handle_orientation: UPRIGHT, limits };
         let (second, assist) = second.map_or((None, None), |hand| (Some(hand.servo_hand), hand.assist));
         let started = LiveSession::begin(&mut session, simulation, device, second, &mut observer);
         let (live, events) = started.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
@@ -109,6 +111,11 @@ impl Lesson {
         &self.observer.edits
     }
 
+    /// The exercise's limits of force and speed, and when they were exceeded.
+    pub fn limits(&self) -> &LimitMonitor {
+        &self.observer.limits
+    }
+
     /// Orientation of the handle at the newest tick, `world_from_handle`.
     pub fn handle_orientation(&self) -> Quat {
         self.observer.handle_orientation
@@ -141,6 +148,7 @@ struct RecordingObserver {
     recorder: Recorder,
     edits: Vec<Edit>,
     handle_orientation: Quat,
+    limits: LimitMonitor,
 }
 
 impl Observer for RecordingObserver {
@@ -160,6 +168,7 @@ impl Observer for RecordingObserver {
 
     fn tick_completed(&mut self, reading: &Reading, step: &Step, edits: &[Edit]) -> Result<(), RecorderError> {
         self.edits.extend_from_slice(edits);
+        self.limits.observe(step);
         if reading.pose.is_valid() {
             self.handle_orientation = reading.pose.orientation;
         }

@@ -128,11 +128,6 @@ impl TransferFunction {
         TransferFunction::single_table(table([0.92, 0.96, 1.0], |d| 0.035 * d * d), DEFAULT_OPACITY_UNIT, 0.0)
     }
 
-    /// Red, green, blue and opacity in proportion to the density: a colourless tooth to begin from (y = x).
-    pub fn proportional() -> TransferFunction {
-        TransferFunction::single_table(std::array::from_fn(|density| [density as u8; 4]), DEFAULT_OPACITY_UNIT, 0.6)
-    }
-
     /// The given labels in their colours, all others like glass.
     pub fn highlighting(labels: &[Label], palette: &LabelPalette) -> TransferFunction {
         let glass = table([0.75, 0.82, 0.88], |d| 0.006 * linear_ramp(d, 0.4, 0.9));

@@ -244,6 +244,30 @@ fn names_that_lead_nowhere() {
         json!("zone_removed_pct(target)"),
         &[("unknown-zone", "/rubric/items/0/metric")],
     );
+    let near = |limit: Value| json!({ "near": [limit] });
+    let limits: [(&str, Value, &[(&str, &str)]); 6] = [
+        (
+            "limit near no zone",
+            near(json!({ "place": { "zone": "nerve" }, "force_n": 1.0 })),
+            &[("unknown-zone", "/limits/near/0/place/zone")],
+        ),
+        (
+            "limit near no tissue",
+            near(json!({ "place": { "tissue": "nerve" }, "force_n": 1.0 })),
+            &[("unknown-tissue", "/limits/near/0/place/tissue")],
+        ),
+        ("limit of nothing", near(json!({ "place": { "tissue": "pulp" } })), &[("no-limit", "/limits/near/0")]),
+        (
+            "warning below the cutting force",
+            json!({ "warning_force_n": 0.1 }),
+            &[("limit-below-cutting", "/limits/warning_force_n")],
+        ),
+        ("limit of an enormous force", json!({ "cry_force_n": 50 }), &[("out-of-range", "/limits/cry_force_n")]),
+        ("a low limit on gingiva", near(json!({ "place": { "tissue": "gingiva" }, "force_n": 0.1 })), &[]),
+    ];
+    for (name, written, expected) in limits {
+        check(name, "/limits", written, expected);
+    }
     let dependent = "/rubric/items/1/counts_with";
     check("item that counts with no item", dependent, json!("dice"), &[("unknown-item", dependent)]);
     check("item that counts with itself", dependent, json!("healthy_per_decay_pct"), &[("unknown-item", dependent)]);

@@ -4,6 +4,10 @@ use crate::support::bundle::{complained, metric, run_anew, session, typodont};
 use crate::support::folder::folder;
 use serde_json::{Value, json};
 use std::path::PathBuf;
+use typodont_core::tick::Tick;
+use typodont_exercise::record::{self, Recording, ReplayCheck};
+use typodont_exercise::scenario::{LimitPlace, LimitedQuantity};
+use typodont_exercise::score::{self, EXCEEDANCE_GAP_TICKS, LimitMonitor};
 
 /// The exercise of deep caries in large voxels, with three more zones, and with measures of force and speed near these or
 /// near one that is named.
@@ -58,4 +62,64 @@ fn a_measure_near_a_zone_that_is_not_there_is_reported() {
     let output = typodont(&["check", file.to_str().unwrap()]);
     let told = complained(&output);
     assert!(!output.status.success() && told.contains("unknown-zone") && told.contains("nerve"), "{told}");
+}
+
+#[test]
+fn warnings_and_measures_agree_about_every_limit() {
+    // Aim: whoever is warned near a zone finds the same value in the result, and nobody is warned of what the result does not
+    // have. Method: a hasty session in an exercise with limits near three zones, at one of which nobody was, and anywhere; the
+    // peaks of the exceedances beside the measures, those of the score beside those of a second monitor that sees only the
+    // ticks, and the warnings that this one raises, tick by tick.
+    let file = exercise("near_limits", None);
+    let mut scenario: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    let near = |zone: &str, response: &str| json!({ "place": { "zone": zone }, "force_n": 1.0, "speed_mm_s": 20, "response": response });
+    let limits = [near("nerve", "warning"), near("enamel", "cry"), near("apex", "both")];
+    scenario["limits"] = json!({ "warning_force_n": 20, "cry_force_n": 0.9, "cry_speed_mm_s": 30, "near": limits });
+    std::fs::write(&file, scenario.to_string()).unwrap();
+    let made = run_anew(file.to_str().unwrap(), "hasty", &folder("near_limits_out"), &[]);
+    let session = session(&made);
+    let recording = Recording::read(&made.join("recording.mcap")).unwrap();
+    let scored = score::score(&recording, ReplayCheck::Skip).unwrap();
+    let scenario = &recording.scenario;
+    let mut exceeded = 0;
+    for (index, limit) in scenario.limits.iter().enumerate() {
+        let name = match limit.quantity {
+            LimitedQuantity::Force => ["force_max_n", "force_max_near_n"],
+            LimitedQuantity::Speed => ["speed_max_mm_s", "speed_max_near_mm_s"],
+        };
+        let name = match limit.place {
+            LimitPlace::Anywhere => name[0].to_string(),
+            LimitPlace::Zone(zone) => format!("{}({})", name[1], scenario.zones[zone].id),
+            LimitPlace::Tissue(_) => unreachable!("the exercise limits no tissue"),
+        };
+        let measured = metric(&session, &name).unwrap();
+        let peak = scored.exceedances.iter().filter(|e| e.limit == index).map(|e| e.peak).reduce(f32::max);
+        println!("{name}: {measured}, limit {}, exceeded up to {peak:?}", limit.most);
+        match measured > f64::from(limit.most) {
+            true => assert!((f64::from(peak.unwrap()) - measured).abs() < 1e-3, "{name}"),
+            false => assert_eq!(peak, None, "{name}"),
+        }
+        exceeded += usize::from(peak.is_some());
+    }
+    assert!(exceeded >= 5 && exceeded < scenario.limits.len(), "{exceeded}");
+    let workpiece = recording.workpiece().unwrap();
+    let mut monitor = LimitMonitor::new(scenario, &workpiece);
+    let (mut raised, mut shown) = (Vec::new(), None);
+    record::replay(&recording, workpiece, ReplayCheck::Skip, |_, step, _, _| {
+        monitor.observe(step);
+        let warning = monitor.warning(step.tick).map(|e| (e.limit, e.span[0]));
+        raised.extend(warning.filter(|_| warning != shown));
+        shown = warning;
+    });
+    assert_eq!(monitor.exceedances(), scored.exceedances);
+    // The first limit that warns is the force near the nerve, and nothing hides its warnings.
+    let of_first = |all: &[(usize, Tick)]| all.iter().filter(|(limit, _)| *limit == 0).copied().collect::<Vec<_>>();
+    let expected: Vec<_> = scored.exceedances.iter().map(|e| (e.limit, e.span[0])).collect();
+    assert_eq!(of_first(&raised), of_first(&expected));
+    let ends = |e: &score::Exceedance| e.span[1].0 + EXCEEDANCE_GAP_TICKS;
+    let of_one = |limit: usize| scored.exceedances.iter().filter(move |e| e.limit == limit).collect::<Vec<_>>();
+    for limit in 0..scenario.limits.len() {
+        assert!(of_one(limit).windows(2).all(|pair| ends(pair[0]) <= pair[1].span[0].0), "two in one pause: {limit}");
+    }
+    assert!(!raised.iter().any(|(limit, _)| !scenario.limits[*limit].warns), "a cry is no warning");
 }

@@ -24,7 +24,7 @@ impl EditorSection {
             "tissues" | "new_tissues" | "stiffness_ratio" | "carving" | "vibration" => EditorSection::Tissues,
             "instruments" => EditorSection::Instruments,
             "stages" => EditorSection::Stages,
-            "zones" => EditorSection::Zones,
+            "zones" | "limits" => EditorSection::Zones,
             "rubric" | "measures" => EditorSection::Marks,
             _ => EditorSection::Exercise,
         }

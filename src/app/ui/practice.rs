@@ -3,6 +3,7 @@
 use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
+use crate::messages;
 use crate::settings::Settings;
 use crate::snapshot::LessonSnapshot;
 use crate::ui::lesson_view::PictureFrame;
@@ -14,15 +15,12 @@ use crate::ui::{
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::Vec3;
 use typodont_exercise::catalog::TissueRole;
+use typodont_exercise::scenario::{ContactLimit, LimitPlace, LimitedQuantity};
 use typodont_render::Eye;
 use typodont_scene as scene;
 
 /// Full width of the force bar, N: the maximum force of a PHANTOM Omni.
 const BAR_FULL: f32 = 3.3;
-
-/// Force above which a warning is shown, N: the thesis's dentists cut with less. The patient cries later (`PAINFUL_FORCE`
-/// in `lesson_sound`).
-const HIGH_FORCE: f32 = 2.0;
 
 /// Formats a time, s, as minutes and seconds.
 pub fn format_time(seconds: f64) -> String {
@@ -184,7 +182,7 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
         let painter = ui.painter();
         painter.rect_filled(rect, 5, Color32::from_gray(0xe2));
         let width = rect.width() * (force / BAR_FULL).clamp(0.0, 1.0);
-        let fill = if force > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
+        let fill = if is_force_high(lesson, &snapshot) { theme::WARNING } else { theme::ACCENT };
         painter.rect_filled(Rect::from_min_size(rect.min, egui::vec2(width, rect.height())), 5, fill);
         if let Some(strength) = lesson.press_strength() {
             let x = rect.min.x + rect.width() * (strength / BAR_FULL).clamp(0.0, 1.0);
@@ -192,9 +190,9 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
         }
         ui.monospace(format!("{force:4.1} N"));
         // There is no room for both in a narrow window.
-        match (warning(lesson, &snapshot), lesson.press_strength()) {
-            (Some(key), _) => {
-                let text = egui::RichText::new(format!("! {}", words.get(key))).strong().color(theme::ERROR);
+        match (warning(lesson, &snapshot, words), lesson.press_strength()) {
+            (Some(text), _) => {
+                let text = egui::RichText::new(format!("! {text}")).strong().color(theme::ERROR);
                 ui.add(egui::Label::new(text).wrap());
             }
             (None, Some(strength)) => {
@@ -206,19 +204,32 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
     });
 }
 
-/// Text key of a warning about the trainee's present action, if there is one.
-fn warning(lesson: &LessonState, snapshot: &LessonSnapshot) -> Option<&'static str> {
+/// Warning about the trainee's present action, if there is one: of tissue that a bur must not touch, of a limit of the
+/// exercise near a zone or a tissue, of sound tissue, and of the limits that hold anywhere.
+fn warning(lesson: &LessonState, snapshot: &LessonSnapshot, words: &Translations) -> Option<String> {
     let cuts = lesson.scenario.instruments.get(snapshot.instrument as usize).is_some_and(|i| i.is_bur());
     let is_cutting = cuts && lesson.stage().is_some_and(|stage| stage.cutting);
-    let is_decay_shown = lesson.is_decay_shown();
+    let limit = exceeded_limit(lesson, snapshot);
+    let of_limit = || Some(messages::limit_text(limit?, snapshot.warning?.peak, &lesson.scenario, words));
+    let text = |key| Some(words.get(key).to_string());
     match snapshot.touch.and_then(|label| lesson.scenario.tissues.role(label)) {
-        Some(TissueRole::Soft) if is_cutting => Some("practice.warn_soft"),
-        Some(TissueRole::Neighbour) if is_cutting => Some("practice.warn_neighbour"),
-        Some(TissueRole::Vulnerable) if is_cutting => Some("practice.warn_pulp"),
-        Some(TissueRole::Sound) if snapshot.cutting && is_decay_shown => Some("practice.warn_sound"),
-        _ if snapshot.spring > HIGH_FORCE => Some("practice.warn_force"),
-        _ => None,
+        Some(TissueRole::Soft) if is_cutting => text("practice.warn_soft"),
+        Some(TissueRole::Neighbour) if is_cutting => text("practice.warn_neighbour"),
+        Some(TissueRole::Vulnerable) if is_cutting => text("practice.warn_pulp"),
+        _ if limit.is_some_and(|limit| limit.place != LimitPlace::Anywhere) => of_limit(),
+        Some(TissueRole::Sound) if snapshot.cutting && lesson.is_decay_shown() => text("practice.warn_sound"),
+        _ => of_limit(),
     }
+}
+
+/// The limit of which a warning is shown.
+fn exceeded_limit<'a>(lesson: &'a LessonState, snapshot: &LessonSnapshot) -> Option<&'a ContactLimit> {
+    lesson.scenario.limits.get(snapshot.warning?.limit as usize)
+}
+
+/// True while a warning of too much force is shown.
+fn is_force_high(lesson: &LessonState, snapshot: &LessonSnapshot) -> bool {
+    exceeded_limit(lesson, snapshot).is_some_and(|limit| limit.quantity == LimitedQuantity::Force)
 }
 
 /// The view of the tooth and the instrument, with the state of the pointer.
@@ -357,7 +368,7 @@ fn pointer_ring(ui: &egui::Ui, lesson: &LessonState, rect: Rect) {
         let (sin, cos) = (std::f32::consts::TAU * i as f32 / CORNERS as f32).sin_cos();
         project(&eye, spot.place + (side * cos + spot.normal.cross(side) * sin) * radius, rect)
     };
-    let colour = if snapshot.spring > HIGH_FORCE { theme::WARNING } else { theme::ACCENT };
+    let colour = if is_force_high(lesson, &snapshot) { theme::WARNING } else { theme::ACCENT };
     let ring: Vec<Pos2> = (0..=CORNERS).filter_map(corner).collect();
     ui.painter().add(egui::Shape::line(ring.clone(), Stroke::new(4.0, Color32::from_black_alpha(90))));
     ui.painter().add(egui::Shape::line(ring.clone(), Stroke::new(2.0, Color32::WHITE)));

@@ -1,9 +1,9 @@
 //! Editor of the transfer function: red, green, blue and alpha curves over the histogram of densities, for one tissue
-//! or for all, by mouse or by keys.
+//! or for all, each channel by itself or several together, by mouse or by keys.
 
 use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
-use crate::transfer_function_draft::{DensityHistogram, TransferFunctionDraft};
+use crate::transfer_function_draft::{DensityHistogram, TissuePeak, TransferFunctionDraft};
 use crate::ui::theme;
 use eframe::egui::{self, Color32, Key, Pos2, Rect, Sense, Stroke};
 use typodont_core::volume::Label;
@@ -68,6 +68,8 @@ pub fn transfer_function_ui(
         new = edit_by_keys(ui, &new, &response);
     }
     paint(ui, &new, &histogram.heights(new.tissue), rect, response.has_focus());
+    let shown = histogram.peaks().into_iter().filter(|peak| new.tissue == Label::AIR || peak.tissue == new.tissue);
+    peaks_ui(ui, &shown.collect::<Vec<_>>(), palette, rect, title);
     ui.small(words.get("transfer.about"));
     if new != *draft {
         commands.push(AppCommand::Practice(PracticeCommand::SetTransferFunction(Box::new(new))));
@@ -84,8 +86,8 @@ fn presets_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, palette: &La
         if ui.small_button(words.get("menu.xray")).clicked() {
             *draft = TransferFunctionDraft::new(TransferFunction::x_ray());
         }
-        if ui.small_button(words.get("transfer.straight")).clicked() {
-            *draft = TransferFunctionDraft::new(TransferFunction::proportional());
+        if ui.small_button("y = x").on_hover_text(words.get("transfer.straight")).clicked() {
+            *draft = TransferFunctionDraft::straight_line(palette);
         }
     });
 }
@@ -103,27 +105,26 @@ fn channels_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, words: &Tra
     });
 }
 
-/// The arrows go along the curve and lift or lower it there.
+/// The arrows go along the curves and lift or lower those that are drawn there, each from its own value.
 fn edit_by_keys(ui: &egui::Ui, draft: &TransferFunctionDraft, response: &egui::Response) -> TransferFunctionDraft {
     let filter = egui::EventFilter { horizontal_arrows: true, vertical_arrows: true, ..Default::default() };
     ui.memory_mut(|memory| memory.set_focus_lock_filter(response.id, filter));
     let pressed = |key| ui.input_mut(|input| input.consume_key(egui::Modifiers::NONE, key));
-    let Some(channel) = draft.first_channel() else { return draft.clone() };
-    let here = draft.table()[usize::from(draft.cursor)][channel];
-    let to = if pressed(Key::ArrowLeft) {
+    let here = draft.table()[usize::from(draft.cursor)];
+    let lift: fn(u8) -> u8 = if pressed(Key::ArrowLeft) {
         return TransferFunctionDraft { cursor: draft.cursor.saturating_sub(KEY_STEP), ..draft.clone() };
     } else if pressed(Key::ArrowRight) {
         return TransferFunctionDraft { cursor: draft.cursor.saturating_add(KEY_STEP), ..draft.clone() };
     } else if pressed(Key::ArrowUp) {
-        here.saturating_add(KEY_STEP)
+        |value| value.saturating_add(KEY_STEP)
     } else if pressed(Key::ArrowDown) {
-        here.saturating_sub(KEY_STEP)
+        |value| value.saturating_sub(KEY_STEP)
     } else {
         return draft.clone();
     };
     // A stretch as wide as a step along, so that neighbouring steps leave no spike.
     let [low, high] = [draft.cursor.saturating_sub(KEY_STEP / 2), draft.cursor.saturating_add(KEY_STEP / 2)];
-    TransferFunctionDraft { cursor: draft.cursor, ..draft.with_line([low, to], [high, to]) }
+    draft.with_values(low..=high, |_, channel| lift(here[channel]))
 }
 
 /// Density and channel value, 0 to 255, at a position of the drawing.
@@ -143,24 +144,52 @@ fn paint(ui: &egui::Ui, draft: &TransferFunctionDraft, heights: &[f32; 256], rec
         let line = [place(density, 0.0), place(density, *height)];
         painter.line_segment(line, Stroke::new(1.5, Color32::from_gray(0xdd)));
     }
-    // Those that are drawn come last, above the others.
-    let mut order: Vec<usize> = (0..CHANNELS.len()).collect();
-    order.sort_by_key(|&channel| draft.channels[channel]);
-    for channel in order {
+    // Those that are drawn last, above the others.
+    let [still, drawn] =
+        [false, true].map(|is_drawn| (0..CHANNELS.len()).filter(move |&c| draft.channels[c] == is_drawn));
+    for channel in still.chain(drawn) {
         let value = |density: usize| f32::from(draft.table()[density][channel]) / 255.0;
         let points: Vec<Pos2> = (0..256).map(|density| place(density, value(density))).collect();
         let width = if draft.channels[channel] { 2.5 } else { 1.0 };
         painter.add(egui::Shape::line(points, Stroke::new(width, CHANNELS[channel].1)));
     }
-    if let Some(channel) = draft.first_channel().filter(|_| has_focus) {
-        let here = draft.table()[usize::from(draft.cursor)][channel];
-        painter.circle_stroke(
-            place(usize::from(draft.cursor), f32::from(here) / 255.0),
-            5.0,
-            Stroke::new(2.0, theme::ACCENT),
-        );
+    if has_focus {
+        let here = draft.table()[usize::from(draft.cursor)];
+        for (value, _) in here.iter().zip(draft.channels).filter(|(_, is_drawn)| *is_drawn) {
+            let at = place(usize::from(draft.cursor), f32::from(*value) / 255.0);
+            painter.circle_stroke(at, 5.0, Stroke::new(2.0, theme::ACCENT));
+        }
     }
     painter.rect_stroke(rect, 3, Stroke::new(1.0, Color32::from_gray(0x99)), egui::StrokeKind::Inside);
+}
+
+/// Marks of the tissues' peaks at the upper edge of the drawing, in the tissues' colours, and their names below it. Tissues
+/// with the same peak share a mark.
+fn peaks_ui<'a>(
+    ui: &mut egui::Ui,
+    peaks: &[TissuePeak],
+    palette: &LabelPalette,
+    rect: Rect,
+    title: impl Fn(Label) -> &'a str,
+) {
+    /// Half the width and the height of a mark, points.
+    const MARK: egui::Vec2 = egui::vec2(4.0, 8.0);
+    let mut densities: Vec<u8> = peaks.iter().map(|peak| peak.density).collect();
+    densities.sort_unstable();
+    densities.dedup();
+    for density in densities {
+        let tissues: Vec<Label> = peaks.iter().filter(|p| p.density == density).map(|p| p.tissue).collect();
+        let x = rect.min.x + f32::from(density) / 255.0 * rect.width();
+        // Within the frame, also at its edges.
+        let x = x.clamp(rect.min.x + MARK.x, rect.max.x - MARK.x);
+        let corners = [(-MARK.x, 0.0), (MARK.x, 0.0), (0.0, MARK.y)];
+        let corners = corners.map(|(dx, dy)| egui::pos2(x + dx, rect.min.y + dy)).to_vec();
+        let [r, g, b] = palette.appearance(tissues[0]).colour.map(|share| (share * 255.0).round() as u8);
+        let outline = Stroke::new(1.0, Color32::from_gray(0x33));
+        ui.painter().add(egui::Shape::convex_polygon(corners, Color32::from_rgb(r, g, b), outline));
+        let names: Vec<&str> = tissues.iter().map(|tissue| title(*tissue)).collect();
+        ui.small(format!("{density}: {}", names.join(", ")));
+    }
 }
 
 #[cfg(test)]
@@ -185,21 +214,5 @@ mod tests {
         assert_eq!(after.cursor, 100);
         let all = TransferFunctionDraft { tissue: Label::AIR, ..before }.with_line([0, 7], [255, 7]);
         assert!([0, 2, 255].iter().all(|&label| all.function.table(Label(label)).iter().all(|entry| entry[0] == 7)));
-    }
-
-    #[test]
-    fn several_channels_are_drawn_at_once_from_a_straight_line() {
-        // Aim: the thesis's way to a translucent tooth (4.2.2.3): all channels begin at y = x, and those that are switched on
-        // are drawn together. Method: red and green are drawn; blue and opacity stay where they began.
-        let before = TransferFunctionDraft {
-            channels: [true, true, false, false],
-            ..TransferFunctionDraft::new(TransferFunction::proportional())
-        };
-        assert!((0..=255u8).all(|d| before.table()[usize::from(d)] == [d; 4]));
-        let after = before.with_line([60, 200], [80, 220]);
-        assert_eq!(after.table()[70], [210, 210, 70, 70]);
-        assert_eq!(after.table()[81], [81; 4]);
-        let off = TransferFunctionDraft { channels: [false; 4], ..before.clone() };
-        assert_eq!(off.with_line([0, 9], [255, 9]).table(), before.table());
     }
 }

@@ -6,6 +6,7 @@
 pub use super::arch_file::*;
 pub use super::cavity_file::*;
 pub use super::decay_file::*;
+pub use super::limits_file::*;
 pub use super::periodontium_file::*;
 
 use super::questionnaire::Questionnaire;
@@ -76,6 +77,9 @@ pub struct ScenarioFile {
     /// Parameters of the measures.
     #[serde(default)]
     pub measures: MeasuresFile,
+    /// Greatest force and speed, and what follows when they are exceeded.
+    #[serde(default)]
+    pub limits: LimitsFile,
     /// Rules for awarding points. If omitted, the exercise is measured but not graded.
     #[serde(default)]
     pub rubric: Option<RubricFile>,

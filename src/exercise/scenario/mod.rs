@@ -6,11 +6,13 @@
 mod arch_file;
 mod cavity;
 mod cavity_file;
+mod contact_limit;
 mod decay_file;
 mod periodontium_file;
 mod calculus_and_fillings;
 pub mod file;
 mod lesion;
+mod limits_file;
 pub mod metric;
 pub mod metric_id;
 mod questionnaire;
@@ -21,6 +23,7 @@ mod tooth_words;
 mod workpiece;
 
 pub use cavity::{PreparedCavity, ProximalBox};
+pub use contact_limit::{ContactLimit, LimitPlace, LimitedQuantity};
 pub use file::QuestionnaireTime;
 pub use lesion::{Lesion, seeded_random};
 pub use metric::Metric;
@@ -73,6 +76,8 @@ pub struct Scenario {
     pub guidances: Vec<Guidance>,
     pub stages: Vec<Stage>,
     pub measures: MeasureParams,
+    /// Limits of force and speed, those near a zone or a tissue first.
+    pub limits: Vec<ContactLimit>,
     pub rubric: Option<Rubric>,
     pub questionnaire: Option<Questionnaire>,
     pub questionnaire_time: QuestionnaireTime,

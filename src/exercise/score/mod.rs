@@ -5,10 +5,12 @@
 
 mod voxel_set;
 mod charting;
+mod contact_motion;
 mod contact_spell;
 mod voxel_removals;
 mod grade;
 mod idle;
+mod limit_monitor;
 mod line_of_sight;
 mod error_episodes;
 mod measures;
@@ -25,6 +27,7 @@ pub use contact_spell::ContactSpell;
 pub use error_episodes::{EpisodeKind, ErrorEpisode, error_episodes};
 pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
 pub use idle::{idle_grade, trainee_grade};
+pub use limit_monitor::{EXCEEDANCE_GAP_TICKS, Exceedance, LimitMonitor};
 pub use measures::{Evidence, Measure, Measures};
 pub use nearest_offset::AnatomicalDirection;
 pub use process::{Trace, TraceSample, UnseenCut, UnseenVoxel};
@@ -56,6 +59,8 @@ pub struct Scored {
     pub hard_presses: Vec<ContactSpell>,
     /// Spells in which a running bur touched soft tissue or an adjacent tooth.
     pub forbidden_contacts: Vec<ContactSpell>,
+    /// Periods in which limits of the exercise were exceeded.
+    pub exceedances: Vec<Exceedance>,
     /// Force, speed and progress over time, sampled for charts.
     pub trace: Trace,
     pub grade: Option<Grade>,
@@ -109,7 +114,9 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
     let measures = measures::all(recording, &replay, &seen, &comparison, restoration.as_ref(), chart.as_deref());
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
-    let process::ProcessStats { removals, trace, led_ticks, hard_presses, forbidden_contacts, unseen, .. } = seen;
+    let process::ProcessStats {
+        removals, trace, led_ticks, hard_presses, forbidden_contacts, exceedances, unseen, ..
+    } = seen;
     Scored {
         replay,
         measures,
@@ -118,6 +125,7 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
         zones: comparison.zones,
         hard_presses,
         forbidden_contacts,
+        exceedances,
         trace,
         grade,
         restoration,

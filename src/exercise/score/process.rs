@@ -1,6 +1,8 @@
 //! The process of the work: force, speed and path, tick by tick.
 
+use super::contact_motion::{Contact, ContactMotion, ContactTick, SPAN, SpanMotion};
 use super::contact_spell::{ContactSpell, ContactSpells};
+use super::limit_monitor::{Exceedance, LimitMonitor};
 use super::line_of_sight::LineOfSight;
 use super::removal_comparison::ProximityField;
 use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
@@ -14,10 +16,6 @@ use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::tick::{TICK_S, Tick};
 use typodont_core::volume::{Edit, Label};
-
-/// Number of ticks over which speed and path are measured: over a single tick of 1 ms, a coarse encoder alone reads as
-/// 55 mm/s.
-const SPAN: u64 = 20;
 
 /// Time in contact below which smoothness has no meaning, s.
 const SMOOTHNESS_LEAST_S: f64 = 1.0;
@@ -89,6 +87,8 @@ pub struct ProcessStats {
     pub hard_presses: Vec<ContactSpell>,
     /// Spells in which a running bur touched soft tissue or an adjacent tooth in a cutting stage.
     pub forbidden_contacts: Vec<ContactSpell>,
+    /// Periods in which limits of the exercise were exceeded.
+    pub exceedances: Vec<Exceedance>,
     /// Removals out of the trainee's sight; `None` if the recording has no view.
     pub unseen: Option<UnseenCut>,
 }
@@ -146,6 +146,8 @@ impl Trace {
 /// Collects the process statistics during a replay.
 pub struct ProcessObserver {
     tooth_from_world: Pose,
+    motion: ContactMotion,
+    limits: LimitMonitor,
     roles: [Option<TissueRole>; 256],
     is_rotary: Vec<bool>,
     proximity: ProximityField,
@@ -158,9 +160,6 @@ pub struct ProcessObserver {
     force_limit: Option<f64>,
     hard_presses: ContactSpells,
     forbidden_contacts: ContactSpells,
-    last_place: Option<Vec3>,
-    /// The last contact since the speed was last measured: the touched tissue and the force, N.
-    last_touch: Option<(Label, f32)>,
     now: TraceSample,
     /// Sum of the forces since the last mean, N, tooth space.
     force_sum: Vec3,
@@ -181,6 +180,8 @@ impl ProcessObserver {
         let now = TraceSample { at: Tick::ZERO, force: 0.0, speed: 0.0, cleared: 0.0, touched: false, cutting: false };
         ProcessObserver {
             tooth_from_world: workpiece.world_from_tooth.inverse(),
+            motion: ContactMotion::new(workpiece.world_from_tooth),
+            limits: LimitMonitor::new(scenario, workpiece),
             roles,
             is_rotary: scenario.instruments.iter().map(|i| i.is_bur()).collect(),
             proximity: ProximityField::around_vulnerable(scenario, &workpiece.volume, within),
@@ -203,14 +204,13 @@ impl ProcessObserver {
                 trace: Trace::default(),
                 hard_presses: Vec::new(),
                 forbidden_contacts: Vec::new(),
+                exceedances: Vec::new(),
                 unseen: has_views.then(UnseenCut::default),
             },
             sight: has_views.then(|| LineOfSight::of(workpiece)),
             force_limit: force_limit(scenario),
             hard_presses: ContactSpells::default(),
             forbidden_contacts: ContactSpells::default(),
-            last_place: None,
-            last_touch: None,
             now,
             force_sum: Vec3::ZERO,
             contact_runs: Vec::new(),
@@ -220,11 +220,9 @@ impl ProcessObserver {
 
     pub fn observe(&mut self, haptic: &TickRecord, step: &Step, edits: &[Edit], session: &Session) {
         let tick = haptic.tick;
-        let place = self.tooth_from_world * step.tip;
+        let ContactTick { place, pressed, contact, span } = self.motion.observe(tick, step);
+        self.limits.observe(step);
         self.stats.ticks = tick.0 + 1;
-        // Forces of guidance by the exercise or an instructor are not forces of the trainee.
-        let led = step.guidance + step.coupling_force;
-        let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
         let removal = VoxelRemoval { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
         self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
         self.observe_force(tick, pressed);
@@ -236,9 +234,7 @@ impl ProcessObserver {
         {
             self.stats.led_ticks[stage] += 1;
         }
-        if let Some(touch) = &step.touch {
-            let (tissue, force) = (touch.label, pressed.length());
-            self.last_touch = Some((tissue, force));
+        if let Some(Contact { tissue, force }) = contact {
             self.stats.contact_ticks += 1;
             let reached = PeakValue { value: f64::from(force), at: tick, place, tissue, force };
             self.stats.force.add(reached);
@@ -262,8 +258,8 @@ impl ProcessObserver {
                 self.forbidden_contacts.add(tissue, tick, force, place);
             }
         }
-        if tick.0.is_multiple_of(SPAN) {
-            self.observe_span(tick, place);
+        if let Some(span) = span {
+            self.observe_span(tick, place, span);
         }
         if (tick.0 + 1).is_multiple_of(Trace::SPAN_TICKS) {
             let cleared = session.cleared_pct().unwrap_or(0.0) as f32;
@@ -296,12 +292,11 @@ impl ProcessObserver {
     }
 
     /// Updates path, speed and the track for smoothness, once every [`SPAN`] ticks.
-    fn observe_span(&mut self, tick: Tick, place: Vec3) {
-        let step_length = self.last_place.map_or(0.0, |last| f64::from(place.distance(last)));
-        let speed = step_length / (SPAN as f64 * TICK_S);
-        self.stats.path_mm += step_length;
+    fn observe_span(&mut self, tick: Tick, place: Vec3, span: SpanMotion) {
+        let SpanMotion { length, speed, contact } = span;
+        self.stats.path_mm += length;
         self.now.speed = speed as f32;
-        if let Some((tissue, force)) = self.last_touch.filter(|_| self.last_place.is_some()) {
+        if let Some(Contact { tissue, force }) = contact {
             let reached = PeakValue { value: speed, at: tick, place, tissue, force };
             self.stats.speed.add(reached);
             if self.proximity.is_near(place) {
@@ -317,8 +312,6 @@ impl ProcessObserver {
         } else if self.contact_runs.last().is_some_and(|s| !s.is_empty()) {
             self.contact_runs.push(Vec::new());
         }
-        self.last_touch = None;
-        self.last_place = Some(place);
     }
 
     pub fn finish(mut self) -> ProcessStats {
@@ -326,6 +319,7 @@ impl ProcessObserver {
         self.stats.smoothness = log_dimensionless_jerk(&self.contact_runs);
         self.stats.hard_presses = self.hard_presses.finish();
         self.stats.forbidden_contacts = self.forbidden_contacts.finish();
+        self.stats.exceedances = self.limits.exceedances().to_vec();
         self.stats
     }
 }

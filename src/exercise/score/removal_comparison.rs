@@ -254,7 +254,8 @@ impl RemovalCounts {
     }
 }
 
-/// Distance to the vulnerable tissue or to a zone of a volume, up to a maximum distance.
+/// Distance to the vulnerable tissue, to a tissue or to a zone of a volume, up to a maximum distance.
+#[derive(Clone, Debug)]
 pub struct ProximityField {
     crop: Option<SubGrid>,
     distances: Vec<f32>,
@@ -265,6 +266,11 @@ impl ProximityField {
     pub fn around_vulnerable(scenario: &Scenario, initial: &Volume, within: f32) -> ProximityField {
         let is_vulnerable = |i: usize| scenario.tissues.role(initial.tissue(i)) == Some(TissueRole::Vulnerable);
         ProximityField::around(initial.grid(), within, is_vulnerable)
+    }
+
+    /// Returns the field of a tissue as it is at the start.
+    pub fn around_tissue(label: Label, initial: &Volume, within: f32) -> ProximityField {
+        ProximityField::around(initial.grid(), within, |i| initial.tissue(i) == label)
     }
 
     /// Returns the field of a zone as it is judged: of a protected zone, without its decay.

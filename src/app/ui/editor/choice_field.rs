@@ -38,6 +38,7 @@ pub fn named_choices(form: &FormContext, pointer: &str) -> Option<Vec<NamedChoic
                 .map(|(name, title)| NamedChoice { description: name.clone(), name, title })
                 .collect(),
         ),
+        "zone" => Some(plain(editor.ids(&["/zones".to_string()]))),
         "metric" => Some(metric_choices(form)),
         "counts_with" => Some(other_item_choices(form, pointer)),
         "tooth_with" | "quadrant_of" => Some(plain(editor.draw_ids().into_iter().chain(decay()).collect())),

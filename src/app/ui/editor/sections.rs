@@ -26,7 +26,7 @@ const SECTIONS: [(EditorSection, &str); 9] = [
 ];
 
 /// Top-level keys that are shown in a section of their own; all others are in the first section.
-const KEYS_WITH_SECTION: [&str; 15] = [
+const KEYS_WITH_SECTION: [&str; 16] = [
     "$schema",
     "id",
     "title",
@@ -42,6 +42,7 @@ const KEYS_WITH_SECTION: [&str; 15] = [
     "zones",
     "rubric",
     "measures",
+    "limits",
 ];
 
 /// The list of sections, with the number of complaints in each.
@@ -101,6 +102,8 @@ pub fn section_ui(ui: &mut egui::Ui, form: &mut FormContext) {
         EditorSection::Zones => {
             ui.add(egui::Label::new(form.words.get("author.zones_about")).wrap());
             entries_ui(ui, form, "/zones");
+            ui.add_space(8.0);
+            field_ui(ui, form, "/limits");
         }
         EditorSection::Marks => rubric::rubric_ui(ui, form),
         EditorSection::Text => source_view::source_ui(ui, form),

@@ -3,6 +3,7 @@
 //! All diagnostics are collected, so that an author sees every error at once.
 
 mod guidance;
+mod limits;
 mod rubric;
 mod scene;
 mod stages;
@@ -163,6 +164,7 @@ impl Resolver<'_> {
         let questionnaire = written.questionnaire.as_ref().and_then(|name| self.questionnaire(name));
         let factors = self.factors(written, &instruments);
         let carving = self.carving(&written.carving);
+        let limits = self.limits(written, &zones, carving.law);
         let operating_field = self.operating_field(written);
         Some(Scenario {
             id: written.id.clone(),
@@ -190,6 +192,7 @@ impl Resolver<'_> {
                 leeway: written.measures.leeway_mm,
                 tolerance: written.measures.tolerance_mm,
             },
+            limits,
             rubric,
             texts: self.texts(written, &instruments, questionnaire.as_ref()),
             instruments,

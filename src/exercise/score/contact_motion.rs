@@ -1,0 +1,74 @@
+//! Force and speed in contact, as the measures and the limits have them.
+
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::sim::Step;
+use typodont_core::tick::{TICK_S, Tick};
+use typodont_core::volume::Label;
+
+/// Number of ticks over which speed and path are measured: over a single tick of 1 ms, a coarse encoder alone reads as
+/// 55 mm/s.
+pub const SPAN: u64 = 20;
+
+/// Follows the tip, tick by tick.
+#[derive(Clone, Debug)]
+pub struct ContactMotion {
+    tooth_from_world: Pose,
+    /// Position of the tip at the end of the last span, tooth space, mm.
+    last_place: Option<Vec3>,
+    /// The last contact of the running span.
+    last_contact: Option<Contact>,
+}
+
+/// Touched tissue and force, N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    pub tissue: Label,
+    pub force: f32,
+}
+
+/// One tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactTick {
+    /// Position of the tip, tooth space, mm.
+    pub place: Vec3,
+    /// Force on the hand without guidance, with or without contact, N, world space.
+    pub pressed: Vec3,
+    pub contact: Option<Contact>,
+    /// The span that this tick ends, if it ends one.
+    pub span: Option<SpanMotion>,
+}
+
+/// Motion of the tip over [`SPAN`] ticks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpanMotion {
+    /// Distance from the position at the end of the span before, mm.
+    pub length: f64,
+    /// Mean speed, mm/s.
+    pub speed: f64,
+    /// The last contact of the span; `None` if there was none or the span before is unknown.
+    pub contact: Option<Contact>,
+}
+
+impl ContactMotion {
+    pub fn new(world_from_tooth: Pose) -> ContactMotion {
+        ContactMotion { tooth_from_world: world_from_tooth.inverse(), last_place: None, last_contact: None }
+    }
+
+    pub fn observe(&mut self, tick: Tick, step: &Step) -> ContactTick {
+        let place = self.tooth_from_world * step.tip;
+        // Forces of guidance by the exercise or an instructor are not forces of the trainee.
+        let led = step.guidance + step.coupling_force;
+        let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
+        let contact = step.touch.map(|touch| Contact { tissue: touch.label, force: pressed.length() });
+        self.last_contact = contact.or(self.last_contact);
+        let span = tick.0.is_multiple_of(SPAN).then(|| self.end_span(place));
+        ContactTick { place, pressed, contact, span }
+    }
+
+    fn end_span(&mut self, place: Vec3) -> SpanMotion {
+        let length = self.last_place.map_or(0.0, |last| f64::from(place.distance(last)));
+        let contact = self.last_contact.take().filter(|_| self.last_place.is_some());
+        self.last_place = Some(place);
+        SpanMotion { length, speed: length / (SPAN as f64 * TICK_S), contact }
+    }
+}
