@@ -48,7 +48,7 @@ fn tooth_vertex(corner: Corner) -> Varying {
 fn tooth_fragment(in: Varying) -> @location(0) vec4f {
     let normal = normalize(in.normal);
     let at = (tooth.voxel_from_world * vec4f(in.point, 1.0)).xyz;
-    return vec4f(screen(lit(in.finish, openness(at, normal), in.point, normal)), 1.0);
+    return vec4f(screen(lit(finish(at), openness(at, normal), in.point, normal)), 1.0);
 }
 
 // Behind everything: a triangle that covers the picture.

@@ -13,8 +13,8 @@ struct Tooth {
     high: vec4f,
     // Voxel spacing, mm; w: 1 for a radiograph.
     spacing: vec4f,
-    // Colour and gloss by label.
-    palette: array<vec4f, 256>,
+    // Voxels along the edge of a cell of `colours`.
+    cells: vec4f,
 }
 
 @group(1) @binding(0) var<uniform> tooth: Tooth;
@@ -27,6 +27,8 @@ struct Tooth {
 @group(1) @binding(4) var hollow: texture_3d<f32>;
 // By density and label: colour and opacity after one step; for a radiograph attenuation in red and green.
 @group(1) @binding(5) var transfer: texture_2d<f32>;
+// Colour and gloss of cells near the surface.
+@group(1) @binding(6) var colours: texture_3d<f32>;
 
 const BRICK: f32 = 8.0;
 // A brick in which every sample is the same.
@@ -90,22 +92,10 @@ fn openness(at: vec3f, normal: vec3f) -> f32 {
     return 1.0 - DARKEST * textureSampleLevel(hollow, between, (outside + 0.5) / (tooth.dims.w * cubes), 0.0).r;
 }
 
-// Colour and gloss of the matter around a place, by how much there is of each.
+// Colour and gloss of the surface at a place.
 fn finish(at: vec3f) -> vec4f {
-    let base = floor(at);
-    let part = at - base;
-    let last = vec3i(tooth.dims.xyz) - 1;
-    var sum = vec4f(0.0);
-    var total = 0.0;
-    for (var i = 0; i < 8; i++) {
-        let corner = vec3i(i & 1, (i >> 1u) & 1, i >> 2u);
-        let voxel = textureLoad(voxels, clamp(vec3i(base) + corner, vec3i(0), last), 0).rg;
-        let near = mix(vec3f(1.0) - part, part, vec3f(corner));
-        let weight = near.x * near.y * near.z * voxel.r;
-        sum += tooth.palette[u32(voxel.g * 255.0 + 0.5)] * weight;
-        total += weight;
-    }
-    return sum / max(total, 1e-6);
+    let cells = vec3f(textureDimensions(colours));
+    return textureSampleLevel(colours, between, (at + 0.5) / (tooth.cells.x * cells), 0.0);
 }
 
 fn box_corner(index: u32) -> vec3f {

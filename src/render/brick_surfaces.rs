@@ -3,7 +3,6 @@
 //! Each brick has a slot with a little spare capacity, and degenerate triangles fill the unused part of a slot. A
 //! brick that outgrows its slot moves to a free one or to the end of the buffer.
 
-use super::scene::LabelPalette;
 use super::surface_mesh;
 use super::vertex::Vertex;
 use std::ops::Range;
@@ -23,7 +22,6 @@ pub struct BrickSurfaces {
     indices: GrowableBuffer,
     slots: Vec<Slot>,
     free: Vec<Slot>,
-    palette: LabelPalette,
 }
 
 /// Ranges of a brick's vertices and triangles (three indices each) in the buffers.
@@ -46,9 +44,9 @@ struct BrickMesh {
 }
 
 impl BrickMesh {
-    fn extract(volume: &Volume, palette: &LabelPalette, brick: usize) -> BrickMesh {
+    fn extract(volume: &Volume, brick: usize) -> BrickMesh {
         let mesh = surface::extract_brick(volume, brick);
-        BrickMesh { vertices: surface_mesh::tooth_vertices(volume, palette, &mesh), triangles: mesh.triangles }
+        BrickMesh { vertices: surface_mesh::tooth_vertices(&mesh), triangles: mesh.triangles }
     }
 
     /// Returns the triangles with indices into the common vertex buffer, filled up with degenerate ones to the slot's
@@ -63,8 +61,8 @@ impl BrickMesh {
 
 impl BrickSurfaces {
     /// Extracts and uploads the surfaces of all bricks of a volume.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, palette: &LabelPalette) -> BrickSurfaces {
-        let parts = par_map(volume.bricks().len(), |brick| BrickMesh::extract(volume, palette, brick));
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume) -> BrickSurfaces {
+        let parts = par_map(volume.bricks().len(), |brick| BrickMesh::extract(volume, brick));
         let mut slots = Vec::with_capacity(parts.len());
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
         for part in &parts {
@@ -79,20 +77,14 @@ impl BrickSurfaces {
             indices: GrowableBuffer::filled(device, queue, "triangles", wgpu::BufferUsages::INDEX, &triangles),
             slots,
             free: Vec::new(),
-            palette: palette.clone(),
         }
-    }
-
-    /// True when the vertices have the colours of this palette.
-    pub fn has_palette(&self, palette: &LabelPalette) -> bool {
-        self.palette == *palette
     }
 
     /// Extracts again all surfaces that changed bricks can affect. Returns their number.
     pub fn update(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, changed: &[usize]) -> usize {
         let affected = surface::dirty_neighbourhood(volume, changed);
         for &brick in &affected {
-            let part = BrickMesh::extract(volume, &self.palette, brick);
+            let part = BrickMesh::extract(volume, brick);
             if !self.slots[brick].fits(&part) {
                 self.move_to_larger_slot(device, queue, brick, &part);
             }

@@ -212,7 +212,7 @@ impl Renderer {
     /// Updates the triangles only while they are shown. After a change in another mode they are rebuilt when next
     /// shown.
     fn prepare_surfaces(&mut self, tooth: &VolumeInstance) -> usize {
-        let VolumeInstance { volume, palette, .. } = *tooth;
+        let volume = tooth.volume;
         if tooth.mode != RenderMode::Surface {
             if tooth.changes != Changes::Bricks(&[]) {
                 self.surfaces = None;
@@ -220,11 +220,9 @@ impl Renderer {
             return 0;
         }
         match (&mut self.surfaces, tooth.changes) {
-            (Some(known), Changes::Bricks(changed)) if known.has_palette(palette) => {
-                known.update(&self.device, &self.queue, volume, changed)
-            }
+            (Some(known), Changes::Bricks(changed)) => known.update(&self.device, &self.queue, volume, changed),
             _ => {
-                self.surfaces = Some(BrickSurfaces::new(&self.device, &self.queue, volume, palette));
+                self.surfaces = Some(BrickSurfaces::new(&self.device, &self.queue, volume));
                 0
             }
         }

@@ -78,16 +78,23 @@ pub enum RenderMode {
 
 /// Appearance of each label.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LabelPalette(pub [Appearance; 256]);
+pub struct LabelPalette {
+    pub appearances: [Appearance; 256],
+    /// True for labels that are drawn as decay, with a soft border.
+    pub is_decay: [bool; 256],
+    /// Label of the tissue that shows decay near it as a white spot: enamel.
+    pub translucent: Option<Label>,
+}
 
 impl LabelPalette {
-    /// Builds a palette with one colour per label and the same gloss for all.
+    /// Builds a palette with one colour per label and the same gloss for all, without decay.
     pub fn from_colours(colour: impl Fn(Label) -> Rgb, gloss: f32) -> LabelPalette {
-        LabelPalette(std::array::from_fn(|l| Appearance { colour: colour(Label(l as u8)), gloss }))
+        let appearances = std::array::from_fn(|l| Appearance { colour: colour(Label(l as u8)), gloss });
+        LabelPalette { appearances, is_decay: [false; 256], translucent: None }
     }
 
     pub fn appearance(&self, label: Label) -> Appearance {
-        self.0[usize::from(label.0)]
+        self.appearances[usize::from(label.0)]
     }
 }
 

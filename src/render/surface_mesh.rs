@@ -1,10 +1,8 @@
 //! Vertices of meshes for the surface pass.
 
-use super::cpu;
-use super::scene::{Appearance, LabelPalette, MeshInstance};
+use super::scene::{Appearance, MeshInstance};
 use super::vertex::Vertex;
 use typodont_core::mesh::Mesh;
-use typodont_core::volume::Volume;
 
 /// Returns the vertices of a mesh instance: its vertex colours and full gloss, which are later multiplied with its
 /// appearance.
@@ -15,8 +13,8 @@ pub fn instance_vertices(solid: &MeshInstance) -> Vec<Vertex> {
     corners.map(|(i, (&p, &n))| Vertex::new(p, n, Appearance { colour: tint(i), gloss: 1.0 })).collect()
 }
 
-/// Returns the vertices of a tooth's surface, or of a part of it, with the appearance of the matter there.
-pub fn tooth_vertices(volume: &Volume, palette: &LabelPalette, mesh: &Mesh) -> Vec<Vertex> {
-    let appearance = |p| cpu::appearance_at(volume, palette, volume.grid().from_tooth(p));
-    mesh.positions.iter().zip(&mesh.normals).map(|(&p, &n)| Vertex::new(p, n, appearance(p))).collect()
+/// Returns the vertices of a tooth's surface, or of a part of it; the pass looks up its colours for each pixel.
+pub fn tooth_vertices(mesh: &Mesh) -> Vec<Vertex> {
+    let white = Appearance { colour: [1.0; 3], gloss: 1.0 };
+    mesh.positions.iter().zip(&mesh.normals).map(|(&p, &n)| Vertex::new(p, n, white)).collect()
 }

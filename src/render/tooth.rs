@@ -2,7 +2,8 @@
 
 use super::ambient_occlusion::OcclusionVolume;
 use super::empty_space::EmptySpaceMap;
-use super::scene::{Changes, LabelPalette, RenderMode, VolumeInstance};
+use super::scene::{Changes, RenderMode, VolumeInstance};
+use super::tissue_colours::TissueColours;
 use super::transfer_function::TransferFunction;
 use super::{bounds_of_matter, integration_step, resources};
 use std::sync::Arc;
@@ -24,7 +25,7 @@ pub mod gpu {
         pub low: [f32; 4],
         pub high: [f32; 4],
         pub spacing: [f32; 4],
-        pub palette: [[f32; 4]; 256],
+        pub cells: [f32; 4],
     }
 }
 
@@ -51,11 +52,13 @@ pub struct ToothTextures {
     bounds: Aabb,
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
+    colours: TissueColours,
     function: Option<Arc<TransferFunction>>,
     uniform: wgpu::Buffer,
     voxels: wgpu::Texture,
     empty_texture: wgpu::Texture,
     occlusion_texture: wgpu::Texture,
+    colour_texture: wgpu::Texture,
     transfer_texture: wgpu::Texture,
     pub group: wgpu::BindGroup,
 }
@@ -78,6 +81,7 @@ impl ToothTextures {
                     wgpu::TextureSampleType::Float { filterable: false },
                     wgpu::TextureViewDimension::D2,
                 ),
+                volume(float),
             ],
         )
     }
@@ -93,16 +97,19 @@ impl ToothTextures {
         let dims = volume.grid().dims;
         let empty_space = EmptySpaceMap::new(volume, &tooth.mode);
         let occlusion = OcclusionVolume::new(volume);
+        let colours = TissueColours::new(volume, tooth.palette);
         use wgpu::TextureFormat as Format;
         let space = |label, dims, format| resources::volume_texture(device, label, dims, format);
         let voxels = space("voxels", dims, Format::Rg8Unorm);
         let empty_texture = space("empty", empty_space.dims(), Format::R8Uint);
         let occlusion_texture = space("occlusion", occlusion.dims(), Format::R8Unorm);
+        let colour_texture = space("colours", colours.dims(), Format::Rgba8Unorm);
         let transfer_texture = resources::table_texture(device, "transfer", [256, 256], Format::Rgba8Unorm);
         let uniform = resources::uniform_buffer(device, "tooth", size_of::<gpu::ToothUniform>());
         let linear_sampler = resources::sampler(device);
         let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let views = [view(&voxels), view(&empty_texture), view(&occlusion_texture), view(&transfer_texture)];
+        let textures = [&voxels, &empty_texture, &occlusion_texture, &transfer_texture, &colour_texture];
+        let views = textures.map(view);
         let group = resources::group(
             device,
             layout,
@@ -113,6 +120,7 @@ impl ToothTextures {
                 wgpu::BindingResource::TextureView(&views[1]),
                 wgpu::BindingResource::TextureView(&views[2]),
                 wgpu::BindingResource::TextureView(&views[3]),
+                wgpu::BindingResource::TextureView(&views[4]),
             ],
         );
         let bounds = bounds_of_matter(volume);
@@ -122,11 +130,13 @@ impl ToothTextures {
             bounds,
             empty_space,
             occlusion,
+            colours,
             function,
             uniform,
             voxels,
             empty_texture,
             occlusion_texture,
+            colour_texture,
             transfer_texture,
             group,
         };
@@ -139,6 +149,12 @@ impl ToothTextures {
         resources::write_box(queue, &self.voxels, [0; 3], self.dims, &interleaved(volume, [0; 3], self.dims));
         self.upload_empty_space(queue);
         resources::write_box(queue, &self.occlusion_texture, [0; 3], self.occlusion.dims(), self.occlusion.means());
+        self.upload_colours(queue);
+    }
+
+    fn upload_colours(&self, queue: &wgpu::Queue) {
+        let texels = self.colours.texels().as_flattened();
+        resources::write_box(queue, &self.colour_texture, [0; 3], self.colours.dims(), texels);
     }
 
     fn upload_empty_space(&self, queue: &wgpu::Queue) {
@@ -180,7 +196,20 @@ impl ToothTextures {
             let place = self.occlusion.cube_at(cube);
             resources::write_box(queue, &self.occlusion_texture, place, [1; 3], &self.occlusion.means()[cube..=cube]);
         }
+        self.update_colours(queue, tooth, changed);
         changed.len()
+    }
+
+    fn update_colours(&mut self, queue: &wgpu::Queue, tooth: &VolumeInstance, changed: &[usize]) {
+        if !self.colours.has_palette(tooth.palette) {
+            self.colours = TissueColours::new(tooth.volume, tooth.palette);
+            return self.upload_colours(queue);
+        }
+        for brick in self.colours.update(tooth.volume, changed) {
+            let (first, size) = self.colours.block(tooth.volume, brick);
+            let texels = self.colours.texels_of((first, size));
+            resources::write_box(queue, &self.colour_texture, first, size, &texels);
+        }
     }
 
     /// Writes the pose and the appearance of the tooth for this image.
@@ -208,14 +237,10 @@ impl ToothTextures {
             low: low.extend(integration_step(tooth.volume)).to_array(),
             high: high.extend(light).to_array(),
             spacing: grid.spacing.extend(is_radiograph).to_array(),
-            palette: colours(tooth.palette),
+            cells: [self.colours.cell_voxels() as f32, 0.0, 0.0, 0.0],
         };
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }
-}
-
-fn colours(palette: &LabelPalette) -> [[f32; 4]; 256] {
-    palette.0.map(|appearance| [appearance.colour[0], appearance.colour[1], appearance.colour[2], appearance.gloss])
 }
 
 fn voxel_from_world(tooth: &VolumeInstance) -> [[f32; 4]; 4] {

@@ -13,11 +13,13 @@ pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalet
     let enamel = tissues.by_name("enamel");
     let entry =
         |label: u8| tissues.by_label(Label(label)).filter(|e| is_decay_shown || e.role != TissueRole::Decay).or(enamel);
-    LabelPalette(std::array::from_fn(|label| {
+    let appearances = std::array::from_fn(|label| {
         let entry = entry(label as u8);
         let is_dull = entry.is_some_and(|e| matches!(e.role, TissueRole::Decay | TissueRole::Deposit));
         Appearance { colour: entry.map_or([0.85, 0.82, 0.75], |e| e.rgb()), gloss: if is_dull { DULL } else { GLOSS } }
-    }))
+    });
+    let is_decay = std::array::from_fn(|label| entry(label as u8).is_some_and(|entry| entry.role == TissueRole::Decay));
+    LabelPalette { appearances, is_decay, translucent: enamel.map(|entry| entry.label()) }
 }
 
 /// Attenuation of X-rays by a tissue, per mm, at 40 keV: about the mean of a dental tube of 65 kV. Unless the exercise

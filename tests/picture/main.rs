@@ -7,3 +7,4 @@ mod radiograph;
 mod render;
 mod scene;
 mod scenes;
+mod tissues;

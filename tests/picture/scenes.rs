@@ -53,8 +53,10 @@ pub fn palette() -> LabelPalette {
         },
         0.10,
     );
-    palette.0[1].gloss = 0.22;
-    palette.0[4].gloss = 0.02;
+    palette.appearances[1].gloss = 0.22;
+    palette.appearances[4].gloss = 0.02;
+    palette.is_decay[4] = true;
+    palette.translucent = Some(Label(1));
     palette
 }
 

@@ -15,11 +15,11 @@ mod surface_pass;
 mod volume_pass;
 
 pub use stereo_pass::stereo_pass;
-pub use volume_sampler::appearance_at;
 
 use super::eye::Eye;
 use super::mirror::{self, PlaneMirror};
 use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
+use super::tissue_colours::TissueColours;
 use super::{ambient_occlusion::OcclusionVolume, empty_space::EmptySpaceMap};
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
@@ -35,25 +35,32 @@ struct CachedVolume {
     dims: [u32; 3],
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
+    colours: TissueColours,
 }
 
 impl CpuRenderer {
     /// Applies the changes of the scene's tooth. Must be called once before the scene is drawn, for any number of eyes.
     pub fn prepare(&mut self, scene: &RenderScene) {
         let Some(tooth) = &scene.tooth else { return };
-        let VolumeInstance { volume, changes, mode, .. } = tooth;
+        let VolumeInstance { volume, changes, mode, palette, .. } = tooth;
         let dims = volume.grid().dims;
         match (&mut self.cached, changes) {
             (Some(known), Changes::Bricks(changed)) if known.dims == dims => {
                 known.empty_space.set_mode(mode);
                 known.empty_space.update(volume, changed);
                 known.occlusion.update(volume, changed);
+                if known.colours.has_palette(palette) {
+                    known.colours.update(volume, changed);
+                } else {
+                    known.colours = TissueColours::new(volume, palette);
+                }
             }
             _ => {
                 self.cached = Some(CachedVolume {
                     dims,
                     empty_space: EmptySpaceMap::new(volume, mode),
                     occlusion: OcclusionVolume::new(volume),
+                    colours: TissueColours::new(volume, palette),
                 });
             }
         }
@@ -88,7 +95,7 @@ impl CpuRenderer {
             mirror_pass::mirror_pass(mirror, reflected, &view, &mut framebuffer);
         }
         if let (Some(tooth), Some(known)) = (&scene.tooth, &self.cached) {
-            let sampler = VolumeSampler::new(tooth, &known.empty_space, &known.occlusion);
+            let sampler = VolumeSampler::new(tooth, known);
             match &tooth.mode {
                 RenderMode::Surface => surface_pass::tooth(&sampler, &view, &mut framebuffer),
                 RenderMode::Iso => iso_pass::iso_pass(&sampler, &view, &mut framebuffer),

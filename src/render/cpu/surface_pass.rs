@@ -27,11 +27,11 @@ pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer
 
 pub fn tooth(sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Framebuffer) {
     let mesh = surface::extract(sampler.volume);
-    let vertices = surface_mesh::tooth_vertices(sampler.volume, sampler.palette, &mesh);
+    let vertices = surface_mesh::tooth_vertices(&mesh);
     let grid = sampler.volume.grid();
-    triangles(&vertices, &mesh.triangles, sampler.world_from_tooth, view, framebuffer, |own, normal, finish, point| {
-        let open = sampler.openness(grid.from_tooth(own), normal);
-        view.shade(finish, open, point, normal)
+    triangles(&vertices, &mesh.triangles, sampler.world_from_tooth, view, framebuffer, |own, normal, _, point| {
+        let at = grid.from_tooth(own);
+        view.shade(sampler.appearance(at), sampler.openness(at, normal), point, normal)
     });
 }
 

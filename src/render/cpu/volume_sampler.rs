@@ -1,11 +1,12 @@
 //! The carved tooth as a volume, for the passes that look into it. Twin of `tooth.wgsl`.
 
-use super::CpuView;
+use super::{CachedVolume, CpuView};
 use crate::ambient_occlusion::OcclusionVolume;
 use crate::bounds_of_matter;
 use crate::empty_space;
 use crate::empty_space::EmptySpaceMap;
-use crate::scene::{Appearance, LabelPalette, VolumeInstance};
+use crate::scene::{Appearance, VolumeInstance};
+use crate::tissue_colours::TissueColours;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::volume::{BRICK, Volume};
@@ -15,10 +16,10 @@ const NUDGE: f32 = 0.004;
 
 pub struct VolumeSampler<'a> {
     pub volume: &'a Volume,
-    pub palette: &'a LabelPalette,
     pub world_from_tooth: Pose,
     empty_space: &'a EmptySpaceMap,
     occlusion: &'a OcclusionVolume,
+    colours: &'a TissueColours,
     low: Vec3,
     high: Vec3,
 }
@@ -37,14 +38,11 @@ impl Ray {
 }
 
 impl<'a> VolumeSampler<'a> {
-    pub fn new(
-        tooth: &VolumeInstance<'a>,
-        empty_space: &'a EmptySpaceMap,
-        occlusion: &'a OcclusionVolume,
-    ) -> VolumeSampler<'a> {
-        let VolumeInstance { volume, world_from_tooth, palette, .. } = *tooth;
+    pub fn new(tooth: &VolumeInstance<'a>, cached: &'a CachedVolume) -> VolumeSampler<'a> {
+        let VolumeInstance { volume, world_from_tooth, .. } = *tooth;
+        let CachedVolume { empty_space, occlusion, colours, .. } = cached;
         let Aabb { low, high } = bounds_of_matter(volume);
-        VolumeSampler { volume, palette, world_from_tooth, empty_space, occlusion, low, high }
+        VolumeSampler { volume, world_from_tooth, empty_space, occlusion, colours, low, high }
     }
 
     /// The ray through a pixel, with its way in world space.
@@ -110,29 +108,8 @@ impl<'a> VolumeSampler<'a> {
         self.occlusion.openness(at, outward)
     }
 
+    /// Colour and gloss of the surface at a place.
     pub fn appearance(&self, at: Vec3) -> Appearance {
-        appearance_at(self.volume, self.palette, at)
+        self.colours.at(at)
     }
-}
-
-/// Colour and gloss of the matter around a place, by how much there is of each.
-pub fn appearance_at(volume: &Volume, palette: &LabelPalette, at: Vec3) -> Appearance {
-    let grid = volume.grid();
-    let base = at.floor();
-    let part = at - base;
-    let last = Vec3::from(grid.dims.map(|n| n as f32 - 1.0));
-    let (mut colour, mut gloss, mut total) = (Vec3::ZERO, 0.0, 0.0);
-    for n in 0..8u32 {
-        let corner = Vec3::from([0, 1, 2].map(|a| (n >> a & 1) as f32));
-        let cell = (base + corner).clamp(Vec3::ZERO, last);
-        let voxel = volume.voxel(grid.index([cell.x as u32, cell.y as u32, cell.z as u32]));
-        let near = (Vec3::ONE - part) + (part - (Vec3::ONE - part)) * corner;
-        let weight = near.x * near.y * near.z * voxel.density.unit();
-        let own = palette.appearance(voxel.label);
-        colour += Vec3::from(own.colour) * weight;
-        gloss += own.gloss * weight;
-        total += weight;
-    }
-    let total = f32::max(total, 1e-6);
-    Appearance { colour: (colour / total).to_array(), gloss: gloss / total }
 }

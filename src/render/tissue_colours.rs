@@ -1,0 +1,476 @@
+//! Colours of the tooth's matter around its surface, smooth where labels change from voxel to voxel.
+//!
+//! Takes a volume and a palette. Gives a colour and a gloss for each cell of one or a few voxels, between whose centres
+//! the renderers interpolate. Decay has a soft border: from sound tissue over a white spot (in enamel) and amber to its own
+//! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
+
+use super::scene::{Appearance, LabelPalette};
+use typodont_core::frame::Vec3;
+use typodont_core::parallel::par_map;
+use typodont_core::volume::{BRICK, Label, Volume};
+
+/// Width of a cell, mm, that is not exceeded by averaging voxels: fine volumes need no colour for every voxel.
+const CELL_WIDTH: f32 = 0.12;
+
+/// Distance, cells, up to which decay tints its surroundings: wide enough that no voxel's corner shows in the border, and
+/// far less than what an excavator removes with one stroke.
+const REACH: usize = 4;
+
+/// Weights of the cells at a distance of 0 to [`REACH`]: a Gaussian of 2.2 cells.
+const WIDE: [f32; REACH + 1] = [1.0, 0.902, 0.662, 0.395, 0.192];
+
+/// Weights of a cell and its neighbours: they smooth the stairs of voxels, and leave a single voxel visible.
+const NARROW: [f32; 2] = [0.5, 0.25];
+
+/// Weight of the decay at a place itself beside that around it: above 0, so that a last voxel of decay is seen, and below 1,
+/// so that the border is soft.
+const OWN_WEIGHT: f32 = 0.6;
+
+/// Cells along the edge of the surroundings of a brick's cells.
+const WINDOW: usize = BRICK as usize + 2 * REACH;
+
+/// Colours of decay's border: the white spot of demineralised enamel, which scatters more than sound enamel, and the amber
+/// of firm, discoloured tissue. Chosen by comparison with the photographs of the ICDAS criteria (Pitts, 2004).
+const WHITE_SPOT: Vec3 = Vec3::new(0.975, 0.965, 0.93);
+const AMBER: Vec3 = Vec3::new(0.80, 0.60, 0.33);
+
+/// Distance between the values of the noise that mottles decay, mm.
+const MOTTLE: [f32; 2] = [0.55, 0.21];
+
+/// Colours and gloss of the cells near the surface; those of other cells are not defined.
+#[derive(Clone, Debug)]
+pub struct TissueColours {
+    palette: LabelPalette,
+    /// Voxels along a cell's edge: 1, 2, 4 or 8.
+    cell_voxels: u32,
+    dims: [u32; 3],
+    /// Red, green, blue and gloss, x fastest.
+    texels: Vec<[u8; 4]>,
+}
+
+/// Matter of a cell, or a weighted sum over cells.
+#[derive(Clone, Copy, Default)]
+struct Matter {
+    /// Colour and gloss of sound matter, and its amount.
+    sound: [f32; 4],
+    sound_amount: f32,
+    /// Amount of enamel in it.
+    enamel: f32,
+    /// Colour and gloss of decayed matter, and its amount.
+    decay: [f32; 4],
+    decay_amount: f32,
+}
+
+impl Matter {
+    fn add(&mut self, other: &Matter, weight: f32) {
+        for c in 0..4 {
+            self.sound[c] += other.sound[c] * weight;
+            self.decay[c] += other.decay[c] * weight;
+        }
+        self.sound_amount += other.sound_amount * weight;
+        self.enamel += other.enamel * weight;
+        self.decay_amount += other.decay_amount * weight;
+    }
+
+    fn amount(&self) -> f32 {
+        self.sound_amount + self.decay_amount
+    }
+
+    /// Share of decayed matter, 0 to 1.
+    fn decayed_share(&self) -> f32 {
+        self.decay_amount / self.amount().max(1e-6)
+    }
+}
+
+impl TissueColours {
+    pub fn new(volume: &Volume, palette: &LabelPalette) -> TissueColours {
+        let grid = volume.grid();
+        let voxels = CELL_WIDTH / grid.spacing.min_element();
+        let cell_voxels = [1, 2, 4, BRICK].into_iter().rfind(|&edge| edge as f32 <= voxels).unwrap_or(1);
+        let dims = grid.dims.map(|n| n.div_ceil(cell_voxels));
+        let texels = vec![[0; 4]; dims.iter().map(|&n| n as usize).product()];
+        let mut colours = TissueColours { palette: palette.clone(), cell_voxels, dims, texels };
+        let bricks: Vec<usize> = (0..volume.bricks().len()).collect();
+        colours.compute(volume, &bricks);
+        colours
+    }
+
+    /// True if these are the colours of this palette.
+    pub fn has_palette(&self, palette: &LabelPalette) -> bool {
+        self.palette == *palette
+    }
+
+    #[cfg(feature = "gpu")]
+    pub fn cell_voxels(&self) -> u32 {
+        self.cell_voxels
+    }
+
+    #[cfg(feature = "gpu")]
+    pub fn dims(&self) -> [u32; 3] {
+        self.dims
+    }
+
+    #[cfg(feature = "gpu")]
+    pub fn texels(&self) -> &[[u8; 4]] {
+        &self.texels
+    }
+
+    /// Computes the colours again that changed bricks can affect. Returns the bricks that were computed.
+    pub fn update(&mut self, volume: &Volume, changed: &[usize]) -> Vec<usize> {
+        let bricks = volume.bricks();
+        let last = bricks.dims().map(|n| n - 1);
+        let mut affected: Vec<usize> = Vec::new();
+        for &brick in changed {
+            let at = bricks.corner(brick).map(|c| c / BRICK);
+            // Cells of more than 2 voxels reach beyond the neighbouring brick.
+            let reach = (REACH as u32 * self.cell_voxels).div_ceil(BRICK);
+            let range = |a: usize| at[a].saturating_sub(reach)..=(at[a] + reach).min(last[a]);
+            for z in range(2) {
+                for y in range(1) {
+                    affected.extend(range(0).map(|x| bricks.index([x, y, z])));
+                }
+            }
+        }
+        affected.sort_unstable();
+        affected.dedup();
+        self.compute(volume, &affected)
+    }
+
+    /// Cells of a brick: the first, and the number along each axis.
+    pub fn block(&self, volume: &Volume, brick: usize) -> ([u32; 3], [u32; 3]) {
+        let first = volume.bricks().corner(brick).map(|c| c / self.cell_voxels);
+        let edge = BRICK / self.cell_voxels;
+        (first, std::array::from_fn(|a| edge.min(self.dims[a] - first[a])))
+    }
+
+    /// Texels of a block of cells, x fastest.
+    #[cfg(feature = "gpu")]
+    pub fn texels_of(&self, (first, size): ([u32; 3], [u32; 3])) -> Vec<u8> {
+        let rows = (0..size[2]).flat_map(|z| (0..size[1]).map(move |y| [first[0], first[1] + y, first[2] + z]));
+        rows.flat_map(|cell| {
+            let start = self.index(cell);
+            self.texels[start..start + size[0] as usize].iter().flatten().copied()
+        })
+        .collect()
+    }
+
+    /// Colour and gloss at a point near the surface, in voxel coordinates.
+    pub fn at(&self, at: Vec3) -> Appearance {
+        let last = Vec3::from(self.dims.map(|n| n as f32 - 1.0));
+        let place = ((at + 0.5) / self.cell_voxels as f32 - 0.5).clamp(Vec3::ZERO, last);
+        let base = place.floor();
+        let part = place - base;
+        let next = (base + 1.0).min(last);
+        let mut sum = [0.0; 4];
+        for n in 0..8u32 {
+            let is_next = [0, 1, 2].map(|a| n >> a & 1 == 1);
+            let cell = [0, 1, 2].map(|a| if is_next[a] { next[a] } else { base[a] } as u32);
+            let weight: f32 = (0..3).map(|a| if is_next[a] { part[a] } else { 1.0 - part[a] }).product();
+            let texel = self.texels[self.index(cell)];
+            (0..4).for_each(|c| sum[c] += f32::from(texel[c]) * weight / 255.0);
+        }
+        let [r, g, b, gloss] = sum;
+        Appearance { colour: [r, g, b], gloss }
+    }
+
+    fn index(&self, [x, y, z]: [u32; 3]) -> usize {
+        (z as usize * self.dims[1] as usize + y as usize) * self.dims[0] as usize + x as usize
+    }
+
+    /// Computes the cells of those bricks that are near the surface, and returns these bricks.
+    fn compute(&mut self, volume: &Volume, bricks: &[usize]) -> Vec<usize> {
+        let mixer = Mixer::new(&self.palette);
+        let made = par_map(bricks.len(), |i| {
+            let block = self.block(volume, bricks[i]);
+            self.is_near_surface(volume, block).then(|| self.colours_of(volume, &mixer, block))
+        });
+        let mut computed = Vec::new();
+        for (&brick, texels) in bricks.iter().zip(made) {
+            let Some(texels) = texels else { continue };
+            let (first, size) = self.block(volume, brick);
+            for (row, texels) in texels.chunks_exact(size[0] as usize).enumerate() {
+                let [y, z] = [row as u32 % size[1], row as u32 / size[1]];
+                let start = self.index([first[0], first[1] + y, first[2] + z]);
+                self.texels[start..start + texels.len()].copy_from_slice(texels);
+            }
+            computed.push(brick);
+        }
+        computed
+    }
+
+    /// True if the surface may be so near to a block of cells that its colours are interpolated there.
+    fn is_near_surface(&self, volume: &Volume, (first, size): ([u32; 3], [u32; 3])) -> bool {
+        let grid = volume.grid();
+        let [xs, ys, zs] = [0, 1, 2].map(|a| {
+            let low = first[a].saturating_sub(1) * self.cell_voxels;
+            low..((first[a] + size[a] + 1) * self.cell_voxels).min(grid.dims[a])
+        });
+        // Matter at the end of the grid has its surface there.
+        let is_at_end = (0..3).any(|a| first[a] == 0 || first[a] + size[a] == self.dims[a]);
+        let (mut has_matter, mut has_air) = (false, is_at_end);
+        for [y, z] in zs.flat_map(|z| ys.clone().map(move |y| [y, z])) {
+            let row = grid.index([xs.start, y, z]);
+            for density in &volume.densities()[row..row + xs.len()] {
+                has_matter |= density.bits() > 0;
+                has_air |= density.bits() < u8::MAX;
+            }
+            if has_matter && has_air {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Colours of a block of cells, x fastest.
+    fn colours_of(&self, volume: &Volume, mixer: &Mixer, (first, size): ([u32; 3], [u32; 3])) -> Vec<[u8; 4]> {
+        let window = self.window(volume, mixer, first);
+        let size = size.map(|n| n as usize);
+        if let Some(Label(sole)) = window.sole_label.filter(|_| !window.has_decay) {
+            return vec![texel(mixer.matter[usize::from(sole)].sound, 1.0); size.iter().product()];
+        }
+        let narrow = blurred(&window.cells, size, &NARROW);
+        let wide = window.has_decay.then(|| blurred(&window.cells, size, &WIDE));
+        let grid = volume.grid();
+        let scale = grid.spacing * self.cell_voxels as f32;
+        let mut texels = Vec::with_capacity(narrow.len());
+        for (i, near) in narrow.iter().enumerate() {
+            let Some(wide) = wide.as_ref().map(|wide| &wide[i]).filter(|wide| wide.decay_amount > 0.0) else {
+                texels.push(texel(near.sound, near.sound_amount));
+                continue;
+            };
+            let cell = [i % size[0], i / size[0] % size[1], i / (size[0] * size[1])];
+            let place = Vec3::from(std::array::from_fn(|a| (first[a] as usize + cell[a]) as f32)) * scale;
+            texels.push(decayed_texel(near, wide, mottle(place)));
+        }
+        texels
+    }
+
+    /// Matter of a block of cells and of its surroundings.
+    fn window(&self, volume: &Volume, mixer: &Mixer, first: [u32; 3]) -> Window {
+        let mut cells = vec![Matter::default(); WINDOW * WINDOW * WINDOW];
+        let (mut has_decay, mut first_label, mut is_sole) = (false, Label::AIR, true);
+        let grid = volume.grid();
+        let edge = self.cell_voxels as usize;
+        let start = first.map(|c| c as i64 - REACH as i64);
+        let span = |a: usize, n: usize| {
+            let low = (start[a] + n as i64) * edge as i64;
+            low.clamp(0, i64::from(grid.dims[a])) as u32..(low + edge as i64).clamp(0, i64::from(grid.dims[a])) as u32
+        };
+        let share = 1.0 / (edge * edge * edge) as f32;
+        for (i, cell) in cells.iter_mut().enumerate() {
+            let [x, y, z] = [i % WINDOW, i / WINDOW % WINDOW, i / (WINDOW * WINDOW)];
+            for z in span(2, z) {
+                for y in span(1, y) {
+                    for x in span(0, x) {
+                        let voxel = volume.voxel(grid.index([x, y, z]));
+                        if voxel.label != Label::AIR {
+                            let label = mixer.alike[usize::from(voxel.label.0)];
+                            first_label = if first_label == Label::AIR { label } else { first_label };
+                            is_sole &= label == first_label;
+                            cell.add(&mixer.matter[usize::from(label.0)], voxel.density.unit() * share);
+                        }
+                    }
+                }
+            }
+            has_decay |= cell.decay_amount > 0.0;
+        }
+        let sole_label = (is_sole && first_label != Label::AIR).then_some(first_label);
+        Window { cells, has_decay, sole_label }
+    }
+}
+
+/// Matter around the cells of a brick, [`WINDOW`] cells wide, x fastest.
+struct Window {
+    cells: Vec<Matter>,
+    has_decay: bool,
+    /// The only label in the window, if there is one.
+    sole_label: Option<Label>,
+}
+
+/// Matter of one full voxel of each label.
+struct Mixer {
+    matter: Vec<Matter>,
+    /// The first label that looks like each label: where decay is hidden, sums must not differ in the last bit either.
+    alike: Vec<Label>,
+}
+
+impl Mixer {
+    fn new(palette: &LabelPalette) -> Mixer {
+        let look = |label: u8| {
+            let index = usize::from(label);
+            (palette.appearances[index], palette.is_decay[index])
+        };
+        let all = || 1..=u8::MAX;
+        let alike = all().map(|label| Label(all().find(|&other| look(other) == look(label)).unwrap_or(label)));
+        let translucent = palette.translucent.map(|Label(label)| look(label));
+        let matter = |label: u8| {
+            let (Appearance { colour: [r, g, b], gloss }, is_decay) = look(label);
+            let own = [r, g, b, gloss];
+            match is_decay {
+                true => Matter { decay: own, decay_amount: 1.0, ..Matter::default() },
+                false => Matter {
+                    sound: own,
+                    sound_amount: 1.0,
+                    enamel: if translucent == Some(look(label)) { 1.0 } else { 0.0 },
+                    ..Matter::default()
+                },
+            }
+        };
+        Mixer { matter: (0..=u8::MAX).map(matter).collect(), alike: std::iter::once(Label::AIR).chain(alike).collect() }
+    }
+}
+
+/// Weighted sums over the surroundings of the cells in the middle of a window, one axis after the other.
+fn blurred(window: &[Matter], size: [usize; 3], weights: &[f32]) -> Vec<Matter> {
+    let reach = weights.len() - 1;
+    let mut dims = [WINDOW; 3];
+    let mut from = window.to_vec();
+    for axis in 0..3 {
+        let mut to_dims = dims;
+        to_dims[axis] = size[axis];
+        let stride = [1, dims[0], dims[0] * dims[1]][axis];
+        let mut to = Vec::with_capacity(to_dims.iter().product());
+        for z in 0..to_dims[2] {
+            for y in 0..to_dims[1] {
+                for x in 0..to_dims[0] {
+                    let mut at = [x, y, z];
+                    at[axis] += REACH;
+                    let middle = (at[2] * dims[1] + at[1]) * dims[0] + at[0];
+                    let mut sum = Matter::default();
+                    sum.add(&from[middle], weights[0]);
+                    for step in 1..=reach {
+                        sum.add(&from[middle - step * stride], weights[step]);
+                        sum.add(&from[middle + step * stride], weights[step]);
+                    }
+                    to.push(sum);
+                }
+            }
+        }
+        (from, dims) = (to, to_dims);
+    }
+    from
+}
+
+fn texel(sum: [f32; 4], amount: f32) -> [u8; 4] {
+    sum.map(|v| (v / amount.max(1e-6) * 255.0 + 0.5) as u8)
+}
+
+/// Colour and gloss where decay is near. The closer decay is, and the more of it there is at the place itself, the farther
+/// along the way from sound tissue to its own colour; noise makes the way uneven.
+fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
+    // Both shares are one half at the border of decay. The first makes it soft; the second still shows a single voxel.
+    let [far, own] = [wide.decayed_share(), near.decayed_share()];
+    let share = far + OWN_WEIGHT * own * (1.0 - far);
+    let uneven = (share + 1.3 * mottle * share * (1.0 - share)).clamp(0.0, 1.0);
+    let mean = |sum: [f32; 4], amount: f32| (Vec3::new(sum[0], sum[1], sum[2]) / amount, sum[3] / amount);
+    let (decay, decay_gloss) = mean(wide.decay, wide.decay_amount);
+    let decay = decay * (1.0 + 0.22 * mottle);
+    let (sound, sound_gloss) = match [near, wide].into_iter().find(|matter| matter.sound_amount > 1e-4) {
+        Some(matter) => mean(matter.sound, matter.sound_amount),
+        None => (decay, decay_gloss),
+    };
+    let enamel = wide.enamel / wide.sound_amount.max(1e-6);
+    let spot = sound.lerp(WHITE_SPOT, 0.7 * enamel.min(1.0));
+    let amber = decay.lerp(AMBER, 0.6);
+    let colour = sound
+        .lerp(spot, smooth_step(0.02, 0.2, uneven))
+        .lerp(amber, smooth_step(0.12, 0.65, uneven))
+        .lerp(decay, smooth_step(0.4, 0.95, uneven));
+    let gloss = sound_gloss + (decay_gloss - sound_gloss) * smooth_step(0.03, 0.6, uneven);
+    texel([colour.x, colour.y, colour.z, gloss].map(|v| v.clamp(0.0, 1.0)), 1.0)
+}
+
+/// Rises from 0 to 1 between two values, without a kink.
+fn smooth_step(from: f32, to: f32, value: f32) -> f32 {
+    let part = ((value - from) / (to - from)).clamp(0.0, 1.0);
+    part * part * (3.0 - 2.0 * part)
+}
+
+/// Noise at a place, mm: −1 to 1, the same at the same place of every volume.
+fn mottle(place: Vec3) -> f32 {
+    0.65 * value_noise(place / MOTTLE[0]) + 0.35 * value_noise(place / MOTTLE[1])
+}
+
+/// Random values on a lattice of whole numbers, −1 to 1, interpolated between them.
+fn value_noise(at: Vec3) -> f32 {
+    let base = at.floor();
+    let part = at - base;
+    let part = part * part * (3.0 - 2.0 * part);
+    let mut sum = 0.0;
+    for n in 0..8u32 {
+        let is_next = [0, 1, 2].map(|a| n >> a & 1 == 1);
+        let weight: f32 = (0..3).map(|a| if is_next[a] { part[a] } else { 1.0 - part[a] }).product();
+        let corner = [0, 1, 2].map(|a| base[a] as i32 as u32 + u32::from(is_next[a]));
+        sum += weight * (lattice_value(corner) * 2.0 - 1.0);
+    }
+    sum
+}
+
+/// Random value of a lattice point, 0 to 1 (the finalizer of MurmurHash3).
+fn lattice_value([x, y, z]: [u32; 3]) -> f32 {
+    let mut hash =
+        x.wrapping_mul(0x9E37_79B1) ^ y.wrapping_mul(0x85EB_CA77).rotate_left(11) ^ z.wrapping_mul(0xC2B2_AE3D);
+    hash = (hash ^ hash >> 16).wrapping_mul(0x85EB_CA6B);
+    hash = (hash ^ hash >> 13).wrapping_mul(0xC2B2_AE35);
+    (hash >> 8) as f32 / (1u32 << 24) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use typodont_core::frame::Vec3;
+    use typodont_core::volume::{Grid, Voxel};
+
+    const DECAY: Label = Label(2);
+
+    fn palette() -> LabelPalette {
+        let mut palette =
+            LabelPalette::from_colours(|label| [[0.9, 0.9, 0.8], [0.4, 0.2, 0.1]][usize::from(label == DECAY)], 0.2);
+        palette.is_decay[usize::from(DECAY.0)] = true;
+        palette
+    }
+
+    /// A ball whose upper part is decayed.
+    fn ball(spacing: f32) -> Volume {
+        let grid = Grid::centred([52, 47, 44], Vec3::splat(spacing));
+        let label = |p: Vec3| if p.z > 9.0 * spacing { DECAY } else { Label(1) };
+        Volume::from_distance(grid, 1.5 * spacing, |p| (p.length() - 18.0 * spacing, label(p)))
+    }
+
+    #[test]
+    fn after_a_cut_the_colours_near_the_surface_are_those_computed_anew() {
+        // Aim: what is seen depends on what is there, not on how it came about. Method: cells of one voxel and of several; a
+        // cut through the decay and one at the border of the grid.
+        for spacing in [0.2, 0.06, 0.03] {
+            let mut volume = ball(spacing);
+            let mut colours = TissueColours::new(&volume, &palette());
+            for cell in [[26, 23, 40], [26, 24, 39], [27, 24, 38], [26, 23, 31], [8, 23, 22]] {
+                volume.set_cell(cell, Voxel::AIR);
+            }
+            let changed = volume.take_dirty();
+            let computed = colours.update(&volume, &changed);
+            let anew = TissueColours::new(&volume, &palette());
+            assert!(!computed.is_empty());
+            for brick in 0..volume.bricks().len() {
+                let (first, size) = anew.block(&volume, brick);
+                if anew.is_near_surface(&volume, (first, size)) {
+                    let cells = |all: &TissueColours| -> Vec<[u8; 4]> {
+                        let grid = Grid { dims: size, spacing: Vec3::ONE, origin: Vec3::ZERO };
+                        grid.cells().map(|c| all.texels[all.index([0, 1, 2].map(|a| first[a] + c[a]))]).collect()
+                    };
+                    assert!(cells(&colours) == cells(&anew), "{spacing} mm, brick {brick}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn noise_is_even_and_continuous() {
+        // Aim: mottles lighten as much as they darken and have no edges. Method: its mean and its largest step.
+        let places = (0..20_000).map(|i| Vec3::new(0.013 * i as f32, 0.4, -7.0));
+        let values: Vec<f32> = places.map(mottle).collect();
+        assert!((values.iter().sum::<f32>() / values.len() as f32).abs() < 0.05);
+        assert!(values.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.12));
+        assert!(values.iter().any(|v| *v > 0.4) && values.iter().any(|v| *v < -0.4));
+    }
+}

@@ -1,0 +1,118 @@
+//! Colours of tissues: soft borders of decay, and decay that stays hidden.
+
+use crate::scenes::*;
+use std::sync::Arc;
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::volume::{Grid, Label, Volume};
+use typodont_exercise::catalog::{TissueRole, TissueTable};
+use typodont_formats::Library;
+use typodont_render::*;
+use typodont_scene::tissue_palette;
+
+const SPACING: f32 = 0.1;
+
+/// White light from everywhere: what is drawn is the tissue's own colour.
+fn even_light() -> Lights {
+    Lights { ambient: 1.0, chair: Lamp::OFF, head: Lamp::OFF }
+}
+
+/// A plate with its top at z = 0 and a label by place.
+fn plate(label: impl Fn(Vec3) -> Label) -> Volume {
+    let grid = Grid { dims: [90, 90, 40], spacing: Vec3::splat(SPACING), origin: Vec3::new(-4.45, -4.45, -3.45) };
+    Volume::from_distance(grid, 1.5 * SPACING, |p| (p.z, label(p)))
+}
+
+/// The plate from above, without perspective to speak of; the number of pixels per voxel follows from the distance.
+fn from_above(volume: &Volume, palette: &LabelPalette, mode: RenderMode, size: [u32; 2]) -> RgbaImage {
+    let viewpoint = Viewpoint::look_at(Vec3::new(0.0, 0.0, 30.0), Vec3::ZERO, Vec3::Y);
+    let scene = RenderScene {
+        tooth: Some(VolumeInstance { world_from_tooth: Pose::IDENTITY, ..tooth(volume, palette, mode) }),
+        lights: even_light(),
+        ..RenderScene::empty()
+    };
+    OffscreenRenderer::cpu().draw(&scene, &viewpoint, None, size).unwrap()
+}
+
+#[test]
+fn the_border_of_decay_is_soft_and_has_no_steps() {
+    // Aim: no saw-teeth where labels change from voxel to voxel. Method: a plate decayed on one side of a line that is
+    // slightly turned against the voxels. Nowhere does a fifth of the change from sound to decayed happen within a quarter
+    // of a voxel, and most of it takes more than two voxels; labels that are merely interpolated take one.
+    let line = Vec3::new(1.0, 0.21, 0.0).normalize();
+    let volume = plate(|p| if p.dot(line) > 0.0 { CARIES } else { Label(1) });
+    for mode in [RenderMode::Surface, RenderMode::Iso] {
+        let image = from_above(&volume, &palette(), mode.clone(), [600, 600]);
+        let field_of_view = Viewpoint::look_at(Vec3::Z * 30.0, Vec3::ZERO, Vec3::Y).field_of_view;
+        let pixels_per_voxel = 600.0 * SPACING / (2.0 * 30.0 * (0.5 * field_of_view).tan());
+        // Within the plate, away from its edges.
+        let half = (25.0 * pixels_per_voxel) as u32;
+        let (mut largest_step, mut between) = (0.0f32, 0);
+        for y in 300 - half..300 + half {
+            let green: Vec<f32> = (300 - half..300 + half).map(|x| f32::from(image.pixel(x, y)[1])).collect();
+            let (sound, decayed) = (green[0], green[green.len() - 1]);
+            assert!(sound > decayed + 80.0, "{mode:?}: {sound} to {decayed}");
+            let share: Vec<f32> = green.iter().map(|v| (sound - v) / (sound - decayed)).collect();
+            largest_step = share.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(largest_step, f32::max);
+            between += share.iter().filter(|share| (0.05..0.9).contains(*share)).count();
+        }
+        let width = between as f32 / (2 * half) as f32 / pixels_per_voxel;
+        let per_quarter = largest_step * 0.25 * pixels_per_voxel;
+        println!(
+            "{mode:?}: {pixels_per_voxel:.1} pixels a voxel, {per_quarter:.2} in a quarter, {width:.1} voxels wide"
+        );
+        assert!(per_quarter < 0.2, "{mode:?}: {per_quarter} of the change within a quarter of a voxel");
+        assert!(width > 2.0, "{mode:?}: {width} voxels from sound to decayed");
+    }
+}
+
+#[test]
+fn decay_that_was_removed_leaves_no_tint() {
+    // Aim: a clean floor looks clean, so that nobody cuts on. Method: decay cut out to the last voxel, beside the same
+    // cavity in a sound plate.
+    let cut = |mut volume: Volume| {
+        carve(&mut volume, Vec3::new(0.0, 0.0, 0.2), 1.0);
+        carve(&mut volume, Vec3::new(0.0, 0.0, 0.0), 1.0);
+        volume
+    };
+    let decayed = cut(plate(|p| if p.length() < 0.7 { CARIES } else { Label(2) }));
+    let sound = cut(plate(|_| Label(2)));
+    assert_eq!(decayed.count(CARIES), 0);
+    for mode in [RenderMode::Surface, RenderMode::Iso, tissue(&palette())] {
+        let [decayed, sound] = [&decayed, &sound].map(|v| from_above(v, &palette(), mode.clone(), [200, 200]));
+        assert!(decayed.rgba == sound.rgba, "{mode:?}");
+    }
+}
+
+#[test]
+fn hidden_decay_changes_no_pixel() {
+    // Aim: where an exercise hides decay, no rendering gives it away. Method: the shipped tissues; a molar with and without
+    // each kind of decay under and in its enamel, in every mode that such a stage offers and in the translucent one.
+    let tissues = TissueTable::read(&Library::shipped()).unwrap();
+    let palette = tissue_palette(&tissues, false);
+    let shown = tissue_palette(&tissues, true);
+    let mut sound = molar([96, 96, 60]);
+    let enamel = tissues.label_of("enamel").unwrap();
+    sound.relabel(|_, label| if label == Label::AIR { label } else { enamel });
+    let grid = *sound.grid();
+    let top = sound.extent().high;
+    let viewpoint =
+        Orbit { middle: Vec3::new(0.0, 1.0, 0.0), azimuth: 0.5, elevation: 0.9, distance: 42.0 }.viewpoint();
+    let draw = |volume: &Volume, palette: &LabelPalette, mode: RenderMode| {
+        let scene = RenderScene { tooth: Some(tooth(volume, palette, mode)), ..RenderScene::empty() };
+        OffscreenRenderer::cpu().draw(&scene, &viewpoint, None, [240, 240]).unwrap()
+    };
+    for entry in tissues.entries().iter().filter(|entry| entry.role == TissueRole::Decay) {
+        let mut decayed = sound.clone();
+        let place = Vec3::new(0.0, 0.0, top.z - 2.0);
+        decayed.relabel(|i, label| {
+            if label != Label::AIR && grid.centre(grid.cell(i)).distance(place) < 2.5 { entry.label() } else { label }
+        });
+        let film = Arc::new(TransferFunction::radiograph(|l| typodont_scene::x_ray_attenuation(&tissues, l, false)));
+        for mode in [RenderMode::Surface, RenderMode::Iso, tissue(&palette), RenderMode::Volume(film)] {
+            let [with, without] = [&decayed, &sound].map(|volume| draw(volume, &palette, mode.clone()));
+            assert!(with.rgba == without.rgba, "{} in {mode:?}", entry.name);
+        }
+        let seen = draw(&decayed, &shown, RenderMode::Iso).rgba != draw(&sound, &shown, RenderMode::Iso).rgba;
+        assert!(seen, "{} can be seen where it is shown", entry.name);
+    }
+}
