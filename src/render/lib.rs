@@ -85,7 +85,7 @@ mod stereo;
 #[cfg(feature = "gpu")]
 mod stereo_pass;
 mod surface_mesh;
-mod tissue_colours;
+mod surface_colours;
 #[cfg(feature = "gpu")]
 mod surface_pass;
 #[cfg(feature = "gpu")]

@@ -3,7 +3,7 @@
 use super::ambient_occlusion::OcclusionVolume;
 use super::empty_space::EmptySpaceMap;
 use super::scene::{Changes, RenderMode, VolumeInstance};
-use super::tissue_colours::TissueColours;
+use super::surface_colours::SurfaceColours;
 use super::transfer_function::TransferFunction;
 use super::{bounds_of_matter, integration_step, resources};
 use std::sync::Arc;
@@ -52,7 +52,7 @@ pub struct ToothTextures {
     bounds: Aabb,
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
-    colours: TissueColours,
+    colours: SurfaceColours,
     function: Option<Arc<TransferFunction>>,
     uniform: wgpu::Buffer,
     voxels: wgpu::Texture,
@@ -97,7 +97,7 @@ impl ToothTextures {
         let dims = volume.grid().dims;
         let empty_space = EmptySpaceMap::new(volume, &tooth.mode);
         let occlusion = OcclusionVolume::new(volume);
-        let colours = TissueColours::new(volume, tooth.palette);
+        let colours = SurfaceColours::new(volume, tooth.palette);
         use wgpu::TextureFormat as Format;
         let space = |label, dims, format| resources::volume_texture(device, label, dims, format);
         let voxels = space("voxels", dims, Format::Rg8Unorm);
@@ -202,7 +202,7 @@ impl ToothTextures {
 
     fn update_colours(&mut self, queue: &wgpu::Queue, tooth: &VolumeInstance, changed: &[usize]) {
         if !self.colours.has_palette(tooth.palette) {
-            self.colours = TissueColours::new(tooth.volume, tooth.palette);
+            self.colours = SurfaceColours::new(tooth.volume, tooth.palette);
             return self.upload_colours(queue);
         }
         for brick in self.colours.update(tooth.volume, changed) {

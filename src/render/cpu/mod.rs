@@ -19,7 +19,7 @@ pub use stereo_pass::stereo_pass;
 use super::eye::Eye;
 use super::mirror::{self, PlaneMirror};
 use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
-use super::tissue_colours::TissueColours;
+use super::surface_colours::SurfaceColours;
 use super::{ambient_occlusion::OcclusionVolume, empty_space::EmptySpaceMap};
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
@@ -35,7 +35,7 @@ struct CachedVolume {
     dims: [u32; 3],
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
-    colours: TissueColours,
+    colours: SurfaceColours,
 }
 
 impl CpuRenderer {
@@ -52,7 +52,7 @@ impl CpuRenderer {
                 if known.colours.has_palette(palette) {
                     known.colours.update(volume, changed);
                 } else {
-                    known.colours = TissueColours::new(volume, palette);
+                    known.colours = SurfaceColours::new(volume, palette);
                 }
             }
             _ => {
@@ -60,7 +60,7 @@ impl CpuRenderer {
                     dims,
                     empty_space: EmptySpaceMap::new(volume, mode),
                     occlusion: OcclusionVolume::new(volume),
-                    colours: TissueColours::new(volume, palette),
+                    colours: SurfaceColours::new(volume, palette),
                 });
             }
         }

@@ -6,7 +6,7 @@ use crate::bounds_of_matter;
 use crate::empty_space;
 use crate::empty_space::EmptySpaceMap;
 use crate::scene::{Appearance, VolumeInstance};
-use crate::tissue_colours::TissueColours;
+use crate::surface_colours::SurfaceColours;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::volume::{BRICK, Volume};
@@ -19,7 +19,7 @@ pub struct VolumeSampler<'a> {
     pub world_from_tooth: Pose,
     empty_space: &'a EmptySpaceMap,
     occlusion: &'a OcclusionVolume,
-    colours: &'a TissueColours,
+    colours: &'a SurfaceColours,
     low: Vec3,
     high: Vec3,
 }

@@ -39,7 +39,7 @@ const MOTTLE: [f32; 2] = [0.55, 0.21];
 
 /// Colours and gloss of the cells near the surface; those of other cells are not defined.
 #[derive(Clone, Debug)]
-pub struct TissueColours {
+pub struct SurfaceColours {
     palette: LabelPalette,
     /// Voxels along a cell's edge: 1, 2, 4 or 8.
     cell_voxels: u32,
@@ -82,14 +82,14 @@ impl Matter {
     }
 }
 
-impl TissueColours {
-    pub fn new(volume: &Volume, palette: &LabelPalette) -> TissueColours {
+impl SurfaceColours {
+    pub fn new(volume: &Volume, palette: &LabelPalette) -> SurfaceColours {
         let grid = volume.grid();
         let voxels = CELL_WIDTH / grid.spacing.min_element();
         let cell_voxels = [1, 2, 4, BRICK].into_iter().rfind(|&edge| edge as f32 <= voxels).unwrap_or(1);
         let dims = grid.dims.map(|n| n.div_ceil(cell_voxels));
         let texels = vec![[0; 4]; dims.iter().map(|&n| n as usize).product()];
-        let mut colours = TissueColours { palette: palette.clone(), cell_voxels, dims, texels };
+        let mut colours = SurfaceColours { palette: palette.clone(), cell_voxels, dims, texels };
         let bricks: Vec<usize> = (0..volume.bricks().len()).collect();
         colours.compute(volume, &bricks);
         colours
@@ -443,18 +443,18 @@ mod tests {
         // cut through the decay and one at the border of the grid.
         for spacing in [0.2, 0.06, 0.03] {
             let mut volume = ball(spacing);
-            let mut colours = TissueColours::new(&volume, &palette());
+            let mut colours = SurfaceColours::new(&volume, &palette());
             for cell in [[26, 23, 40], [26, 24, 39], [27, 24, 38], [26, 23, 31], [8, 23, 22]] {
                 volume.set_cell(cell, Voxel::AIR);
             }
             let changed = volume.take_dirty();
             let computed = colours.update(&volume, &changed);
-            let anew = TissueColours::new(&volume, &palette());
+            let anew = SurfaceColours::new(&volume, &palette());
             assert!(!computed.is_empty());
             for brick in 0..volume.bricks().len() {
                 let (first, size) = anew.block(&volume, brick);
                 if anew.is_near_surface(&volume, (first, size)) {
-                    let cells = |all: &TissueColours| -> Vec<[u8; 4]> {
+                    let cells = |all: &SurfaceColours| -> Vec<[u8; 4]> {
                         let grid = Grid { dims: size, spacing: Vec3::ONE, origin: Vec3::ZERO };
                         grid.cells().map(|c| all.texels[all.index([0, 1, 2].map(|a| first[a] + c[a]))]).collect()
                     };
