@@ -232,3 +232,31 @@ impl LathePart {
 fn rounded(mm: f32) -> f32 {
     (mm * 1e4).round() / 1e4
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use typodont_exercise::catalog::InstrumentTable;
+    use typodont_formats::Library;
+
+    #[test]
+    fn every_shipped_instrument_is_drawn_as_wide_as_it_is_felt_and_its_cutting_part_is_told_apart() {
+        // Aim: the picture shows the working end that touched. Method: the widest place of each end of revolution against
+        // the instrument of the simulation, and the surface of the end against the table.
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        for entry in table.entries() {
+            let parts = instrument_parts(entry);
+            assert!(!parts.is_empty(), "{}", entry.id);
+            let InstrumentPart::Lathe(end) = &parts[0] else { continue };
+            let is_cutting = matches!(end.surface, PartSurface::Edge | PartSurface::Flutes | PartSurface::Grit);
+            assert_eq!(is_cutting, entry.cuts, "{}", entry.id);
+            let is_diamond = entry.kind == Some(ToolKind::DiamondBur);
+            assert_eq!(end.surface == PartSurface::Grit, is_diamond, "{}", entry.id);
+            if entry.end.profile().is_some() {
+                let widest = end.outline.iter().map(|[r, _]| *r).fold(0.0, f32::max);
+                let felt = entry.to_instrument().head_radius();
+                assert!((widest - felt).abs() < 0.02, "{}: {widest} and {felt} mm", entry.id);
+            }
+        }
+    }
+}

@@ -120,6 +120,31 @@ impl Window {
         self.click_on(self.harness.get_by_role_and_label(Role::Button, label).rect().center());
     }
 
+    /// Opens a part that is folded, by the name that a screen reader says.
+    pub fn unfold(&mut self, label: &str) {
+        self.click_on(self.harness.get_by_role_and_label(Role::DisclosureTriangle, label).rect().center());
+    }
+
+    /// Chooses a radio button, by the name that a screen reader says.
+    pub fn choose(&mut self, label: &str) {
+        self.click_on(self.harness.get_by_role_and_label(Role::RadioButton, label).rect().center());
+    }
+
+    /// Draws in a picture from one place to another, each as the share of its width and height from the upper left.
+    pub fn draw_in(&mut self, label: &str, [from, to]: [[f32; 2]; 2]) {
+        let rect = self.harness.get_by_role_and_label(Role::Canvas, label).rect();
+        let [from, to] = [from, to].map(|share| {
+            let pixels = (rect.min + Vec2::from(share) * rect.size()) * self.harness.ctx.pixels_per_point();
+            [pixels.x.round() as i32, pixels.y.round() as i32]
+        });
+        self.move_to(from);
+        self.set_button(true);
+        self.proceed();
+        self.move_to(to);
+        self.proceed();
+        self.set_button(false);
+    }
+
     /// Clicks on a place in the points of the present text size.
     fn click_on(&mut self, place: Pos2) {
         let pixels = place * self.harness.ctx.pixels_per_point();

@@ -160,3 +160,29 @@ fn a_code_that_was_cleared_is_not_brought_back_by_undoing() {
     desk.key("ctrl+z");
     assert_eq!(desk.text_of("Participant code"), "");
 }
+
+#[test]
+fn one_stroke_draws_all_channels_that_are_switched_on() {
+    // Aim: the editor begins at y = x with all channels, and a stroke changes the tooth. Method: the names of the drawing say
+    // which channels are drawn; the screen before and after a stroke that lowers all channels but green.
+    let place = folder("transfer");
+    let options = AppOptions { begins_at_once: true, ..exercise_options(&place, "scenarios/12-deep-caries.json") };
+    let Some(mut desk) = Window::open(&place, options) else { return };
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("hand", |_| true);
+    desk.choose("User-defined colours");
+    desk.wait(Duration::from_millis(500));
+    desk.unfold("Colours and opacity");
+    desk.wait(Duration::from_secs(1));
+    desk.click_button("y = x");
+    desk.wait(Duration::from_secs(1));
+    desk.picture("20-straight-line");
+    let before = desk.pixels();
+    desk.click_button("Green");
+    desk.wait(Duration::from_millis(200));
+    desk.draw_in("Curve, all tissues, Red + Blue + Alpha", [[0.01, 0.3], [0.99, 0.3]]);
+    desk.wait(Duration::from_secs(1));
+    desk.picture("21-green");
+    let differing = before.iter().zip(desk.pixels()).filter(|(a, b)| a.abs_diff(*b) > 8).count();
+    assert!(differing > 20_000, "{differing} values of the screen differ");
+}

@@ -16,12 +16,12 @@ pub struct ContactMotion {
     /// Position of the tip at the end of the last span, tooth space, mm.
     last_place: Option<Vec3>,
     /// The last contact of the running span.
-    last_contact: Option<Contact>,
+    last_contact: Option<TissueContact>,
 }
 
 /// Touched tissue and force, N.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Contact {
+pub struct TissueContact {
     pub tissue: Label,
     pub force: f32,
 }
@@ -33,7 +33,7 @@ pub struct ContactTick {
     pub place: Vec3,
     /// Force on the hand without guidance, with or without contact, N, world space.
     pub pressed: Vec3,
-    pub contact: Option<Contact>,
+    pub contact: Option<TissueContact>,
     /// The span that this tick ends, if it ends one.
     pub span: Option<SpanMotion>,
 }
@@ -46,7 +46,7 @@ pub struct SpanMotion {
     /// Mean speed, mm/s.
     pub speed: f64,
     /// The last contact of the span; `None` if there was none or the span before is unknown.
-    pub contact: Option<Contact>,
+    pub contact: Option<TissueContact>,
 }
 
 impl ContactMotion {
@@ -59,7 +59,7 @@ impl ContactMotion {
         // Forces of guidance by the exercise or an instructor are not forces of the trainee.
         let led = step.guidance + step.coupling_force;
         let pressed = if led == Vec3::ZERO { step.force } else { step.force - led };
-        let contact = step.touch.map(|touch| Contact { tissue: touch.label, force: pressed.length() });
+        let contact = step.touch.map(|touch| TissueContact { tissue: touch.label, force: pressed.length() });
         self.last_contact = contact.or(self.last_contact);
         let span = tick.0.is_multiple_of(SPAN).then(|| self.end_span(place));
         ContactTick { place, pressed, contact, span }

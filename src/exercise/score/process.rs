@@ -1,6 +1,6 @@
 //! The process of the work: force, speed and path, tick by tick.
 
-use super::contact_motion::{Contact, ContactMotion, ContactTick, SPAN, SpanMotion};
+use super::contact_motion::{ContactMotion, ContactTick, SPAN, SpanMotion, TissueContact};
 use super::contact_spell::{ContactSpell, ContactSpells};
 use super::limit_monitor::{Exceedance, LimitMonitor};
 use super::line_of_sight::LineOfSight;
@@ -234,7 +234,7 @@ impl ProcessObserver {
         {
             self.stats.led_ticks[stage] += 1;
         }
-        if let Some(Contact { tissue, force }) = contact {
+        if let Some(TissueContact { tissue, force }) = contact {
             self.stats.contact_ticks += 1;
             let reached = PeakValue { value: f64::from(force), at: tick, place, tissue, force };
             self.stats.force.add(reached);
@@ -296,7 +296,7 @@ impl ProcessObserver {
         let SpanMotion { length, speed, contact } = span;
         self.stats.path_mm += length;
         self.now.speed = speed as f32;
-        if let Some(Contact { tissue, force }) = contact {
+        if let Some(TissueContact { tissue, force }) = contact {
             let reached = PeakValue { value: speed, at: tick, place, tissue, force };
             self.stats.speed.add(reached);
             if self.proximity.is_near(place) {
