@@ -245,7 +245,8 @@ fn names_that_lead_nowhere() {
         &[("unknown-zone", "/rubric/items/0/metric")],
     );
     let near = |limit: Value| json!({ "near": [limit] });
-    let limits: [(&str, Value, &[(&str, &str)]); 6] = [
+    type Complaints = &'static [(&'static str, &'static str)];
+    let limits: [(&str, Value, Complaints); 6] = [
         (
             "limit near no zone",
             near(json!({ "place": { "zone": "nerve" }, "force_n": 1.0 })),
