@@ -244,6 +244,8 @@ fn names_that_lead_nowhere() {
         json!("zone_removed_pct(target)"),
         &[("unknown-zone", "/rubric/items/0/metric")],
     );
+    // The limits of an exercise that has none of its own are not held against it.
+    check("firm caries without limits", "/tissues", json!({ "caries": { "cut_force_n": 2.2 } }), &[]);
     let near = |limit: Value| json!({ "near": [limit] });
     type Complaints = &'static [(&'static str, &'static str)];
     let limits: [(&str, Value, Complaints); 6] = [

@@ -1,7 +1,7 @@
 //! Limits of force and speed, with complaints about those that cannot hold.
 
-use super::Resolver;
 use super::file::{LimitPlaceFile, LimitResponseFile, LimitsFile, NearLimitFile, ScenarioFile};
+use super::{ResolveMode, Resolver};
 use crate::catalog::TissueRole;
 use crate::scenario::{ContactLimit, LimitPlace, LimitedQuantity, Zone};
 use typodont_core::touch::CuttingLaw;
@@ -54,13 +54,21 @@ impl Resolver<'_> {
     /// Complains about limits of the force with which nothing that the exercise asks to remove can be cut: whoever works
     /// would be warned all the time. Under the rate law any force cuts.
     fn find_forces_too_low_to_cut(&mut self, written: &ScenarioFile, law: CuttingLaw) {
+        if self.mode == ResolveMode::FromRecording {
+            return;
+        }
         let is_cut = written.stages.iter().any(|stage| stage.cutting) && law == CuttingLaw::Threshold;
         let Some(needed) = self.least_cutting_force(written).filter(|_| is_cut) else { return };
         let limits = &written.limits;
         let near = limits.near.iter().enumerate().filter(|(_, limit)| !self.is_never_cut(&limit.place));
         let near = near.filter_map(|(index, limit)| Some((format!("/limits/near/{index}/force_n"), limit.force_n?)));
-        let anywhere = [("warning_force_n", limits.warning_force_n), ("cry_force_n", limits.cry_force_n)];
-        let anywhere = anywhere.map(|(key, most)| (format!("/limits/{key}"), most));
+        // What the author did not write is not judged: an exercise without limits stays valid.
+        let anywhere = [
+            ("warning_force_n", limits.warning_force_n, ContactLimit::WARNING_FORCE),
+            ("cry_force_n", limits.cry_force_n, ContactLimit::CRY_FORCE),
+        ];
+        let anywhere = anywhere.into_iter().filter(|(_, most, default)| most != default);
+        let anywhere = anywhere.map(|(key, most, _)| (format!("/limits/{key}"), most));
         let too_low: Vec<_> = near.chain(anywhere).filter(|(_, most)| *most < needed).collect();
         for (path, most) in too_low {
             let message = format!("the limit of {most} N is below the {needed} N that cutting needs");
