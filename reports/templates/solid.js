@@ -133,9 +133,13 @@ class Solid {
     return Object.assign(this, { eye, clips, ring, held, byVerdict, byDeviation, patterns });
   }
 
-  /** Takes the shapes of the tray's instruments. */
+  /** Takes the shapes of the tray's instruments; without them the tooth is shown alone. */
   carry(shapes) {
-    this.instruments = new InstrumentMeshes(this.gl, shapes);
+    try {
+      this.instruments = new InstrumentMeshes(this.gl, shapes);
+    } catch (reason) {
+      console.warn(reason);
+    }
     this.useTooth();
   }
 

@@ -41,6 +41,8 @@ pub struct LessonSound {
     speed: f32,
     /// Time since the patient was last in pain, s.
     time_since_pain: f32,
+    /// Tick up to which excesses over limits have been answered; a pause does not bring earlier ones back.
+    pain_noted: Tick,
 }
 
 /// Sound properties of an instrument.
@@ -80,6 +82,7 @@ impl LessonSound {
             last: None,
             speed: 0.0,
             time_since_pain: RELIEF,
+            pain_noted: Tick::ZERO,
         };
         let enamel = scenario.tissues.by_label(anatomy_tissues(&scenario.tissues).enamel);
         for entry in scenario.tissues.entries() {
@@ -96,7 +99,8 @@ impl LessonSound {
     /// exercise as of that tick.
     pub fn update(&mut self, step: &Step, is_running: bool, limits: &LimitMonitor) {
         let Some(&voice) = self.tools.get(step.instrument) else { return };
-        let excess = limits.painful_excess(self.last.map_or(Tick::ZERO, |(tick, _)| Tick(tick)));
+        let excess = limits.painful_excess(self.pain_noted);
+        self.pain_noted = step.tick;
         let seconds = self.update_speed(step);
         let load = self.load(step, voice, is_running);
         self.sender.set_load(&load);
@@ -220,6 +224,32 @@ mod tests {
         assert!(probing.tool == Tool::Hand && !probing.is_running && probing.is_touching);
         let resting = treatment.load(&step(bur, None), treatment.tools[bur], false);
         assert!(!resting.is_running && !resting.is_suction_on);
+    }
+
+    #[test]
+    fn a_pause_brings_no_earlier_pain_back() {
+        // Aim: who goes on after a pause without pressing hears no cry. Method: a press above the limit, a pause, and a light
+        // touch a second later; a cry would begin the time since the last pain again.
+        let text =
+            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.4");
+        let scenario =
+            scenario::resolve(SourceText::new("5-grinding", text), &Library::shipped(), ResolveMode::MakeWorkpiece)
+                .unwrap();
+        let mut limits = LimitMonitor::new(&scenario, &scenario::Workpiece::make(&scenario, 1).unwrap());
+        let mut treatment = LessonSound::new(&scenario, sound_channel().0);
+        let enamel = scenario.tissues.by_name("enamel").unwrap().label();
+        let mut touch = |treatment: &mut LessonSound, tick: u64, force: f32| {
+            let step = Step { tick: Tick(tick), force: Vec3::Y * force, ..step(2, Some((enamel, force))) };
+            limits.observe(&step);
+            treatment.update(&step, false, &limits);
+        };
+        touch(&mut treatment, 100, 4.0);
+        assert_eq!(treatment.time_since_pain, 0.0, "a cry");
+        treatment.silence();
+        for tick in [1100, 2100] {
+            touch(&mut treatment, tick, 0.5);
+        }
+        assert!(treatment.time_since_pain > 0.9, "{}", treatment.time_since_pain);
     }
 
     #[test]

@@ -179,11 +179,18 @@ impl SurfaceColours {
 
     /// Computes the cells of those bricks that are near the surface, and returns these bricks.
     fn compute(&mut self, volume: &Volume, bricks: &[usize]) -> Vec<usize> {
+        /// Number of bricks from which threads are started: a cut changes fewer, in every picture.
+        const MANY: usize = 64;
+        if bricks.is_empty() {
+            return Vec::new();
+        }
         let mixer = Mixer::new(&self.palette);
-        let made = par_map(bricks.len(), |i| {
+        let make = |i: usize| {
             let block = self.block(volume, bricks[i]);
             self.is_near_surface(volume, block).then(|| self.colours_of(volume, &mixer, block))
-        });
+        };
+        let made =
+            if bricks.len() < MANY { (0..bricks.len()).map(make).collect() } else { par_map(bricks.len(), make) };
         let mut computed = Vec::new();
         for (&brick, texels) in bricks.iter().zip(made) {
             let Some(texels) = texels else { continue };

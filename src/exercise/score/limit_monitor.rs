@@ -29,8 +29,8 @@ pub struct Exceedance {
 #[derive(Clone, Debug)]
 pub struct LimitMonitor {
     limits: Vec<ContactLimit>,
-    /// Surroundings of the place of each limit; `None` for a limit that holds anywhere.
-    fields: Vec<Option<ProximityField>>,
+    /// Surroundings of each place that a limit names.
+    fields: Vec<(LimitPlace, ProximityField)>,
     motion: ContactMotion,
     /// All exceedances, in the order in which they began.
     exceedances: Vec<Exceedance>,
@@ -42,16 +42,19 @@ impl LimitMonitor {
     pub fn new(scenario: &Scenario, workpiece: &Workpiece) -> LimitMonitor {
         let initial = &workpiece.volume;
         let within = scenario.measures.pulp_proximity;
-        let field = |limit: &ContactLimit| match limit.place {
-            LimitPlace::Anywhere => None,
-            LimitPlace::Zone(zone) => {
-                Some(ProximityField::around_zone(&scenario.zones[zone], scenario, initial, within))
-            }
-            LimitPlace::Tissue(label) => Some(ProximityField::around_tissue(label, initial, within)),
-        };
+        let mut fields: Vec<(LimitPlace, ProximityField)> = Vec::new();
+        for place in scenario.limits.iter().map(|limit| limit.place) {
+            let field = match place {
+                _ if fields.iter().any(|(known, _)| *known == place) => continue,
+                LimitPlace::Anywhere => continue,
+                LimitPlace::Zone(zone) => ProximityField::around_zone(&scenario.zones[zone], scenario, initial, within),
+                LimitPlace::Tissue(label) => ProximityField::around_tissue(label, initial, within),
+            };
+            fields.push((place, field));
+        }
         LimitMonitor {
             limits: scenario.limits.clone(),
-            fields: scenario.limits.iter().map(field).collect(),
+            fields,
             motion: ContactMotion::new(workpiece.world_from_tooth),
             exceedances: Vec::new(),
             last: vec![None; scenario.limits.len()],
@@ -73,7 +76,7 @@ impl LimitMonitor {
     }
 
     /// Returns the exceedance of which a warning is shown at a tick: of the first limit that warns and was exceeded less
-    /// than [`EXCEEDANCE_GAP_TICKS`] ago.
+    /// than [`EXCEEDANCE_GAP_TICKS`] ago. Others do not interrupt it: a warning that flickers cannot be read.
     pub fn warning(&self, now: Tick) -> Option<Exceedance> {
         let recent = self.latest(|limit| limit.warns);
         recent.into_iter().find(|e| now.0.saturating_sub(e.span[1].0) < EXCEEDANCE_GAP_TICKS)
@@ -106,8 +109,10 @@ impl LimitMonitor {
     }
 
     fn is_at_place(&self, index: usize, seen: &ContactTick, touched: Label) -> bool {
-        let is_touched = self.limits[index].place == LimitPlace::Tissue(touched);
-        self.fields[index].as_ref().is_none_or(|field| is_touched || field.is_near(seen.place))
+        let place = self.limits[index].place;
+        let field = self.fields.iter().find(|(known, _)| *known == place);
+        let is_touched = place == LimitPlace::Tissue(touched);
+        field.is_none_or(|(_, field)| is_touched || field.is_near(seen.place))
     }
 
     fn note(&mut self, limit: usize, tick: Tick, value: f32) {

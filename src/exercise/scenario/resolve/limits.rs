@@ -1,6 +1,6 @@
 //! Limits of force and speed, with complaints about those that cannot hold.
 
-use super::file::{LimitPlaceFile, LimitResponseFile, LimitsFile, NearLimitFile, ScenarioFile};
+use super::file::{LimitPlaceFile, LimitResponseFile, LimitsFile, NearLimitFile, ScenarioFile, ZoneRole};
 use super::{ResolveMode, Resolver};
 use crate::catalog::TissueRole;
 use crate::scenario::{ContactLimit, LimitPlace, LimitedQuantity, Zone};
@@ -60,9 +60,9 @@ impl Resolver<'_> {
         let is_cut = written.stages.iter().any(|stage| stage.cutting) && law == CuttingLaw::Threshold;
         let Some(needed) = self.least_cutting_force(written).filter(|_| is_cut) else { return };
         let limits = &written.limits;
-        let near = limits.near.iter().enumerate().filter(|(_, limit)| !self.is_never_cut(&limit.place));
+        let near = limits.near.iter().enumerate().filter(|(_, limit)| !self.is_never_cut(written, &limit.place));
         let near = near.filter_map(|(index, limit)| Some((format!("/limits/near/{index}/force_n"), limit.force_n?)));
-        // What the author did not write is not judged: an exercise without limits stays valid.
+        // The usual values are not judged: an exercise without limits stays valid.
         let anywhere = [
             ("warning_force_n", limits.warning_force_n, ContactLimit::WARNING_FORCE),
             ("cry_force_n", limits.cry_force_n, ContactLimit::CRY_FORCE),
@@ -91,11 +91,18 @@ impl Resolver<'_> {
         cut.filter_map(|entry| entry.cut_force_n).reduce(f32::min)
     }
 
-    /// True for a tissue that no bur cuts, such as gingiva: its limit may be as low as its author wants.
-    fn is_never_cut(&self, place: &LimitPlaceFile) -> bool {
+    /// True for a place in which nothing is to be cut, such as the pulp, gingiva or a zone to be preserved: its limit may be
+    /// as low as its author wants.
+    fn is_never_cut(&self, written: &ScenarioFile, place: &LimitPlaceFile) -> bool {
+        let is_spared = |role| matches!(role, TissueRole::Vulnerable | TissueRole::Soft | TissueRole::Neighbour);
         match place {
-            LimitPlaceFile::Zone(_) => false,
-            LimitPlaceFile::Tissue(name) => self.tissues.by_name(name).is_none_or(|entry| entry.cut_force_n.is_none()),
+            LimitPlaceFile::Zone(id) => {
+                written.zones.iter().any(|zone| zone.id == *id && zone.role == ZoneRole::NeverRemove)
+            }
+            LimitPlaceFile::Tissue(name) => {
+                let entry = self.tissues.by_name(name);
+                entry.is_none_or(|entry| entry.cut_force_n.is_none() || is_spared(entry.role))
+            }
         }
     }
 }
