@@ -30,7 +30,7 @@ const OWN_WEIGHT: f32 = 0.6;
 const WINDOW: usize = BRICK as usize + 2 * REACH;
 
 /// Colours of decay's border: the white spot of demineralised enamel, which scatters more than sound enamel, and the amber
-/// of firm, discoloured tissue. Chosen by comparison with the photographs of the ICDAS criteria (Pitts, 2004).
+/// of firm, discoloured tissue. Chosen by eye on the fixed scenes; no published source.
 const WHITE_SPOT: Vec3 = Vec3::new(0.975, 0.965, 0.93);
 const AMBER: Vec3 = Vec3::new(0.80, 0.60, 0.33);
 
