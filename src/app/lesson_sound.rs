@@ -230,13 +230,8 @@ mod tests {
     fn a_pause_brings_no_earlier_pain_back() {
         // Aim: who goes on after a pause without pressing hears no cry. Method: a press above the limit, a pause, and a light
         // touch a second later; a cry would begin the time since the last pain again.
-        let text =
-            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.4");
-        let scenario =
-            scenario::resolve(SourceText::new("5-grinding", text), &Library::shipped(), ResolveMode::MakeWorkpiece)
-                .unwrap();
+        let (mut treatment, scenario) = grinding();
         let mut limits = LimitMonitor::new(&scenario, &scenario::Workpiece::make(&scenario, 1).unwrap());
-        let mut treatment = LessonSound::new(&scenario, sound_channel().0);
         let enamel = scenario.tissues.by_name("enamel").unwrap().label();
         let mut touch = |treatment: &mut LessonSound, tick: u64, force: f32| {
             let step = Step { tick: Tick(tick), force: Vec3::Y * force, ..step(2, Some((enamel, force))) };

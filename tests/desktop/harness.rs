@@ -117,17 +117,17 @@ impl Window {
 
     /// Clicks on a button, by the name that a screen reader says.
     pub fn click_button(&mut self, label: &str) {
-        self.click_on(self.harness.get_by_role_and_label(Role::Button, label).rect().center());
+        self.click_on_widget(Role::Button, label);
     }
 
     /// Opens a part that is folded, by the name that a screen reader says.
     pub fn unfold(&mut self, label: &str) {
-        self.click_on(self.harness.get_by_role_and_label(Role::DisclosureTriangle, label).rect().center());
+        self.click_on_widget(Role::DisclosureTriangle, label);
     }
 
     /// Chooses a radio button, by the name that a screen reader says.
     pub fn choose(&mut self, label: &str) {
-        self.click_on(self.harness.get_by_role_and_label(Role::RadioButton, label).rect().center());
+        self.click_on_widget(Role::RadioButton, label);
     }
 
     /// Draws in a picture from one place to another, each as the share of its width and height from the upper left.
@@ -143,6 +143,10 @@ impl Window {
         self.move_to(to);
         self.proceed();
         self.set_button(false);
+    }
+
+    fn click_on_widget(&mut self, role: Role, label: &str) {
+        self.click_on(self.harness.get_by_role_and_label(role, label).rect().center());
     }
 
     /// Clicks on a place in the points of the present text size.

@@ -78,21 +78,21 @@ impl LimitMonitor {
     /// Returns the exceedance of which a warning is shown at a tick: of the first limit that warns and was exceeded less
     /// than [`EXCEEDANCE_GAP_TICKS`] ago. Others do not interrupt it: a warning that flickers cannot be read.
     pub fn warning(&self, now: Tick) -> Option<Exceedance> {
-        let recent = self.latest(|limit| limit.warns);
-        recent.into_iter().find(|e| now.0.saturating_sub(e.span[1].0) < EXCEEDANCE_GAP_TICKS)
+        let mut latest = self.latest(|limit| limit.warns);
+        latest.find(|e| now.0.saturating_sub(e.span[1].0) < EXCEEDANCE_GAP_TICKS)
     }
 
     /// Returns the greatest excess over a limit that causes cries, as a share of that limit, if one was exceeded after a
     /// tick.
     pub fn painful_excess(&self, after: Tick) -> Option<f32> {
-        let recent = self.latest(|limit| limit.cries).into_iter().filter(|e| e.span[1] > after);
+        let recent = self.latest(|limit| limit.cries).filter(|e| e.span[1] > after);
         recent.map(|e| e.peak / self.limits[e.limit].most - 1.0).reduce(f32::max)
     }
 
     /// Returns the latest exceedance of each limit of a kind, in the order of the limits.
-    fn latest(&self, is_asked: impl Fn(&ContactLimit) -> bool) -> Vec<Exceedance> {
-        let asked = self.last.iter().zip(&self.limits).filter(|(_, limit)| is_asked(limit));
-        asked.filter_map(|(last, _)| last.map(|index| self.exceedances[index])).collect()
+    fn latest(&self, is_asked: impl Fn(&ContactLimit) -> bool) -> impl Iterator<Item = Exceedance> {
+        let asked = self.last.iter().zip(&self.limits).filter(move |(_, limit)| is_asked(limit));
+        asked.filter_map(|(last, _)| last.map(|index| self.exceedances[index]))
     }
 
     /// Returns the value of a limit's quantity at a tick if it is above the limit.
