@@ -43,7 +43,8 @@ function fell(voxel) {
 (async () => {
   const args = ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'];
   const browser = await chromium.launch({ executablePath, args });
-  const context = await browser.newContext({ viewport: { width: 1280, height: 1000 }, locale: 'en-GB' });
+  // Drawn in software: with a quarter of the pixels, the same claims take a third of the time.
+  const context = await browser.newContext({ viewport: { width: 1280, height: 1000 }, deviceScaleFactor: 0.5, locale: 'en-GB' });
   const asked = [];
   await context.route(url => url.protocol !== 'file:', route => { asked.push(route.request().url()); route.abort(); });
   const page = await context.newPage();

@@ -387,7 +387,7 @@ fn workers_that_are_killed_score_every_session_once_and_to_the_last_bit() {
     // TYPODONT_RECORDINGS, TYPODONT_SECONDS, TYPODONT_WORKERS and TYPODONT_KILL_MS make it larger.
     let Some(cluster) = school_of(&["station-1"]) else { return };
     let folder = folder("workers");
-    let count = number("TYPODONT_RECORDINGS", 24);
+    let count = number("TYPODONT_RECORDINGS", 12);
     let bundles = recorded(&folder, count);
     let own = folder.join("own");
     enter(&own, "poison", school::session("5-grinding", "berk", 50.0), 3000);
