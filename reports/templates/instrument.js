@@ -60,7 +60,7 @@ in vec3 normal;
 in vec2 seen;
 flat in float kind;
 out vec4 colour;
-const float EDGE = 2.0, FLUTES = 3.0, GRIT = 4.0;
+const float FLUTES = 3.0, GRIT = 4.0;
 vec3 base() {
   if (kind < 0.5) return vec3(0.74, 0.77, 0.81);
   if (kind < 1.5) return vec3(0.47, 0.51, 0.57);

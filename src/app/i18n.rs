@@ -32,7 +32,19 @@ impl Translations {
 
     /// A text with its `{}` replaced.
     pub fn format(&self, key: &str, value: impl ToString) -> String {
-        self.get(key).replacen("{}", &value.to_string(), 1)
+        self.format_all(key, &[&value.to_string()])
+    }
+
+    /// A text with each `{}` replaced by the next value. What stands in a value stays as it is: authors write titles.
+    pub fn format_all(&self, key: &str, values: &[&str]) -> String {
+        let mut pieces = self.get(key).split("{}");
+        let mut text = pieces.next().unwrap_or_default().to_string();
+        let mut values = values.iter().fuse();
+        for piece in pieces {
+            text.push_str(values.next().unwrap_or(&"{}"));
+            text.push_str(piece);
+        }
+        text
     }
 
     /// A text of an exercise in this language; the base text if its author wrote no other.
@@ -95,6 +107,14 @@ mod tests {
     use super::*;
     use regex_lite::Regex;
     use std::collections::BTreeSet;
+
+    #[test]
+    fn a_value_that_looks_like_a_place_for_a_value_stays_as_it_is() {
+        let texts = [("two".to_string(), "Near “{}”. {}".to_string())].into();
+        let words = Translations { code: "en".into(), texts };
+        assert_eq!(words.format_all("two", &["a {} b", "Press less."]), "Near “a {} b”. Press less.");
+        assert_eq!(words.format("two", "pulp"), "Near “pulp”. {}");
+    }
 
     #[test]
     fn every_language_has_every_key_that_the_window_uses_and_no_other() {

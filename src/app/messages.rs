@@ -44,7 +44,7 @@ pub fn limit_text(limit: &ContactLimit, peak: f32, scenario: &Scenario, words: &
         LimitPlace::Tissue(label) => scenario.tissues.by_label(label).map(|entry| entry.title.in_language(&words.code)),
     };
     let advice = match place {
-        Some(place) => words.format("practice.warn_near", place).replacen("{}", advice, 1),
+        Some(place) => words.format_all("practice.warn_near", &[place, advice]),
         None => advice.to_string(),
     };
     // Rounded up, so that a value above its limit is not shown as equal to it.
@@ -53,7 +53,7 @@ pub fn limit_text(limit: &ContactLimit, peak: f32, scenario: &Scenario, words: &
         LimitedQuantity::Speed => (format!("{:.0}", peak.ceil()), "mm/s"),
     };
     let [peak, most] = [peak, most.to_string()].map(|value| format!("{value} {unit}"));
-    format!("{advice}: {}", words.format("practice.warn_values", peak).replacen("{}", &most, 1))
+    format!("{advice}: {}", words.format_all("practice.warn_values", &[&peak, &most]))
 }
 
 /// Text key for inputs after the end of a lesson.

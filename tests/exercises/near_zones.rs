@@ -68,8 +68,7 @@ fn a_measure_near_a_zone_that_is_not_there_is_reported() {
 fn warnings_and_measures_agree_about_every_limit() {
     // Aim: whoever is warned near a zone finds the same value in the result, and nobody is warned of what the result does not
     // have. Method: a hasty session in an exercise with limits near three zones, at one of which nobody was, and anywhere; the
-    // peaks of the exceedances beside the measures, those of the score beside those of a second monitor that sees only the
-    // ticks, and the warnings that this one raises, tick by tick.
+    // peaks that a monitor of its ticks finds beside the measures, and the warnings that it raises, tick by tick.
     let file = exercise("near_limits", None);
     let mut scenario: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
     let near = |zone: &str, response: &str| json!({ "place": { "zone": zone }, "force_n": 1.0, "speed_mm_s": 20, "response": response });
@@ -79,8 +78,17 @@ fn warnings_and_measures_agree_about_every_limit() {
     let made = run_anew(file.to_str().unwrap(), "hasty", &folder("near_limits_out"), &[]);
     let session = session(&made);
     let recording = Recording::read(&made.join("recording.mcap")).unwrap();
-    let scored = score::score(&recording, ReplayCheck::Skip).unwrap();
     let scenario = &recording.scenario;
+    let workpiece = recording.workpiece().unwrap();
+    let mut monitor = LimitMonitor::new(scenario, &workpiece);
+    let (mut raised, mut shown) = (Vec::new(), None);
+    record::replay(&recording, workpiece, ReplayCheck::Skip, |_, step, _, _| {
+        monitor.observe(step);
+        let warning = monitor.warning(step.tick).map(|e| (e.limit, e.span[0]));
+        raised.extend(warning.filter(|_| warning != shown));
+        shown = warning;
+    });
+    let exceedances = monitor.exceedances();
     let mut exceeded = 0;
     for (index, limit) in scenario.limits.iter().enumerate() {
         let name = match limit.quantity {
@@ -93,7 +101,7 @@ fn warnings_and_measures_agree_about_every_limit() {
             LimitPlace::Tissue(_) => unreachable!("the exercise limits no tissue"),
         };
         let measured = metric(&session, &name).unwrap();
-        let peak = scored.exceedances.iter().filter(|e| e.limit == index).map(|e| e.peak).reduce(f32::max);
+        let peak = exceedances.iter().filter(|e| e.limit == index).map(|e| e.peak).reduce(f32::max);
         println!("{name}: {measured}, limit {}, exceeded up to {peak:?}", limit.most);
         match measured > f64::from(limit.most) {
             true => assert!((f64::from(peak.unwrap()) - measured).abs() < 1e-3, "{name}"),
@@ -102,22 +110,12 @@ fn warnings_and_measures_agree_about_every_limit() {
         exceeded += usize::from(peak.is_some());
     }
     assert!(exceeded >= 5 && exceeded < scenario.limits.len(), "{exceeded}");
-    let workpiece = recording.workpiece().unwrap();
-    let mut monitor = LimitMonitor::new(scenario, &workpiece);
-    let (mut raised, mut shown) = (Vec::new(), None);
-    record::replay(&recording, workpiece, ReplayCheck::Skip, |_, step, _, _| {
-        monitor.observe(step);
-        let warning = monitor.warning(step.tick).map(|e| (e.limit, e.span[0]));
-        raised.extend(warning.filter(|_| warning != shown));
-        shown = warning;
-    });
-    assert_eq!(monitor.exceedances(), scored.exceedances);
     // The first limit that warns is the force near the nerve, and nothing hides its warnings.
     let of_first = |all: &[(usize, Tick)]| all.iter().filter(|(limit, _)| *limit == 0).copied().collect::<Vec<_>>();
-    let expected: Vec<_> = scored.exceedances.iter().map(|e| (e.limit, e.span[0])).collect();
+    let expected: Vec<_> = exceedances.iter().map(|e| (e.limit, e.span[0])).collect();
     assert_eq!(of_first(&raised), of_first(&expected));
     let ends = |e: &score::Exceedance| e.span[1].0 + EXCEEDANCE_GAP_TICKS;
-    let of_one = |limit: usize| scored.exceedances.iter().filter(move |e| e.limit == limit).collect::<Vec<_>>();
+    let of_one = |limit: usize| exceedances.iter().filter(move |e| e.limit == limit).collect::<Vec<_>>();
     for limit in 0..scenario.limits.len() {
         assert!(of_one(limit).windows(2).all(|pair| ends(pair[0]) <= pair[1].span[0].0), "two in one pause: {limit}");
     }

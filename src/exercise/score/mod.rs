@@ -59,8 +59,6 @@ pub struct Scored {
     pub hard_presses: Vec<ContactSpell>,
     /// Spells in which a running bur touched soft tissue or an adjacent tooth.
     pub forbidden_contacts: Vec<ContactSpell>,
-    /// Periods in which limits of the exercise were exceeded.
-    pub exceedances: Vec<Exceedance>,
     /// Force, speed and progress over time, sampled for charts.
     pub trace: Trace,
     pub grade: Option<Grade>,
@@ -115,7 +113,7 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
     let process::ProcessStats {
-        removals, trace, led_ticks, hard_presses, forbidden_contacts, exceedances, unseen, ..
+        removals, trace, led_ticks, hard_presses, forbidden_contacts, unseen, ..
     } = seen;
     Scored {
         replay,
@@ -125,7 +123,6 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
         zones: comparison.zones,
         hard_presses,
         forbidden_contacts,
-        exceedances,
         trace,
         grade,
         restoration,

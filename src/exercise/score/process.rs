@@ -2,7 +2,6 @@
 
 use super::contact_motion::{ContactMotion, ContactTick, SPAN, SpanMotion, TissueContact};
 use super::contact_spell::{ContactSpell, ContactSpells};
-use super::limit_monitor::{Exceedance, LimitMonitor};
 use super::line_of_sight::LineOfSight;
 use super::removal_comparison::ProximityField;
 use super::voxel_removals::{VoxelRemoval, VoxelRemovals};
@@ -87,8 +86,6 @@ pub struct ProcessStats {
     pub hard_presses: Vec<ContactSpell>,
     /// Spells in which a running bur touched soft tissue or an adjacent tooth in a cutting stage.
     pub forbidden_contacts: Vec<ContactSpell>,
-    /// Periods in which limits of the exercise were exceeded.
-    pub exceedances: Vec<Exceedance>,
     /// Removals out of the trainee's sight; `None` if the recording has no view.
     pub unseen: Option<UnseenCut>,
 }
@@ -147,7 +144,6 @@ impl Trace {
 pub struct ProcessObserver {
     tooth_from_world: Pose,
     motion: ContactMotion,
-    limits: LimitMonitor,
     roles: [Option<TissueRole>; 256],
     is_rotary: Vec<bool>,
     proximity: ProximityField,
@@ -181,7 +177,6 @@ impl ProcessObserver {
         ProcessObserver {
             tooth_from_world: workpiece.world_from_tooth.inverse(),
             motion: ContactMotion::new(workpiece.world_from_tooth),
-            limits: LimitMonitor::new(scenario, workpiece),
             roles,
             is_rotary: scenario.instruments.iter().map(|i| i.is_bur()).collect(),
             proximity: ProximityField::around_vulnerable(scenario, &workpiece.volume, within),
@@ -204,7 +199,6 @@ impl ProcessObserver {
                 trace: Trace::default(),
                 hard_presses: Vec::new(),
                 forbidden_contacts: Vec::new(),
-                exceedances: Vec::new(),
                 unseen: has_views.then(UnseenCut::default),
             },
             sight: has_views.then(|| LineOfSight::of(workpiece)),
@@ -221,7 +215,6 @@ impl ProcessObserver {
     pub fn observe(&mut self, haptic: &TickRecord, step: &Step, edits: &[Edit], session: &Session) {
         let tick = haptic.tick;
         let ContactTick { place, pressed, contact, span } = self.motion.observe(tick, step);
-        self.limits.observe(step);
         self.stats.ticks = tick.0 + 1;
         let removal = VoxelRemoval { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
         self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
@@ -319,7 +312,6 @@ impl ProcessObserver {
         self.stats.smoothness = log_dimensionless_jerk(&self.contact_runs);
         self.stats.hard_presses = self.hard_presses.finish();
         self.stats.forbidden_contacts = self.forbidden_contacts.finish();
-        self.stats.exceedances = self.limits.exceedances().to_vec();
         self.stats
     }
 }
