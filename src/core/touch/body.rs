@@ -1,12 +1,15 @@
-//! Working ends other than a point or a ball: burs of any profile and voxelised shapes, with their shank.
+//! Working ends other than a point or a ball: burs of any profile and sampled shapes, with their shank.
 //!
-//! Takes profiles or volumes. Gives signed distances of the cutting part, and surface points for contact queries. All
-//! coordinates are in handle space: +z along the shaft toward the hand, the origin at the tip of the device.
+//! Takes profiles, volumes or sampled shapes. Gives signed distances of the cutting part, and surface points for contact
+//! queries. All coordinates are in handle space: +z along the shaft toward the hand, the origin at the tip of the
+//! device.
 
 use super::profile::{Profile, ProfilePoint, ProfileSample};
+use super::sampled_shape::SampledShape;
 use crate::aabb::Aabb;
 use crate::frame::Vec3;
-use crate::volume::{Grid, ISO, Volume, distance, surface};
+use crate::mesh::Mesh;
+use crate::volume::{Volume, surface};
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
@@ -15,7 +18,7 @@ use std::ops::Range;
 pub struct Body {
     head: HeadGeometry,
     /// Makes contact, never cuts.
-    shank: Option<Profile>,
+    shank: Option<ShankGeometry>,
     surface_points: Vec<BodySurfacePoint>,
     chunks: Vec<PointChunk>,
     /// Centre of a sphere around all surface points, handle space.
@@ -27,7 +30,15 @@ pub struct Body {
 #[derive(Clone, Debug, PartialEq)]
 enum HeadGeometry {
     Revolved { profile: Profile, table: ProfileTable },
-    Voxels(HeadSdf),
+    Sampled(SampledShape),
+}
+
+/// Part that makes contact but never cuts.
+#[derive(Clone, Debug, PartialEq)]
+enum ShankGeometry {
+    Revolved(Profile),
+    /// The whole instrument, of which the head is a part.
+    Whole(SampledShape),
 }
 
 /// Neck and shank above the head of a bur.
@@ -119,33 +130,35 @@ impl Body {
             });
         }
         let table = ProfileTable::of(&profile);
-        Body::enclosed(HeadGeometry::Revolved { profile, table }, shank, points)
+        Body::enclosed(HeadGeometry::Revolved { profile, table }, shank.map(ShankGeometry::Revolved), points)
     }
 
     /// Creates a working end from the solid part of a volume, whose coordinates become handle space. The shape may be
     /// concave.
     pub fn of_volume(volume: &Volume) -> Body {
         let mesh = surface::extract(volume);
-        let field = HeadSdf::of(volume);
+        let field = SampledShape::of_volume(volume);
         let area = mesh.triangles.iter().map(|t| {
             let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
             0.5 * (b - a).cross(c - a).length()
         });
         let spacing = (area.sum::<f32>() / TARGET_POINTS).sqrt().max(0.5 * volume.grid().spacing.min_element());
-        let mut points: Vec<BodySurfacePoint> = Vec::new();
-        for (&at, &outward) in mesh.positions.iter().zip(&mesh.normals) {
-            if points.iter().all(|node| node.position.distance_squared(at) > 0.7 * spacing * spacing) {
-                let along = outward.any_orthonormal_vector();
-                points.push(BodySurfacePoint {
-                    position: at,
-                    outward,
-                    along,
-                    half_extent: [0.6 * spacing; 2],
-                    region: BodyRegion::Head,
-                });
-            }
+        let points = spread_over(&mesh, |_| spacing, |_| BodyRegion::Head);
+        Body::enclosed(HeadGeometry::Sampled(field), None, points)
+    }
+
+    /// Creates an instrument of any shape in handle space. `cutting` is the part of it that cuts, if not the whole.
+    pub fn sampled(shape: SampledShape, cutting: Option<SampledShape>) -> Body {
+        let mesh = shape.surface();
+        let spacing = graded_spacing(&mesh, shape.grid().spacing.min_element());
+        let edge = 0.5 * shape.grid().spacing.max_element();
+        let is_beside = |at: Vec3| cutting.as_ref().is_some_and(|part| part.distance(at) > edge);
+        let region = |at: Vec3| if is_beside(at) { BodyRegion::Shank } else { BodyRegion::Head };
+        let points = spread_over(&mesh, spacing, region);
+        match cutting {
+            None => Body::enclosed(HeadGeometry::Sampled(shape), None, points),
+            Some(part) => Body::enclosed(HeadGeometry::Sampled(part), Some(ShankGeometry::Whole(shape)), points),
         }
-        Body::enclosed(HeadGeometry::Voxels(field), None, points)
     }
 
     /// Creates a hand instrument: the solid part of a volume cuts or presses; the shaft on the axis behind it only
@@ -158,15 +171,15 @@ impl Body {
         let spacing = SHANK_SPACING_FACTOR
             * (revolution_area(&shaft) / TARGET_POINTS).sqrt().clamp(POINT_SPACING[0], POINT_SPACING[1]);
         let inside =
-            |at: Vec3| if let HeadGeometry::Voxels(field) = &head { field.distance(at) } else { f32::INFINITY };
+            |at: Vec3| if let HeadGeometry::Sampled(field) = &head { field.distance(at) } else { f32::INFINITY };
         shell.retain(|node| shaft.distance(ProfilePoint::of(node.position)) > -1e-4);
         let mut shaft_points = Vec::new();
         sample_revolution(&shaft, BodyRegion::Shank, spacing, &mut shaft_points);
         shell.extend(shaft_points.into_iter().filter(|node| inside(node.position) > 1e-3));
-        Body::enclosed(head, Some(shaft), shell)
+        Body::enclosed(head, Some(ShankGeometry::Revolved(shaft)), shell)
     }
 
-    fn enclosed(head: HeadGeometry, shank: Option<Profile>, surface_points: Vec<BodySurfacePoint>) -> Body {
+    fn enclosed(head: HeadGeometry, shank: Option<ShankGeometry>, surface_points: Vec<BodySurfacePoint>) -> Body {
         let (centre, bounding_radius) = enclosing_sphere(&surface_points);
         let chunks = surface_points.chunks(CHUNK).enumerate().map(|(index, points)| {
             let (centre, radius) = enclosing_sphere(points);
@@ -192,7 +205,7 @@ impl Body {
 
     /// Signed distance in mm (negative inside) of a point in handle space from the cutting part.
     ///
-    /// Accurate to 1–2 µm within half a millimetre of its surface.
+    /// Accurate to 1–2 µm within half a millimetre of the surface of a bur.
     #[inline]
     pub fn head_distance(&self, point_in_handle: Vec3) -> f32 {
         match &self.head {
@@ -200,7 +213,7 @@ impl Body {
                 let at = ProfilePoint::of(point_in_handle);
                 table.distance(at).unwrap_or_else(|| profile.distance(at))
             }
-            HeadGeometry::Voxels(field) => field.distance(point_in_handle),
+            HeadGeometry::Sampled(field) => field.distance(point_in_handle),
         }
     }
 
@@ -208,8 +221,8 @@ impl Body {
     pub fn head_cylinder(&self) -> (f32, [f32; 2]) {
         match &self.head {
             HeadGeometry::Revolved { profile, .. } => (profile.radius(), profile.span()),
-            HeadGeometry::Voxels(field) => {
-                let Aabb { low, high } = field.grid.extent();
+            HeadGeometry::Sampled(field) => {
+                let Aabb { low, high } = field.grid().extent();
                 let aside = low.abs().max(high.abs());
                 (ProfilePoint::of(aside).r, [low.z, high.z])
             }
@@ -220,20 +233,20 @@ impl Body {
     pub(super) fn face_radius(&self) -> f32 {
         match &self.head {
             HeadGeometry::Revolved { profile, .. } => profile.radius(),
-            HeadGeometry::Voxels(field) => {
+            HeadGeometry::Sampled(field) => {
                 // Narrowest half-width of the grid, less the margin by which the grid exceeds the shape.
-                let Aabb { low, high } = field.grid.extent();
-                let margin = 4.0 * field.grid.spacing.max_element();
+                let Aabb { low, high } = field.grid().extent();
+                let margin = 4.0 * field.grid().spacing.max_element();
                 (high.x.min(high.y).min(-low.x).min(-low.y) - margin).max(0.0)
             }
         }
     }
 
-    /// Greatest distance of the cutting part from the axis, mm; 0 for a voxelised shape.
+    /// Greatest distance of the cutting part from the axis, mm; 0 for a sampled shape.
     pub fn head_radius(&self) -> f32 {
         match &self.head {
             HeadGeometry::Revolved { profile, .. } => profile.radius(),
-            HeadGeometry::Voxels(_) => 0.0,
+            HeadGeometry::Sampled(_) => 0.0,
         }
     }
 
@@ -244,11 +257,48 @@ impl Body {
             (on.lift_beside(point_in_handle), normal.lift_beside(point_in_handle))
         };
         match (region, &self.head, &self.shank) {
-            (BodyRegion::Shank, _, Some(shank)) => on_profile(shank),
+            // The head has no surface of its own where it ends within the whole.
+            (_, _, Some(ShankGeometry::Whole(whole))) => whole.project_to_surface(point_in_handle),
+            (BodyRegion::Shank, _, Some(ShankGeometry::Revolved(shank))) => on_profile(shank),
             (_, HeadGeometry::Revolved { profile, .. }, _) => on_profile(profile),
-            (_, HeadGeometry::Voxels(field), _) => field.project_to_surface(point_in_handle),
+            (_, HeadGeometry::Sampled(field), _) => field.project_to_surface(point_in_handle),
         }
     }
+}
+
+/// Distance from the tip, mm, at which surface points of a sampled shape are twice as far apart as at the tip: what is
+/// far from the tip is met rarely.
+const GRADING: f32 = 4.0;
+
+/// Spacing of surface points by their position, mm, that gives [`TARGET_POINTS`] points on a surface with a given voxel
+/// size.
+fn graded_spacing(mesh: &Mesh, voxel: f32) -> impl Fn(Vec3) -> f32 + use<> {
+    let grade = |at: Vec3| 1.0 + at.length() / GRADING;
+    let patch = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+        0.5 * (b - a).cross(c - a).length() / grade((a + b + c) / 3.0).powi(2)
+    };
+    let at_tip = (mesh.triangles.iter().map(patch).sum::<f32>() / TARGET_POINTS).sqrt();
+    let at_tip = at_tip.max(POINT_SPACING[0]).max(0.5 * voxel);
+    move |at| at_tip * grade(at)
+}
+
+/// Spreads surface points over a fine mesh at a spacing, mm.
+fn spread_over(
+    mesh: &Mesh,
+    spacing: impl Fn(Vec3) -> f32,
+    region: impl Fn(Vec3) -> BodyRegion,
+) -> Vec<BodySurfacePoint> {
+    let mut points: Vec<BodySurfacePoint> = Vec::new();
+    for (&at, &outward) in mesh.positions.iter().zip(&mesh.normals) {
+        let spacing = spacing(at);
+        if points.iter().all(|node| node.position.distance_squared(at) > 0.7 * spacing * spacing) {
+            let along = outward.any_orthonormal_vector();
+            let half_extent = [0.6 * spacing; 2];
+            points.push(BodySurfacePoint { position: at, outward, along, half_extent, region: region(at) });
+        }
+    }
+    points
 }
 
 /// Centre and radius of a sphere around surface points, mm.
@@ -328,47 +378,5 @@ impl ProfileTable {
         let high = self.distances.get(corner + row..corner + row + 2)?;
         let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
         Some(mix(mix(low[0], low[1], fr), mix(high[0], high[1], fr), fz))
-    }
-}
-
-/// Signed distances on a grid in handle space, mm.
-#[derive(Clone, Debug, PartialEq)]
-struct HeadSdf {
-    grid: Grid,
-    distances: Vec<f32>,
-}
-
-impl HeadSdf {
-    fn of(volume: &Volume) -> HeadSdf {
-        let grid = *volume.grid();
-        let far = distance::signed(&grid, |i| volume.densities()[i].is_solid());
-        // Near the surface the density ramp gives the distance more accurately than whole voxels do.
-        let near = |i: usize| (ISO - volume.densities()[i].unit()) * 2.0 * volume.half_band();
-        let is_near_surface = |i: usize| (0.02..0.98).contains(&volume.densities()[i].unit());
-        let distances =
-            far.iter().enumerate().map(|(i, &far)| if is_near_surface(i) { near(i) } else { far }).collect();
-        HeadSdf { grid, distances }
-    }
-
-    /// Trilinear interpolation; beyond the grid the distance to the grid is added.
-    fn distance(&self, point_in_handle: Vec3) -> f32 {
-        let Aabb { low, high } = self.grid.extent();
-        let inside = point_in_handle.clamp(low, high);
-        self.grid.trilinear(&self.distances, inside) + inside.distance(point_in_handle)
-    }
-
-    fn normal(&self, point_in_handle: Vec3) -> Vec3 {
-        let step = 0.5 * self.grid.spacing.min_element();
-        let along =
-            |axis: Vec3| self.distance(point_in_handle + axis * step) - self.distance(point_in_handle - axis * step);
-        Vec3::new(along(Vec3::X), along(Vec3::Y), along(Vec3::Z)).normalize_or_zero()
-    }
-
-    fn project_to_surface(&self, point_in_handle: Vec3) -> (Vec3, Vec3) {
-        let mut on = point_in_handle;
-        for _ in 0..2 {
-            on -= self.normal(on) * self.distance(on);
-        }
-        (on, self.normal(on))
     }
 }

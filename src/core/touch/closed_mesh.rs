@@ -5,6 +5,7 @@
 
 use crate::frame::Vec3;
 use crate::mesh::Mesh;
+use crate::volume::solid::Triangle;
 use parry3d::math::Vector;
 use parry3d::query::{PointQuery, PointQueryWithLocation};
 use parry3d::shape::{TriMesh, TriMeshFlags, TrianglePointLocation};
@@ -197,6 +198,28 @@ impl ClosedMesh {
             _ => return self.normal(triangle),
         };
         from_library(mean).try_normalize().unwrap_or(Vec3::Z)
+    }
+}
+
+/// Triangles, closed or not, that can be asked for their distance from a point.
+pub(super) struct TriangleTree(TriMesh);
+
+impl TriangleTree {
+    /// Arranges triangles for queries; `None` if there are none.
+    pub fn new(triangles: &[Triangle]) -> Option<TriangleTree> {
+        let corners = triangles.iter().flatten().map(|p| to_library(*p)).collect();
+        let indices = (0..triangles.len() as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect();
+        TriMesh::new(corners, indices).ok().map(TriangleTree)
+    }
+
+    /// Index of the triangle nearest to a point.
+    pub fn nearest(&self, point: Vec3) -> u32 {
+        self.0.project_local_point_and_get_location(to_library(point), false).1.0
+    }
+
+    /// Distance of a point from one of the triangles, mm; never negative.
+    pub fn distance_from(&self, triangle: u32, point: Vec3) -> f32 {
+        self.0.triangle(triangle).distance_to_local_point(to_library(point), false).abs()
     }
 }
 

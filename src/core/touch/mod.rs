@@ -7,6 +7,7 @@ mod collision_scene;
 mod sdf_grid;
 mod closed_mesh;
 mod profile;
+mod sampled_shape;
 mod body;
 mod collider_bounds;
 mod instrument;
@@ -38,6 +39,7 @@ pub use material::{Coefficient, Material, MaterialScale, MaterialScales, Materia
 pub use pack::{FillingMaterial, MAX_VOID_SHARE, Packer};
 pub use profile::{EDGE_RADIUS, NearestProfilePoint, Profile, ProfilePoint};
 pub use proxy::{Contact, Proxy};
+pub use sampled_shape::SampledShape;
 pub use sdf_grid::{Compliance, SdfGrid};
 pub use vibration::Vibration;
 pub use wear::WearRate;
