@@ -102,8 +102,8 @@ fn read_exercise(path: &Path) -> Result<CourseExercise, CliError> {
     let written = json::read::<ScenarioFile>(source)?.value;
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("exercise.json").to_string();
     let shipped = Library::shipped();
-    let models = scenario.instruments.iter().filter_map(|instrument| instrument.mesh.clone());
-    let named = written.named_files().into_iter().chain(models).filter(|name| shipped.bytes(name).is_err());
+    let of_instruments = written.instrument_files(&library);
+    let named = written.named_files().into_iter().chain(of_instruments).filter(|name| shipped.bytes(name).is_err());
     let mut files = BTreeMap::from([(name.clone(), scenario.text.as_bytes().to_vec())]);
     for name in named {
         files.insert(name.clone(), library.bytes(&name)?.to_vec());

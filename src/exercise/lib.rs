@@ -20,6 +20,7 @@
 pub mod local_text;
 pub mod catalog;
 pub mod tooth_import;
+mod instrument_import;
 pub mod scenario;
 pub mod session;
 pub mod record;

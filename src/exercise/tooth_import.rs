@@ -124,6 +124,19 @@ pub fn labelled(image: &VoxelImage, spacing: Option<[f32; 3]>, names: &BTreeMap<
     })
 }
 
+/// Returns a label map as the volume of one object, with a smoothed surface: 0 is air, every other number the object.
+///
+/// # Errors
+/// Returns a message if the voxel spacing is unknown, if the image contains numbers that are not whole, or if every voxel
+/// is air.
+pub(crate) fn solid_volume(image: &VoxelImage) -> Result<Volume, String> {
+    let order = AxisOrder::of(&image.geometry);
+    let grid = order.grid(&image.geometry, None).map_err(|_| "the voxel spacing is unknown".to_string())?;
+    let number = number_reader(&image.samples)?;
+    let labels = order.indices().map(|index| if number(index) == 0 { Label::AIR } else { Label(1) }).collect();
+    volume_from_label_map(&grid, labels).ok_or_else(|| "every voxel has the number 0, which is air".to_string())
+}
+
 /// Returns a flag for each voxel, true for voxels with exactly this value, x fastest.
 ///
 /// The file's axes may have either direction, but must be in the order x, y, z, so that the mask has the size of the

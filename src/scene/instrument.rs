@@ -206,6 +206,9 @@ fn end_mesh(end: &WorkingEndEntry) -> Mesh {
         WorkingEndEntry::Spoon(e) => return with_handle(e.visual_mesh(), 0.4, 0.3 * e.diameter_mm),
         WorkingEndEntry::Blade(e) => return with_handle(e.visual_mesh(), 0.45, 0.5 * e.thickness_mm),
         WorkingEndEntry::Bent(wire) => return explorer_mesh(wire),
+        WorkingEndEntry::Shape(shape) => {
+            return shape.sampled.as_ref().map_or_else(Mesh::default, |end| Mesh::clone(&end.surface));
+        }
         _ => {}
     }
     let tip = bur_profile(end);
@@ -230,7 +233,8 @@ fn bur_profile(end: &WorkingEndEntry) -> Vec<[f32; 2]> {
         | WorkingEndEntry::Plugger(_)
         | WorkingEndEntry::Spoon(_)
         | WorkingEndEntry::Cleoid(_)
-        | WorkingEndEntry::Blade(_) => Vec::new(),
+        | WorkingEndEntry::Blade(_)
+        | WorkingEndEntry::Shape(_) => Vec::new(),
         WorkingEndEntry::Ball(e) => arc_profile(0.5 * e.diameter_mm, -1.0, 0.8),
         WorkingEndEntry::Pear(e) => {
             let radius = 0.5 * e.diameter_mm;
@@ -289,7 +293,9 @@ pub(super) fn revolve(outline: &[[f32; 2]]) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use typodont_exercise::catalog::InstrumentTable;
+    use typodont_core::touch::Body;
+    use typodont_core::volume::{Grid, Label, Volume, surface};
+    use typodont_exercise::catalog::{InstrumentTable, LengthUnitEntry, SampledEnd, ShapeEntry};
 
     #[test]
     fn an_instrument_is_drawn_from_its_mesh_or_else_by_its_outline() {
@@ -308,6 +314,28 @@ mod tests {
         let (broken, complaint) = instrument_solid(&entry, &library);
         assert_eq!(broken.mesh, plain.mesh);
         assert!(complaint.unwrap().headline().contains("bur.obj"));
+    }
+
+    #[test]
+    fn a_shape_from_a_file_is_drawn_as_it_is_felt() {
+        // Method: the surface of a ball is the picture; before it has been read there is none.
+        let ball =
+            Volume::from_distance(Grid::centred([40; 3], Vec3::splat(0.1)), 0.15, |p| (p.length() - 1.5, Label(1)));
+        let surface = Arc::new(surface::extract(&ball));
+        let mut shape = ShapeEntry {
+            file: "ball.stl".into(),
+            unit: LengthUnitEntry::Mm,
+            position_mm: Default::default(),
+            orientation_deg: Default::default(),
+            cutting: None,
+            sampled: None,
+        };
+        let mut entry = InstrumentTable::read(&Library::shipped()).unwrap().by_id("explorer").unwrap().clone();
+        entry.end = WorkingEndEntry::Shape(shape.clone());
+        assert!(procedural_instrument(&entry).mesh.is_empty());
+        shape.sampled = Some(Arc::new(SampledEnd { body: Arc::new(Body::of_volume(&ball)), surface: surface.clone() }));
+        entry.end = WorkingEndEntry::Shape(shape);
+        assert_eq!(procedural_instrument(&entry).mesh, surface);
     }
 
     #[test]

@@ -150,6 +150,9 @@ fn cylinder_size(end: &WorkingEndEntry) -> Option<[f32; 2]> {
 /// Distance of the reference point of a working end from a plane that it touches, mm. `normal` out of the plane, handle
 /// space.
 fn support(end: &WorkingEndEntry, normal: Vec3) -> f32 {
+    if let WorkingEndEntry::Shape(shape) = end {
+        return shape.support(normal);
+    }
     match cylinder_size(end) {
         Some([radius, length]) => {
             let aside = normal.truncate().length();

@@ -8,7 +8,6 @@ use js_sys::{JSON, Object, Reflect, Uint8Array};
 use std::path::{Component, Path};
 use typodont_app::GivenExercise;
 use typodont_exercise::scenario::file::ScenarioFile;
-use typodont_exercise::scenario::{ResolveMode, resolve};
 use typodont_formats::diagnostic::{Diagnostic, headlines};
 use typodont_formats::{Library, decode_text, json};
 use typodont_report::bundle::{BundleFolder, SESSION_FILE, sha256};
@@ -59,11 +58,8 @@ impl Launch {
         for name in written.named_files() {
             insert(window, &mut library, &url, &name).await?;
         }
-        // The school's own instruments may name models.
-        if let Ok(scenario) = resolve(source.clone(), &library, ResolveMode::ReadScans) {
-            for name in scenario.instruments.iter().filter_map(|instrument| instrument.mesh.as_deref()) {
-                insert(window, &mut library, &url, name).await?;
-            }
+        for name in written.instrument_files(&library) {
+            insert(window, &mut library, &url, &name).await?;
         }
         Ok(Some(GivenExercise { source, library }))
     }

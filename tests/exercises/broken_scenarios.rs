@@ -633,6 +633,92 @@ fn a_schools_own_instrument_is_a_file() {
     );
 }
 
+/// A box as a binary STL file, without its last `open` triangles; mm.
+fn stl_box(size: f32, open: usize) -> Vec<u8> {
+    let triangles: Vec<_> = box_triangles(size).collect();
+    stl(triangles[..12 - open].iter().copied())
+}
+
+fn box_triangles(size: f32) -> impl Iterator<Item = [[f32; 3]; 3]> {
+    let corner = move |n: usize| [n & 1, n >> 1 & 1, n >> 2 & 1].map(|bit| bit as f32 * size);
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).map(move |t| t.map(corner))
+}
+
+fn stl(triangles: impl ExactSizeIterator<Item = [[f32; 3]; 3]>) -> Vec<u8> {
+    let mut file = vec![0; 80];
+    file.extend((triangles.len() as u32).to_le_bytes());
+    for triangle in triangles {
+        file.extend([0; 12]);
+        file.extend(triangle.iter().flatten().flat_map(|v| v.to_le_bytes()));
+        file.extend([0; 2]);
+    }
+    file
+}
+
+/// Complaints about an instrument whose shape is a file, each as "code: message".
+fn shape_complaints(shape: Value, cuts: bool, files: &[(&str, Vec<u8>)]) -> Vec<String> {
+    let mut library = Library::shipped();
+    let entry = json!({ "id": "own", "title": "Own", "cuts": cuts, "end": { "shape": shape } });
+    library.insert("own.json", json!({ "instruments": [entry] }).to_string().into_bytes());
+    files.iter().for_each(|(name, bytes)| library.insert(*name, bytes.clone()));
+    let mut root: Value = serde_json::from_str(&shipped("5-grinding.json")).unwrap();
+    root["instrument_file"] = json!("own.json");
+    root["instruments"] = json!(["round_bur_014", "own"]);
+    let found = scenario::resolve(SourceText::new("exercise.json", root.to_string()), &library, ResolveMode::ReadScans);
+    let told = |d: &Diagnostic| {
+        assert!(d.path == "/instruments/1" || d.source.name == "own.json", "{d}");
+        format!("{}: {}", d.code, d.message)
+    };
+    found.err().unwrap_or_default().iter().map(told).collect()
+}
+
+#[test]
+fn a_shape_that_cannot_be_used_gets_one_complaint() {
+    let check = |shape: Value, files: &[(&str, Vec<u8>)], expected: &str| {
+        let found = shape_complaints(shape.clone(), true, files);
+        let is_expected = if expected.is_empty() { found.is_empty() } else { found.len() == 1 };
+        assert!(is_expected && found.iter().all(|text| text.contains(expected)), "{shape}: {found:?}");
+    };
+    let file = |bytes: Vec<u8>| [("a.stl", bytes)];
+    let whole = json!({ "file": "a.stl" });
+    check(whole.clone(), &file(stl_box(4.0, 0)), "");
+    check(whole.clone(), &[], "missing-file: \"a.stl\": the file does not exist");
+    check(whole.clone(), &file(Vec::new()), "the file is empty");
+    check(whole.clone(), &file(stl_box(4.0, 1)), "open-mesh: \"a.stl\": the surface has a hole");
+    check(whole.clone(), &file(stl_box(0.004, 0)), "its longest side is 0.004 mm");
+    check(json!({ "file": "a.stl", "unit": "m" }), &file(stl_box(0.004, 0)), "");
+    check(json!({ "file": "a.stl", "unit": "m" }), &file(stl_box(4.0, 0)), "its longest side is 4000 mm");
+    check(json!({ "file": "a.stl", "position_mm": [90, 0, 0] }), &file(stl_box(4.0, 0)), "within 20 mm of its tip");
+    let many = stl((0..300_001).map(|n| [[n as f32, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]));
+    check(whole.clone(), &file(many), "300001 triangles");
+    let dust =
+        (0..501).flat_map(|n| box_triangles(0.1).map(move |t| t.map(|[x, y, z]| [x + 9.0 * n as f32 / 50.0, y, z])));
+    check(whole.clone(), &file(stl(dust.collect::<Vec<_>>().into_iter())), "501 separate pieces");
+    check(json!({ "file": "a.step" }), &[("a.step", vec![1])], "cannot be read from \".step\"");
+    let cutting = |part: Value| json!({ "file": "a.stl", "cutting": part });
+    check(cutting(json!({ "length_mm": 1.0 })), &file(stl_box(4.0, 0)), "");
+    check(cutting(json!({ "length_mm": 90.0 })), &file(stl_box(4.0, 0)), "out-of-range");
+    let raised = json!({ "file": "a.stl", "position_mm": [0, 0, 2], "cutting": { "length_mm": 1.0 } });
+    check(raised, &file(stl_box(4.0, 0)), "within 1 mm of its tip along the shaft");
+    let blade = [("a.stl", stl_box(4.0, 0)), ("b.stl", stl_box(2.0, 0))];
+    check(cutting(json!({ "file": "b.stl" })), &blade, "");
+    check(cutting(json!({ "file": "c.stl" })), &blade, "missing-file: \"c.stl\"");
+    let map = |n: usize, value: u8| {
+        let header = "NRRD0004\ntype: uint8\ndimension: 3\nspacings: 0.3 0.3 0.3\nencoding: raw\n";
+        let voxels = std::iter::repeat_n(value, n * n * n);
+        header.bytes().chain(format!("sizes: {n} {n} {n}\n\n").bytes()).chain(voxels).collect::<Vec<u8>>()
+    };
+    let check_map = |n: usize, value: u8, expected: &str| {
+        check(json!({ "file": "a.nrrd" }), &[("a.nrrd", map(n, value))], expected);
+    };
+    check_map(9, 0, "every voxel has the number 0");
+    check_map(9, 7, "");
+    check_map(260, 7, "17576000 voxels");
+    let idle = shape_complaints(cutting(json!({ "length_mm": 1.0 })), false, &blade);
+    assert!(idle.len() == 1 && idle[0].starts_with("idle-cutting"), "{idle:?}");
+}
+
 #[test]
 fn all_mistakes_are_told_at_once_in_order_of_place() {
     let mut root: Value = serde_json::from_str(&shipped("5-grinding.json")).unwrap();

@@ -13,4 +13,5 @@ mod guidance;
 mod obstacles;
 mod packing;
 mod rate_law;
+mod sampled_ends;
 mod shell;

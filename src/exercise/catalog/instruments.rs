@@ -1,6 +1,7 @@
 //! The table of instruments.
 
 use crate::catalog::hand_instruments::{BladeEntry, CleoidEntry, PluggerEntry, SpoonEntry};
+use crate::catalog::shape::ShapeEntry;
 use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -46,7 +47,7 @@ pub struct InstrumentEntry {
     pub us_number: Option<String>,
     /// Picture of the instrument: an .obj, .glb or .gltf file in millimetres, with the tip of the working end at the
     /// origin and +z along the shaft toward the handle. It is for display only; touch uses `end`. If it is omitted or
-    /// cannot be read, the outline of the working end is drawn.
+    /// cannot be read, the outline of the working end is drawn. An instrument with a `shape` must not have it.
     #[serde(default)]
     #[schemars(length(min = 1, max = 200))]
     pub mesh: Option<String>,
@@ -131,6 +132,8 @@ pub enum WorkingEndEntry {
     Probe(ProbeEntry),
     /// An explorer with a bent fine end.
     Bent(BentExplorerEntry),
+    /// Any shape, from a file: a hook, a ring, a scanned instrument.
+    Shape(ShapeEntry),
 }
 
 /// A periodontal probe.
@@ -366,7 +369,14 @@ impl InstrumentEntry {
         self.cuts && !self.kind.is_some_and(ToolKind::is_blade)
     }
 
-    /// Returns the instrument in the form used by the simulation of touch.
+    /// Returns the names of the files that the entry names: its picture, or its shape.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        let shape = if let WorkingEndEntry::Shape(shape) = &self.end { Some(shape) } else { None };
+        self.mesh.as_deref().into_iter().chain(shape.into_iter().flat_map(ShapeEntry::files))
+    }
+
+    /// Returns the instrument in the form used by the simulation of touch. A shape from a file that has not been read is
+    /// a point.
     pub fn to_instrument(&self) -> Instrument {
         let made = self.with_working_end();
         let made = if self.is_bur() { made } else { made.non_rotary() };
@@ -401,6 +411,10 @@ impl InstrumentEntry {
             WorkingEndEntry::Spoon(e) => Instrument::with_body(e.body(), self.cuts),
             WorkingEndEntry::Cleoid(e) => revolved(e.profile()),
             WorkingEndEntry::Blade(e) => Instrument::with_body(e.body(), self.cuts),
+            WorkingEndEntry::Shape(shape) => {
+                let body = shape.sampled.as_ref().map(|end| WorkingEnd::Body(end.body.clone()));
+                Instrument::new(body.unwrap_or(WorkingEnd::Point), self.cuts)
+            }
         }
     }
 }
@@ -480,7 +494,8 @@ impl WorkingEndEntry {
             | WorkingEndEntry::Blade(_)
             | WorkingEndEntry::Mirror(_)
             | WorkingEndEntry::Probe(_)
-            | WorkingEndEntry::Bent(_) => None,
+            | WorkingEndEntry::Bent(_)
+            | WorkingEndEntry::Shape(_) => None,
         }
     }
 
@@ -490,7 +505,8 @@ impl WorkingEndEntry {
             WorkingEndEntry::Point
             | WorkingEndEntry::Ball(_)
             | WorkingEndEntry::Mirror(_)
-            | WorkingEndEntry::Plugger(_) => return None,
+            | WorkingEndEntry::Plugger(_)
+            | WorkingEndEntry::Shape(_) => return None,
             WorkingEndEntry::Spoon(e) => {
                 (2.0 * e.thickness_mm > e.diameter_mm, "a spoon must be at least twice as wide as it is thick")
             }
@@ -553,7 +569,7 @@ struct EntryRule {
 }
 
 /// Rules for every instrument, in the order of their diagnostics.
-const ENTRY_RULES: [EntryRule; 5] = [
+const ENTRY_RULES: [EntryRule; 7] = [
     EntryRule {
         is_broken_by: |entry| entry.kind.is_some_and(|kind| (kind.is_bur() || kind.is_blade()) != entry.cuts),
         key: "kind",
@@ -590,6 +606,22 @@ const ENTRY_RULES: [EntryRule; 5] = [
         code: "cutting-point",
         message: "\"{id}\" cuts, but its end is a point, a probe or a mirror",
         help: "give the end of a bur with its width, as in { \"ball\": { \"diameter_mm\": … } }",
+    },
+    EntryRule {
+        is_broken_by: |entry| {
+            !entry.cuts && matches!(&entry.end, WorkingEndEntry::Shape(ShapeEntry { cutting: Some(_), .. }))
+        },
+        key: "end",
+        code: "idle-cutting",
+        message: "\"{id}\" has a cutting part, but does not cut",
+        help: "remove \"cutting\" from its shape, or set \"cuts\": true",
+    },
+    EntryRule {
+        is_broken_by: |entry| entry.mesh.is_some() && matches!(entry.end, WorkingEndEntry::Shape(_)),
+        key: "mesh",
+        code: "two-pictures",
+        message: "\"{id}\" has a picture in addition to its shape",
+        help: "remove \"mesh\": an instrument with a shape is drawn as it is felt",
     },
 ];
 

@@ -5,6 +5,7 @@
 mod coefficient;
 mod tissues;
 mod hand_instruments;
+mod shape;
 mod instruments;
 mod touch_factors;
 
@@ -14,5 +15,6 @@ pub use instruments::{
     BentExplorerEntry, InstrumentEntry, InstrumentTable, MirrorEntry, PackingActionEntry, ProbeEntry, ToolKind,
     WorkingEndEntry,
 };
+pub use shape::{CuttingPartEntry, LengthUnitEntry, SampledEnd, ShapeEntry};
 pub use tissues::{PackingEntry, TissueEntry, TissueRole, TissueTable, parse_color};
 pub use touch_factors::{AgeBand, TouchFactorTable};

@@ -10,11 +10,12 @@ pub use super::limits_file::*;
 pub use super::periodontium_file::*;
 
 use super::questionnaire::Questionnaire;
-use crate::catalog::TissueEntry;
+use crate::catalog::{InstrumentTable, TissueEntry};
 use crate::local_text::LocalText;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use typodont_formats::Library;
 
 /// An exercise: its scene, the tasks set to the trainee, and the scoring.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -108,6 +109,18 @@ impl ScenarioFile {
         let scans = self.scene.scans().map(str::to_string);
         let own = self.instrument_file.clone().into_iter().chain(questionnaire);
         own.chain(scans).chain(labels).chain(guidance).collect()
+    }
+
+    /// Names of all files that the instruments of the exercise name: pictures and shapes. `library` contains the tables
+    /// of instruments; a table that cannot be read names none.
+    pub fn instrument_files(&self, library: &Library) -> BTreeSet<String> {
+        let shipped = InstrumentTable::read(library);
+        let table = shipped.and_then(|table| match &self.instrument_file {
+            Some(name) => table.extended_with(library, name),
+            None => Ok(table),
+        });
+        let tray = table.iter().flat_map(|table| self.instruments.iter().filter_map(|id| table.by_id(id)));
+        tray.flat_map(|entry| entry.files().map(str::to_string)).collect()
     }
 }
 

@@ -13,7 +13,10 @@ mod zones;
 
 use super::file::{self, ScenarioFile};
 use super::{MeasureParams, OperatingField, Questionnaire, Scenario};
-use crate::catalog::{AgeBand, InstrumentEntry, InstrumentTable, TissueEntry, TissueTable, TouchFactorTable};
+use crate::catalog::{
+    AgeBand, InstrumentEntry, InstrumentTable, ShapeEntry, TissueEntry, TissueTable, TouchFactorTable, WorkingEndEntry,
+};
+use crate::instrument_import;
 use crate::local_text::LocalTexts;
 use rubric::Capabilities;
 use sha2::{Digest, Sha256};
@@ -265,8 +268,13 @@ impl Resolver<'_> {
                     "",
                 );
             }
-            match self.instruments.by_id(id) {
-                Some(entry) => tray.push(entry.clone()),
+            match self.instruments.by_id(id).cloned() {
+                Some(mut entry) => {
+                    if let WorkingEndEntry::Shape(shape) = &mut entry.end {
+                        self.read_shape(shape, &path);
+                    }
+                    tray.push(entry);
+                }
                 None => {
                     let help = did_you_mean(id, self.instruments.ids());
                     self.complain(&path, "unknown-instrument", format!("there is no instrument \"{id}\""), help);
@@ -274,6 +282,18 @@ impl Resolver<'_> {
             }
         }
         tray
+    }
+
+    /// Reads the shape of an instrument and keeps the bytes of its files for the recording.
+    fn read_shape(&mut self, shape: &mut ShapeEntry, path: &str) {
+        match instrument_import::sampled_end(shape, self.library) {
+            Ok(end) => {
+                shape.sampled = Some(Arc::new(end));
+                let bytes = |name: &str| Some((name.to_string(), self.library.bytes(name).ok()?));
+                self.files.extend(shape.files().filter_map(bytes));
+            }
+            Err(error) => self.complain(path, error.code, error.message, error.help),
+        }
     }
 
     /// Returns the factors by which each instrument of the tray and the patient's age change the tissues' tactile

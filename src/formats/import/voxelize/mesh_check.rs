@@ -51,6 +51,8 @@ pub enum VoxelizeError {
         found: usize,
         named: usize,
     },
+    /// Number of separate pieces, more than an object has.
+    Pieces(usize),
     /// The grid would have too many voxels.
     TooFine {
         spacing: f32,
@@ -132,6 +134,11 @@ impl fmt::Display for VoxelizeError {
                 "its closed shells are nested {found} deep, and {named} tissues were named — name one tissue for \
                  each from outside in, as in --shells enamel,dentine,pulp, or give one file per tissue with --tissue"
             ),
+            VoxelizeError::Pieces(found) => write!(
+                f,
+                "it has {found} separate pieces — keep those of the object (MeshLab: Remove Isolated Pieces) and export it \
+                 again"
+            ),
             VoxelizeError::TooFine { spacing, voxels } => write!(
                 f,
                 "at {spacing} mm it would have {voxels:.0} voxels, too many — use a larger --spacing-mm, or crop one \
@@ -169,17 +176,27 @@ impl CheckedMesh {
     /// Fails when the mesh is empty, not finite, of an implausible size, not closed, or cannot be oriented
     /// consistently.
     pub fn of(triangles: &[Triangle]) -> Result<CheckedMesh, VoxelizeError> {
+        let length = Aabb::around(triangles.iter().flatten().copied()).size().max_element();
+        if triangles.iter().flatten().all(|corner| corner.is_finite())
+            && !triangles.is_empty()
+            && !LENGTH.contains(&length)
+        {
+            return Err(VoxelizeError::Size(length));
+        }
+        CheckedMesh::of_any_size(triangles)
+    }
+
+    /// Does the same for a surface of any size.
+    ///
+    /// # Errors
+    /// Fails when the mesh is empty, not finite, not closed, or cannot be oriented consistently.
+    pub fn of_any_size(triangles: &[Triangle]) -> Result<CheckedMesh, VoxelizeError> {
         if triangles.iter().flatten().any(|corner| !corner.is_finite()) {
             return Err(VoxelizeError::NotFinite);
         }
         let (positions, mut corners) = welded(triangles);
         if corners.is_empty() {
             return Err(VoxelizeError::Empty);
-        }
-        let Aabb { low, high } = Aabb::around(positions.iter().copied());
-        let length = (high - low).max_element();
-        if !LENGTH.contains(&length) {
-            return Err(VoxelizeError::Size(length));
         }
         let edges = half_edges(&corners);
         check_rims(&edges, &positions)?;

@@ -48,6 +48,28 @@ pub struct TissueSurface {
 pub fn tissue_surface(label: Label, triangles: &[Triangle]) -> Result<TissueSurface, VoxelizeError> {
     let mesh = CheckedMesh::of(triangles)?;
     let mut notes = flipped_triangles_note(mesh.flipped_triangles);
+    let (all, flipped_shells) = outward_triangles(&mesh);
+    notes.extend(flipped_shells_note(flipped_shells));
+    Ok(TissueSurface { label, volume_mm3: signed_volume_mm3(&all), triangles: all, notes })
+}
+
+/// Maximum number of pieces of an object: an assembly has dozens, and each is compared with every other.
+const PIECES_MAX: usize = 500;
+
+/// Checks and orients a closed surface of any size: all pieces face outward, those around hollows inward.
+///
+/// # Errors
+/// Fails when the surface is empty, open or inconsistent, or in too many pieces.
+pub fn closed_surface(triangles: &[Triangle]) -> Result<Vec<Triangle>, VoxelizeError> {
+    let mesh = CheckedMesh::of_any_size(triangles)?;
+    match mesh.pieces.len() {
+        found if found > PIECES_MAX => Err(VoxelizeError::Pieces(found)),
+        _ => Ok(outward_triangles(&mesh).0),
+    }
+}
+
+/// Triangles of all pieces, facing outward, and the number of pieces that had to be turned inside out.
+fn outward_triangles(mesh: &CheckedMesh) -> (Vec<Triangle>, usize) {
     let pieces: Vec<Vec<Triangle>> = (0..mesh.pieces.len()).map(|n| mesh.triangles(n)).collect();
     let depths = nesting_depths(&pieces);
     let mut all = Vec::new();
@@ -60,8 +82,7 @@ pub fn tissue_surface(label: Label, triangles: &[Triangle]) -> Result<TissueSurf
         }
         all.extend(piece);
     }
-    notes.extend(flipped_shells_note(flipped));
-    Ok(TissueSurface { label, volume_mm3: signed_volume_mm3(&all), triangles: all, notes })
+    (all, flipped)
 }
 
 /// Assigns the shells of one surface to tissues by nesting depth: the first label is the outermost.
