@@ -15,6 +15,9 @@ const VERTEX_NUMBERS = 7;
 /** Length over which the shaft fades out at its end, mm. */
 const FADE = 6;
 
+/** Height at which a shape ends that does not fade out, mm: above every instrument. */
+const ENDLESS = 1e6;
+
 /** Opacity of what the tooth hides. */
 const HIDDEN = 0.3;
 
@@ -150,6 +153,25 @@ function wireMesh({ surface, rings }) {
   return numbers;
 }
 
+/** Triangles of a surface; a corner's normal is the mean of its triangles' by their areas. */
+function surfaceMesh({ surface, corners, triangles }) {
+  const numbers = [], kind = SURFACES.indexOf(surface), normals = corners.map(() => [0, 0, 0]);
+  for (const triangle of triangles) {
+    const [a, b, c] = triangle.map(n => corners[n]);
+    const normal = cross(added(b, scaled(a, -1)), added(c, scaled(a, -1)));
+    for (const n of triangle) normals[n] = added(normals[n], normal);
+  }
+  const outward = normals.map(normal => (normal.some(v => v !== 0) ? unit(normal) : normal));
+  for (const n of triangles.flat()) numbers.push(...corners[n], ...outward[n], kind);
+  return numbers;
+}
+
+/** Triangles of a part. */
+function partMesh(part) {
+  if (part.outline) return latheMesh(part);
+  return part.rings ? wireMesh(part) : surfaceMesh(part);
+}
+
 /** The instruments of a tray, ready to be drawn. */
 class InstrumentMeshes {
   /** `shapes` are the parts of each instrument; those that were never held have none. */
@@ -169,7 +191,7 @@ class InstrumentMeshes {
 
   mesh(parts) {
     const { gl } = this;
-    const numbers = new Float32Array(parts.flatMap(part => (part.outline ? latheMesh(part) : wireMesh(part))));
+    const numbers = new Float32Array(parts.flatMap(partMesh));
     const vertices = gl.createVertexArray();
     gl.bindVertexArray(vertices);
     gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
@@ -178,7 +200,8 @@ class InstrumentMeshes {
       gl.enableVertexAttribArray(place);
       gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * VERTEX_NUMBERS, 4 * from);
     });
-    let ends = -Infinity;
+    // A shape from a file is drawn to its end; only the shafts that the page adds fade out.
+    let ends = parts.some(part => part.triangles) ? ENDLESS : -Infinity;
     for (let i = 2; i < numbers.length; i += VERTEX_NUMBERS) ends = Math.max(ends, numbers[i]);
     return { vertices, count: numbers.length / VERTEX_NUMBERS, ends };
   }

@@ -1,13 +1,16 @@
 //! Shape of an instrument as a page draws it.
 //!
 //! Takes an entry of the catalogue. Gives few numbers, of which the page's script makes meshes: outlines that are
-//! turned about an axis, and wires. Never used for touch.
+//! turned about an axis, wires, and the simplified surface of a shape from a file. Never used for touch.
 
 use serde::Serialize;
+use std::collections::BTreeMap;
 use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Profile, ProfilePoint, Shank};
 use typodont_exercise::catalog::{
-    BentExplorerEntry, BladeEntry, InstrumentEntry, MirrorEntry, ProbeEntry, SpoonEntry, ToolKind, WorkingEndEntry,
+    BentExplorerEntry, BladeEntry, InstrumentEntry, MirrorEntry, ProbeEntry, SampledEnd, SpoonEntry, ToolKind,
+    WorkingEndEntry,
 };
 
 /// Greatest distance between a profile and its outline, mm. Less than a pixel of a page shows.
@@ -45,6 +48,7 @@ pub enum PartSurface {
 pub enum InstrumentPart {
     Lathe(LathePart),
     Wire(WirePart),
+    Mesh(TriangleMeshPart),
 }
 
 /// An outline turned about the z axis of the part.
@@ -71,6 +75,15 @@ pub struct WirePart {
     pub rings: Vec<[f32; 4]>,
 }
 
+/// Triangles that face outward.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TriangleMeshPart {
+    pub surface: PartSurface,
+    pub corners: Vec<[f32; 3]>,
+    /// Indices into `corners`.
+    pub triangles: Vec<[u32; 3]>,
+}
+
 /// Corners of a round cross-section.
 const ROUND: u8 = 28;
 
@@ -85,6 +98,9 @@ pub fn instrument_parts(entry: &InstrumentEntry) -> Vec<InstrumentPart> {
         WorkingEndEntry::Bent(wire) => explorer_parts(wire),
         WorkingEndEntry::Spoon(spoon) => spoon_parts(spoon),
         WorkingEndEntry::Blade(blade) => blade_parts(blade),
+        WorkingEndEntry::Shape(shape) => {
+            shape.sampled.as_ref().map_or_else(Vec::new, |end| sampled_parts(end, end_surface(entry)))
+        }
         // A straight explorer; every other end has a profile.
         _ => lathes([lathe(PartSurface::Steel, &[[0.0, 0.0], [0.12, 0.6], [0.5, 8.0], [1.0, 14.0], [1.0, 24.0]])]),
     }
@@ -207,6 +223,73 @@ fn blade_parts(blade: &BladeEntry) -> Vec<InstrumentPart> {
     lathes([plate, shaft(0.5 * shank.neck, half.z, &shank)])
 }
 
+/// Maximum number of triangles of a shape in a page: some 100 kB of text.
+const PAGE_TRIANGLES_MAX: usize = 4000;
+
+/// Distance from the cutting part up to which a triangle is drawn as its surface, mm.
+const CUTTING_WITHIN: f32 = 0.1;
+
+/// The surface of a shape from a file, its cutting part and the rest.
+fn sampled_parts(end: &SampledEnd, surface: PartSurface) -> Vec<InstrumentPart> {
+    let (corners, triangles) = simplified(&end.surface);
+    let middle = |t: &[u32; 3]| t.iter().map(|&i| corners[i as usize]).sum::<Vec3>() / 3.0;
+    let (cutting, rest): (Vec<_>, Vec<_>) =
+        triangles.into_iter().partition(|t| end.body.head_distance(middle(t)) < CUTTING_WITHIN);
+    let part = |surface, triangles: Vec<[u32; 3]>| {
+        // Each part holds only the corners that it needs, in the order of their first use.
+        let mut numbers = BTreeMap::new();
+        let mut own = Vec::new();
+        let triangles = triangles.iter().map(|t| {
+            t.map(|corner| {
+                *numbers.entry(corner).or_insert_with(|| {
+                    own.push(corners[corner as usize].to_array().map(rounded));
+                    own.len() as u32 - 1
+                })
+            })
+        });
+        let triangles = triangles.collect();
+        InstrumentPart::Mesh(TriangleMeshPart { surface, triangles, corners: own })
+    };
+    let parts = [(surface, cutting), (PartSurface::Steel, rest)].into_iter();
+    parts.filter(|(_, triangles)| !triangles.is_empty()).map(|(surface, triangles)| part(surface, triangles)).collect()
+}
+
+/// Joins the corners of a mesh in the cells of a lattice, which is made coarser until at most [`PAGE_TRIANGLES_MAX`]
+/// triangles are left; a corner is the mean of those in its cell.
+fn simplified(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    /// Size of the first cells, mm, and the factor from one size to the next.
+    const CELL: f32 = 0.02;
+    const COARSER: f32 = 1.5;
+    let mut cell = CELL;
+    loop {
+        let found = joined(mesh, cell);
+        if found.1.len() <= PAGE_TRIANGLES_MAX {
+            return found;
+        }
+        cell *= COARSER;
+    }
+}
+
+fn joined(mesh: &Mesh, cell: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+    let mut sums: Vec<(Vec3, f32)> = Vec::new();
+    let mut number = |at: Vec3| {
+        let key = (at / cell).floor().to_array().map(|v| v as i32);
+        let number = *numbers.entry(key).or_insert(sums.len() as u32);
+        if number as usize == sums.len() {
+            sums.push((Vec3::ZERO, 0.0));
+        }
+        let (sum, count) = &mut sums[number as usize];
+        *sum += at;
+        *count += 1.0;
+        number
+    };
+    let corners: Vec<u32> = mesh.positions.iter().map(|&at| number(at)).collect();
+    let triangles = mesh.triangles.iter().map(|t| t.map(|i| corners[i as usize]));
+    let triangles = triangles.filter(|[a, b, c]| a != b && b != c && c != a).collect();
+    (sums.into_iter().map(|(sum, count)| sum / count).collect(), triangles)
+}
+
 fn lathe(surface: PartSurface, outline: &[[f32; 2]]) -> LathePart {
     LathePart {
         surface,
@@ -236,6 +319,9 @@ fn rounded(mm: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
+    use typodont_core::touch::{Body, SampledShape};
+    use typodont_core::volume::{Grid, Label, Volume, surface};
     use typodont_exercise::catalog::InstrumentTable;
     use typodont_formats::Library;
 
@@ -256,6 +342,32 @@ mod tests {
                 let widest = end.outline.iter().map(|[r, _]| *r).fold(0.0, f32::max);
                 let felt = entry.to_instrument().head_radius();
                 assert!((widest - felt).abs() < 0.02, "{}: {widest} and {felt} mm", entry.id);
+            }
+        }
+    }
+
+    #[test]
+    fn a_shape_from_a_file_is_drawn_where_it_is_felt() {
+        // Aim: the page's triangles lie on the surface that is felt, few enough for a page, and the cutting part is told
+        // apart. Method: a ball of which the lower part cuts.
+        let ball =
+            Volume::from_distance(Grid::centred([70; 3], Vec3::splat(0.05)), 0.075, |p| (p.length() - 1.5, Label(1)));
+        let mesh = surface::extract(&ball);
+        let triangles: Vec<_> = mesh.triangles.iter().map(|t| t.map(|i| mesh.positions[i as usize])).collect();
+        let shape = SampledShape::of_triangles(*ball.grid(), &triangles).unwrap();
+        let cutting = shape.clone().below(-0.5).cropped(0.4);
+        let body = Arc::new(Body::sampled(shape.clone(), cutting));
+        assert!(mesh.triangles.len() > PAGE_TRIANGLES_MAX);
+        let parts = sampled_parts(&SampledEnd { body, surface: Arc::new(mesh) }, PartSurface::Edge);
+        let meshes: Vec<&TriangleMeshPart> =
+            parts.iter().filter_map(|p| if let InstrumentPart::Mesh(mesh) = p { Some(mesh) } else { None }).collect();
+        assert_eq!([meshes[0].surface, meshes[1].surface], [PartSurface::Edge, PartSurface::Steel]);
+        let count: usize = meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+        assert!((1000..=PAGE_TRIANGLES_MAX).contains(&count), "{count} triangles");
+        for (mesh, side) in meshes.iter().zip([-1.0, 1.0]) {
+            for corner in mesh.corners.iter().map(|&corner| Vec3::from(corner)) {
+                assert!(shape.distance(corner).abs() < 0.02, "{corner}");
+                assert!(side * (corner.z + 0.5) > -0.3, "{:?} at {corner}", mesh.surface);
             }
         }
     }
