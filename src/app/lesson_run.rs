@@ -175,6 +175,10 @@ impl LessonPort {
         let (mut lesson, events) = prepared.begin(device, second)?;
         self.send_events(events);
         lesson.await_movement();
+        if reconnect.is_some() {
+            // The buttons of a mouse have other functions.
+            lesson.use_clutch_button();
+        }
         Ok(RunningLesson { lesson, reconnect, last_attempt: Instant::now() })
     }
 

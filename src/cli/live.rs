@@ -43,6 +43,7 @@ pub fn play(prepared: PreparedSession, hands: Hands) -> Result<RecordedSession, 
     let lines = typed_lines();
     let is_interrupted = interrupt_flag();
     let (mut lesson, events) = prepared.begin(device, second)?;
+    lesson.use_clutch_button();
     print_events(&events, lesson.session());
     let mut last_attempt = Instant::now();
     let mut is_listening = true;

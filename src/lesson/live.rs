@@ -320,9 +320,9 @@ impl LiveSession {
         observer: &mut O,
     ) -> Result<Vec<LiveEvent>, LiveError<O::Error>> {
         let mut events = Vec::new();
-        // Whoever looks around has not begun.
+        // Whoever looks around, and whose hand follows the view, has not begun.
         if self.awaits_movement
-            && !matches!(input, Input::Look(_))
+            && !matches!(input, Input::Look(_) | Input::PlaceHand(_))
             && let Some(servo) = self.servo_mut()
         {
             servo.send(ServoCommand::StopAwaiting);

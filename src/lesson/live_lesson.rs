@@ -26,6 +26,20 @@ pub struct Lesson {
     disk_sync: Option<DiskSync>,
     partial_bundle: PartialBundle,
     templates: Templates,
+    has_second_hand: bool,
+    clutch: ClutchButton,
+}
+
+/// Bit of a device's second button, which is the clutch.
+const CLUTCH_BUTTON: u32 = 1 << 1;
+
+/// State of the clutch.
+#[derive(Clone, Copy, Debug, Default)]
+struct ClutchButton {
+    /// True if the second button of the device is the clutch.
+    has_button: bool,
+    /// True once the session was told that the clutch is pressed, until it was told otherwise.
+    is_pressed: bool,
 }
 
 impl Lesson {
@@ -40,10 +54,14 @@ impl Lesson {
         let limits = LimitMonitor::new(&scenario, &workpiece);
         let mut session = Session::new(scenario, &workpiece);
         let mut observer = RecordingObserver { recorder, edits: Vec::new(), handle_orientation: UPRIGHT, limits };
+        let has_second_hand = second.is_some();
         let (second, assist) = second.map_or((None, None), |hand| (Some(hand.servo_hand), hand.assist));
         let started = LiveSession::begin(&mut session, simulation, device, second, &mut observer);
         let (live, events) = started.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
-        Ok((Lesson { session, live, assist, observer, disk_sync, partial_bundle, templates }, events))
+        let clutch = ClutchButton::default();
+        let lesson =
+            Lesson { session, live, assist, observer, disk_sync, partial_bundle, templates, has_second_hand, clutch };
+        Ok((lesson, events))
     }
 
     /// Returns the events since the last call, in order; [`Lesson::edits`] then holds the edits of that time.
@@ -57,7 +75,26 @@ impl Lesson {
             return Err(LessonError::stopped(&self.partial_bundle, &why));
         }
         let events = self.live.poll(&mut self.session, &mut self.observer);
-        events.map_err(|broken| stopped_error(&self.partial_bundle, &broken))
+        let mut events = events.map_err(|broken| stopped_error(&self.partial_bundle, &broken))?;
+        events.extend(self.update_clutch()?);
+        Ok(events)
+    }
+
+    /// Makes the second button of the device the clutch. With a second hand there is no clutch: the coupling holds in the
+    /// space of both devices.
+    pub fn use_clutch_button(&mut self) {
+        self.clutch.has_button = !self.has_second_hand;
+    }
+
+    /// Tells the session if the clutch is pressed or released since the last call.
+    fn update_clutch(&mut self) -> Result<Vec<LiveEvent>, LessonError> {
+        let ClutchButton { has_button, is_pressed } = self.clutch;
+        let is_down = has_button && self.live.buttons() & CLUTCH_BUTTON != 0;
+        if is_down == is_pressed || self.session.are_stages_over() {
+            return Ok(Vec::new());
+        }
+        self.clutch.is_pressed = is_down;
+        self.submit(&Input::PressClutch(is_down))
     }
 
     /// Next event of a second device that is connected to this machine, in order; `None` if there is none.
@@ -170,7 +207,7 @@ impl Observer for RecordingObserver {
         self.edits.extend_from_slice(edits);
         self.limits.observe(step);
         if reading.pose.is_valid() {
-            self.handle_orientation = reading.pose.orientation;
+            self.handle_orientation = step.handle;
         }
         self.recorder.tick_completed(reading, step, edits)
     }

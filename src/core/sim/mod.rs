@@ -4,16 +4,20 @@
 //! same [`Simulation::step`]; the servo thread of `typodont-devices` calls it at 1 kHz with a real device. A step
 //! never reads a clock, uses unseeded randomness, depends on a scenario, or allocates.
 
+mod hand_mapping;
 mod tooling;
 
+pub use hand_mapping::HandFrame;
+
 use crate::device::{DeviceSpec, Reading, Wrench};
-use crate::frame::{Pose, Vec3};
+use crate::frame::{Pose, Quat, Vec3};
 use crate::tick::Tick;
 use crate::touch::{
     CarvingParameters, Coefficient, CollisionScene, Contact, ContactForce, ContactSpring, FillingMaterial, ForceLimit,
     Gate, Guidance, GuidanceController, Instrument, MaterialScales, Materials, Proxy, SpringLimit, ToolLoad, Vibration,
 };
 use crate::volume::{Edit, Label, Volume};
+use hand_mapping::{FreeHand, HandMapping, TipPath};
 use tooling::Tooling;
 
 /// Initial state and parameters of a simulation.
@@ -57,22 +61,30 @@ pub enum Command {
     SetGuidance { guidance: Option<usize> },
     /// Selects the filling that carriers place, or none.
     SetFilling { label: Option<Label> },
+    /// Moves the space of the hand to a frame. Meanwhile the hand is free; the tip stays if it is at the tooth or touches
+    /// anything, and otherwise keeps its place in the workspace of the device.
+    PlaceHand { frame: HandFrame },
+    /// Presses or releases the clutch: while it is pressed, the hand is free and the tip stays. The second of two short
+    /// presses brings the middle of the device's workspace back to the origin of the world.
+    PressClutch { is_pressed: bool },
 }
 
 /// Result of one tick. Positions, directions and forces are in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Step {
     pub tick: Tick,
-    /// Force to be rendered by the device, N.
+    /// Force on the hand, N; [`Step::wrench`] gives it in the space of the device.
     pub force: Vec3,
-    /// Torque about the tip to be rendered by the device, N·mm.
+    /// Torque on the hand about the tip, N·mm.
     pub torque: Vec3,
     /// Position of the hand, mm; the last valid one if the reading was refused.
     pub hand: Vec3,
     /// Position of the working end, mm, including its penetration into soft tissue.
     pub tip: Vec3,
-    /// Unit vector from the working end along the handle toward the hand.
-    pub shaft: Vec3,
+    /// Orientation of the handle, `world_from_handle`.
+    pub handle: Quat,
+    /// Orientation of the device's space, `world_from_device`; the identity unless the hand was placed otherwise.
+    pub world_from_device: Quat,
     pub touch: Option<Touch>,
     /// True while matter is being cut, even if the cut was too small to change a voxel in this tick.
     pub cutting: bool,
@@ -95,7 +107,8 @@ impl Step {
             torque: Vec3::ZERO,
             hand: hand.position,
             tip: hand.position,
-            shaft: hand.rotate(Vec3::Z),
+            handle: hand.orientation,
+            world_from_device: Quat::IDENTITY,
             touch: None,
             cutting: false,
             removed: 0,
@@ -105,9 +118,19 @@ impl Step {
         }
     }
 
-    /// Force and torque to be sent to the device.
+    /// Unit vector from the working end along the handle toward the hand.
+    pub fn shaft(&self) -> Vec3 {
+        self.handle * Vec3::Z
+    }
+
+    /// Force and torque to be sent to the device, in its own space.
     pub fn wrench(&self) -> Wrench {
-        Wrench { force: self.force, torque: self.torque }
+        let Step { force, torque, world_from_device, .. } = *self;
+        if world_from_device == Quat::IDENTITY {
+            return Wrench { force, torque };
+        }
+        let device_from_world = world_from_device.conjugate();
+        Wrench { force: device_from_world * force, torque: device_from_world * torque }
     }
 }
 
@@ -127,6 +150,11 @@ pub struct Touch {
 /// force fades in again.
 const REENGAGE_DISTANCE: f32 = 2.0;
 const REENGAGE_ANGLE: f32 = 0.2;
+
+/// Distance of the tip from the middle of the tooth's neck up to which it stays where it is while the hand is placed
+/// anew, mm: a crown, its root and a tip that has just left them. A tip that stays displaces the hand within its
+/// workspace by up to twice its distance, so that one farther away turns with the view instead.
+const STAY_DISTANCE: f32 = 15.0;
 
 /// Last valid hand pose and tip position before a run of invalid readings, tooth space.
 #[derive(Clone, Copy, Debug)]
@@ -215,7 +243,10 @@ pub struct Simulation {
     /// Ticks since the hand was released, up to `ramp`.
     ticks_since_release: u32,
     coupling_force: Vec3,
+    hand_mapping: HandMapping,
     hand: Pose,
+    /// Wrench of the last tick, in the space of the device.
+    rendered: Wrench,
     proxy: Proxy,
     contact_spring: ContactSpring,
     tooling: Tooling,
@@ -267,7 +298,9 @@ impl Simulation {
             ramp,
             ticks_since_release: 0,
             coupling_force: Vec3::ZERO,
+            hand_mapping: HandMapping::new(),
             hand: Pose::IDENTITY,
+            rendered: Wrench::ZERO,
             proxy,
             contact_spring: ContactSpring::new(spring),
             tooling: Tooling::new(carving, fillings),
@@ -283,7 +316,23 @@ impl Simulation {
     pub fn step(&mut self, reading: &Reading) -> Step {
         let tick = self.tick;
         self.tick = tick.next();
-        let Some(pose) = self.gate.admit(&reading.pose) else { return self.lose_hand(tick) };
+        let mut step = match self.gate.admit(&reading.pose) {
+            Some(in_device) => self.step_with_hand(tick, &in_device),
+            None => self.lose_hand(tick),
+        };
+        step.world_from_device = self.hand_mapping.frame().orientation;
+        self.rendered = step.wrench();
+        step
+    }
+
+    /// Advances the simulation by one tick with a valid pose of the hand in the space of its device.
+    fn step_with_hand(&mut self, tick: Tick, in_device: &Pose) -> Step {
+        if self.hand_mapping.is_changing()
+            && let Some(free) = self.hand_mapping.advance(in_device)
+        {
+            return self.free_hand(tick, &free);
+        }
+        let pose = self.hand_mapping.world_pose(in_device);
         self.hand = pose;
         let tooth_from_handle = self.tooth_from_world * pose;
         if !self.is_engaged {
@@ -316,8 +365,37 @@ impl Simulation {
         }
     }
 
+    /// Leaves the hand free for a tick in which its mapping changes. The force that it felt before fades out.
+    fn free_hand(&mut self, tick: Tick, free: &FreeHand) -> Step {
+        self.hand = free.world_from_handle;
+        self.set_scale(self.hand_mapping.frame().scale);
+        let world_from_device = self.hand_mapping.frame().orientation;
+        let Wrench { force, torque } = free.wrench;
+        let step = self.release(tick);
+        Step { force: world_from_device * force, torque: world_from_device * torque, ..step }
+    }
+
+    /// Frees the hand until its mapping has changed. From then on the working end continues where it was, if the hand is
+    /// still there, or as soon as the hand is clear of matter.
+    fn disengage(&mut self) {
+        if self.is_engaged {
+            let orientation = (self.tooth_from_world * self.hand).orientation;
+            let tip = self.proxy.tip();
+            self.last_trusted = Some(LastTrusted { hand: Pose { position: tip, orientation }, tip });
+        }
+        self.is_engaged = false;
+    }
+
+    /// Limits all springs so that the device renders them with the same stiffness at a scale as without it: a hand that
+    /// moves the tip by twice its own way would feel twice the stiffness.
+    fn set_scale(&mut self, scale: f32) {
+        self.contact_spring.set_scale(scale);
+        self.guidance.set_scale(scale);
+    }
+
     /// Releases the hand for a tick without a valid reading; remembers the last trusted hand and tip.
     fn lose_hand(&mut self, tick: Tick) -> Step {
+        self.hand_mapping.drop_force();
         if self.is_engaged {
             self.last_trusted = Some(LastTrusted { hand: self.tooth_from_world * self.hand, tip: self.proxy.tip() });
         }
@@ -405,7 +483,7 @@ impl Simulation {
         self.coupling_force = if force.is_finite() { force } else { Vec3::ZERO };
     }
 
-    /// Applies a command before the next tick. Unknown instruments are ignored.
+    /// Applies a command before the next tick. Unknown instruments and frames that are not valid are ignored.
     pub fn apply(&mut self, command: &Command) {
         match *command {
             Command::SelectInstrument { instrument } if instrument < self.instruments.len() => {
@@ -431,6 +509,29 @@ impl Simulation {
             Command::RunBur { running } => self.tooling.bur_runs = running,
             Command::SetGuidance { guidance } => self.guidance.choose(guidance, self.tick),
             Command::SetFilling { label } => self.tooling.select_filling(label),
+            Command::PlaceHand { frame } if frame.is_valid() => self.place_hand(frame),
+            Command::PlaceHand { .. } => {}
+            Command::PressClutch { is_pressed } => self.press_clutch(is_pressed),
+        }
+    }
+
+    fn place_hand(&mut self, frame: HandFrame) {
+        let frame = HandFrame { orientation: frame.orientation.normalize(), ..frame };
+        let tip = self.proxy.tip();
+        let is_at_work =
+            tip.length() < STAY_DISTANCE || self.proxy.contact().is_some() || self.hand_mapping.is_tip_held();
+        let path = if is_at_work { TipPath::Stay(self.world_from_tooth * tip) } else { TipPath::Turn };
+        if self.hand_mapping.place(frame, path, self.rendered) {
+            self.disengage();
+        } else if !self.hand_mapping.is_changing() {
+            self.set_scale(self.hand_mapping.frame().scale);
+        }
+    }
+
+    fn press_clutch(&mut self, is_pressed: bool) {
+        let tip = self.world_from_tooth * self.proxy.tip();
+        if self.hand_mapping.press_clutch(is_pressed, self.tick, tip, self.rendered) {
+            self.disengage();
         }
     }
 
@@ -469,5 +570,97 @@ impl Simulation {
     /// Counts of refused readings and limited forces so far.
     pub fn gate(&self) -> &Gate {
         &self.gate
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::touch::{CuttingLaw, Material, WorkingEnd};
+    use crate::volume::Grid;
+
+    /// A ball above a level wall at z = 0, with forces that fade in over half a second.
+    fn wall() -> Simulation {
+        let hard = Label(1);
+        let grid = Grid::centred([100, 60, 60], Vec3::splat(0.2));
+        let volume = Volume::from_distance(grid, 0.3, |p| (p.z, hard));
+        let material = Material {
+            stiffness: 1.0,
+            damping: 1.0,
+            static_friction: 0.0,
+            dynamic_friction: 0.0,
+            cut_force: None,
+            hardness: None,
+        };
+        Simulation::new(Setup {
+            scene: CollisionScene { volume, colliders: Vec::new() },
+            materials: Materials::new().with(hard, material),
+            material_scales: Vec::new(),
+            instruments: vec![Instrument::new(WorkingEnd::Ball { radius: 0.7 }, false)],
+            carving: CarvingParameters { dwell: 0.3, dwell_share: 0.3, max_feed: 30.0, law: CuttingLaw::Threshold },
+            fillings: Vec::new(),
+            vibration: Vibration::NONE,
+            guidances: Vec::new(),
+            world_from_tooth: Pose::IDENTITY,
+            device: DeviceSpec::phantom_omni(),
+            ramp: RAMP_TICKS,
+        })
+    }
+
+    /// Steps with a hand that moves evenly from one place to another; returns the largest change of the force on the
+    /// device in one tick, N, and the last step.
+    fn go(sim: &mut Simulation, from: Vec3, to: Vec3, ticks: u32) -> (f32, Step) {
+        let (mut worst, mut before, mut last) = (0.0, sim.rendered.force, None);
+        for tick in 1..=ticks {
+            let step = sim.step(&Reading::at(from.lerp(to, tick as f32 / ticks as f32)));
+            let force = step.wrench().force;
+            worst = before.distance(force).max(worst);
+            (before, last) = (force, Some(step));
+        }
+        (worst, last.expect("at least one tick"))
+    }
+
+    #[test]
+    fn a_hand_moves_100_mm_under_the_clutch_without_a_step_of_the_force() {
+        // Aim: the tip stays and nobody feels the clutch. Method: press on a wall, hold the clutch, move the hand by 100 mm,
+        // let go, and press again from there; no tick changes the force on the device by more than 0.05 N.
+        const MOST: f32 = 0.05;
+        let mut sim = wall();
+        let (above, pressed) = (Vec3::Z * 2.0, Vec3::Z * -0.3);
+        let (entry, step) = go(&mut sim, above, pressed, 1_500);
+        assert!(step.force.z > 0.5 && entry < MOST, "{} N, step {entry} N", step.force.z);
+        let tip = step.tip;
+        sim.apply(&Command::PressClutch { is_pressed: true });
+        let far = pressed + Vec3::X * 100.0;
+        let (held, step) = go(&mut sim, pressed, far, 800);
+        assert!(step.tip.distance(tip) < 1e-4 && step.force == Vec3::ZERO, "{} N at {}", step.force, step.tip);
+        sim.apply(&Command::PressClutch { is_pressed: false });
+        let (released, _) = go(&mut sim, far, far, 700);
+        let (again, step) = go(&mut sim, far, far - Vec3::Z * 0.9, 1_000);
+        println!("largest steps: {entry} {held} {released} {again} N");
+        assert!(held < MOST && released < MOST && again < MOST, "{held} {released} {again} N");
+        assert!(step.force.z > 0.5 && step.tip.distance(tip) < 0.1, "{} N at {}", step.force, step.tip);
+    }
+
+    #[test]
+    fn a_placed_hand_feels_the_wall_in_its_own_space() {
+        // Aim: after a turn by a quarter the wall is felt against the movement of the hand, and a lost reading during the
+        // turn ends every force. Method: press along z, turn so that the hand's x is the world's -z, and push along +x.
+        let mut sim = wall();
+        let pressed = Vec3::Z * -0.3;
+        go(&mut sim, Vec3::Z * 2.0, pressed, 1_500);
+        let orientation = Quat::from_rotation_y(core::f32::consts::FRAC_PI_2);
+        sim.apply(&Command::PlaceHand { frame: HandFrame { orientation, scale: 1.0 } });
+        let mut lost = sim.clone();
+        assert!(lost.step(&Reading::at(pressed)).force != Vec3::ZERO);
+        assert_eq!(lost.step(&Reading::ABSENT).force, Vec3::ZERO);
+        assert_eq!(lost.step(&Reading::at(pressed)).force, Vec3::ZERO);
+        let (turning, _) = go(&mut sim, pressed, pressed, 400);
+        let out = pressed - Vec3::X * 2.0;
+        go(&mut sim, pressed, out, 600);
+        let (_, step) = go(&mut sim, out, pressed + Vec3::X * 0.8, 1_500);
+        let felt = step.wrench().force;
+        assert!(turning < 0.05, "{turning} N");
+        assert!(felt.x < -0.3 && felt.y.abs() + felt.z.abs() < 0.05 && step.force.z > 0.3, "{felt} N");
     }
 }

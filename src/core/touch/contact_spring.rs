@@ -20,11 +20,22 @@ pub struct SpringLimit {
     pub resolution: f32,
 }
 
+impl SpringLimit {
+    /// Returns the limits of springs at the tooth for a hand whose way is multiplied by a scale on the way there.
+    pub fn at_scale(&self, scale: f32) -> SpringLimit {
+        SpringLimit {
+            max_stiffness: self.max_stiffness / scale,
+            max_damping: self.max_damping / scale,
+            resolution: self.resolution * scale,
+        }
+    }
+}
+
 /// Ticks over which the velocity of the hand is measured. Fewer are noisy with coarse encoders (0.055 mm in 1 ms
 /// reads as 55 mm/s); more are late: at 8 a free hand of 45 g starts to gain energy.
 const SPEED_TICKS: usize = 5;
 
-/// Depth over which damping fades in, mm: no jolt at first contact. 0.2–0.3 keeps slow contacts passive.
+/// Depth over which damping fades in at scale 1, mm: no jolt at first contact. 0.2–0.3 keeps slow contacts passive.
 const DAMPING_DEPTH: f32 = 0.3;
 
 /// Encoder steps over which the spring fades in, f = k·d·(1 − e^(−d / (10 q))), because an encoder cannot resolve the
@@ -52,7 +63,11 @@ pub struct ContactForce {
 /// State of the contact spring: recent hand positions and the coefficients in effect.
 #[derive(Clone, Debug)]
 pub struct ContactSpring {
+    /// Limits of the device at the present scale of the hand.
     limit: SpringLimit,
+    device_limit: SpringLimit,
+    /// Distance at the tooth per distance of the hand.
+    scale: f32,
     /// Last hand positions, tooth space; the newest at index `newest`.
     hand_history: [Vec3; SPEED_TICKS + 1],
     newest: usize,
@@ -65,11 +80,18 @@ impl ContactSpring {
     pub fn new(limit: SpringLimit) -> ContactSpring {
         ContactSpring {
             limit,
+            device_limit: limit,
+            scale: 1.0,
             hand_history: [Vec3::ZERO; SPEED_TICKS + 1],
             newest: 0,
             filled: 0,
             current_material: None,
         }
+    }
+
+    /// Sets the distance at the tooth per distance of the hand. The hand feels the same stiffness and damping as at 1.
+    pub fn set_scale(&mut self, scale: f32) {
+        (self.limit, self.scale) = (self.device_limit.at_scale(scale), scale);
     }
 
     /// Clears the hand history, after a pause or a jump of the device.
@@ -105,7 +127,7 @@ impl ContactSpring {
         let spring = stiffness * softened;
         let outward = stretch.normalize_or_zero();
         let leaving = self.velocity().dot(outward);
-        let damping = material.damping * self.limit.max_damping * (depth / DAMPING_DEPTH).min(1.0);
+        let damping = material.damping * self.limit.max_damping * (depth / (DAMPING_DEPTH * self.scale)).min(1.0);
         // The contact only pushes; it never pulls on a hand that moves away.
         let force = outward * (spring - damping * leaving).max(0.0);
         ContactForce { force, spring, stiffness }

@@ -98,6 +98,16 @@ pub const SOFT_BORDER: f32 = 0.3;
 /// Minimum distance between consecutive points of a path, mm: an encoder step of a common device.
 pub const POINT_DISTANCE: f32 = 0.05;
 
+impl Guidance {
+    /// Returns the guidance with stiffness and damping limited to what a device renders well.
+    fn limited_to(self, limit: &SpringLimit) -> Guidance {
+        match self {
+            Guidance::Path(fixture) => Guidance::Path(fixture.limited_to(limit)),
+            Guidance::Forces(forces) => Guidance::Forces(forces),
+        }
+    }
+}
+
 impl ForceTable {
     /// Force at a time after the beginning, s; N.
     pub fn at(&self, seconds: f64) -> Vec3 {
@@ -243,7 +253,11 @@ impl Fixture {
 /// Active guidance and its progress.
 #[derive(Clone, Debug)]
 pub struct GuidanceController {
+    /// Guidances with the stiffness and damping that their authors gave them.
+    written: Vec<Guidance>,
+    /// The same, limited to what the device renders well at the present scale of the hand.
     guidances: Vec<Guidance>,
+    limit: SpringLimit,
     wanted: Option<ActiveGuidance>,
     /// Lags behind `wanted`: the guidance in effect fades out before another fades in.
     in_effect: Option<ActiveGuidance>,
@@ -265,18 +279,26 @@ struct ActiveGuidance {
 impl GuidanceController {
     /// Guidances in the order of their indices; none is active.
     pub fn new(guidances: Vec<Guidance>, limit: &SpringLimit) -> GuidanceController {
-        let fitted = guidances.into_iter().map(|guidance| match guidance {
-            Guidance::Path(fixture) => Guidance::Path(fixture.limited_to(limit)),
-            forces => forces,
-        });
+        let fitted = guidances.iter().map(|guidance| guidance.clone().limited_to(limit));
         GuidanceController {
             guidances: fitted.collect(),
+            written: guidances,
+            limit: *limit,
             wanted: None,
             in_effect: None,
             fade_ticks: 0,
             progress: 0.0,
             anchor: None,
             hand: Vec3::ZERO,
+        }
+    }
+
+    /// Sets the distance at the tooth per distance of the hand, which then feels the same stiffness as at 1.
+    pub fn set_scale(&mut self, scale: f32) {
+        let limit = self.limit.at_scale(scale);
+        for (guidance, written) in self.guidances.iter_mut().zip(&self.written) {
+            // Only counts of shared tables change: nothing is allocated or freed.
+            *guidance = written.clone().limited_to(&limit);
         }
     }
 

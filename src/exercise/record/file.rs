@@ -6,15 +6,15 @@ use crate::session::{AnswerValue, ChartInput, EndedBy, Input, MirrorFace, Traine
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use typodont_core::device::DeviceSpec;
-use typodont_core::frame::Vec3;
-use typodont_core::sim::{Command, Simulation};
+use typodont_core::frame::{Quat, Vec3};
+use typodont_core::sim::{Command, HandFrame, Simulation};
 use typodont_core::tick::TICK_S;
 use typodont_core::touch::Coefficient;
 use typodont_core::volume::Label;
 
 /// Version of the recording format. A reader refuses a newer version, and replays an older one as its program did:
 /// version 1 has no torque, no force ramp at the start of contact and no second hand. Version 2 has no draws, no sealed
-/// seeds and no substituted tooth with a number of its own.
+/// seeds, no substituted tooth with a number of its own and no placed hand.
 pub const VERSION: u32 = 3;
 
 /// Name of the metadata record written before the first tick.
@@ -253,6 +253,27 @@ pub enum InputFile {
     Rate { item: String, value: u8 },
     Abort {},
     Look(ViewFile),
+    PlaceHand(HandFrameFile),
+    PressClutch { is_pressed: bool },
+}
+
+/// File form of [`HandFrame`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HandFrameFile {
+    pub world_from_device_xyzw: [f32; 4],
+    pub scale: f32,
+}
+
+impl From<&HandFrame> for HandFrameFile {
+    fn from(frame: &HandFrame) -> HandFrameFile {
+        HandFrameFile { world_from_device_xyzw: frame.orientation.to_array(), scale: frame.scale }
+    }
+}
+
+impl From<&HandFrameFile> for HandFrame {
+    fn from(file: &HandFrameFile) -> HandFrame {
+        HandFrame { orientation: Quat::from_array(file.world_from_device_xyzw), scale: file.scale }
+    }
 }
 
 /// File form of [`TraineeView`].
@@ -334,6 +355,8 @@ impl From<&Input> for InputFile {
             Input::Rate { item, value } => InputFile::Rate { item, value },
             Input::Abort => InputFile::Abort {},
             Input::Look(view) => InputFile::Look(ViewFile::from(&view)),
+            Input::PlaceHand(frame) => InputFile::PlaceHand(HandFrameFile::from(&frame)),
+            Input::PressClutch(is_pressed) => InputFile::PressClutch { is_pressed },
         }
     }
 }
@@ -359,6 +382,8 @@ impl From<InputFile> for Input {
             InputFile::Rate { item, value } => Input::Rate { item, value },
             InputFile::Abort {} => Input::Abort,
             InputFile::Look(view) => Input::Look(TraineeView::from(view)),
+            InputFile::PlaceHand(frame) => Input::PlaceHand(HandFrame::from(&frame)),
+            InputFile::PressClutch { is_pressed } => Input::PressClutch(is_pressed),
         }
     }
 }
@@ -394,6 +419,10 @@ pub enum CommandFile {
     Fill {
         label: Option<u8>,
     },
+    PlaceHand(HandFrameFile),
+    PressClutch {
+        is_pressed: bool,
+    },
 }
 
 impl From<&Command> for CommandFile {
@@ -410,6 +439,8 @@ impl From<&Command> for CommandFile {
             Command::RunBur { running } => CommandFile::RunBur { running },
             Command::SetGuidance { guidance } => CommandFile::Guide { guidance },
             Command::SetFilling { label } => CommandFile::Fill { label: label.map(|l| l.0) },
+            Command::PlaceHand { frame } => CommandFile::PlaceHand(HandFrameFile::from(&frame)),
+            Command::PressClutch { is_pressed } => CommandFile::PressClutch { is_pressed },
         }
     }
 }
@@ -428,6 +459,8 @@ impl From<&CommandFile> for Command {
             CommandFile::RunBur { running } => Command::RunBur { running },
             CommandFile::Guide { guidance } => Command::SetGuidance { guidance },
             CommandFile::Fill { label } => Command::SetFilling { label: label.map(Label) },
+            CommandFile::PlaceHand(ref frame) => Command::PlaceHand { frame: HandFrame::from(frame) },
+            CommandFile::PressClutch { is_pressed } => Command::PressClutch { is_pressed },
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::scenario::{
 use std::sync::Arc;
 use typodont_core::device::DeviceSpec;
 use typodont_core::frame::Pose;
-use typodont_core::sim::{Command, RAMP_TICKS, Setup, Step};
+use typodont_core::sim::{Command, HandFrame, RAMP_TICKS, Setup, Step};
 use typodont_core::tick::Tick;
 use typodont_core::touch::{Coefficient, CollisionScene, CuttingLaw};
 use typodont_core::volume::{Edit, Label, Volume};
@@ -66,6 +66,10 @@ pub enum Input {
     Abort,
     /// Tells from where the person looks. It changes nothing in the simulation.
     Look(TraineeView),
+    /// Places the space in which the hand moves, so that it fits the view.
+    PlaceHand(HandFrame),
+    /// Presses (true) or releases the clutch, with which the hand moves while the tip stays.
+    PressClutch(bool),
 }
 
 /// Finding to be recorded in the periodontal chart.
@@ -500,6 +504,10 @@ impl Session {
                 self.view = Some(*view).filter(TraineeView::is_valid);
                 Vec::new()
             }
+            (Input::PlaceHand(frame), _) => vec![Effect::Command(Command::PlaceHand { frame: *frame })],
+            (Input::PressClutch(is_pressed), _) => {
+                vec![Effect::Command(Command::PressClutch { is_pressed: *is_pressed })]
+            }
             (Input::Rate { item, value }, SessionPhase::Over) => self.rate(item, *value),
             (Input::Rate { .. }, _) => refused(InputError::TooEarly),
             (_, SessionPhase::Waiting | SessionPhase::Over) => refused(InputError::NoStage),
@@ -580,7 +588,7 @@ impl Session {
             return Err(InputError::NoChart);
         };
         let entry = &self.scenario.instruments[step.instrument];
-        let shaft = self.tooth_from_world.rotate(step.shaft);
+        let shaft = self.tooth_from_world.rotate(step.shaft());
         let (probe, radius) = match &entry.end {
             WorkingEndEntry::Probe(probe) => (Some(probe), 0.5 * probe.diameter_mm),
             _ => (None, 0.0),
