@@ -79,7 +79,7 @@ struct MotionTolerance {
 /// Packs the motion of a session; `None` of a session without a tick.
 pub fn pack(recording: &Recording, scored: &Scored) -> Option<PackedMotion> {
     let forces = &scored.trace.forces;
-    let poses = poses(recording, &scored.replay.workpiece.world_from_tooth.inverse());
+    let poses = poses(recording, &scored.trace, &scored.replay.workpiece.world_from_tooth.inverse());
     let FittedMotion { keys, tolerance, packed } = fit(&poses, forces);
     let held = held(recording);
     let shape = |(index, entry)| match held.iter().any(|(_, tool)| usize::from(*tool) == index) {
@@ -129,13 +129,17 @@ fn fit(poses: &[Pose], forces: &[Vec3]) -> FittedMotion {
 ///
 /// The position is that of the working end, which the tooth stops; the orientation is that of the hand, and the last
 /// valid one where the device reported none.
-fn poses(recording: &Recording, tooth_from_world: &Pose) -> Vec<Pose> {
-    let mut orientation = Quat::IDENTITY;
+fn poses(recording: &Recording, trace: &Trace, tooth_from_world: &Pose) -> Vec<Pose> {
+    let mut device_orientations = trace.device_orientations.iter().peekable();
+    let (mut world_from_device, mut in_device) = (Quat::IDENTITY, Quat::IDENTITY);
     let pose = |tick: &TickRecord| {
-        if tick.reading.pose.is_valid() {
-            orientation = tick.reading.pose.orientation.normalize();
+        if let Some((_, orientation)) = device_orientations.next_if(|(from, _)| *from == tick.tick) {
+            world_from_device = *orientation;
         }
-        *tooth_from_world * Pose { position: tick.tip, orientation }
+        if tick.reading.pose.is_valid() {
+            in_device = tick.reading.pose.orientation.normalize();
+        }
+        *tooth_from_world * Pose { position: tick.tip, orientation: world_from_device * in_device }
     };
     recording.ticks.iter().map(pose).collect()
 }
@@ -268,6 +272,7 @@ mod tests {
     use super::*;
     use base64::Engine;
     use std::io::Read;
+    use typodont_core::tick::Tick;
     use typodont_exercise::record::ReplayCheck;
 
     /// Columns of a packed motion, read by the description in `reports/README.md`.
@@ -353,12 +358,27 @@ mod tests {
     }
 
     #[test]
+    fn a_placed_hand_turns_the_instrument_from_its_tick_on() {
+        // Aim: the player shows the instrument as the trainee saw it. Method: a recorded session, and the same as if the
+        // hand had been placed at its tick 100.
+        let (recording, _) = golden("version-3");
+        let turn = Quat::from_rotation_y(1.0);
+        let placed = Trace { device_orientations: vec![(Tick(100), turn)], ..Trace::default() };
+        let [before, after] = [Trace::default(), placed].map(|trace| poses(&recording, &trace, &Pose::IDENTITY));
+        for (tick, (before, after)) in before.iter().zip(&after).enumerate() {
+            let expected = if tick < 100 { before.orientation } else { turn * before.orientation };
+            assert!(after.orientation.angle_between(expected) < 2e-3, "tick {tick}");
+            assert_eq!(after.position, before.position);
+        }
+    }
+
+    #[test]
     fn a_page_holds_every_recorded_pose_within_its_tolerance_in_little_space() {
         // Aim: what is played back is what was seen, with every instrument, and costs less than 0.4 MB a minute. Method:
         // read the packed text by its description and compare every tick of recorded sessions.
         for (recording, scored) in [crate::example(), golden("version-1"), golden("version-2"), golden("version-3")] {
             let motion = pack(&recording, &scored).unwrap();
-            let poses = poses(&recording, &scored.replay.workpiece.world_from_tooth.inverse());
+            let poses = poses(&recording, &scored.trace, &scored.replay.workpiece.world_from_tooth.inverse());
             let [mm, degrees] = read(&motion).worst(&poses);
             let header = &motion.header;
             assert_eq!((header.tolerance_mm, header.tolerance_deg), (0.01, 0.1));

@@ -12,7 +12,7 @@ pub const SCHEMA_NAME: &str = "typodont_msgs/msg/Haptic";
 pub const SCHEMA: &str = "\
 # One tick of the haptic loop. World space: x right, y up, z toward the user; mm, N.
 uint64 tick
-# What the device reported.
+# What the device reported, in its own space; that is world space unless a command has placed the hand.
 float32[3] position_mm
 float32[4] orientation_xyzw
 uint32 buttons

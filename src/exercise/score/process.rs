@@ -11,7 +11,7 @@ use crate::scenario::metric::MetricArgument;
 use crate::scenario::{Limit, Rubric, Scenario, Workpiece, Zone};
 use crate::session::{Input, Session};
 use std::collections::BTreeMap;
-use typodont_core::frame::{Pose, Vec3};
+use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::tick::{TICK_S, Tick};
 use typodont_core::volume::{Edit, Label};
@@ -129,6 +129,9 @@ pub struct Trace {
     /// Mean forces on the instrument, N, tooth space, without those of guidance: one for every
     /// [`Trace::FORCE_TICKS`] ticks.
     pub forces: Vec<Vec3>,
+    /// Orientations of the device's space, `world_from_device`, each with the tick from which it holds; the identity before
+    /// the first.
+    pub device_orientations: Vec<(Tick, Quat)>,
 }
 
 impl Trace {
@@ -138,6 +141,13 @@ impl Trace {
     /// Number of ticks over which a force is averaged: whole periods of a bur's vibration (500 Hz in the thesis), and
     /// shorter than a press of the hand. 10–40 looks alike.
     pub const FORCE_TICKS: u64 = 20;
+
+    fn add_device_orientation(&mut self, tick: Tick, world_from_device: Quat) {
+        let last = self.device_orientations.last().map_or(Quat::IDENTITY, |(_, last)| *last);
+        if world_from_device != last {
+            self.device_orientations.push((tick, world_from_device));
+        }
+    }
 }
 
 /// Collects the process statistics during a replay.
@@ -219,6 +229,7 @@ impl ProcessObserver {
         let removal = VoxelRemoval { at: tick, force: pressed.length(), instrument: step.instrument as u8 };
         self.removal_log.extend(edits.iter().filter(|e| e.removes()).map(|e| (e.index, removal)));
         self.observe_force(tick, pressed);
+        self.stats.trace.add_device_orientation(tick, step.world_from_device);
         self.observe_visibility(tick, edits, session);
         self.stats.drilling_ticks += u64::from(step.cutting);
         self.now.cutting |= step.cutting;
