@@ -1,5 +1,6 @@
 //! A live session on a wire: what the servo did is what a replay does, even when the cable was pulled in the middle.
 
+use crate::haply::Haply;
 use crate::rig::{Misbehaviour, Rig, SharedHand};
 use crate::simulated::Simulated;
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use typodont_core::device::DeviceSpec;
 use typodont_core::frame::Vec3;
-use typodont_core::sim::Simulation;
+use typodont_core::sim::{Command, Simulation, Step};
 use typodont_devices::HandLink;
 use typodont_devices::servo::{SecondHandLink, SecondHandRole, SecondHandServo};
 use typodont_exercise::record::{Recorder, Recording, RecordingEndFile, RecordingHeadFile, ReplayCheck, replay};
@@ -102,6 +103,96 @@ fn a_live_session_holds_when_turned_again() {
         assert_eq!(again.difference, None, "{}", again.difference.as_ref().unwrap());
         assert!(removed > 100, "{removed} voxels fell");
         assert!(!again.outcome.aborted);
+    })
+}
+
+/// A live session, and the hand at its device.
+struct HeldSession {
+    hand: SharedHand,
+    live: LiveSession,
+    session: Session,
+    recorder: Recorder,
+}
+
+impl HeldSession {
+    /// Moves the hand evenly to a place, mm, within a time, s.
+    fn go(&mut self, to: Vec3, seconds: f32) {
+        let (from, start) = (self.hand.goal(), Instant::now());
+        let mut share = 0.0;
+        while share < 1.0 {
+            share = (start.elapsed().as_secs_f32() / seconds).min(1.0);
+            self.hand.reach(from.lerp(to, share));
+            self.live.poll(&mut self.session, &mut self.recorder).unwrap();
+            std::thread::sleep(Duration::from_millis(3));
+        }
+    }
+
+    /// Lowers the hand until the tooth is pressed with 0.4 N; returns the last step.
+    fn press(&mut self) -> Step {
+        let start = Instant::now();
+        while self.latest_step().force.length() < 0.4 {
+            self.go(self.hand.goal() - Vec3::Y * 0.1, 0.05);
+            assert!(start.elapsed() < Duration::from_secs(20), "{:?}", self.latest_step());
+        }
+        self.latest_step()
+    }
+
+    fn submit(&mut self, input: &Input) {
+        self.live.submit(input, &mut self.session, &mut self.recorder).unwrap();
+    }
+
+    fn latest_step(&self) -> Step {
+        *self.live.latest_step().unwrap()
+    }
+}
+
+#[test]
+fn the_clutch_moves_an_arm_by_100_mm_without_a_step_of_its_force() {
+    crate::support::peace::in_real_time(|| {
+        // Aim: the clutch is not felt at an arm, and a recording with it is a proof. Method: the tooth is pressed with an arm
+        // that speaks its service's protocol; the clutch is pressed, the hand moves by 100 mm, and the clutch is released: no
+        // tick of that changes the force by more than 0.05 N. Then the hand presses the same place from where it is.
+        const FORCE_STEP_MAX: f32 = 0.05;
+        let mut rig = Haply::plug_in("values");
+        let hand = rig.hand();
+        hand.reach(Vec3::Y * 8.0);
+        let device = rig.open().unwrap();
+        let Begun { workpiece, file, mut recorder, mut session, simulation } = begun("clutch", device.spec());
+        // On enamel beside the decay.
+        let beside = workpiece.world_from_tooth * workpiece.lesions[0].centre + Vec3::X * 2.5;
+        let (live, _) = LiveSession::begin(&mut session, simulation, device, None, &mut recorder).unwrap();
+        let mut held = HeldSession { hand: hand.clone(), live, session, recorder };
+        // The explorer, which cuts nothing.
+        held.submit(&Input::Take { instrument: 2 });
+        held.go(beside + Vec3::Y * 8.0, 1.0);
+        let pressed = held.press();
+        held.submit(&Input::PressClutch(true));
+        let from = hand.position();
+        held.go(hand.goal() + Vec3::new(60.0, 0.0, 80.0), 1.5);
+        held.go(hand.goal(), 0.5);
+        let free = held.latest_step();
+        assert!(hand.position().distance(from) > 99.0 && free.force == Vec3::ZERO, "{free:?}");
+        assert!(free.tip.distance(pressed.tip) < 0.2, "the tip went from {} to {}", pressed.tip, free.tip);
+        held.submit(&Input::PressClutch(false));
+        held.go(hand.position(), 0.5);
+        let over = held.latest_step().tick;
+        held.go(hand.goal() + Vec3::Y * 2.0, 0.7);
+        let again = held.press();
+        assert!(again.tip.distance(pressed.tip) < 1.0, "{again:?}");
+        held.submit(&Input::Confirm);
+        let HeldSession { live, recorder, .. } = held;
+        let servo = live.end::<Recorder>().unwrap().servo_file();
+        recorder.finish(&RecordingEndFile { reason: "complete".into(), servo }).unwrap();
+        let recording = Recording::read(&file).unwrap();
+        let replayed = replay(&recording, recording.workpiece().unwrap(), ReplayCheck::Full, |_, _, _, _| {});
+        assert_eq!(replayed.difference, None, "{}", replayed.difference.as_ref().unwrap());
+        let is_press = |command: &Option<Command>| *command == Some(Command::PressClutch { is_pressed: true });
+        let press = recording.commands.iter().find(|(_, command)| is_press(command)).unwrap().0;
+        let under_clutch = &recording.ticks[press.0 as usize - 1..over.0 as usize];
+        let steps = under_clutch.windows(2).map(|pair| pair[0].force.distance(pair[1].force));
+        let worst = steps.fold(0.0, f32::max);
+        println!("{} ticks under the clutch; the largest step is {worst} N", under_clutch.len());
+        assert!(under_clutch[0].force.length() > 0.2 && worst < FORCE_STEP_MAX, "{worst} N");
     })
 }
 

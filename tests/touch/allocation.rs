@@ -1,11 +1,12 @@
-//! A step never allocates: not in free space, not in contact, not while cutting, not when a reading is bad.
+//! A step never allocates: not in free space, not in contact, not while cutting, not while the hand is placed anew, not when
+//! a reading is bad.
 
 use crate::support::phantom;
 
 use phantom::*;
 use typodont_core::device::Reading;
 use typodont_core::frame::{Pose, Quat, Vec3};
-use typodont_core::sim::{Command, Simulation};
+use typodont_core::sim::{Command, HandFrame, Simulation};
 use typodont_core::touch::{
     AnchorMode, Body, Coefficient, Collider, ColliderGeometry, EDGE_RADIUS, Fixture, ForceRow, ForceSpace, ForceTable,
     Guidance, Instrument, Polyline, Profile, Shank, WorkingEnd,
@@ -34,6 +35,7 @@ fn a_step_never_allocates() {
     let rows = (0..100).map(|i| ForceRow { time: f64::from(i) * 0.01, force: Vec3::X * (i as f32 * 0.01) }).collect();
     let forces = ForceTable { rows, repeat: true, scale: 1.0, space: ForceSpace::Tooth };
     setup.guidances = vec![Guidance::Path(tube), Guidance::Path(follow), Guidance::Forces(forces)];
+    let frame = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 2.0 };
     let mut sim = Simulation::new(setup);
     let mut cut = 0;
     let mut touched = 0;
@@ -45,6 +47,8 @@ fn a_step_never_allocates() {
                 6_000 => sim.apply(&Command::SetGuidance { guidance: Some(1) }),
                 10_000 => sim.apply(&Command::SetGuidance { guidance: Some(2) }),
                 18_000 => sim.apply(&Command::SetGuidance { guidance: None }),
+                18_500 => sim.apply(&Command::PlaceHand { frame }),
+                19_200 | 19_500 => sim.apply(&Command::PressClutch { is_pressed: tick == 19_200 }),
                 8_000 => sim.apply(&Command::SelectInstrument { instrument: 1 }),
                 12_000 => sim.apply(&Command::SelectInstrument { instrument: 2 }),
                 15_000 => {
