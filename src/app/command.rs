@@ -115,6 +115,8 @@ pub enum PracticeCommand {
         bit: u32,
         is_down: bool,
     },
+    /// Presses the clutch of an arm, with which the hand moves while the instrument stays, or releases it.
+    PressClutch(bool),
     /// Opens the mouth further by this angle, degrees; negative closes it.
     AdjustMouthOpening(f32),
     SetCamera(CameraPreset),

@@ -27,6 +27,8 @@ pub enum LessonCommand {
     /// click does not end the next stage.
     StageInput(usize, Input),
     Pause(bool),
+    /// Presses the clutch of an arm by a key, or releases it.
+    PressClutch(bool),
     /// Finishes the questionnaire, even if statements are not rated.
     FinishQuestionnaire,
 }
@@ -63,6 +65,14 @@ pub struct LessonConfig {
     pub digests: BTreeMap<String, String>,
     /// Called when the window should draw a new frame.
     pub wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl LessonConfig {
+    /// True if the hand can be placed anew for the view: it is an arm's, and not coupled to a second hand, because the
+    /// coupling holds in the space of both devices.
+    pub fn is_hand_placeable(&self) -> bool {
+        matches!(self.input_device, InputDevice::Device(_)) && self.second.is_none()
+    }
 }
 
 /// The trainee's input device.

@@ -282,6 +282,10 @@ impl LessonPort {
                     self.is_paused = is_paused;
                     lesson.set_paused(is_paused);
                 }
+                LessonCommand::PressClutch(is_down) => {
+                    let events = lesson.press_clutch_key(is_down)?;
+                    self.send_events(events);
+                }
                 LessonCommand::FinishQuestionnaire if lesson.session().are_stages_over() => return Ok(true),
                 LessonCommand::FinishQuestionnaire => {}
             }

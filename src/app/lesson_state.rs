@@ -3,6 +3,7 @@
 use crate::answer_draft::parse_draft;
 use crate::completion::CompletionState;
 use crate::controls_progress::{ControlsProgress, LessonProgress};
+use crate::hand_placement::HandPlacement;
 use crate::inline_lesson::InlineLesson;
 use crate::lesson_backend::{LessonBackend, LessonClient, LessonCommand, LessonConfig, LessonEvent};
 use crate::lesson_run::LessonRun;
@@ -15,7 +16,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer, SoundSender};
 use typodont_core::frame::{Pose, Vec3};
-use typodont_core::sim::Command as Tell;
+use typodont_core::sim::{Command as Tell, HandFrame};
 use typodont_core::touch::{Coefficient, Materials};
 use typodont_core::volume::Label;
 use typodont_exercise::scenario::{Scenario, Stage};
@@ -60,6 +61,9 @@ pub struct LessonState {
     /// True while the pointer acts as the device.
     pub is_pointer_captured: bool,
     pub pointer_hand: PointerHand,
+    /// Placement of an arm's hand; `None` if the hand cannot be placed.
+    hand_placement: Option<HandPlacement>,
+    pub is_clutch_pressed: bool,
     /// Actions done in the running stage, for a stage that teaches the controls.
     pub controls: ControlsProgress,
     pub is_confirming_abort: bool,
@@ -111,6 +115,7 @@ impl LessonState {
     ) -> Result<LessonState, String> {
         let scenario = config.scenario.clone();
         let materials = scenario.tissues.materials();
+        let hand_placement = config.is_hand_placeable().then(HandPlacement::default);
         let (sound_sender, sound_receiver) = audio::sound_channel();
         let (client, backend) =
             start_lesson(config, sound_sender).map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
@@ -134,6 +139,8 @@ impl LessonState {
             is_paused: false,
             is_pointer_captured: false,
             pointer_hand: PointerHand::default(),
+            hand_placement,
+            is_clutch_pressed: false,
             controls: ControlsProgress::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
@@ -192,6 +199,34 @@ impl LessonState {
             && self.client.send(LessonCommand::Input(Input::Look(view)))
         {
             self.recorded_view = Some(view);
+        }
+    }
+
+    /// True if an arm's hand can be placed anew, by the view and by the clutch.
+    pub fn has_placeable_hand(&self) -> bool {
+        self.hand_placement.is_some()
+    }
+
+    /// True if an arm's hand is about to be placed anew.
+    pub fn is_hand_placement_pending(&self) -> bool {
+        self.stage.is_some() && self.hand_placement.is_some_and(|placement| placement.is_pending())
+    }
+
+    /// Places the hand of an arm in a frame once that has settled, if a stage runs. For `is_dragging` and `now` see
+    /// [`HandPlacement::is_due`].
+    pub fn place_hand(&mut self, frame: HandFrame, is_dragging: bool, now: f64) {
+        let LessonState { stage: Some(_), hand_placement: Some(placement), client, .. } = self else { return };
+        if placement.is_due(frame, is_dragging, now) && client.send(LessonCommand::Input(Input::PlaceHand(frame))) {
+            placement.placed = frame;
+        }
+    }
+
+    /// Presses the clutch of an arm, if a stage runs, or releases it.
+    pub fn press_clutch(&mut self, is_pressed: bool) {
+        let can_press = self.has_placeable_hand() && self.stage.is_some();
+        if is_pressed != self.is_clutch_pressed && (can_press || !is_pressed) {
+            self.is_clutch_pressed = is_pressed;
+            self.send(LessonCommand::PressClutch(is_pressed));
         }
     }
 
@@ -342,6 +377,7 @@ impl LessonState {
             }
             Effect::StagesOver => {
                 (self.stage, self.are_stages_over) = (None, true);
+                self.is_clutch_pressed = false;
                 self.is_confirming_finish = false;
                 self.ended = Some(Instant::now());
                 self.release_pointer();

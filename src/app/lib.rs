@@ -39,6 +39,7 @@ mod supervisor_code;
 mod lesson_state;
 mod lesson_scene;
 mod pointer_hand;
+mod hand_placement;
 mod lesson_sound;
 mod messages;
 mod transfer_function_draft;

@@ -5,6 +5,7 @@ use crate::platform;
 use crate::user_folder::UserFolder;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use typodont_core::sim::HandFrame;
 use typodont_render::{Stereo, StereoLayout};
 
 /// Default distance between the eyes for a mouth on a screen, mm: a tenth of the natural distance, because the scene is
@@ -24,6 +25,10 @@ pub struct Settings {
     pub language: String,
     /// Input device: `mouse`, or a device as in `--device`.
     pub device: String,
+    /// True if the hand of an arm follows the view.
+    pub hand_follows_view: bool,
+    /// Distance at the tooth per distance of an arm's hand.
+    pub hand_scale: f32,
     pub stereo: StereoMode,
     pub eye_distance_mm: f32,
     /// True to smooth edges; without a value edges are smoothed if a graphics processor draws.
@@ -59,6 +64,8 @@ impl Default for Settings {
         Settings {
             language: crate::i18n::system_language(),
             device: "mouse".into(),
+            hand_follows_view: true,
+            hand_scale: 1.0,
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,
             smooth_edges: None,
@@ -104,6 +111,8 @@ impl Settings {
 
     /// Limits values, which may have been edited in the file, to their valid ranges.
     fn in_range(mut self) -> Settings {
+        let [least, most] = HandFrame::SCALES;
+        self.hand_scale = self.hand_scale.clamp(least, most);
         self.eye_distance_mm = self.eye_distance_mm.clamp(0.0, 80.0);
         self.volume = self.volume.clamp(0.0, 1.0);
         self.font_size = self.font_size.clamp(*FONT_SIZES.start(), *FONT_SIZES.end());

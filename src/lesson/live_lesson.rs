@@ -27,17 +27,18 @@ pub struct Lesson {
     partial_bundle: PartialBundle,
     templates: Templates,
     has_second_hand: bool,
-    clutch: ClutchButton,
+    clutch: ClutchControls,
 }
 
 /// Bit of a device's second button, which is the clutch.
 const CLUTCH_BUTTON: u32 = 1 << 1;
 
-/// State of the clutch.
+/// State of the button and of the key that are the clutch: it is pressed while one of them is.
 #[derive(Clone, Copy, Debug, Default)]
-struct ClutchButton {
+struct ClutchControls {
     /// True if the second button of the device is the clutch.
     has_button: bool,
+    is_key_down: bool,
     /// True once the session was told that the clutch is pressed, until it was told otherwise.
     is_pressed: bool,
 }
@@ -58,7 +59,7 @@ impl Lesson {
         let (second, assist) = second.map_or((None, None), |hand| (Some(hand.servo_hand), hand.assist));
         let started = LiveSession::begin(&mut session, simulation, device, second, &mut observer);
         let (live, events) = started.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
-        let clutch = ClutchButton::default();
+        let clutch = ClutchControls::default();
         let lesson =
             Lesson { session, live, assist, observer, disk_sync, partial_bundle, templates, has_second_hand, clutch };
         Ok((lesson, events))
@@ -86,10 +87,20 @@ impl Lesson {
         self.clutch.has_button = !self.has_second_hand;
     }
 
+    /// Presses or releases the clutch by a key, unless there is a second hand.
+    ///
+    /// # Errors
+    ///
+    /// [`LessonError::Stopped`] if the recording cannot be written.
+    pub fn press_clutch_key(&mut self, is_down: bool) -> Result<Vec<LiveEvent>, LessonError> {
+        self.clutch.is_key_down = is_down && !self.has_second_hand;
+        self.update_clutch()
+    }
+
     /// Tells the session if the clutch is pressed or released since the last call.
     fn update_clutch(&mut self) -> Result<Vec<LiveEvent>, LessonError> {
-        let ClutchButton { has_button, is_pressed } = self.clutch;
-        let is_down = has_button && self.live.buttons() & CLUTCH_BUTTON != 0;
+        let ClutchControls { has_button, is_key_down, is_pressed } = self.clutch;
+        let is_down = is_key_down || (has_button && self.live.buttons() & CLUTCH_BUTTON != 0);
         if is_down == is_pressed || self.session.are_stages_over() {
             return Ok(Vec::new());
         }

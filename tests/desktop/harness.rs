@@ -43,6 +43,12 @@ fn screen() -> Vec2 {
     Vec2::from(SCREEN_SIZE.map(|pixels| pixels as f32))
 }
 
+/// The press or the release of a key, without others.
+fn key_event(key: &str, pressed: bool) -> Event {
+    let key = Key::from_name(key).unwrap_or_else(|| panic!("no key {key}"));
+    Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: Modifiers::NONE }
+}
+
 /// Folder of the user's own files, for a window whose home is in `place`.
 pub fn user_folder(place: &Path) -> PathBuf {
     place.join("home/config/typodont")
@@ -128,6 +134,26 @@ impl Window {
     /// Chooses a radio button, by the name that a screen reader says.
     pub fn choose(&mut self, label: &str) {
         self.click_on_widget(Role::RadioButton, label);
+    }
+
+    /// Chooses an entry of a list that opens, by the names that a screen reader says.
+    pub fn choose_from(&mut self, list: &str, entry: &str) {
+        self.click_on_widget(Role::ComboBox, list);
+        self.turn();
+        self.click_on_widget(Role::Button, entry);
+    }
+
+    /// Presses a key, or releases it.
+    pub fn set_key(&mut self, key: &str, pressed: bool) {
+        self.send(key_event(key, pressed));
+    }
+
+    /// Presses a key twice in a row.
+    pub fn press_twice(&mut self, key: &str) {
+        for pressed in [true, false, true, false] {
+            self.harness.event(key_event(key, pressed));
+        }
+        self.frame();
     }
 
     /// Draws in a picture from one place to another, each as the share of its width and height from the upper left.

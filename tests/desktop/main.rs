@@ -2,6 +2,7 @@
 
 #[path = "../support/mod.rs"]
 mod support;
+mod arm_window;
 mod author_window;
 mod harness;
 mod lesson_window;

@@ -412,6 +412,7 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SetPressure(_) | PracticeCommand::SetDeviceButton { .. } if !lesson.is_pointer_captured => {}
         PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
+        PracticeCommand::PressClutch(is_pressed) => lesson.press_clutch(is_pressed),
         PracticeCommand::AdjustMouthOpening(by) => {
             if let Some(scene) = &mut lesson.scene {
                 scene.open_mouth(by);

@@ -3,6 +3,7 @@
 use super::{App, CloseState};
 use crate::AppOptions;
 use crate::completion::{Completion, CompletionProgress};
+use crate::hand_placement;
 use crate::platform;
 use crate::results::{BundleState, LessonResults};
 use crate::screen::Screen;
@@ -50,7 +51,10 @@ impl App {
             // A page that nobody sees stands still, and goes on where it stopped.
             Screen::Lesson(lesson) if platform::IS_PAGE && is_hidden(ctx) && !lesson.are_stages_over => {}
             Screen::Lesson(lesson) => {
-                lesson.poll(self.settings.volume, ctx.input(|input| input.unstable_dt));
+                let (elapsed, is_dragging, now) =
+                    ctx.input(|input| (input.unstable_dt, input.pointer.any_down(), input.time));
+                lesson.poll(self.settings.volume, elapsed);
+                lesson.place_hand(hand_placement::frame_of(&lesson.orbit, &self.settings), is_dragging, now);
                 self.skip_questionnaire();
                 self.poll_lesson();
             }
@@ -206,7 +210,8 @@ impl App {
             // The eyes change with every frame of the screen.
             Screen::Lesson(lesson) if !lesson.are_stages_over && self.settings.is_frame_sequential() => Duration::ZERO,
             Screen::Lesson(lesson) if !lesson.are_stages_over => {
-                match is_view_active || lesson.pointer_hand.is_pressing {
+                let is_hand_moving = lesson.pointer_hand.is_pressing || lesson.is_hand_placement_pending();
+                match is_view_active || is_hand_moving {
                     true => LESSON_FRAME_INTERVAL,
                     // Only the clock moves. Movement of the hand requests a frame at once.
                     false => lesson.time_to_next_second(),

@@ -87,6 +87,8 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState, view: &LessonView) {
     if let Some(SecondHandStatus::AwaitingConnection(address)) = lesson.second_hand {
         log.record("may_join", address);
     }
+    log.record("hand_frame", if lesson.is_hand_placement_pending() { "pending" } else { "placed" });
+    log.record("clutch", if lesson.is_clutch_pressed { "pressed" } else { "free" });
     log.record("view", format!("{:.4} {:.4}", lesson.orbit.azimuth, lesson.orbit.elevation));
     if let Some(scene) = &lesson.scene {
         log.record("open", scene.mouth_opening);

@@ -7,6 +7,7 @@ use crate::settings::{FONT_SIZES, Settings, StereoMode};
 use crate::ui::ui_anchors;
 use eframe::egui;
 use std::path::Path;
+use typodont_core::sim::HandFrame;
 use typodont_devices::DRIVERS;
 
 const STEREO_MODES: [(StereoMode, &str); 7] = [
@@ -33,6 +34,7 @@ pub fn settings_ui(
     egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
         language_row(ui, &mut new, languages, words);
         device_row(ui, &mut new, words);
+        hand_rows(ui, &mut new, words);
         stereo_row(ui, &mut new, words);
         row(ui, words.get("settings.eyes"), |ui| {
             let slider = egui::Slider::new(&mut new.eye_distance_mm, 0.0..=80.0).suffix(" mm").fixed_decimals(0);
@@ -129,6 +131,21 @@ fn device_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) 
             }
         });
         choice.response
+    });
+}
+
+/// Draws how the hand of an arm moves; a mouse works in the picture anyway.
+fn hand_rows(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    let is_arm = settings.device != "mouse";
+    ui.label("");
+    let follows = egui::Checkbox::new(&mut settings.hand_follows_view, words.get("settings.hand_follows_view"));
+    ui.add_enabled(is_arm, follows);
+    ui.end_row();
+    row(ui, words.get("settings.hand_scale"), |ui| {
+        let [least, most] = HandFrame::SCALES;
+        let slider =
+            egui::Slider::new(&mut settings.hand_scale, least..=most).step_by(0.1).fixed_decimals(1).suffix(" ×");
+        ui.add_enabled(is_arm, slider)
     });
 }
 

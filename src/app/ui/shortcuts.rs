@@ -10,7 +10,7 @@ use typodont_exercise::session::ChartInput;
 
 /// Keys with the text keys of their functions, in the order of the page. A key whose name differs between languages is
 /// itself a text key.
-const SHORTCUTS: [(&str, &str); 30] = [
+const SHORTCUTS: [(&str, &str); 31] = [
     ("F1", "keys.help"),
     ("F2", "keys.settings"),
     ("Tab", "keys.tab"),
@@ -18,6 +18,7 @@ const SHORTCUTS: [(&str, &str); 30] = [
     ("Enter", "keys.next"),
     ("Esc", "keys.back"),
     ("O", "keys.hold"),
+    ("O", "keys.clutch"),
     ("Ctrl Enter", "keys.done"),
     ("T", "keys.tool"),
     ("D", "keys.depth"),
@@ -42,6 +43,9 @@ const SHORTCUTS: [(&str, &str); 30] = [
     ("F5", "keys.try"),
     ("F8", "keys.check"),
 ];
+
+/// Key that is the clutch of an arm.
+const CLUTCH_KEY: Key = Key::O;
 
 /// Angle by which one key press opens the mouth, degrees.
 const MOUTH_STEP: f32 = 2.5;
@@ -95,6 +99,13 @@ pub fn collect_commands(
     commands: &mut Vec<AppCommand>,
 ) {
     let pressed = |key| is_pressed(ctx, Modifiers::NONE, key);
+    // Also without an event: a window that loses the keyboard hears of no key any more.
+    if let Screen::Lesson(lesson) = screen
+        && lesson.is_clutch_pressed
+        && !ctx.input(|input| input.key_down(CLUTCH_KEY))
+    {
+        commands.push(AppCommand::Practice(PracticeCommand::PressClutch(false)));
+    }
     if pressed(Key::F1) {
         commands.push(AppCommand::ShowShortcuts(!overlay.shortcuts));
     }
@@ -189,8 +200,11 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
         }
         return;
     }
-    if pressed(Key::O) && lesson.has_mouse() {
+    if lesson.has_mouse() && pressed(Key::O) {
         commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(!lesson.is_pointer_captured)));
+    }
+    if lesson.has_placeable_hand() {
+        clutch_shortcut(ctx, commands);
     }
     if pressed(Key::T)
         && let Some(instrument) = next_instrument(lesson)
@@ -222,6 +236,17 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
             false => AppCommand::Practice(PracticeCommand::AskToAbort(!lesson.is_confirming_abort)),
         });
     }
+}
+
+/// Presses and releases the clutch with its key, in order: two short presses in one frame recentre the arm.
+fn clutch_shortcut(ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
+    ctx.input(|input| {
+        for event in &input.events {
+            if let Event::Key { key: CLUTCH_KEY, pressed, repeat: false, .. } = event {
+                commands.push(AppCommand::Practice(PracticeCommand::PressClutch(*pressed)));
+            }
+        }
+    });
 }
 
 /// Shortcuts that move the camera, for users whose mouse is not free.
