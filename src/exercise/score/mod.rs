@@ -112,9 +112,7 @@ pub fn evaluate(recording: &Recording, observed: ObservedReplay) -> Scored {
     let measures = measures::all(recording, &replay, &seen, &comparison, restoration.as_ref(), chart.as_deref());
     let is_finished = recording.end.is_some() && !replay.outcome.aborted;
     let grade = scenario.rubric.as_ref().map(|rubric| grade::of(rubric, &measures, is_finished));
-    let process::ProcessStats {
-        removals, trace, led_ticks, hard_presses, forbidden_contacts, unseen, ..
-    } = seen;
+    let process::ProcessStats { removals, trace, led_ticks, hard_presses, forbidden_contacts, unseen, .. } = seen;
     Scored {
         replay,
         measures,
