@@ -198,6 +198,7 @@ mod tests {
             tip: Vec3::ZERO,
             handle: typodont_core::device::UPRIGHT,
             world_from_device: typodont_core::frame::Quat::IDENTITY,
+            is_hand_free: false,
             touch: touched.map(|(label, spring)| Touch { label, spring, normal: Vec3::Y }),
             cutting: touched.is_some(),
             removed: 0,

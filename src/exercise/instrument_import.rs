@@ -35,6 +35,9 @@ const SAMPLES_MAX: f32 = 1_500_000.0;
 /// Maximum number of voxels of a label map: an instrument of 10×10×20 mm at 0.05 mm.
 const VOXELS_MAX: u64 = 16_000_000;
 
+/// Maximum of [`rows_behind`]: some 250 MB while a shape is sampled. A shape of 20 mm with plain surfaces has a million.
+const ROWS_MAX: f64 = 1e7;
+
 /// Margin of the samples around the shape, mm: as wide as the surface band of coarse volumes.
 const MARGIN: f32 = 0.45;
 
@@ -170,12 +173,28 @@ fn sampled(triangles: &[Triangle]) -> Result<SampledShape, ShapeError> {
         let message = format!("no part of the instrument lies within {REACH} mm of its tip");
         return Err(ShapeError::wrong(message, "move its tip to [0, 0, 0] by \"position_mm\""));
     }
-    let spacing = ((high - low + 2.0 * MARGIN).element_product() / SAMPLES_MAX).cbrt().max(SPACING_MIN);
+    let spacing = libm::cbrtf((high - low + 2.0 * MARGIN).element_product() / SAMPLES_MAX).max(SPACING_MIN);
     let grid = Grid::covering(low, high, Vec3::splat(spacing), (MARGIN / spacing).ceil() as u32);
+    let rows = rows_behind(&grid, triangles);
+    if rows > ROWS_MAX {
+        let message = "too many triangles lie behind one another";
+        return Err(ShapeError::wrong(message, "leave out what is inside the instrument, and reduce its surface"));
+    }
     SampledShape::of_triangles(grid, triangles).ok_or_else(|| {
         let message = format!("the instrument is nowhere as thick as {spacing:.2} mm, the distance of its samples");
         ShapeError::wrong(message, "make it thicker, or leave out what is far from the tip")
     })
+}
+
+/// Returns at most how often rows of a grid along x cross triangles: the memory that the sampling of a shape needs.
+fn rows_behind(grid: &Grid, triangles: &[Triangle]) -> f64 {
+    let Aabb { low, high } = grid.extent();
+    let rows = |triangle: &Triangle| {
+        let box_of = Aabb::around(triangle.iter().copied());
+        let size = (box_of.high.min(high) - box_of.low.max(low)) / grid.spacing;
+        if size.y < 0.0 || size.z < 0.0 { 0.0 } else { f64::from(size.y + 1.0) * f64::from(size.z + 1.0) }
+    };
+    triangles.iter().map(rows).sum()
 }
 
 /// A mesh in which each triangle has its own corners and normal.
@@ -185,5 +204,29 @@ fn faceted(triangles: &[Triangle]) -> Mesh {
         positions: triangles.iter().flatten().copied().collect(),
         normals: triangles.iter().flat_map(|t| [normal(*t); 3]).collect(),
         triangles: (0..triangles.len() as u32).map(|n| [3 * n, 3 * n + 1, 3 * n + 2]).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn surfaces_one_behind_another_are_refused_before_they_take_memory() {
+        // Method: plates of 40 mm in a row, few triangles each; one of them is a shape.
+        let plates = |count: usize| -> Vec<Triangle> {
+            let plate = |n: usize| {
+                let corner = move |i: usize| {
+                    let side = |bit: usize| if i >> bit & 1 == 1 { 20.0 } else { -20.0 };
+                    Vec3::new(n as f32 * 0.4 + if i & 1 == 1 { 0.2 } else { 0.0 }, side(1), side(2))
+                };
+                let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+                quads.into_iter().flat_map(move |[a, b, c, d]| [[a, b, c], [a, c, d]].map(|t| t.map(corner)))
+            };
+            (0..count).flat_map(plate).collect()
+        };
+        assert!(sampled(&plates(1)).is_ok());
+        let error = sampled(&plates(400)).unwrap_err();
+        assert!(error.message.contains("behind one another"), "{}", error.message);
     }
 }

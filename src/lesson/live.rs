@@ -405,6 +405,11 @@ impl LiveSession {
         matches!(self.state, LiveState::Suspended(_))
     }
 
+    /// True while ticks pass: the lesson is neither paused nor without a device, and the hand has begun to move.
+    pub fn is_running(&self) -> bool {
+        matches!(self.state, LiveState::Running(_)) && !self.is_paused && !self.is_awaiting
+    }
+
     /// Timing statistics of the servo so far; `None` before they are available.
     pub fn timing(&self) -> Option<TimingSummary> {
         match &self.state {

@@ -97,11 +97,12 @@ impl Lesson {
         self.update_clutch()
     }
 
-    /// Tells the session if the clutch is pressed or released since the last call.
+    /// Tells the session if the clutch is pressed or released since the last call. Not while no ticks pass: a press has its
+    /// length in ticks.
     fn update_clutch(&mut self) -> Result<Vec<LiveEvent>, LessonError> {
         let ClutchControls { has_button, is_key_down, is_pressed } = self.clutch;
         let is_down = is_key_down || (has_button && self.live.buttons() & CLUTCH_BUTTON != 0);
-        if is_down == is_pressed || self.session.are_stages_over() {
+        if is_down == is_pressed || self.session.are_stages_over() || !self.live.is_running() {
             return Ok(Vec::new());
         }
         self.clutch.is_pressed = is_down;

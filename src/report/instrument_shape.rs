@@ -5,6 +5,7 @@
 
 use serde::Serialize;
 use std::collections::BTreeMap;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Profile, ProfilePoint, Shank};
@@ -271,10 +272,12 @@ fn simplified(mesh: &Mesh) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 fn joined(mesh: &Mesh, cell: f32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    // From a corner of the mesh, so that cells of its size hold all of it.
+    let low = Aabb::around(mesh.positions.iter().copied()).low;
     let mut numbers: BTreeMap<[i32; 3], u32> = BTreeMap::new();
     let mut sums: Vec<(Vec3, f32)> = Vec::new();
     let mut number = |at: Vec3| {
-        let key = (at / cell).floor().to_array().map(|v| v as i32);
+        let key = ((at - low) / cell).floor().to_array().map(|v| v as i32);
         let number = *numbers.entry(key).or_insert(sums.len() as u32);
         if number as usize == sums.len() {
             sums.push((Vec3::ZERO, 0.0));

@@ -133,7 +133,7 @@ fn poses(recording: &Recording, trace: &Trace, tooth_from_world: &Pose) -> Vec<P
     let mut device_orientations = trace.device_orientations.iter().peekable();
     let (mut world_from_device, mut in_device) = (Quat::IDENTITY, Quat::IDENTITY);
     let pose = |tick: &TickRecord| {
-        if let Some((_, orientation)) = device_orientations.next_if(|(from, _)| *from == tick.tick) {
+        while let Some((_, orientation)) = device_orientations.next_if(|(from, _)| *from <= tick.tick) {
             world_from_device = *orientation;
         }
         if tick.reading.pose.is_valid() {

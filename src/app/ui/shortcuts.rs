@@ -242,7 +242,9 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
 fn clutch_shortcut(ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
     ctx.input(|input| {
         for event in &input.events {
-            if let Event::Key { key: CLUTCH_KEY, pressed, repeat: false, .. } = event {
+            if let Event::Key { key: CLUTCH_KEY, pressed, repeat: false, modifiers, .. } = event
+                && (!pressed || modifiers.is_none())
+            {
                 commands.push(AppCommand::Practice(PracticeCommand::PressClutch(*pressed)));
             }
         }

@@ -181,6 +181,11 @@ impl HandMapping {
         self.change.is_some_and(|change| matches!(change.path, TipPath::Stay(_)))
     }
 
+    /// True while the middle of the workspace returns to the origin.
+    pub fn is_centring(&self) -> bool {
+        self.change.is_some_and(|change| matches!(change.path, TipPath::Centre(_)))
+    }
+
     /// Returns the pose of a hand in the world, `world_from_handle`.
     pub fn world_pose(&mut self, in_device: &Pose) -> Pose {
         self.has_hand = true;

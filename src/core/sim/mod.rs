@@ -85,6 +85,8 @@ pub struct Step {
     pub handle: Quat,
     /// Orientation of the device's space, `world_from_device`; the identity unless the hand was placed otherwise.
     pub world_from_device: Quat,
+    /// True while the hand is placed anew or the clutch is pressed: the tip then does not follow the hand.
+    pub is_hand_free: bool,
     pub touch: Option<Touch>,
     /// True while matter is being cut, even if the cut was too small to change a voxel in this tick.
     pub cutting: bool,
@@ -100,7 +102,7 @@ pub struct Step {
 
 impl Step {
     /// Tick in which the hand is free: zero force, no contact, no cutting.
-    fn released(tick: Tick, hand: &Pose, instrument: usize) -> Step {
+    pub fn released(tick: Tick, hand: &Pose, instrument: usize) -> Step {
         Step {
             tick,
             force: Vec3::ZERO,
@@ -109,6 +111,7 @@ impl Step {
             tip: hand.position,
             handle: hand.orientation,
             world_from_device: Quat::IDENTITY,
+            is_hand_free: false,
             touch: None,
             cutting: false,
             removed: 0,
@@ -372,7 +375,7 @@ impl Simulation {
         let world_from_device = self.hand_mapping.frame().orientation;
         let Wrench { force, torque } = free.wrench;
         let step = self.release(tick);
-        Step { force: world_from_device * force, torque: world_from_device * torque, ..step }
+        Step { force: world_from_device * force, torque: world_from_device * torque, is_hand_free: true, ..step }
     }
 
     /// Frees the hand until its mapping has changed. From then on the working end continues where it was, if the hand is
@@ -520,7 +523,12 @@ impl Simulation {
         let tip = self.proxy.tip();
         let is_at_work =
             tip.length() < STAY_DISTANCE || self.proxy.contact().is_some() || self.hand_mapping.is_tip_held();
-        let path = if is_at_work { TipPath::Stay(self.world_from_tooth * tip) } else { TipPath::Turn };
+        let tip = self.world_from_tooth * tip;
+        let path = match is_at_work {
+            _ if self.hand_mapping.is_centring() => TipPath::Centre(tip),
+            true => TipPath::Stay(tip),
+            false => TipPath::Turn,
+        };
         if self.hand_mapping.place(frame, path, self.rendered) {
             self.disengage();
         } else if !self.hand_mapping.is_changing() {

@@ -143,7 +143,7 @@ impl Body {
             0.5 * (b - a).cross(c - a).length()
         });
         let spacing = (area.sum::<f32>() / TARGET_POINTS).sqrt().max(0.5 * volume.grid().spacing.min_element());
-        let points = spread_over(&mesh, |_| spacing, |_| BodyRegion::Head);
+        let points = spread_over(&mesh, |_| spacing, |_, _| true, |_| BodyRegion::Head);
         Body::enclosed(HeadGeometry::Sampled(field), None, points)
     }
 
@@ -154,7 +154,9 @@ impl Body {
         let edge = 0.5 * shape.grid().spacing.max_element();
         let is_beside = |at: Vec3| cutting.as_ref().is_some_and(|part| part.distance(at) > edge);
         let region = |at: Vec3| if is_beside(at) { BodyRegion::Shank } else { BodyRegion::Head };
-        let points = spread_over(&mesh, spacing, region);
+        // A thin part keeps points on both of its faces.
+        let is_same_face = |node: &BodySurfacePoint, outward: Vec3| node.outward.dot(outward) > 0.0;
+        let points = spread_over(&mesh, spacing, is_same_face, region);
         match cutting {
             None => Body::enclosed(HeadGeometry::Sampled(shape), None, points),
             Some(part) => Body::enclosed(HeadGeometry::Sampled(part), Some(ShankGeometry::Whole(shape)), points),
@@ -283,16 +285,21 @@ fn graded_spacing(mesh: &Mesh, voxel: f32) -> impl Fn(Vec3) -> f32 + use<> {
     move |at| at_tip * grade(at)
 }
 
-/// Spreads surface points over a fine mesh at a spacing, mm.
+/// Spreads surface points over a fine mesh at a spacing, mm. A point stands for the surface around it where `covers` holds
+/// for it and the outward normal there.
 fn spread_over(
     mesh: &Mesh,
     spacing: impl Fn(Vec3) -> f32,
+    covers: impl Fn(&BodySurfacePoint, Vec3) -> bool,
     region: impl Fn(Vec3) -> BodyRegion,
 ) -> Vec<BodySurfacePoint> {
     let mut points: Vec<BodySurfacePoint> = Vec::new();
     for (&at, &outward) in mesh.positions.iter().zip(&mesh.normals) {
         let spacing = spacing(at);
-        if points.iter().all(|node| node.position.distance_squared(at) > 0.7 * spacing * spacing) {
+        let is_covered = |node: &BodySurfacePoint| {
+            node.position.distance_squared(at) <= 0.7 * spacing * spacing && covers(node, outward)
+        };
+        if !points.iter().any(is_covered) {
             let along = outward.any_orthonormal_vector();
             let half_extent = [0.6 * spacing; 2];
             points.push(BodySurfacePoint { position: at, outward, along, half_extent, region: region(at) });

@@ -44,7 +44,7 @@ pub enum CuttingPartEntry {
     /// Length of the cutting part along the shaft from the tip, mm: 0.1 to 20.
     LengthMm(CuttingLengthEntry),
     /// File with the shape of the cutting part, with the unit, position and rotation of the instrument's file.
-    File(String),
+    File(#[schemars(length(min = 1, max = 500))] String),
 }
 
 /// Length, mm: 0.1 to 20.

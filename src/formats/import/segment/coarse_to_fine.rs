@@ -66,7 +66,7 @@ struct Blocks {
 
 impl Blocks {
     fn of(grid: &Grid) -> Blocks {
-        let side = (grid.len() as f64 * grid.voxel_mm3() / COARSE).cbrt() as f32;
+        let side = libm::cbrt(grid.len() as f64 * grid.voxel_mm3() / COARSE) as f32;
         let counts = grid.spacing.to_array().map(|spacing| (side / spacing).round().max(1.0) as u32);
         let dims = [0, 1, 2].map(|axis| grid.dims[axis].div_ceil(counts[axis]));
         let wide = Vec3::from(counts.map(|n| n as f32));
