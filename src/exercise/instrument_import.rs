@@ -89,7 +89,12 @@ fn cutting_part(
             ShapeError::wrong(message, "check \"position_mm\" and \"length_mm\": the tip must be at z = 0")
         }),
         CuttingPartEntry::File(name) => {
-            sampled(&placed_triangles(entry, name, library)?).map_err(|error| error.in_file(name))
+            let part = sampled(&placed_triangles(entry, name, library)?).map_err(|error| error.in_file(name))?;
+            // What is not a part of the instrument is neither seen nor felt, and cuts nothing.
+            part.within(whole).cropped(MARGIN).ok_or_else(|| {
+                let help = "it must be a part of the instrument, at the same position and in the same unit";
+                ShapeError::wrong("no part of the instrument is within this cutting part", help).in_file(name)
+            })
         }
     }
 }

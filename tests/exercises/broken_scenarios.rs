@@ -704,6 +704,14 @@ fn a_shape_that_cannot_be_used_gets_one_complaint() {
     let blade = [("a.stl", stl_box(4.0, 0)), ("b.stl", stl_box(2.0, 0))];
     check(cutting(json!({ "file": "b.stl" })), &blade, "");
     check(cutting(json!({ "file": "c.stl" })), &blade, "missing-file: \"c.stl\"");
+    let beside: Vec<_> = box_triangles(2.0).map(|t| t.map(|[x, y, z]| [x + 9.0, y, z])).collect();
+    let beside = stl(beside.into_iter());
+    let apart = [("a.stl", stl_box(4.0, 0)), ("b.stl", beside)];
+    check(
+        cutting(json!({ "file": "b.stl" })),
+        &apart,
+        "\"b.stl\": no part of the instrument is within this cutting part",
+    );
     let map = |n: usize, value: u8| {
         let header = "NRRD0004\ntype: uint8\ndimension: 3\nspacings: 0.3 0.3 0.3\nencoding: raw\n";
         let voxels = std::iter::repeat_n(value, n * n * n);
@@ -717,6 +725,31 @@ fn a_shape_that_cannot_be_used_gets_one_complaint() {
     check_map(260, 7, "17576000 voxels");
     let idle = shape_complaints(cutting(json!({ "length_mm": 1.0 })), false, &blade);
     assert!(idle.len() == 1 && idle[0].starts_with("idle-cutting"), "{idle:?}");
+}
+
+#[test]
+fn a_file_with_the_name_of_a_recordings_part_is_refused() {
+    // Regression: the file took the place of the part in the recording, which could not be read again. Method: an instrument
+    // file, and the voxels of an instrument.
+    let voxels = || {
+        let header = "NRRD0004\ntype: uint8\ndimension: 3\nspacings: 0.3 0.3 0.3\nencoding: raw\nsizes: 9 9 9\n\n";
+        header.bytes().chain([7; 729]).collect::<Vec<u8>>()
+    };
+    for name in scenario::RECORDING_PARTS {
+        let is_table = name.ends_with(".json");
+        let end = if is_table { json!("point") } else { json!({ "shape": { "file": name } }) };
+        let table = json!({ "instruments": [{ "id": "own", "title": "Own", "cuts": false, "end": end }] });
+        let table_name = if is_table { name } else { "own.json" };
+        let mut library = Library::shipped();
+        (!is_table).then(|| library.insert(name, voxels()));
+        library.insert(table_name, table.to_string().into_bytes());
+        let mut root: Value = serde_json::from_str(&shipped("5-grinding.json")).unwrap();
+        root["instrument_file"] = json!(table_name);
+        root["instruments"] = json!(["round_bur_014", "own"]);
+        let source = SourceText::new("exercise.json", root.to_string());
+        let found = scenario::resolve(source, &library, ResolveMode::ReadScans).unwrap_err();
+        assert!(found.len() == 1 && found[0].code == "reserved-name" && found[0].message.contains(name), "{found:?}");
+    }
 }
 
 #[test]

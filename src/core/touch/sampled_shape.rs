@@ -68,6 +68,15 @@ impl SampledShape {
         self
     }
 
+    /// Returns the part that also lies within another shape.
+    pub fn within(mut self, other: &SampledShape) -> SampledShape {
+        let grid = self.grid;
+        for (cell, distance) in grid.cells().zip(&mut self.distances) {
+            *distance = distance.max(other.distance(grid.centre(cell)));
+        }
+        self
+    }
+
     /// Returns the shape on the smallest part of its grid that holds it with a margin, mm; `None` if no point of the
     /// grid is inside.
     pub fn cropped(self, margin: f32) -> Option<SampledShape> {

@@ -1,18 +1,19 @@
 //! The initial volume of a session, stored as two NRRD attachments of the recording.
 
+use crate::scenario::RECORDING_PARTS;
 use typodont_core::volume::{Density, Label, Volume};
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
 
 /// Name of the attachment with the initial densities.
-pub const DENSITY: &str = "initial.density.nrrd";
+pub const DENSITY: &str = RECORDING_PARTS[1];
 /// Name of the attachment with the initial labels.
-pub const LABEL: &str = "initial.label.nrrd";
+pub const LABEL: &str = RECORDING_PARTS[2];
 
 /// Name of the attachment with the densities of the tooth before its cavity was cut.
-pub const ORIGINAL_DENSITY: &str = "original.density.nrrd";
+pub const ORIGINAL_DENSITY: &str = RECORDING_PARTS[3];
 /// Name of the attachment with the labels of the tooth before its cavity was cut.
-pub const ORIGINAL_LABEL: &str = "original.label.nrrd";
+pub const ORIGINAL_LABEL: &str = RECORDING_PARTS[4];
 
 /// NRRD key of the half-width of the density ramp, mm, stored as the bits of an `f32`.
 const BAND_KEY: &str = "typodont_band_mm";

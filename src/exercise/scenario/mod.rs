@@ -22,6 +22,10 @@ mod tooth_bounds;
 mod tooth_words;
 mod workpiece;
 
+/// Names under which a recording keeps its own parts; no file of an exercise may have one of them.
+pub const RECORDING_PARTS: [&str; 5] =
+    ["scenario.json", "initial.density.nrrd", "initial.label.nrrd", "original.density.nrrd", "original.label.nrrd"];
+
 pub use cavity::{PreparedCavity, ProximalBox};
 pub use contact_limit::{ContactLimit, LimitPlace, LimitedQuantity};
 pub use file::QuestionnaireTime;

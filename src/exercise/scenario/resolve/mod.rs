@@ -12,7 +12,7 @@ mod dry_run;
 mod zones;
 
 use super::file::{self, ScenarioFile};
-use super::{MeasureParams, OperatingField, Questionnaire, Scenario};
+use super::{MeasureParams, OperatingField, Questionnaire, RECORDING_PARTS, Scenario};
 use crate::catalog::{
     AgeBand, InstrumentEntry, InstrumentTable, ShapeEntry, TissueEntry, TissueTable, TouchFactorTable, WorkingEndEntry,
 };
@@ -169,6 +169,7 @@ impl Resolver<'_> {
         let carving = self.carving(&written.carving);
         let limits = self.limits(written, &zones, carving.law);
         let operating_field = self.operating_field(written);
+        self.refuse_names_of_recording_parts();
         Some(Scenario {
             id: written.id.clone(),
             title: written.title.to_string(),
@@ -282,6 +283,15 @@ impl Resolver<'_> {
             }
         }
         tray
+    }
+
+    /// Complains of files that a recording could not keep beside its own parts.
+    fn refuse_names_of_recording_parts(&mut self) {
+        for name in RECORDING_PARTS.iter().filter(|name| self.files.contains_key(**name)).collect::<Vec<_>>() {
+            let message =
+                format!("a file of an exercise cannot be called \"{name}\": a recording has a part of this name");
+            self.complain("", "reserved-name", message, "rename the file, here and where it is named");
+        }
     }
 
     /// Reads the shape of an instrument and keeps the bytes of its files for the recording.
