@@ -287,10 +287,12 @@ impl Resolver<'_> {
 
     /// Complains of files that a recording could not keep beside its own parts.
     fn refuse_names_of_recording_parts(&mut self) {
-        for name in RECORDING_PARTS.iter().filter(|name| self.files.contains_key(**name)).collect::<Vec<_>>() {
-            let message =
-                format!("a file of an exercise cannot be called \"{name}\": a recording has a part of this name");
-            self.complain("", "reserved-name", message, "rename the file, here and where it is named");
+        for name in RECORDING_PARTS {
+            if self.files.contains_key(name) {
+                let message =
+                    format!("a file of an exercise cannot be called \"{name}\": a recording has a part of this name");
+                self.complain("", "reserved-name", message, "rename the file, here and where it is named");
+            }
         }
     }
 
