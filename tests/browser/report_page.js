@@ -1,8 +1,11 @@
 // Opens a bundle's report.html in Chromium as a reader would: from the disk, without a network, with mouse and keyboard.
 //
-//     node report_page.js PLAYWRIGHT-CORE CHROMIUM BUNDLE PICTURES [hostile]
+//     node report_page.js PLAYWRIGHT-CORE CHROMIUM BUNDLE PICTURES explored|played|hostile
 //
-// PICTURES may have poses.json: poses of the recording at some ticks, which the page must hold.
+// explored  what the pictures, marks and sections of a report show is what its label maps say
+// played    the hand that is played back is the recorded one; colours by deviation, paper, narrow windows, no WebGL. PICTURES
+//           has poses.json: poses of the recording at some ticks, which the page must hold
+// hostile   a page with hostile texts is loaded, moved, translated and printed, and does no harm
 //
 // Prints what it measured as JSON. Exits with 1 and a line per claim that does not hold.
 
@@ -10,7 +13,8 @@ const fs = require('fs');
 const path = require('path');
 const zlib = require('zlib');
 
-const [playwright, executablePath, bundle, pictures, hostile] = process.argv.slice(2);
+const [playwright, executablePath, bundle, pictures, part] = process.argv.slice(2);
+const [explored, played, hostile] = ['explored', 'played', 'hostile'].map(name => name === part);
 const { chromium } = require(playwright);
 const { appearance } = require('./page_checks.js');
 
@@ -76,35 +80,37 @@ function fell(voxel) {
   await photograph('report-top.png');
   await page.evaluate(() => document.getElementById('explore').scrollIntoView());
 
-  // A hostile page is loaded, moved, translated and printed; what it shows is judged on the plain one.
   let shown = 0, clicked = 0, fallen = 0, compared = 0;
 
-  // The time slider changes every picture.
   const ids = ['solid', 'cut-0', 'cut-1', 'cut-2'];
-  const seen = {};
-  for (const share of [0, 0.4, 1]) {
-    await slide(share);
-    for (const id of ids) (seen[id] ||= new Set()).add(await picture(id));
-    await photograph(`report-at-${share}.png`);
-  }
-  for (const id of ids) claim(seen[id].size === 3, `${id} shows ${seen[id].size} pictures at three moments`);
-
-  // A mark on the curves moves the time, the eye and what is told; by mouse and by keyboard.
   const moments = await page.evaluate(() => JSON.parse(document.getElementById('session').textContent).moments);
   const timed = moments.filter(m => m.at !== null);
   claim(timed.length > 0, 'no moment is marked on the curves');
-  for (const { number, at } of timed) {
-    const before = await picture('solid');
-    const mark = page.locator(`#curves [data-mark="${number}"]`);
-    if (number % 2) await settled(() => mark.locator('circle').click());
-    else await settled(async () => { await mark.focus(); await page.keyboard.press('Enter'); });
-    claim(Math.abs(await moment() - at) < 0.011, `mark ${number} moves the time to ${await moment()} s, not ${at} s`);
-    claim(await picture('solid') !== before, `mark ${number} does not move the eye`);
-    claim((await told()).text.includes(`Flag ${number}.`), `mark ${number} tells: ${(await told()).text}`);
-    if (number === 1) await photograph('report-mark.png');
+
+  if (!played) {
+    // The time slider changes every picture.
+    const seen = {};
+    for (const share of [0, 0.4, 1]) {
+      await slide(share);
+      for (const id of ids) (seen[id] ||= new Set()).add(await picture(id));
+      await photograph(`report-at-${share}.png`);
+    }
+    for (const id of ids) claim(seen[id].size === 3, `${id} shows ${seen[id].size} pictures at three moments`);
+
+    // A mark on the curves moves the time, the eye and what is told; by mouse and by keyboard.
+    for (const { number, at } of timed) {
+      const before = await picture('solid');
+      const mark = page.locator(`#curves [data-mark="${number}"]`);
+      if (number % 2) await settled(() => mark.locator('circle').click());
+      else await settled(async () => { await mark.focus(); await page.keyboard.press('Enter'); });
+      claim(Math.abs(await moment() - at) < 0.011, `mark ${number} moves the time to ${await moment()} s, not ${at} s`);
+      claim(await picture('solid') !== before, `mark ${number} does not move the eye`);
+      claim((await told()).text.includes(`Flag ${number}.`), `mark ${number} tells: ${(await told()).text}`);
+      if (number === 1) await photograph('report-mark.png');
+    }
   }
 
-  if (!hostile) {
+  if (explored) {
     // What a sentence shows is seen: its place lies in the picture, nothing of the tooth at that moment lies before it, and a ring
     // is drawn around it. Regression: the tooth was turned by a rule that did not ask what covers the place.
     const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -178,19 +184,21 @@ function fell(voxel) {
     claim((await told()).text.length > 0, 'a click on a voxel tells nothing');
   }
 
-  // All of it by keyboard: the tooth turns, the time moves.
-  const before = await picture('solid');
-  await settled(async () => { await page.locator('#solid').focus(); await page.keyboard.press('ArrowLeft'); await page.keyboard.press('+'); });
-  claim(await picture('solid') !== before, 'arrow keys do not turn the tooth');
-  await page.locator('#moment').focus();
-  await settled(() => page.keyboard.press('Home'));
-  claim(await moment() === 0, 'Home does not lead to the beginning');
-  await settled(() => page.keyboard.press('End'));
-  for (const number of [0, 1]) await page.locator(`[data-clip="${number}"]`).check();
-  await settled(() => page.locator('[data-side="work"]').click());
-  await photograph('report-clipped.png');
+  if (!played) {
+    // All of it by keyboard: the tooth turns, the time moves.
+    const before = await picture('solid');
+    await settled(async () => { await page.locator('#solid').focus(); await page.keyboard.press('ArrowLeft'); await page.keyboard.press('+'); });
+    claim(await picture('solid') !== before, 'arrow keys do not turn the tooth');
+    await page.locator('#moment').focus();
+    await settled(() => page.keyboard.press('Home'));
+    claim(await moment() === 0, 'Home does not lead to the beginning');
+    await settled(() => page.keyboard.press('End'));
+    for (const number of [0, 1]) await page.locator(`[data-clip="${number}"]`).check();
+    await settled(() => page.locator('[data-side="work"]').click());
+    await photograph('report-clipped.png');
+  }
 
-  if (!hostile) {
+  if (explored) {
     // An adapter that is lost and comes back shows the same picture. Regression: colours by verdict and hatching came back on.
     // A slow adapter draws fewer pixels, by the time it took: with that time held, every picture has all of them.
     await page.evaluate(() => { performance.now = () => 0; });
@@ -212,7 +220,7 @@ function fell(voxel) {
   }
 
   // The hand is played back: at any tick the page holds the recorded pose, within 0.01 mm and 0.1°, and draws it.
-  const recorded = hostile ? [] : JSON.parse(fs.readFileSync(path.join(pictures, 'poses.json')));
+  const recorded = played ? JSON.parse(fs.readFileSync(path.join(pictures, 'poses.json'))) : [];
   const heldPose = () => page.evaluate(() => JSON.parse(document.getElementById('held').dataset.pose || 'null'));
   const slideTo = seconds => settled(() => page.evaluate(seconds => {
     const slider = document.getElementById('moment'), { step } = slider;
@@ -232,7 +240,7 @@ function fell(voxel) {
     off.degrees = Math.max(off.degrees, 2 * Math.atan2(sine, along) * 180 / Math.PI);
     claim(pose.tool === tool, `tick ${tick}: instrument ${pose.tool}, the recording has ${tool}`);
   }
-  claim(hostile || recorded.length >= 20, `${recorded.length} poses were compared`);
+  claim(!played || recorded.length >= 20, `${recorded.length} poses were compared`);
   claim(off.mm <= 0.0101 && off.degrees <= 0.1001, `a pose is off by ${off.mm} mm and ${off.degrees}°`);
 
   // By keyboard: play, pause, pace, and a stop at each flag with its sentences.
@@ -241,7 +249,7 @@ function fell(voxel) {
   const passes = seconds => page.waitForFunction(seconds => Number(document.getElementById('moment').value) > seconds, seconds, { timeout: 60000 });
   const press = async (id, key) => { await page.locator(`#${id}`).focus(); await page.keyboard.press(key); };
   const captions = () => page.evaluate(() => (document.getElementById('caption').hidden ? '' : document.getElementById('caption').innerText));
-  if (!hostile) {
+  if (played) {
     const first = Math.min(...timed.map(m => m.at)), flags = timed.filter(m => Math.abs(m.at - first) < 5e-4);
     await slideTo(first - 0.3);
     claim(await captions() === '', `between the flags it says: ${await captions()}`);
@@ -312,7 +320,7 @@ function fell(voxel) {
   await photograph('report-turkish.png');
   await page.locator('[data-language="en"]').click();
 
-  if (!hostile) {
+  if (played) {
     // The signed distance from the ideal cavity, by its definition: what was to be removed is the ideal cavity; of a place within
     // it the distance to the nearest tissue that should stay, of another the distance to the ideal cavity, each to the border
     // halfway between two voxels.
@@ -365,62 +373,66 @@ function fell(voxel) {
     for (const section of [1, 2]) claim(sides[name][section][0][1] === -mesial, `${name} section ${section}: mesial is not on the left`);
   }
 
-  // On paper: the summary on one page, six pages at most, and the tooth in them.
-  await settled(() => page.locator('[name="colours"][value="verdict"]').check());
-  const pdf = await page.pdf({ format: 'A4', printBackground: true });
-  if (pictures) fs.writeFileSync(path.join(pictures, 'report.pdf'), pdf);
-  const source = pdf.toString('latin1'), sheets = (source.match(/\/Type\s*\/Page\b(?!s)/g) || []).length;
-  claim(sheets >= 2 && sheets <= 6, `${sheets} pages on paper`);
-  const printed = await page.evaluate(() => ['solid-print', 'deviation-print'].map(id => {
-    const canvas = document.getElementById(id), { width, height } = canvas;
-    const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
-    return { width, height, colours: new Set(pixels).size };
-  }));
-  for (const { width, height, colours } of printed) {
-    const isIn = source.includes(`/Width ${width}`) && source.includes(`/Height ${height}`);
-    claim(colours > 100 && isIn, `the tooth on paper: ${width} × ${height} pixels, ${colours} colours, ${isIn ? 'in' : 'not in'} the file`);
+  let sheets = 0, summary = 0;
+  if (!explored) {
+    // On paper: the summary on one page, six pages at most, and the tooth in them.
+    await settled(() => page.locator('[name="colours"][value="verdict"]').check());
+    const pdf = await page.pdf({ format: 'A4', printBackground: true });
+    if (pictures) fs.writeFileSync(path.join(pictures, 'report.pdf'), pdf);
+    const source = pdf.toString('latin1');
+    sheets = (source.match(/\/Type\s*\/Page\b(?!s)/g) || []).length;
+    claim(sheets >= 2 && sheets <= 6, `${sheets} pages on paper`);
+    const printed = await page.evaluate(() => ['solid-print', 'deviation-print'].map(id => {
+      const canvas = document.getElementById(id), { width, height } = canvas;
+      const pixels = new Uint32Array(canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
+      return { width, height, colours: new Set(pixels).size };
+    }));
+    for (const { width, height, colours } of printed) {
+      const isIn = source.includes(`/Width ${width}`) && source.includes(`/Height ${height}`);
+      claim(colours > 100 && isIn, `the tooth on paper: ${width} × ${height} pixels, ${colours} colours, ${isIn ? 'in' : 'not in'} the file`);
+    }
+    await page.emulateMedia({ media: 'print' });
+    await page.setViewportSize({ width: Math.floor(184 / 25.4 * 96), height: 900 });
+    summary = await page.evaluate(() => document.getElementById('explore').getBoundingClientRect().top + window.scrollY);
+    // Titles of ninety letters without a space fill more than one sheet, and are broken.
+    claim(hostile || summary <= 273 / 25.4 * 96, `the summary is ${Math.round(summary)} pixels high on paper`);
+    const unwanted = await page.evaluate(() => [...document.querySelectorAll('.screen, .formula, .time, .player, .force')].filter(e => e.offsetParent !== null).map(e => e.textContent.trim().slice(0, 40)));
+    claim(unwanted.length === 0, `printed: ${unwanted.join(' | ')}`);
+    await page.emulateMedia({ media: null });
+    wrong.push(...(await appearance(page)).filter(line => !hostile || !line.startsWith('a word is broken')));
+
+    // A narrow window has nothing beside it.
+    await page.setViewportSize({ width: 400, height: 800 });
+    const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+    claim(beyond <= 0, `${beyond} pixels stand out of a window of 400`);
+
+    // Without WebGL, and with still pictures for whoever prefers them: the hand is told, and time goes on in steps of a second.
+    const plain = await browser.newContext({ viewport: { width: 1280, height: 1000 }, reducedMotion: 'reduce' });
+    const bare = await plain.newPage();
+    bare.on('pageerror', error => wrong.push(`thrown without WebGL: ${error.message}`));
+    await bare.addInitScript(() => {
+      const given = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind === 'webgl2' ? null : given.call(this, kind, ...more); };
+    });
+    await bare.goto(`file://${file}`, { timeout: 120000 });
+    await bare.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
+    claim(!(await bare.locator('#solid').isVisible()), 'an empty picture is shown without WebGL');
+    await bare.locator('#stops').uncheck({ force: true });
+    await bare.evaluate(() => {
+      window.times = [];
+      new MutationObserver(() => window.times.push(document.getElementById('moment').value)).observe(document.getElementById('moment'), { attributeFilter: ['aria-valuetext'] });
+    });
+    await bare.locator('#play').click();
+    await bare.waitForTimeout(2600);
+    await bare.locator('#play').click();
+    const steps = await bare.evaluate(() => [...new Set(window.times)]);
+    claim(steps.length >= 2 && steps.length <= 4, `${steps.length} pictures in 2.6 s: ${steps.join(' ')}`);
+    claim((await bare.locator('#held').textContent()).match(/\sN$/) || hostile, `told without WebGL: ${await bare.locator('#held').textContent()}`);
+    await plain.close();
   }
-  await page.emulateMedia({ media: 'print' });
-  await page.setViewportSize({ width: Math.floor(184 / 25.4 * 96), height: 900 });
-  const first = await page.evaluate(() => document.getElementById('explore').getBoundingClientRect().top + window.scrollY);
-  // Titles of ninety letters without a space fill more than one sheet, and are broken.
-  claim(hostile || first <= 273 / 25.4 * 96, `the summary is ${Math.round(first)} pixels high on paper`);
-  const unwanted = await page.evaluate(() => [...document.querySelectorAll('.screen, .formula, .time, .player, .force')].filter(e => e.offsetParent !== null).map(e => e.textContent.trim().slice(0, 40)));
-  claim(unwanted.length === 0, `printed: ${unwanted.join(' | ')}`);
-  await page.emulateMedia({ media: null });
-  wrong.push(...(await appearance(page)).filter(line => !hostile || !line.startsWith('a word is broken')));
-
-  // A narrow window has nothing beside it.
-  await page.setViewportSize({ width: 400, height: 800 });
-  const beyond = await page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
-  claim(beyond <= 0, `${beyond} pixels stand out of a window of 400`);
-
-  // Without WebGL, and with still pictures for whoever prefers them: the hand is told, and time goes on in steps of a second.
-  const plain = await browser.newContext({ viewport: { width: 1280, height: 1000 }, reducedMotion: 'reduce' });
-  const bare = await plain.newPage();
-  bare.on('pageerror', error => wrong.push(`thrown without WebGL: ${error.message}`));
-  await bare.addInitScript(() => {
-    const given = HTMLCanvasElement.prototype.getContext;
-    HTMLCanvasElement.prototype.getContext = function (kind, ...more) { return kind === 'webgl2' ? null : given.call(this, kind, ...more); };
-  });
-  await bare.goto(`file://${file}`, { timeout: 120000 });
-  await bare.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: 60000 });
-  claim(!(await bare.locator('#solid').isVisible()), 'an empty picture is shown without WebGL');
-  await bare.locator('#stops').uncheck({ force: true });
-  await bare.evaluate(() => {
-    window.times = [];
-    new MutationObserver(() => window.times.push(document.getElementById('moment').value)).observe(document.getElementById('moment'), { attributeFilter: ['aria-valuetext'] });
-  });
-  await bare.locator('#play').click();
-  await bare.waitForTimeout(2600);
-  await bare.locator('#play').click();
-  const steps = await bare.evaluate(() => [...new Set(window.times)]);
-  claim(steps.length >= 2 && steps.length <= 4, `${steps.length} pictures in 2.6 s: ${steps.join(' ')}`);
-  claim((await bare.locator('#held').textContent()).match(/\sN$/) || hostile, `told without WebGL: ${await bare.locator('#held').textContent()}`);
-  await plain.close();
   claim(asked.length === 0, `asked of a network: ${asked.join(' ')}`);
   await browser.close();
-  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, shown, clicked, fallen, compared, poses: recorded.length, off, sheets, summary_px: Math.round(first) }));
+  console.log(JSON.stringify({ bytes, shown_ms, moments: moments.length, shown, clicked, fallen, compared, poses: recorded.length, off, sheets, summary_px: Math.round(summary) }));
   for (const line of wrong) console.error(line);
   process.exit(wrong.length ? 1 : 0);
 })().catch(error => { console.error(error); process.exit(1); });
