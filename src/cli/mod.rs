@@ -397,15 +397,24 @@ fn open_window(options: app::AppOptions) -> Result<(), CliError> {
 const SESSIONS: &str = "reports/sessions";
 
 /// Folder of finished bundles if the program is started by its icon, in an arbitrary working folder: [`SESSIONS`] if
-/// the working folder contains `reports`, else a folder in the user's documents.
+/// sessions are kept there, else a folder in the user's documents.
 #[cfg(feature = "desktop")]
 fn default_output_folder() -> PathBuf {
+    let kept_here = match (std::env::current_dir(), std::env::current_exe()) {
+        (Ok(working), Ok(program)) => keeps_sessions(&working, &program),
+        _ => true,
+    };
     match directories::UserDirs::new() {
-        Some(dirs) if !Path::new("reports").is_dir() => {
-            dirs.document_dir().unwrap_or(dirs.home_dir()).join("Typodont").join("sessions")
-        }
+        Some(dirs) if !kept_here => dirs.document_dir().unwrap_or(dirs.home_dir()).join("Typodont").join("sessions"),
         _ => PathBuf::from(SESSIONS),
     }
+}
+
+/// True if sessions are kept in the working folder: it has a folder `reports` and is not the folder of the program's own
+/// files. Windows starts a program by its icon in the latter, which users may not write into.
+#[cfg(feature = "desktop")]
+fn keeps_sessions(working: &Path, program: &Path) -> bool {
+    working.join("reports").is_dir() && program.parent() != Some(working)
 }
 
 /// Default folder of finished bundles of a build without the window.
@@ -467,4 +476,20 @@ fn read_override_log(folder: &Path) -> Result<typodont_review::OverrideSnapshot,
         eprintln!("{}: {issue}", path.display());
     }
     Ok(log)
+}
+
+#[cfg(all(test, feature = "desktop"))]
+mod tests {
+    use std::path::Path;
+
+    use super::keeps_sessions;
+
+    #[test]
+    fn an_icon_keeps_sessions_in_a_checkout_but_not_beside_the_program() {
+        let checkout = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let elsewhere = checkout.join("target/release/typodont");
+        assert!(keeps_sessions(checkout, &elsewhere), "a checkout");
+        assert!(!keeps_sessions(&checkout.join("src"), &elsewhere), "a folder without reports");
+        assert!(!keeps_sessions(checkout, &checkout.join("typodont.exe")), "the folder of an installed program");
+    }
 }
