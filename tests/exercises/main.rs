@@ -5,6 +5,7 @@ mod support;
 mod authoring;
 mod broken_scenarios;
 mod charting;
+mod documented_commands;
 mod fairness;
 mod fuzz_scenario;
 mod guessing;
