@@ -3,6 +3,7 @@
 //! Takes an utterance, a sample rate and a seed. Gives samples. Never uses unseeded randomness.
 
 use super::signal::{Noise, PhaseAccumulator, StateVariableFilter, sample_count};
+use typodont_core::frame::smooth_step;
 
 /// Resonances (formants) of the vocal tract, Hz, lowest first.
 pub type Vowel = [f32; 3];
@@ -93,7 +94,7 @@ pub fn synthesize(utterance: &Utterance, rate: f32, seed: u64) -> Vec<f32> {
 /// Tunes the formants for a moment of the utterance, 0 to 1.
 fn tune_formants(mouth: &mut [Option<StateVariableFilter>; 3], utterance: &Utterance, progress: f32, rate: f32) {
     let [from, to] = utterance.vowels;
-    let eased = progress * progress * (3.0 - 2.0 * progress);
+    let eased = smooth_step(progress);
     for (i, filter) in mouth.iter_mut().enumerate() {
         // Interpolated in the logarithm, as the ear perceives frequency.
         let centre = from[i] * (to[i] / from[i]).powf(eased);
@@ -107,7 +108,7 @@ fn apply_formants(mouth: &mut [Option<StateVariableFilter>; 3], source: f32) -> 
 
 fn pitch(utterance: &Utterance, progress: f32) -> f32 {
     let Utterance { pitch: [start, peak, end], peak_at, .. } = *utterance;
-    let between = |from: f32, to: f32, t: f32| from * (to / from).powf(t * t * (3.0 - 2.0 * t));
+    let between = |from: f32, to: f32, t: f32| from * (to / from).powf(smooth_step(t));
     match progress < peak_at {
         true => between(start, peak, progress / peak_at),
         false => between(peak, end, (progress - peak_at) / (1.0 - peak_at)),
@@ -130,6 +131,5 @@ fn glottal_flow(phase: f32) -> f32 {
 fn loudness(utterance: &Utterance, progress: f32) -> f32 {
     let begun = (progress * utterance.length / utterance.attack).min(1.0);
     let left = ((1.0 - progress) / DECAY_SHARE).min(1.0);
-    let smooth = |x: f32| x * x * (3.0 - 2.0 * x);
-    smooth(begun) * smooth(left)
+    smooth_step(begun) * smooth_step(left)
 }

@@ -52,6 +52,18 @@ pub fn nearest_rotation(x: Vec3, y: Vec3, z: Vec3) -> Option<Quat> {
     is_near.then(|| Quat::from_mat3(&Mat3::from_cols(x, z.cross(x), z)).normalize())
 }
 
+/// Rotation about x, then y, then z of the space that stays in place, each in degrees.
+pub fn rotation_about_axes([x, y, z]: [f32; 3]) -> Quat {
+    let [x, y, z] = [x, y, z].map(f32::to_radians);
+    Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x)
+}
+
+/// Rises from 0 at 0 to 1 at 1, level at both ends and beyond them.
+pub fn smooth_step(share: f32) -> f32 {
+    let t = share.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
 impl Default for Pose {
     fn default() -> Self {
         Pose::IDENTITY

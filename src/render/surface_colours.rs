@@ -5,7 +5,7 @@
 //! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
 
 use super::scene::{Appearance, LabelPalette};
-use typodont_core::frame::Vec3;
+use typodont_core::frame::{Vec3, smooth_step};
 use typodont_core::parallel::par_map;
 use typodont_core::volume::{BRICK, Label, Volume};
 
@@ -380,17 +380,16 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
     let spot = sound.lerp(WHITE_SPOT, 0.7 * enamel.min(1.0));
     let amber = decay.lerp(AMBER, 0.6);
     let colour = sound
-        .lerp(spot, smooth_step(0.02, 0.2, uneven))
-        .lerp(amber, smooth_step(0.12, 0.65, uneven))
-        .lerp(decay, smooth_step(0.4, 0.95, uneven));
-    let gloss = sound_gloss + (decay_gloss - sound_gloss) * smooth_step(0.03, 0.6, uneven);
+        .lerp(spot, rise(0.02, 0.2, uneven))
+        .lerp(amber, rise(0.12, 0.65, uneven))
+        .lerp(decay, rise(0.4, 0.95, uneven));
+    let gloss = sound_gloss + (decay_gloss - sound_gloss) * rise(0.03, 0.6, uneven);
     texel([colour.x, colour.y, colour.z, gloss].map(|v| v.clamp(0.0, 1.0)), 1.0)
 }
 
 /// Rises from 0 to 1 between two values, without a kink.
-fn smooth_step(from: f32, to: f32, value: f32) -> f32 {
-    let part = ((value - from) / (to - from)).clamp(0.0, 1.0);
-    part * part * (3.0 - 2.0 * part)
+fn rise(from: f32, to: f32, value: f32) -> f32 {
+    smooth_step((value - from) / (to - from))
 }
 
 /// Noise at a place, mm: −1 to 1, the same at the same place of every volume.

@@ -5,7 +5,7 @@
 //! never allocates, never reads a clock.
 
 use crate::device::Wrench;
-use crate::frame::{Pose, Quat, Vec3};
+use crate::frame::{Pose, Quat, Vec3, smooth_step};
 use crate::tick::Tick;
 
 /// Orientation and scale of the space in which a hand moves.
@@ -148,6 +148,8 @@ pub(super) struct HandMapping {
     frame: HandFrame,
     /// Point of the world at which the middle of the device's workspace is, mm.
     middle: Vec3,
+    /// True while the world is the space of the device, so that most ticks need not compare the frame.
+    is_device_space: bool,
     change: Option<MappingChange>,
     clutch: Clutch,
     /// True once a hand was seen; before, there is no tip that could stay.
@@ -160,6 +162,7 @@ impl HandMapping {
         HandMapping {
             frame: HandFrame::DEVICE,
             middle: Vec3::ZERO,
+            is_device_space: true,
             change: None,
             clutch: Clutch::default(),
             has_hand: false,
@@ -189,7 +192,7 @@ impl HandMapping {
     /// Returns the pose of a hand in the world, `world_from_handle`.
     pub fn world_pose(&mut self, in_device: &Pose) -> Pose {
         self.has_hand = true;
-        if self.frame == HandFrame::DEVICE && self.middle == Vec3::ZERO {
+        if self.is_device_space {
             // A product with the identity may turn −0 into 0, and recordings are compared to the last bit.
             return *in_device;
         }
@@ -209,6 +212,7 @@ impl HandMapping {
         }
         if !self.has_hand {
             self.frame = to;
+            self.is_device_space = self.frame == HandFrame::DEVICE;
             return false;
         }
         self.begin(to, path, rendered);
@@ -273,16 +277,12 @@ impl HandMapping {
                 self.middle + moved
             }
         };
+        self.is_device_space = self.frame == HandFrame::DEVICE && self.middle == Vec3::ZERO;
         let wrench = change.fade.advance();
         let is_over = change.ticks_left == 0 && change.fade.ticks_left == 0 && !self.clutch.is_pressed;
         self.change = (!is_over).then_some(change);
         Some(FreeHand { world_from_handle: self.placed(tip, in_device), wrench })
     }
-}
-
-/// Share of a movement that starts and ends at rest, of a share of its time, both 0 to 1.
-fn smooth_step(share: f32) -> f32 {
-    share * share * (3.0 - 2.0 * share)
 }
 
 #[cfg(test)]

@@ -524,10 +524,12 @@ impl Simulation {
         let is_at_work =
             tip.length() < STAY_DISTANCE || self.proxy.contact().is_some() || self.hand_mapping.is_tip_held();
         let tip = self.world_from_tooth * tip;
-        let path = match is_at_work {
-            _ if self.hand_mapping.is_centring() => TipPath::Centre(tip),
-            true => TipPath::Stay(tip),
-            false => TipPath::Turn,
+        let path = if self.hand_mapping.is_centring() {
+            TipPath::Centre(tip)
+        } else if is_at_work {
+            TipPath::Stay(tip)
+        } else {
+            TipPath::Turn
         };
         if self.hand_mapping.place(frame, path, self.rendered) {
             self.disengage();

@@ -5,7 +5,7 @@
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::sync::Arc;
-use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::frame::{Pose, Vec3, rotation_about_axes};
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::Body;
 
@@ -110,8 +110,7 @@ impl ShapeEntry {
 
     /// Returns the pose of the file's space in handle space, after its lengths have been converted to mm.
     pub fn handle_from_file(&self) -> Pose {
-        let [x, y, z] = self.orientation_deg.map(|angle| angle.0.to_radians());
-        let orientation = Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x);
+        let orientation = rotation_about_axes(self.orientation_deg.map(|angle| angle.0));
         Pose { position: Vec3::from(self.position_mm.map(|c| c.0)), orientation }
     }
 

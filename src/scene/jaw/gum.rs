@@ -7,7 +7,7 @@ use super::arch::{HalfArch, ToothSeat};
 use super::crown::{ColouredMesh, compute_normals, smooth_normals};
 use super::teeth::ToothModel;
 use typodont_anatomy::periodontium::{ProbingSite, SiteLengths};
-use typodont_core::frame::Vec3;
+use typodont_core::frame::{Vec3, smooth_step};
 use typodont_render::Rgb;
 
 /// Upper or lower jaw.
@@ -100,7 +100,7 @@ impl HalfJaw<'_> {
         let middle = place + out * offset;
         let shrink = 1.0 - 0.45 * pad * pad;
         let (wide, narrow) = (half * shrink, half * (1.0 - 0.3 * between) * shrink);
-        let front = 1.0 - smoothstep((arc_length - 12.0) / 16.0);
+        let front = 1.0 - smooth_step((arc_length - 12.0) / 16.0);
         let crest = margin.max(inner_margin) - 0.25 * between;
         let mut rows = vec![
             (wide + 5.0, BASE, MUCOSA),
@@ -147,7 +147,7 @@ impl HalfJaw<'_> {
             let after = seats.iter().position(|s| s.middle() > arc_length).unwrap_or(seats.len());
             let (before, after) = (after.saturating_sub(1), after.min(seats.len() - 1));
             let (a, b) = (seats[before].middle(), seats[after].middle());
-            of(before) + (of(after) - of(before)) * smoothstep((arc_length - a) / (b - a).max(1e-3))
+            of(before) + (of(after) - of(before)) * smooth_step((arc_length - a) / (b - a).max(1e-3))
         };
         let last = seats.len() - 1;
         let here = seats.iter().position(|s| arc_length < s.to).unwrap_or(last);
@@ -209,17 +209,11 @@ fn lerp_tint(a: Rgb, b: Rgb, share: f32) -> Rgb {
     std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share.min(1.0))
 }
 
-/// From 0 to 1, level at both ends.
-fn smoothstep(share: f32) -> f32 {
-    let t = share.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
 /// Height on the midline.
 fn midline_height(jaw: Jaw, front: Vec3, y: f32) -> f32 {
     match jaw {
-        Jaw::Upper => front.z + (VAULT - front.z) * smoothstep((y - front.y) / 26.0),
-        Jaw::Lower => front.z - 2.5 * smoothstep((y - front.y) / 12.0),
+        Jaw::Upper => front.z + (VAULT - front.z) * smooth_step((y - front.y) / 26.0),
+        Jaw::Lower => front.z - 2.5 * smooth_step((y - front.y) / 12.0),
     }
 }
 
@@ -230,14 +224,14 @@ fn relief(jaw: Jaw, front: Vec3, x: f32, y: f32) -> f32 {
     match jaw {
         Jaw::Upper => {
             let aside = x.abs();
-            let mask = smoothstep(aside / 2.0) * (1.0 - smoothstep((aside - 7.0) / 4.0)) * smoothstep(behind / 2.0);
-            let mask = mask * (1.0 - smoothstep((behind - 9.0) / 5.0));
+            let mask = smooth_step(aside / 2.0) * (1.0 - smooth_step((aside - 7.0) / 4.0)) * smooth_step(behind / 2.0);
+            let mask = mask * (1.0 - smooth_step((behind - 9.0) / 5.0));
             let folds = libm::sinf(std::f32::consts::TAU * (behind - 0.45 * aside + 0.3 * libm::sinf(aside)) / 4.0);
             0.4 * mask * folds
-                + 0.25 * bell(x, 0.9) * smoothstep(behind / 4.0)
+                + 0.25 * bell(x, 0.9) * smooth_step(behind / 4.0)
                 + 0.9 * bell(x, 1.6) * bell(behind + 0.5, 2.4)
         }
-        Jaw::Lower => 1.8 * bell(x, 1.0) * smoothstep(behind / 1.5) * (1.0 - smoothstep((behind - 5.0) / 8.0)),
+        Jaw::Lower => 1.8 * bell(x, 1.0) * smooth_step(behind / 1.5) * (1.0 - smooth_step((behind - 5.0) / 8.0)),
     }
 }
 

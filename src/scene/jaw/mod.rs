@@ -21,7 +21,7 @@ use typodont_anatomy::age;
 use typodont_anatomy::age::AgeEffects;
 use typodont_anatomy::form::Sizes;
 use typodont_anatomy::teeth as teeth_by_number;
-use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::frame::{Pose, Quat, Vec3, smooth_step};
 use typodont_core::mesh::Mesh;
 use typodont_core::parallel;
 use typodont_core::touch::{Collider, ColliderGeometry};
@@ -439,10 +439,10 @@ impl TouchedGeometry<'_> {
         let aside = (point - point.clamp(crown.low, crown.high)) * Vec3::new(1.0, 1.0, 0.0);
         let deep = crown.low.z - point.z;
         let as_felt = if self.tooth.fdi % 10 <= 3 { TOUCH_BLEND_IN_FRONT } else { TOUCH_BLEND };
-        let near = (1.0 - smoothstep(aside.length(), as_felt)) * (1.0 - smoothstep(deep, DEEP));
+        let near = (1.0 - rise(aside.length(), as_felt)) * (1.0 - rise(deep, DEEP));
         // Distance queries to a mesh are slow.
         let away = |p: Vec3| self.periodontium.map_or_else(|| gum.distance(p), |own| own.gum_sdf_filled(p));
-        let share = if near > 0.0 { near * (1.0 - smoothstep(away(point).abs(), FAR)) } else { 0.0 };
+        let share = if near > 0.0 { near * (1.0 - rise(away(point).abs(), FAR)) } else { 0.0 };
         if share <= 0.0 {
             return point_in_arch;
         }
@@ -473,7 +473,6 @@ fn has_own_surface(shape: &Collider) -> bool {
 }
 
 /// 0 up to the first bound, 1 from the second on.
-fn smoothstep(value: f32, [low, high]: [f32; 2]) -> f32 {
-    let t = ((value - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
+fn rise(value: f32, [low, high]: [f32; 2]) -> f32 {
+    smooth_step((value - low) / (high - low))
 }

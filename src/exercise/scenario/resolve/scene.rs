@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use typodont_anatomy::age;
 use typodont_anatomy::caries::LesionDepth;
-use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::frame::{Pose, Vec3, rotation_about_axes};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider};
 use typodont_core::volume::{Label, Volume};
@@ -118,8 +118,7 @@ impl Resolver<'_> {
             let label = self.label(&obstacle.tissue, &format!("{path}/tissue"));
             let Some(form) = self.mesh(&obstacle.mesh, &format!("{path}/mesh")) else { continue };
             let position = Vec3::from(obstacle.position_mm.map(|c| c.0));
-            let [x, y, z] = obstacle.orientation_deg.map(|a| a.0.to_radians());
-            let orientation = Quat::from_rotation_z(z) * Quat::from_rotation_y(y) * Quat::from_rotation_x(x);
+            let orientation = rotation_about_axes(obstacle.orientation_deg.map(|angle| angle.0));
             shapes.push(Collider { label, tooth_from_collider: Pose { position, orientation }, geometry: form });
         }
         shapes
