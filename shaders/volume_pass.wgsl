@@ -17,12 +17,51 @@ struct Blended {
     first: f32,
 }
 
+// Density and label (of 255) of a voxel; of the nearest one where there is none.
+fn voxel(at: vec3i) -> vec2f {
+    return textureLoad(voxels, clamp(at, vec3i(0), vec3i(tooth.dims.xyz) - 1), 0).rg;
+}
+
+fn table_entry(density: f32, label: f32) -> vec4f {
+    return textureLoad(transfer, vec2i(i32(density * 255.0 + 0.5), i32(label * 255.0 + 0.5)), 0);
+}
+
 // Entry of the table of the nearest voxel's label for the density at a place.
 fn entry(at: vec3f) -> vec4f {
-    let last = vec3i(tooth.dims.xyz) - 1;
-    let nearest = clamp(vec3i(floor(at + 0.5)), vec3i(0), last);
-    let label = i32(textureLoad(voxels, nearest, 0).g * 255.0 + 0.5);
-    return textureLoad(transfer, vec2i(i32(density(at) * 255.0 + 0.5), label), 0);
+    return table_entry(density(at), voxel(vec3i(floor(at + 0.5))).g);
+}
+
+// Colour and opacity at a place: the entries of the eight labels around it for the density there, by the matter of their
+// voxels, so that no face of a voxel shows where tissues meet.
+fn mixed_entry(at: vec3f) -> vec4f {
+    let corner = floor(at);
+    let share = at - corner;
+    var weights = array<f32, 8>();
+    var labels = array<f32, 8>();
+    var matter = 0.0;
+    var is_alike = true;
+    for (var i = 0u; i < 8u; i++) {
+        let step = vec3f(f32(i & 1u), f32((i >> 1u) & 1u), f32(i >> 2u));
+        let near = mix(1.0 - share, share, step);
+        let found = voxel(vec3i(corner + step));
+        weights[i] = near.x * near.y * near.z * found.r;
+        labels[i] = found.g;
+        matter += weights[i];
+        is_alike = is_alike && labels[i] == labels[0];
+    }
+    let here = density(at);
+    if is_alike || matter <= 0.0 {
+        return table_entry(here, labels[0]);
+    }
+    // Colours multiplied by opacity.
+    var sum = vec4f(0.0);
+    for (var i = 0u; i < 8u; i++) {
+        if weights[i] > 0.0 {
+            let found = table_entry(here, labels[i]);
+            sum += vec4f(found.rgb * found.a, found.a) * weights[i];
+        }
+    }
+    return vec4f(sum.rgb / max(sum.a, 1e-9), sum.a / matter);
 }
 
 // From front to back until nothing shines through or the scene ends the ray.
@@ -49,7 +88,7 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
         // In a uniform brick all samples are equal, so one sample stands for all of them.
         let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
         while z < out {
-            let found = entry(start + along * z);
+            let found = mixed_entry(start + along * z);
             if found.a > 0.0 {
                 let opacity = select(found.a, 1.0 - pow(1.0 - found.a, samples), is_even);
                 blended.colour += vec4f(found.rgb, 1.0) * (opacity * (1.0 - blended.colour.a));
