@@ -22,6 +22,10 @@ use typodont_formats::{Library, nrrd, surfaces};
 /// tooth whose surface the tip touches. `ShapeEntry::file` states it.
 const REACH: f32 = 20.0;
 
+/// Greatest distance of the surface from [0, 0, 0], where the tip must lie, mm: the radius of the largest burs, whose origin is
+/// the middle of the ball, and half of a ring's width.
+const TIP_DISTANCE: f32 = 5.0;
+
 /// Plausible length of an instrument or of a file with its working end only, mm. A length outside this range is in
 /// another unit.
 const LENGTH: std::ops::RangeInclusive<f32> = 1.0..=250.0;
@@ -70,6 +74,12 @@ pub(crate) fn sampled_end(entry: &ShapeEntry, library: &Library) -> Result<Sampl
     let shape = sampled(&triangles).map_err(|error| error.in_file(&entry.file))?;
     let cutting = entry.cutting.as_ref().map(|part| cutting_part(entry, part, &shape, library)).transpose()?;
     let body = Body::sampled(shape, cutting);
+    let away = body.surface_points().iter().map(|point| point.position.length()).fold(f32::INFINITY, f32::min);
+    if away > TIP_DISTANCE {
+        let message =
+            format!("the surface is {away:.1} mm away from [0, 0, 0], where the tip of the instrument must lie");
+        return Err(ShapeError::wrong(message, "move it there by \"position_mm\"").in_file(&entry.file));
+    }
     if !body.surface_points().iter().any(|point| point.region == BodyRegion::Head) {
         let help = "the cutting part must be a part of the instrument, at the same position and in the same unit";
         return Err(ShapeError::wrong("no part of the instrument's surface belongs to its cutting part", help));

@@ -690,6 +690,8 @@ fn a_shape_that_cannot_be_used_gets_one_complaint() {
     check(json!({ "file": "a.stl", "unit": "m" }), &file(stl_box(0.004, 0)), "");
     check(json!({ "file": "a.stl", "unit": "m" }), &file(stl_box(4.0, 0)), "its longest side is 4000 mm");
     check(json!({ "file": "a.stl", "position_mm": [90, 0, 0] }), &file(stl_box(4.0, 0)), "within 20 mm of its tip");
+    let aside = json!({ "file": "a.stl", "position_mm": [9, 0, 0] });
+    check(aside, &file(stl_box(4.0, 0)), "mm away from [0, 0, 0]");
     let many = stl((0..300_001).map(|n| [[n as f32, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]));
     check(whole.clone(), &file(many), "300001 triangles");
     let dust =
