@@ -25,11 +25,12 @@ fn every_fake_is_soaked() {
             Box::new(haply::Haply::plug_in("values")),
             Box::new(haply::Haply::plug_in("vector")),
             Box::new(polhem::HidRig::new()),
-            Box::new(polhem::SerialRig::new()),
             Box::new(open_handle::Rigged::new()),
             Box::new(spacemouse::Rigged::new(false)),
             Box::new(stream::Stream::plug_in()),
         ];
+        #[cfg(unix)]
+        fakes.push(Box::new(crate::polhem_serial::SerialRig::new()));
         fakes.iter_mut().for_each(|fake| soak::soak(fake.as_mut()));
     })
 }

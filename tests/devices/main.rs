@@ -16,6 +16,8 @@ mod open_handle;
 mod pipe;
 mod pointer_policy;
 mod polhem;
+#[cfg(unix)]
+mod polhem_serial;
 mod rig;
 mod servo;
 mod simulated;

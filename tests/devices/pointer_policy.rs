@@ -213,7 +213,7 @@ fn score_by_pointer(exercise: &str, seed: u64) -> serde_json::Value {
     let workpiece = Arc::new(Workpiece::make(&scenario, seed).unwrap());
     let mut policy = PointerPolicy::new(scenario.clone(), workpiece.clone());
     let spec = policy.spec().clone();
-    let place = folder("pointer").join(format!("{}-{seed}.mcap", scenario.id));
+    let place = folder(&format!("pointer-{}-{seed}", scenario.id)).join("recording.mcap");
     let _ = std::fs::remove_file(&place);
     let head = RecordingHeadFile::of(&scenario, &spec, seed);
     let mut recorder = Recorder::create(&place, &head, &scenario, &workpiece).unwrap();

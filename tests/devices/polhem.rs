@@ -1,4 +1,4 @@
-//! Fake Polhems: an arm of encoders and motors on HID, and one that speaks lines over a pair of pseudo-terminals.
+//! Fake Polhem: an arm of encoders and motors on HID.
 //!
 //! Their geometry is worked out the other way round than the driver's: positions are inverted numerically, and what the
 //! hand feels follows from the currents by virtual work.
@@ -7,7 +7,6 @@ use crate::pipe::{DeviceEnd, cable};
 use crate::rig::{Abilities, Misbehaviour, Rig, SharedHand};
 use crate::suite;
 use glam::{DMat3, DQuat, DVec3};
-use serial2::SerialPort;
 use std::collections::VecDeque;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -19,25 +18,24 @@ use typodont_devices::Relay;
 use typodont_devices::hid::Transport;
 use typodont_devices::polhem::geometry::ARM_CONFIGS;
 use typodont_devices::polhem::hid_arm::HidArm;
-use typodont_devices::polhem::serial_arm::SerialArm;
 
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Faults of the fake device, and values that tests read from it.
 #[derive(Default)]
-struct Faults {
+pub struct Faults {
     /// `Misbehaviour as u32 + 1`; 0 for nothing.
-    wrong: AtomicU32,
+    pub wrong: AtomicU32,
     /// True if the device has lost the position of its encoders.
     is_lost: AtomicBool,
     /// The last preset of the third encoder.
     preset: AtomicI32,
     /// Once: the next record on the serial port lacks a byte.
-    drop_byte: AtomicBool,
+    pub drop_byte: AtomicBool,
 }
 
 impl Faults {
-    fn is(&self, how: Misbehaviour) -> bool {
+    pub fn is(&self, how: Misbehaviour) -> bool {
         self.wrong.load(Ordering::Acquire) == how as u32 + 1
     }
 }
@@ -104,7 +102,7 @@ impl Built {
 }
 
 /// World space, mm, to the arm's, m: toward the user, right, up.
-fn in_arm(v: Vec3) -> DVec3 {
+pub fn in_arm(v: Vec3) -> DVec3 {
     DVec3::new(f64::from(v.z), f64::from(v.x), f64::from(v.y)) / 1000.0
 }
 
@@ -113,7 +111,7 @@ fn in_world(v: DVec3) -> Vec3 {
 }
 
 /// The handle's x, y, z are the world's z, x, y of its own: its shaft is along the arm's x.
-fn handle_in_arm(q: Quat) -> DMat3 {
+pub fn handle_in_arm(q: Quat) -> DMat3 {
     let world = DMat3::from_quat(DQuat::from_xyzw(q.x.into(), q.y.into(), q.z.into(), q.w.into()).normalize());
     let axis = |v: DVec3| DVec3::new(v.z, v.x, v.y);
     DMat3::from_cols(axis(world.z_axis), axis(world.x_axis), axis(world.y_axis))
@@ -245,12 +243,17 @@ fn an_arm_on_hid_passes_the_suite() {
     })
 }
 
-fn open(rig: &mut dyn Rig) -> Box<dyn Device + Send> {
+pub fn open(rig: &mut dyn Rig) -> Box<dyn Device + Send> {
     rig.open().unwrap()
 }
 
 /// Exchanges until a state or a reading holds.
-fn until(device: &mut Box<dyn Device + Send>, told: Wrench, what: &str, holds: impl Fn(&Reading, DeviceState) -> bool) {
+pub fn until(
+    device: &mut Box<dyn Device + Send>,
+    told: Wrench,
+    what: &str,
+    holds: impl Fn(&Reading, DeviceState) -> bool,
+) {
     let start = Instant::now();
     loop {
         std::thread::sleep(Duration::from_millis(1));
@@ -316,158 +319,5 @@ fn the_wrist_is_read_in_its_own_order() {
         until(&mut device, Wrench::ZERO, "rolled", |reading, _| {
             reading.buttons == 1 && reading.pose.is_valid() && reading.pose.orientation.angle_between(rolled) < 0.02
         });
-    })
-}
-
-pub struct SerialRig {
-    hand: SharedHand,
-    faults: Arc<Faults>,
-}
-
-impl SerialRig {
-    pub fn new() -> SerialRig {
-        SerialRig { hand: SharedHand::at_rest(0.0), faults: Arc::default() }
-    }
-}
-
-impl Rig for SerialRig {
-    fn name(&self) -> &'static str {
-        "polhem:serial"
-    }
-
-    fn open(&mut self) -> Result<Box<dyn Device + Send>, String> {
-        let (program, arm) = SerialPort::pair().map_err(|e| e.to_string())?;
-        let (hand, faults) = (self.hand.clone(), self.faults.clone());
-        crate::rig::spawn_device(move || speak(arm, &hand, &faults));
-        Ok(Box::new(Relay::start(SerialArm::new(program).map_err(|e| e.to_string())?)))
-    }
-
-    fn hand(&self) -> SharedHand {
-        self.hand.clone()
-    }
-
-    fn abilities(&self) -> Abilities {
-        Abilities {
-            force: true,
-            torque: false,
-            orientation: true,
-            // Its only button sits on a stylus with a radio of its own.
-            buttons: false,
-            resolution: 0.001,
-            is_rate: false,
-            misbehaviours: &[Misbehaviour::Unplug, Misbehaviour::Garbage, Misbehaviour::Late],
-        }
-    }
-
-    fn misbehave(&mut self, how: Misbehaviour) {
-        self.faults.wrong.store(how as u32 + 1, Ordering::Release);
-    }
-
-    fn recover(&mut self) {
-        self.faults.wrong.store(0, Ordering::Release);
-    }
-}
-
-/// Speaks unasked until it hears the first record, then one record for each it hears, in two halves.
-fn speak(mut arm: SerialPort, hand: &SharedHand, faults: &Faults) {
-    arm.set_read_timeout(Duration::from_millis(1)).unwrap();
-    let (mut heard, mut was_woken) = (Vec::new(), false);
-    let (mut force, mut told_at, mut due) = (Vec3::ZERO, Instant::now(), Instant::now());
-    let mut answers: VecDeque<(Instant, Vec<u8>)> = VecDeque::new();
-    while !faults.is(Misbehaviour::Unplug) {
-        // A pseudo-terminal without a program gives an error or nothing, a quiet one a time-out.
-        let mut bytes = [0; 256];
-        match arm.read(&mut bytes) {
-            Ok(0) => break,
-            Ok(n) => heard.extend_from_slice(&bytes[..n]),
-            Err(e) if e.kind() == std::io::ErrorKind::TimedOut => {}
-            Err(_) => break,
-        }
-        let mut asked = u32::from(!was_woken);
-        while heard.len() >= 64 {
-            let record: Vec<u8> = heard.drain(..64).collect();
-            if record[63] != b'\n' {
-                heard.clear();
-                break;
-            }
-            let text = std::str::from_utf8(&record).unwrap();
-            let numbers: Vec<i32> = text.split_whitespace().map(|n| n.parse().unwrap()).collect();
-            assert_eq!((numbers.len(), numbers[3]), (7, 2), "{text}");
-            if !was_woken {
-                assert_eq!(numbers[..3], [0; 3], "the first record wakes and does not push");
-                (was_woken, asked) = (true, 0);
-            }
-            // Toward the user, right, up; mN.
-            let [x, y, z] = [0, 1, 2].map(|i| numbers[i] as f32 / 1000.0);
-            force = Vec3::new(y, z, x);
-            told_at = Instant::now();
-            asked += 1;
-        }
-        if told_at.elapsed() > Duration::from_millis(500) {
-            force = Vec3::ZERO;
-        }
-        // It works at 1 kHz, however fast it is spoken to.
-        std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        due = (due + Duration::from_millis(1)).max(Instant::now() - Duration::from_millis(5));
-        let at = hand.turn(Wrench { force, ..Wrench::ZERO });
-        let delay = if faults.is(Misbehaviour::Late) { Duration::from_millis(50) } else { Duration::ZERO };
-        let line = if faults.is(Misbehaviour::Garbage) { vec![b'#'; 64] } else { line(&at) };
-        answers.extend((0..asked).map(|_| (Instant::now() + delay, line.clone())));
-        while let Some((_, mut answer)) = answers.pop_front_if(|(due, _)| *due <= Instant::now()) {
-            if faults.drop_byte.swap(false, Ordering::AcqRel) {
-                answer.remove(20);
-            }
-            let (first, second) = answer.split_at(23);
-            if arm.write_all(first).is_err() || arm.write_all(second).is_err() {
-                break;
-            }
-        }
-    }
-    hand.turn(Wrench::ZERO);
-}
-
-/// x y z of the arm in mm; the angles A and λ of a forearm that points along the handle, D, E of the wrist; a state.
-///
-/// Every turn without roll can be told by A and λ alone; what is left is D, about the shaft.
-fn line(at: &Reading) -> Vec<u8> {
-    let place = in_arm(at.pose.position) * 1000.0;
-    let handle = handle_in_arm(at.pose.orientation);
-    let shaft = handle.x_axis;
-    let (a, lambda) = (shaft.y.atan2(shaft.x), shaft.z.atan2(shaft.x.hypot(shaft.y)));
-    let fore = DMat3::from_rotation_z(a) * DMat3::from_rotation_y(-lambda);
-    let rest = fore.transpose() * handle;
-    let d = rest.y_axis.z.atan2(rest.y_axis.y);
-    let text = format!("{:.3} {:.3} {:.3} {a:.4} {lambda:.4} {d:.4} 0.0000 0", place.x, place.y, place.z);
-    let mut line = text.into_bytes();
-    line.resize(63, b' ');
-    line.push(b'\n');
-    line
-}
-
-#[test]
-fn an_arm_on_a_serial_port_passes_the_suite() {
-    crate::support::peace::in_real_time(|| {
-        suite::check(&mut SerialRig::new());
-    })
-}
-
-#[test]
-fn a_lost_byte_costs_a_moment_and_not_the_device() {
-    crate::support::peace::in_real_time(|| {
-        // Aim: after a byte is lost the two find each other again, in step. Method: lose one of the arm's bytes several times;
-        // after each the readings follow the hand again.
-        let mut rig = SerialRig::new();
-        let mut device = open(&mut rig);
-        until(&mut device, Wrench::ZERO, "it speaks", |reading, state| state.is_ready() && reading.pose.is_valid());
-        for round in 1..=5 {
-            rig.faults.drop_byte.store(true, Ordering::Release);
-            let goal = Vec3::X * round as f32;
-            rig.hand.reach(goal);
-            until(&mut device, Wrench::ZERO, "it follows again", |reading, state| {
-                state.is_ready() && reading.pose.position.distance(goal) < 0.2
-            });
-        }
-        let push = Wrench { force: Vec3::Y * 0.5, ..Wrench::ZERO };
-        until(&mut device, push, "it pushes again", |_, _| rig.hand.felt().force.distance(push.force) < 0.01);
     })
 }
