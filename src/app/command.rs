@@ -24,6 +24,8 @@ pub enum AppCommand {
     /// The text of a field as it is being typed.
     TypeText(TextField, String),
     BackToList,
+    /// Shows one of the exercise's pictures of the case, by its index, or none.
+    ShowPicture(Option<usize>),
     /// Begins the lesson.
     BeginLesson,
     /// Opens a new exercise at the author's screen.

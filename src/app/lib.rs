@@ -167,6 +167,7 @@ pub fn open_window(options: AppOptions) -> Result<(), String> {
     // With rendering in software, dithering takes a large part of the time of a frame, and pages have few flat colours.
     let native = eframe::NativeOptions { viewport, dithering: false, ..Default::default() };
     let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
+        platform::close_own_console();
         Ok(Box::new(App::new(context, options)))
     });
     eframe::run_native("typodont", native, made).map_err(|error| {

@@ -29,6 +29,8 @@ pub struct Settings {
     pub hand_follows_view: bool,
     /// Distance at the tooth per distance of an arm's hand.
     pub hand_scale: f32,
+    /// True if the handpiece of a mouse leads to the left.
+    pub left_handed: bool,
     pub stereo: StereoMode,
     pub eye_distance_mm: f32,
     /// True to smooth edges; without a value edges are smoothed if a graphics processor draws.
@@ -66,6 +68,7 @@ impl Default for Settings {
             device: "mouse".into(),
             hand_follows_view: true,
             hand_scale: 1.0,
+            left_handed: false,
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,
             smooth_edges: None,

@@ -87,6 +87,7 @@ pub fn default_entry(form: &SchemaForm, whole: &Value, pointer: &str) -> Value {
             "id": id("zone"), "title": id("zone"), "role": "never_remove",
             "region": { "around": { "tissue": "pulp", "within_mm": 0.5 } }
         }),
+        "pictures" => json!({ "file": "picture.jpg", "title": id("picture") }),
         "near" => json!({ "place": { "tissue": "pulp" }, "force_n": 1.5, "response": "warning" }),
         "ask" => json!({ "id": id("question"), "text": "…", "answer": { "yes_no": null } }),
         "options" => json!({ "id": id("option"), "text": "…" }),

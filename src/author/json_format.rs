@@ -45,6 +45,7 @@ const KEY_ORDER: &[&str] = &[
     "carving",
     "vibration",
     "operating_field",
+    "pictures",
     "instruments",
     "zones",
     "instruction",

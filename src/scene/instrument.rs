@@ -35,11 +35,19 @@ pub fn procedural_instrument(entry: &InstrumentEntry) -> MeshInstance {
 /// A bur in a contra-angle handpiece, in two parts: the bur with its shank, and the handpiece.
 pub struct ContraAngle {
     pub bur: MeshInstance,
-    pub handpiece: MeshInstance,
+    /// The handpiece in a right hand, and in a left one.
+    handpieces: [MeshInstance; 2],
 }
 
-/// Direction of a contra-angle's handle from its head: toward the operator, who sits in front of the picture and is
-/// right-handed, and upward by 20°. Handle space; unit vector.
+impl ContraAngle {
+    /// The handpiece as a right-handed or a left-handed operator holds it.
+    pub fn handpiece(&self, is_left_handed: bool) -> &MeshInstance {
+        &self.handpieces[usize::from(is_left_handed)]
+    }
+}
+
+/// Direction of a contra-angle's handle from its head in a right hand: toward the operator, who sits in front of the
+/// picture, and upward by 20°. Handle space; unit vector.
 const HANDLE_DIRECTION: Vec3 = Vec3::new(0.423, -0.840, 0.342);
 
 /// Returns a bur in a contra-angle handpiece, as a pointer holds it; `None` for other instruments and for those with a
@@ -57,14 +65,18 @@ pub fn contra_angle(entry: &InstrumentEntry) -> Option<ContraAngle> {
     let bur = revolve(&[&profile[..], &shank(&profile)].concat());
     let rims = [[0.0, 0.0], [3.2, 0.0], [HEAD_RADIUS, 1.2], [HEAD_RADIUS, HEAD_HEIGHT - 2.0]];
     let cap = [[HEAD_RADIUS - 1.6, HEAD_HEIGHT - 0.4], [2.4, HEAD_HEIGHT], [0.0, HEAD_HEIGHT]];
-    let mut mesh = transformed(revolve(&[&rims[..], &cap].concat()), Pose::at(Vec3::Z * head));
+    let head_mesh = transformed(revolve(&[&rims[..], &cap].concat()), Pose::at(Vec3::Z * head));
     // Neck and handle: distance along the handle from the middle of the head, and radius there.
     const STATIONS: [[f32; 2]; 7] =
         [[0.0, 3.4], [7.0, 3.3], [20.0, 3.9], [26.0, 5.6], [40.0, 6.6], [95.0, 7.4], [110.0, 6.2]];
     let middle = Vec3::Z * (head + 0.5 * HEAD_HEIGHT);
-    let ring = |[along, radius]: [f32; 2]| (middle + HANDLE_DIRECTION * along, HANDLE_DIRECTION, radius);
-    mesh.append(tube(&STATIONS.map(ring)));
-    Some(ContraAngle { bur: plain(bur), handpiece: plain(mesh) })
+    let handpieces = [1.0, -1.0].map(|side| {
+        let direction = HANDLE_DIRECTION * Vec3::new(side, 1.0, 1.0);
+        let mut mesh = head_mesh.clone();
+        mesh.append(tube(&STATIONS.map(|[along, radius]| (middle + direction * along, direction, radius))));
+        plain(mesh)
+    });
+    Some(ContraAngle { bur: plain(bur), handpieces })
 }
 
 /// A periodontal probe with its marks and bands, so that a depth can be read; the middle of its end at the origin.
@@ -344,9 +356,14 @@ mod tests {
         let table = InstrumentTable::read(&Library::shipped()).unwrap();
         assert!(contra_angle(table.by_id("explorer").unwrap()).is_none());
         let held = contra_angle(table.by_id("round_bur_014").unwrap()).unwrap();
-        let lowest = held.handpiece.mesh.positions.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
-        let end = held.handpiece.mesh.positions.iter().copied().min_by(|a, b| a.y.total_cmp(&b.y)).unwrap();
-        assert!(lowest > 8.0 && end.y < -80.0 && end.z > 30.0, "{lowest} {end}");
+        let mut lowest = f32::INFINITY;
+        for (is_left_handed, side) in [(false, 1.0), (true, -1.0)] {
+            let positions = &held.handpiece(is_left_handed).mesh.positions;
+            lowest = positions.iter().map(|p| p.z).fold(lowest, f32::min);
+            let end = positions.iter().copied().min_by(|a, b| a.y.total_cmp(&b.y)).unwrap();
+            assert!(end.y < -80.0 && end.z > 30.0 && side * end.x > 30.0, "left {is_left_handed}: {end}");
+        }
+        assert!(lowest > 8.0, "{lowest}");
         assert!(held.bur.mesh.positions.iter().all(|p| p.truncate().length() < 1.0 && p.z < lowest + 0.1));
     }
 

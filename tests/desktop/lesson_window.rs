@@ -186,3 +186,43 @@ fn one_stroke_draws_all_channels_that_are_switched_on() {
     let differing = before.iter().zip(desk.pixels()).filter(|(a, b)| a.abs_diff(*b) > 8).count();
     assert!(differing > 20_000, "{differing} values of the screen differ");
 }
+
+#[test]
+fn pictures_of_the_case_are_seen_before_the_work_and_beside_it() {
+    // Aim: a trainee looks at a radiograph in the briefing, opens it, and has it beside the tooth during the lesson. Method: a
+    // photograph of one colour; its pixels are counted on the screen.
+    let place = folder("case_pictures_window");
+    let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
+    let mut exercise: serde_json::Value =
+        serde_json::from_str(&text.replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.25")).unwrap();
+    exercise.as_object_mut().unwrap().remove("$schema");
+    exercise["pictures"] = serde_json::json!([{ "file": "bitewing.jpg", "title": "Bite-wing radiograph" }]);
+    let path = place.join("case.json");
+    std::fs::write(&path, exercise.to_string()).unwrap();
+    image::RgbImage::from_pixel(600, 400, image::Rgb([250, 0, 200])).save(place.join("bitewing.jpg")).unwrap();
+    let options = AppOptions { exercise: Some(path), seed: Some(1), ..harness::options(&place) };
+    let Some(mut desk) = Window::open(&place, options) else { return };
+    desk.until("screen", |screen| screen == "briefing");
+    let shown = |desk: &mut Window| {
+        let is_pink = |pixel: &[u8]| pixel[0] > 240 && pixel[1] < 12 && pixel[2].abs_diff(200) < 12;
+        desk.pixels().chunks(4).filter(|pixel| is_pink(pixel)).count()
+    };
+    desk.turn();
+    let small = shown(&mut desk);
+    assert!((5_000..60_000).contains(&small), "{small} pixels of the picture in the briefing");
+    desk.picture("case-briefing");
+    desk.click("picture.0");
+    desk.turn();
+    let large = shown(&mut desk);
+    assert!(large > 3 * small, "{large} pixels of the opened picture, {small} in the briefing");
+    desk.picture("case-opened");
+    desk.click_button("Close window");
+    desk.click("briefing.begin");
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("hand", |_| true);
+    assert_eq!(shown(&mut desk), 0, "it is closed");
+    desk.click("picture.0");
+    desk.turn();
+    assert!(shown(&mut desk) > 3 * small, "it is beside the tooth");
+    desk.picture("case-practice");
+}

@@ -126,7 +126,7 @@ fn commands_in_the_guides_do_what_they_say() {
     let folder = folder("documented_commands");
     let coarse = std::fs::read_to_string("scenarios/5-grinding.json")
         .unwrap()
-        .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.25")
+        .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.4")
         .replace(r#""$schema": "scenario.schema.json","#, "");
     for name in ["scenarios/5-grinding.json", "my-exercises/buccal-caries.json"] {
         std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();
@@ -150,7 +150,7 @@ fn commands_in_the_guides_do_what_they_say() {
     // A gradebook has only sessions of participants.
     let graded = "run scenarios/5-grinding.json --headless --operator hasty --participant P-07";
     commands.insert(0, (graded.split(' ').map(String::from).collect(), "this test".into()));
-    let mut bundle = String::new();
+    let (mut bundle, mut run) = (String::new(), BTreeSet::new());
     for (words, page) in &commands {
         let words: Vec<&str> = words
             .iter()
@@ -162,6 +162,10 @@ fn commands_in_the_guides_do_what_they_say() {
                 (_, other) => other,
             })
             .collect();
+        // Guides name the same bundle in several ways.
+        if !run.insert(words.join(" ")) {
+            continue;
+        }
         let _ = std::fs::remove_file(folder.join("written.txt"));
         let output: Output =
             Command::new(program()).args(&words).current_dir(&folder).env("HOME", &folder).output().unwrap();

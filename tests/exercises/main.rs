@@ -4,6 +4,7 @@
 mod support;
 mod authoring;
 mod broken_scenarios;
+mod case_pictures;
 mod charting;
 mod documented_commands;
 mod fairness;

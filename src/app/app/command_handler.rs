@@ -93,6 +93,7 @@ impl App {
             }
             AppCommand::TypeText(field, text) => self.set_text(field, text),
             AppCommand::BackToList => self.go_back(),
+            AppCommand::ShowPicture(index) => self.shown_picture = index,
             AppCommand::BeginLesson => self.begin_lesson(ctx),
             AppCommand::NewExercise => self.create_exercise(ctx),
             AppCommand::EditExercise => self.edit_selected(ctx),
@@ -143,6 +144,7 @@ impl App {
         let App { exercise_list: list, history, participant, settings, .. } = self;
         if list.can_open_selected(history, participant, settings) {
             self.examiner_code.clear();
+            self.shown_picture = None;
             self.screen = Screen::Briefing;
         }
     }
@@ -151,6 +153,7 @@ impl App {
     pub(super) fn go_back(&mut self) {
         self.leave_results();
         self.examiner_code.clear();
+        self.shown_picture = None;
         if let Some(editor) = self.test_run_origin.take() {
             return self.show_editor(editor);
         }

@@ -6,6 +6,7 @@ use crate::completion::CompletionProgress;
 use crate::i18n::Translations;
 use crate::screen::Screen;
 use crate::ui::briefing::BriefingFields;
+use crate::ui::case_pictures::picture_window;
 use crate::ui::exercise_list::{ListContext, exercise_list_ui};
 use crate::ui::results::{ResultTexts, results_ui};
 use crate::ui::settings_screen::{kiosk_settings_ui, settings_ui};
@@ -29,7 +30,8 @@ impl App {
         if matches!(self.screen, Screen::Editor(_) | Screen::Lesson(_)) {
             self.views.prepare(frame.wgpu_render_state());
         }
-        let App { screen, exercise_list, history, options, words, settings, participant, views, .. } = self;
+        let App { screen, exercise_list, history, options, words, settings, participant, views, shown_picture, .. } =
+            self;
         let examiner_code = options.seed_code.is_none().then_some(self.examiner_code.as_str());
         match screen {
             Screen::ExerciseList => {
@@ -44,7 +46,11 @@ impl App {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
                     let is_code_required = options.kiosk().is_some();
                     let fields = BriefingFields { participant, is_code_required, examiner_code };
-                    briefing::briefing_ui(ui, scenario, fields, completion, words, commands);
+                    briefing::briefing_ui(ui, scenario, fields, completion, &mut views.case_pictures, words, commands);
+                    if let Some(index) = *shown_picture {
+                        let ctx = ui.ctx();
+                        picture_window(ctx, scenario, index, &mut views.case_pictures, words, commands);
+                    }
                 }
             }
             Screen::Lesson(lesson) if lesson.are_stages_over && !lesson.is_submitted => {
@@ -59,6 +65,9 @@ impl App {
             Screen::Completion(completion) => scoring_ui(ui, completion.state().progress, None, words),
             Screen::Lesson(lesson) => {
                 practice::practice_ui(ui, lesson, settings, views, words, commands);
+                if let Some(index) = *shown_picture {
+                    picture_window(ui.ctx(), &lesson.scenario, index, &mut views.case_pictures, words, commands);
+                }
             }
             Screen::Results(results) => {
                 let texts = ResultTexts { words, languages: options.templates.languages() };

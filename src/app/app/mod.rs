@@ -46,6 +46,8 @@ pub struct App {
     /// The editor to return to after the test run of an exercise.
     test_run_origin: Option<Box<EditorState>>,
     overlay: shortcuts::OverlayState,
+    /// Index of the picture of the case that is shown over the briefing or the lesson.
+    shown_picture: Option<usize>,
     closing: CloseState,
     /// A supervisor's attempt to close a kiosk.
     kiosk_exit: KioskExit,
@@ -120,6 +122,7 @@ impl App {
             screen,
             test_run_origin: None,
             overlay: shortcuts::OverlayState::default(),
+            shown_picture: None,
             closing: CloseState::No,
             had_focus: false,
             has_unsaved_settings: false,

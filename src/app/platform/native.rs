@@ -67,8 +67,15 @@ pub fn write_history(_: &str) -> Option<String> {
 }
 
 /// Locale of the user, from the system's environment variables.
+#[cfg(not(any(windows, target_os = "macos")))]
 pub fn locale() -> Option<String> {
     ["LC_ALL", "LC_MESSAGES", "LANG"].into_iter().find_map(|name| std::env::var(name).ok())
+}
+
+/// Locale of the user, as set in the system; programs there get no environment variables for it.
+#[cfg(any(windows, target_os = "macos"))]
+pub fn locale() -> Option<String> {
+    sys_locale::get_locale()
 }
 
 /// Writer of the state log's lines, to the file that the environment names; `None` unless it names one.

@@ -3,6 +3,7 @@
 use crate::command::{AppCommand, TextField};
 use crate::completion::CompletionProgress;
 use crate::i18n::Translations;
+use crate::ui::case_pictures::{CasePictures, thumbnails_ui};
 use crate::ui::text_field::{field_id, participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
@@ -30,6 +31,7 @@ pub fn briefing_ui(
     scenario: &Scenario,
     fields: BriefingFields,
     completion: Option<CompletionProgress>,
+    pictures: &mut CasePictures,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -39,6 +41,7 @@ pub fn briefing_ui(
         ui.heading(words.own(&scenario.texts, &scenario.title));
         ui.label(words.own(&scenario.texts, &scenario.summary));
         ui.add_space(16.0);
+        thumbnails_ui(ui, scenario, pictures, words, commands);
         let below = [(true, 140.0), (completion.is_some(), 70.0), (examiner_code.is_some(), 60.0)];
         let below: f32 = below.iter().filter(|(is_shown, _)| *is_shown).map(|(_, height)| height).sum();
         let room = (ui.available_height() - below).max(160.0);

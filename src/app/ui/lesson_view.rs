@@ -80,6 +80,7 @@ impl LessonView {
             stereo,
             second_size: second_size(settings, viewport, frame.size),
             is_smooth: settings.is_smooth(viewport.has_graphics()),
+            is_left_handed: settings.left_handed,
             particle_count,
         };
         let is_moving = particle_count > 0 && !lesson.is_standing_still();
@@ -123,7 +124,7 @@ impl LessonView {
                 palette: &lesson_scene.palette,
                 mode: lesson_scene.render_mode(mode),
             }),
-            solids: solids(lesson, lesson_scene, &viewpoint),
+            solids: solids(lesson, lesson_scene, settings, &viewpoint),
             opaque_particles: self.particles.opaque(),
             translucent_particles: self.particles.translucent(),
             mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
@@ -152,7 +153,7 @@ fn world_from_tip(seen: &LessonSnapshot) -> Pose {
 }
 
 /// Whatever stands around the tooth, and the instrument in use.
-fn solids(lesson: &LessonState, scene: &LessonScene, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
+fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
     // On a radiograph neither gingiva nor neighbours cover the tooth; the instrument stays.
     let mut solids = Vec::new();
     if lesson.display_mode != DisplayMode::Xray {
@@ -166,7 +167,7 @@ fn solids(lesson: &LessonState, scene: &LessonScene, viewpoint: &Viewpoint) -> V
         Some(held) => {
             solids.push(placed(&held.bur));
             if !hides_tip(viewpoint, world_from_tip) {
-                solids.push(placed(&held.handpiece));
+                solids.push(placed(held.handpiece(settings.left_handed)));
             }
         }
         None => solids.extend(scene.instruments.get(index).map(placed)),

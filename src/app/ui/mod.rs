@@ -4,6 +4,7 @@
 //! this folder but `app` knows of it, and nothing here carries out a command.
 
 pub mod briefing;
+pub mod case_pictures;
 pub mod controls_guide;
 pub mod editor;
 pub mod exercise_list;

@@ -10,7 +10,8 @@ use crate::ui::lesson_view::PictureFrame;
 use crate::ui::viewport::Viewport;
 use crate::ui::views::Views;
 use crate::ui::{
-    controls_guide, periodontal_chart, questions, section_view, shutter_glasses, theme, tools_panel, viewport_input,
+    case_pictures, controls_guide, periodontal_chart, questions, section_view, shutter_glasses, theme, tools_panel,
+    viewport_input,
 };
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::Vec3;
@@ -70,6 +71,7 @@ fn task_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, comman
     ui.weak(format!("{} {number} / {}", words.get("practice.stage"), scenario.stages.len()));
     ui.heading(words.own(&scenario.texts, &stage.title));
     ui.label(words.own(&scenario.texts, &stage.instruction));
+    case_pictures::titles_ui(ui, scenario, words, commands);
     ui.add_space(8.0);
     time_ui(ui, stage.time_limit, lesson.snapshot.as_ref(), words);
     if lesson.is_awaiting_movement {

@@ -34,6 +34,7 @@ pub fn settings_ui(
     egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
         language_row(ui, &mut new, languages, words);
         device_row(ui, &mut new, words);
+        left_handed_row(ui, &mut new, words);
         hand_rows(ui, &mut new, words);
         stereo_row(ui, &mut new, words);
         row(ui, words.get("settings.eyes"), |ui| {
@@ -68,7 +69,7 @@ pub fn settings_ui(
     }
 }
 
-/// Draws the settings of a kiosk: language and size, which hold until the next participant; and the way to close it.
+/// Draws the settings of a kiosk: language, size and the hand, which hold until the next participant; and the way to close it.
 pub fn kiosk_settings_ui(
     ui: &mut egui::Ui,
     settings: &Settings,
@@ -80,6 +81,7 @@ pub fn kiosk_settings_ui(
     egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
         language_row(ui, &mut new, languages, words);
         font_row(ui, &mut new, words);
+        left_handed_row(ui, &mut new, words);
     });
     if new != *settings {
         commands.push(AppCommand::ApplySettings(Box::new(new)));
@@ -132,6 +134,14 @@ fn device_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) 
         });
         choice.response
     });
+}
+
+/// Draws which hand holds the handpiece of a mouse; an arm holds its own.
+fn left_handed_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    ui.label("");
+    let left_handed = egui::Checkbox::new(&mut settings.left_handed, words.get("settings.left_handed"));
+    ui.add_enabled(settings.device == "mouse", left_handed);
+    ui.end_row();
 }
 
 /// Draws how the hand of an arm moves; a mouse works in the picture anyway.

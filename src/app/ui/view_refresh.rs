@@ -35,6 +35,7 @@ pub struct ViewInputs {
     pub stereo: [Option<Stereo>; 2],
     pub second_size: [u32; 2],
     pub is_smooth: bool,
+    pub is_left_handed: bool,
     /// Number of particles in sight.
     pub particle_count: usize,
 }
@@ -144,6 +145,7 @@ mod tests {
             stereo: [None, None],
             second_size: [0, 0],
             is_smooth: false,
+            is_left_handed: false,
             particle_count: 0,
         }
     }

@@ -1,5 +1,6 @@
-//! Pictures of a tooth as the window last drew them. Screens read their state, and change nothing but these.
+//! Pictures as the window last drew them. Screens read their state, and change nothing but these.
 
+use crate::ui::case_pictures::CasePictures;
 use crate::ui::lesson_view::LessonView;
 use crate::ui::preview_view::PreviewView;
 use crate::ui::viewport::Viewport;
@@ -12,6 +13,7 @@ pub struct Views {
     pub viewport: Option<Viewport>,
     pub lesson: LessonView,
     pub preview: PreviewView,
+    pub case_pictures: CasePictures,
 }
 
 impl Views {

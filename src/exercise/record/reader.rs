@@ -391,7 +391,7 @@ impl RecordingParts {
             }
             head.seed = seed;
         }
-        let text = files.remove("scenario.json").ok_or(damaged("the scenario is missing"))?;
+        let text = files.remove(scenario::SCENARIO_PART).ok_or(damaged("the scenario is missing"))?;
         let text = String::from_utf8(text).map_err(|_| damaged("the scenario is not valid UTF-8"))?;
         let (initial, original) = take_volumes(&mut files).map_err(|what| damaged(&what))?;
         let mut library = Library::empty();
@@ -429,10 +429,10 @@ impl RecordingParts {
 /// Removes the volumes from the files of a recording and decodes them: the volume at the start of the session, and the
 /// tooth before its cavity was cut. The error states the damage.
 fn take_volumes(files: &mut BTreeMap<String, Vec<u8>>) -> Result<(Volume, Option<Volume>), String> {
-    let density = files.remove(volume::DENSITY).ok_or("the initial density is missing")?;
-    let label = files.remove(volume::LABEL).ok_or("the initial labels are missing")?;
+    let density = files.remove(scenario::INITIAL_DENSITY_PART).ok_or("the initial density is missing")?;
+    let label = files.remove(scenario::INITIAL_LABEL_PART).ok_or("the initial labels are missing")?;
     let initial = volume::parse(&density, &label)?;
-    let original = match (files.remove(volume::ORIGINAL_DENSITY), files.remove(volume::ORIGINAL_LABEL)) {
+    let original = match (files.remove(scenario::ORIGINAL_DENSITY_PART), files.remove(scenario::ORIGINAL_LABEL_PART)) {
         (Some(density), Some(label)) => Some(volume::parse(&density, &label)?),
         _ => None,
     };

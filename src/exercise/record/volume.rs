@@ -1,19 +1,9 @@
 //! The initial volume of a session, stored as two NRRD attachments of the recording.
 
-use crate::scenario::RECORDING_PARTS;
+use crate::scenario::{INITIAL_DENSITY_PART, INITIAL_LABEL_PART};
 use typodont_core::volume::{Density, Label, Volume};
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
-
-/// Name of the attachment with the initial densities.
-pub const DENSITY: &str = RECORDING_PARTS[1];
-/// Name of the attachment with the initial labels.
-pub const LABEL: &str = RECORDING_PARTS[2];
-
-/// Name of the attachment with the densities of the tooth before its cavity was cut.
-pub const ORIGINAL_DENSITY: &str = RECORDING_PARTS[3];
-/// Name of the attachment with the labels of the tooth before its cavity was cut.
-pub const ORIGINAL_LABEL: &str = RECORDING_PARTS[4];
 
 /// NRRD key of the half-width of the density ramp, mm, stored as the bits of an `f32`.
 const BAND_KEY: &str = "typodont_band_mm";
@@ -37,19 +27,20 @@ pub fn bytes(volume: &Volume) -> Result<(Vec<u8>, Vec<u8>), nrrd::NrrdError> {
 /// # Errors
 /// Returns a description of the first part that is missing, damaged or inconsistent.
 pub fn parse(density: &[u8], label: &[u8]) -> Result<Volume, String> {
-    let density = nrrd::parse(density).map_err(|e| format!("{DENSITY}: {e}"))?;
-    let label = nrrd::parse(label).map_err(|e| format!("{LABEL}: {e}"))?;
+    let density = nrrd::parse(density).map_err(|e| format!("{INITIAL_DENSITY_PART}: {e}"))?;
+    let label = nrrd::parse(label).map_err(|e| format!("{INITIAL_LABEL_PART}: {e}"))?;
     let band = density.key(BAND_KEY).and_then(|bits| bits.parse().ok()).map(f32::from_bits);
-    let band =
-        band.filter(|b| b.is_finite() && *b > 0.0).ok_or(format!("{DENSITY}: {BAND_KEY} is missing or invalid"))?;
-    let grid = density.geometry.grid().ok_or(format!("{DENSITY}: the grid is not axis-aligned"))?;
+    let band = band
+        .filter(|b| b.is_finite() && *b > 0.0)
+        .ok_or(format!("{INITIAL_DENSITY_PART}: {BAND_KEY} is missing or invalid"))?;
+    let grid = density.geometry.grid().ok_or(format!("{INITIAL_DENSITY_PART}: the grid is not axis-aligned"))?;
     if label.geometry != density.geometry {
-        return Err(format!("{LABEL}: the grid differs from that of {DENSITY}"));
+        return Err(format!("{INITIAL_LABEL_PART}: the grid differs from that of {INITIAL_DENSITY_PART}"));
     }
     let (Samples::U8(density), Samples::U8(label)) = (density.samples, label.samples) else {
-        return Err(format!("{DENSITY}, {LABEL}: not 8 bits per voxel"));
+        return Err(format!("{INITIAL_DENSITY_PART}, {INITIAL_LABEL_PART}: not 8 bits per voxel"));
     };
     let density = density.into_iter().map(Density::from_bits).collect();
     Volume::from_parts(grid, band, density, label.into_iter().map(Label).collect())
-        .ok_or(format!("{LABEL}: some voxels with density have no label"))
+        .ok_or(format!("{INITIAL_LABEL_PART}: some voxels with density have no label"))
 }

@@ -7,6 +7,7 @@ use super::file::{
 use super::seal::{SEED, SeedFile, commitment};
 use super::tick_record::{self, TickLayout, TickRecord};
 use super::{replay::RunningDigest, volume};
+use crate::scenario;
 use crate::scenario::{Scenario, Workpiece};
 use crate::session::{Effect, Input, Observer, Session};
 use mcap::records::{MessageHeader, Metadata};
@@ -109,15 +110,15 @@ impl Recorder {
                 let (name, media_type) = (name.to_string(), media_type.to_string());
                 writer.attach(&Attachment { log_time: 0, create_time: 0, name, media_type, data: Cow::Borrowed(data) })
             };
-            attach("scenario.json", "application/json", scenario.text.as_bytes())?;
+            attach(scenario::SCENARIO_PART, "application/json", scenario.text.as_bytes())?;
             for (name, bytes) in &scenario.files {
                 attach(name, "application/octet-stream", bytes)?;
             }
-            attach(volume::DENSITY, "application/x-nrrd", &density)?;
-            attach(volume::LABEL, "application/x-nrrd", &label)?;
+            attach(scenario::INITIAL_DENSITY_PART, "application/x-nrrd", &density)?;
+            attach(scenario::INITIAL_LABEL_PART, "application/x-nrrd", &label)?;
             if let Some((density, label)) = &original {
-                attach(volume::ORIGINAL_DENSITY, "application/x-nrrd", density)?;
-                attach(volume::ORIGINAL_LABEL, "application/x-nrrd", label)?;
+                attach(scenario::ORIGINAL_DENSITY_PART, "application/x-nrrd", density)?;
+                attach(scenario::ORIGINAL_LABEL_PART, "application/x-nrrd", label)?;
             }
             let schema = writer.add_schema(tick_record::SCHEMA_NAME, "ros2msg", tick_record::SCHEMA.as_bytes())?;
             let none = BTreeMap::new();

@@ -35,6 +35,10 @@ pub struct ScenarioFile {
     #[serde(default)]
     #[schemars(length(max = 2000))]
     pub summary: LocalText,
+    /// Photographs and radiographs of the case, which the trainee can look at before and during the exercise.
+    #[serde(default)]
+    #[schemars(length(max = 12))]
+    pub pictures: Vec<PictureFile>,
     /// The tooth or teeth of the exercise and their surroundings.
     pub scene: SceneFile,
     /// File of the school's own instruments, in addition to those of `content/instruments.json`. It has the same keys;
@@ -94,6 +98,18 @@ pub struct ScenarioFile {
     pub questionnaire_time: Option<QuestionnaireTime>,
 }
 
+/// A photograph or a radiograph of the case.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PictureFile {
+    /// PNG, JPEG or TIFF file, at most 12 MB and 8192 pixels wide and high. Its path is relative to the scenario's folder.
+    #[schemars(length(min = 1, max = 500))]
+    pub file: String,
+    /// Title shown to trainees, such as "Bite-wing radiograph".
+    #[schemars(length(min = 1, max = 120))]
+    pub title: LocalText,
+}
+
 impl ScenarioFile {
     /// Names of all files that the exercise itself names, in order, without those that its instrument file names.
     pub fn named_files(&self) -> BTreeSet<String> {
@@ -108,7 +124,8 @@ impl ScenarioFile {
         });
         let scans = self.scene.scans().map(str::to_string);
         let own = self.instrument_file.clone().into_iter().chain(questionnaire);
-        own.chain(scans).chain(labels).chain(guidance).collect()
+        let pictures = self.pictures.iter().map(|picture| picture.file.clone());
+        own.chain(scans).chain(labels).chain(guidance).chain(pictures).collect()
     }
 
     /// Names of all files that the instruments of the exercise name: pictures and shapes. `library` contains the tables

@@ -24,7 +24,15 @@ mod workpiece;
 
 /// Names under which a recording keeps its own parts; no file of an exercise may have one of them.
 pub const RECORDING_PARTS: [&str; 5] =
-    ["scenario.json", "initial.density.nrrd", "initial.label.nrrd", "original.density.nrrd", "original.label.nrrd"];
+    [SCENARIO_PART, INITIAL_DENSITY_PART, INITIAL_LABEL_PART, ORIGINAL_DENSITY_PART, ORIGINAL_LABEL_PART];
+/// The exercise itself.
+pub const SCENARIO_PART: &str = "scenario.json";
+/// Densities and labels at the start of the session.
+pub const INITIAL_DENSITY_PART: &str = "initial.density.nrrd";
+pub const INITIAL_LABEL_PART: &str = "initial.label.nrrd";
+/// Densities and labels of the tooth before its cavity was cut.
+pub const ORIGINAL_DENSITY_PART: &str = "original.density.nrrd";
+pub const ORIGINAL_LABEL_PART: &str = "original.label.nrrd";
 
 pub use cavity::{PreparedCavity, ProximalBox};
 pub use contact_limit::{ContactLimit, LimitPlace, LimitedQuantity};
@@ -55,6 +63,8 @@ pub struct Scenario {
     pub id: String,
     pub title: String,
     pub summary: String,
+    /// Photographs and radiographs of the case.
+    pub pictures: Vec<CasePicture>,
     /// The text of the scenario file.
     pub text: Arc<str>,
     /// SHA-256 of that text, hexadecimal.
@@ -87,6 +97,14 @@ pub struct Scenario {
     pub questionnaire_time: QuestionnaireTime,
     /// Translations of the texts of the exercise and of its tables. All other fields hold the base texts.
     pub texts: LocalTexts,
+}
+
+/// A photograph or a radiograph of the case; its bytes are among [`Scenario::files`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CasePicture {
+    pub title: String,
+    /// Name of the file.
+    pub file: String,
 }
 
 /// Visible effects of drilling. They are drawn only, and do not influence any measure.

@@ -140,6 +140,7 @@ const LABELS: &[(&str, &str)] = &[
     ("cleared_pct", "label.cleared"),
     ("measures", "label.measures"),
     ("limits", "label.limits"),
+    ("pictures", "label.pictures"),
     ("warning_force_n", "label.warning_force"),
     ("cry_force_n", "label.cry_force"),
     ("warning_speed_mm_s", "label.warning_speed"),

@@ -12,7 +12,7 @@ mod dry_run;
 mod zones;
 
 use super::file::{self, ScenarioFile};
-use super::{MeasureParams, OperatingField, Questionnaire, RECORDING_PARTS, Scenario};
+use super::{CasePicture, MeasureParams, OperatingField, Questionnaire, RECORDING_PARTS, Scenario};
 use crate::catalog::{
     AgeBand, InstrumentEntry, InstrumentTable, ShapeEntry, TissueEntry, TissueTable, TouchFactorTable, WorkingEndEntry,
 };
@@ -28,7 +28,7 @@ use typodont_core::touch::{
 use typodont_core::volume::Label;
 use typodont_formats::diagnostic::{Diagnostic, SourceText, did_you_mean};
 use typodont_formats::json::SourceMap;
-use typodont_formats::{Library, json, pointer};
+use typodont_formats::{Library, json, picture, pointer};
 
 /// Treatment of the teeth's shapes while a scenario is resolved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -169,11 +169,13 @@ impl Resolver<'_> {
         let carving = self.carving(&written.carving);
         let limits = self.limits(written, &zones, carving.law);
         let operating_field = self.operating_field(written);
+        let pictures = self.pictures(&written.pictures);
         self.refuse_names_of_recording_parts();
         Some(Scenario {
             id: written.id.clone(),
             title: written.title.to_string(),
             summary: written.summary.to_string(),
+            pictures,
             text: Arc::from(text),
             sha256: hex(&Sha256::digest(text.as_bytes())),
             files: std::mem::take(&mut self.files),
@@ -283,6 +285,30 @@ impl Resolver<'_> {
             }
         }
         tray
+    }
+
+    /// Returns the pictures of the case, and keeps their bytes for the recording.
+    fn pictures(&mut self, written: &[file::PictureFile]) -> Vec<CasePicture> {
+        for (index, file::PictureFile { file, .. }) in written.iter().enumerate() {
+            let path = format!("/pictures/{index}/file");
+            let bytes = match self.library.bytes(file) {
+                Ok(bytes) => bytes,
+                Err(error) => {
+                    self.complain(&path, error.code, error.message, error.help.unwrap_or_default());
+                    continue;
+                }
+            };
+            // What a recording holds was a picture when it was made, and is none of what is scored.
+            if self.mode != ResolveMode::FromRecording
+                && let Err(error) = picture::check(&bytes)
+            {
+                self.complain(&path, error.code(), error.to_string(), error.help());
+            }
+            self.files.insert(file.clone(), bytes);
+        }
+        let shown =
+            |written: &file::PictureFile| CasePicture { title: written.title.to_string(), file: written.file.clone() };
+        written.iter().map(shown).collect()
     }
 
     /// Complains of files that a recording could not keep beside its own parts.

@@ -38,6 +38,8 @@ pub(super) fn local_texts(written: &ScenarioFile, tables: &Tables) -> (LocalText
 /// Texts of the exercise's file, each with its place.
 fn own_texts(written: &ScenarioFile) -> Vec<(String, LocalText)> {
     let mut found = vec![("/title".to_string(), written.title.clone()), ("/summary".into(), written.summary.clone())];
+    let pictures = written.pictures.iter().enumerate();
+    found.extend(pictures.map(|(p, picture)| (format!("/pictures/{p}/title"), picture.title.clone())));
     for (s, stage) in written.stages.iter().enumerate() {
         found.push((format!("/stages/{s}/title"), stage.title.clone()));
         found.push((format!("/stages/{s}/instruction"), stage.instruction.clone()));
