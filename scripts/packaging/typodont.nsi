@@ -1,5 +1,5 @@
 ; The installer for Windows. scripts/package installer calls makensis with:
-;   VERSION   0.2.0
+;   VERSION   0.3.0
 ;   TREE      the folder of the files to install
 ;   FILES     a text of this language that installs the files, and their total size in KIB
 ;   REMOVAL   a text of this language that deletes what was installed, and nothing else
