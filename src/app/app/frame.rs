@@ -49,7 +49,15 @@ impl App {
                     briefing::briefing_ui(ui, scenario, fields, completion, &mut views.case_pictures, words, commands);
                     if let Some(index) = *shown_picture {
                         let ctx = ui.ctx();
-                        picture_window(ctx, scenario, index, &mut views.case_pictures, words, commands);
+                        picture_window(
+                            ctx,
+                            scenario,
+                            index,
+                            egui::Align2::RIGHT_BOTTOM,
+                            &mut views.case_pictures,
+                            words,
+                            commands,
+                        );
                     }
                 }
             }
@@ -66,7 +74,16 @@ impl App {
             Screen::Lesson(lesson) => {
                 practice::practice_ui(ui, lesson, settings, views, words, commands);
                 if let Some(index) = *shown_picture {
-                    picture_window(ui.ctx(), &lesson.scenario, index, &mut views.case_pictures, words, commands);
+                    let corner = egui::Align2::LEFT_BOTTOM;
+                    picture_window(
+                        ui.ctx(),
+                        &lesson.scenario,
+                        index,
+                        corner,
+                        &mut views.case_pictures,
+                        words,
+                        commands,
+                    );
                 }
             }
             Screen::Results(results) => {

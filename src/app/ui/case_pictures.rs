@@ -12,6 +12,9 @@ use typodont_formats::picture;
 /// Height of a picture in the briefing.
 const THUMBNAIL_HEIGHT: f32 = 120.0;
 
+/// Share of the window's width and height that an opened picture takes at first.
+const SHARE: f32 = 0.45;
+
 /// Greatest width and height of a texture, pixels: a radiograph of a sensor in full, a photograph reduced.
 const SIDE_MAX: u32 = 2048;
 
@@ -90,29 +93,36 @@ pub fn titles_ui(ui: &mut egui::Ui, scenario: &Scenario, words: &Translations, c
     }
 }
 
-/// Draws one picture in a window of its own, which may stay open beside the work.
+/// Draws one picture in a window of its own, which may stay open beside the work. `corner` is its place at first.
 pub fn picture_window(
     ctx: &egui::Context,
     scenario: &Scenario,
     index: usize,
+    corner: egui::Align2,
     pictures: &mut CasePictures,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
     let Some(picture) = scenario.pictures.get(index) else { return };
     let title = words.own(&scenario.texts, &picture.title);
-    let room = ctx.content_rect().size();
+    let texture = pictures.texture(ctx, scenario, index);
+    let screen = ctx.content_rect();
+    let room = screen.size() * SHARE;
+    let size = texture.as_ref().map_or(room, |texture| {
+        let pixels = texture.size_vec2();
+        pixels * (room / pixels).min_elem()
+    });
     let mut is_open = true;
     egui::Window::new(title)
-        .id(egui::Id::unique(("picture", index)))
+        .id(egui::Id::unique(("picture", index, corner)))
         .open(&mut is_open)
         .collapsible(false)
-        .default_size(room * 0.5)
-        .max_size(room - egui::vec2(40.0, 80.0))
-        .show(ctx, |ui| match pictures.texture(ctx, scenario, index) {
+        .default_pos(corner.align_size_within_rect(size, screen.shrink2(egui::vec2(24.0, 60.0))).min)
+        .default_width(size.x)
+        .max_size(screen.size() - egui::vec2(40.0, 80.0))
+        .show(ctx, |ui| match texture {
             Some(texture) => {
-                let image = egui::Image::new(&texture).max_size(ui.available_size()).maintain_aspect_ratio(true);
-                ui.add(image.alt_text(title));
+                ui.add(egui::Image::new(&texture).max_width(ui.available_width()).alt_text(title));
             }
             None => _ = ui.colored_label(theme::ERROR, words.format("picture.unreadable", &picture.file)),
         });
