@@ -80,7 +80,12 @@ VIAddVersionKey /LANG=${LANG_ENGLISH} "LegalCopyright" "Typodont contributors"
 
 Function .onInit
   SetRegView 64
+  ; MultiUser chooses a folder of its own; one that was named by /D= stays.
+  StrCpy $R0 $INSTDIR
   !insertmacro MULTIUSER_INIT
+  ${If} $R0 != ""
+    StrCpy $INSTDIR $R0
+  ${EndIf}
 FunctionEnd
 
 Function un.onInit

@@ -167,15 +167,17 @@ pub fn open_window(options: AppOptions) -> Result<(), String> {
     // With rendering in software, dithering takes a large part of the time of a frame, and pages have few flat colours.
     let native = eframe::NativeOptions { viewport, dithering: false, ..Default::default() };
     let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
-        platform::close_own_console();
         Ok(Box::new(App::new(context, options)))
     });
     eframe::run_native("typodont", native, made).map_err(|error| {
         let why = without_source_line(&error.to_string());
-        format!(
-            "no-window: {why}; a window requires a display and a graphics driver (Debian: mesa-vulkan-drivers). \
-             Without them, use `typodont run SCENARIO --headless` in a terminal"
-        )
+        let needed = if cfg!(windows) {
+            "a window requires a graphics driver; the environment variable WGPU_BACKEND=vulkan or WGPU_BACKEND=gl chooses \
+             another one"
+        } else {
+            "a window requires a display and a graphics driver (Debian: mesa-vulkan-drivers)"
+        };
+        format!("no-window: {why}; {needed}. Without it, use `typodont run SCENARIO --headless` in a terminal")
     })
 }
 

@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 fn read_exercise(path: &Path) -> Result<CourseExercise, CliError> {
     let source = typodont_formats::read_text(path)?;
     let library = library_for(path);
-    let scenario = scenario::resolve(source.clone(), &library, ResolveMode::ReadScans)?;
+    let scenario = scenario::resolve(source.clone(), &library, ResolveMode::MakeWorkpiece)?;
     let written = json::read::<ScenarioFile>(source)?.value;
     let name = path.file_name().and_then(OsStr::to_str).unwrap_or("exercise.json").to_string();
     let shipped = Library::shipped();

@@ -74,17 +74,25 @@ pub(crate) fn sampled_end(entry: &ShapeEntry, library: &Library) -> Result<Sampl
     let shape = sampled(&triangles).map_err(|error| error.in_file(&entry.file))?;
     let cutting = entry.cutting.as_ref().map(|part| cutting_part(entry, part, &shape, library)).transpose()?;
     let body = Body::sampled(shape, cutting);
-    let away = body.surface_points().iter().map(|point| point.position.length()).fold(f32::INFINITY, f32::min);
-    if away > TIP_DISTANCE {
-        let message =
-            format!("the surface is {away:.1} mm away from [0, 0, 0], where the tip of the instrument must lie");
-        return Err(ShapeError::wrong(message, "move it there by \"position_mm\"").in_file(&entry.file));
-    }
     if !body.surface_points().iter().any(|point| point.region == BodyRegion::Head) {
         let help = "the cutting part must be a part of the instrument, at the same position and in the same unit";
         return Err(ShapeError::wrong("no part of the instrument's surface belongs to its cutting part", help));
     }
     Ok(SampledEnd { body: Arc::new(body), surface: Arc::new(faceted(&triangles)) })
+}
+
+/// Checks that the tip of an instrument lies where it must; a recording holds what was felt, wherever it lay.
+///
+/// # Errors
+/// Fails when the surface is more than [`TIP_DISTANCE`] away from the origin.
+pub(crate) fn check_tip(entry: &ShapeEntry, end: &SampledEnd) -> Result<(), ShapeError> {
+    let points = end.body.surface_points().iter();
+    let away = points.map(|point| point.position.length()).fold(f32::INFINITY, f32::min);
+    if away <= TIP_DISTANCE {
+        return Ok(());
+    }
+    let message = format!("the surface is {away:.1} mm away from [0, 0, 0], where the tip of the instrument must lie");
+    Err(ShapeError::wrong(message, "move it there by \"position_mm\"").in_file(&entry.file))
 }
 
 fn cutting_part(

@@ -47,7 +47,7 @@ impl fmt::Display for PictureError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PictureError::TooManyBytes(count) => {
-                write!(f, "the picture has {} MB; at most {} MB are read", count >> 20, BYTES_MAX >> 20)
+                write!(f, "the picture has {} MB; at most {} MB are read", count.div_ceil(1 << 20), BYTES_MAX >> 20)
             }
             PictureError::UnknownFormat => write!(f, "the file is not a picture in PNG, JPEG or TIFF"),
             PictureError::Damaged(why) => write!(f, "the picture cannot be read: {why}"),
@@ -57,7 +57,15 @@ impl fmt::Display for PictureError {
 
 impl std::error::Error for PictureError {}
 
-/// Checks that a file is a picture. A build without the feature `pictures` takes JPEG and TIFF by their first bytes.
+/// Checks that a file has the size and the first bytes of a picture, and nothing more of it: a list of exercises is read at once.
+///
+/// # Errors
+/// If the file is too large or of another format.
+pub fn recognise(bytes: &[u8]) -> Result<(), PictureError> {
+    format(bytes).map(|_| ())
+}
+
+/// Checks that a file is a picture, by reading all of it. A build without the feature `pictures` takes JPEG and TIFF by their first bytes.
 ///
 /// # Errors
 /// If the file is too large, of another format, or damaged.

@@ -1,6 +1,6 @@
 //! Fake Polhem: an arm of encoders and motors on HID.
 //!
-//! Their geometry is worked out the other way round than the driver's: positions are inverted numerically, and what the
+//! Its geometry is worked out the other way round than the driver's: positions are inverted numerically, and what the
 //! hand feels follows from the currents by virtual work.
 
 use crate::pipe::{DeviceEnd, cable};

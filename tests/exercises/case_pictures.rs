@@ -53,7 +53,7 @@ fn a_file_that_is_no_picture_gets_one_complaint() {
             library.insert(name, bytes);
         }
         let text = exercise(json!([{ "file": name, "title": "Bite-wing" }]));
-        let resolved = scenario::resolve(SourceText::new("exercise.json", text), &library, ResolveMode::ReadScans);
+        let resolved = scenario::resolve(SourceText::new("exercise.json", text), &library, ResolveMode::MakeWorkpiece);
         let complaints: Vec<_> = resolved.err().unwrap_or_default().into_iter().map(|found| found.code).collect();
         assert_eq!(complaints, Vec::from_iter(code), "{name}");
     }

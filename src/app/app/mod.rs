@@ -235,6 +235,10 @@ impl eframe::App for App {
         }
         self.had_focus = ctx.memory(|memory| memory.focused().is_some());
         self.frame_count += 1;
+        if self.frame_count == 2 {
+            // The first frame was shown: nothing more is told to a console.
+            platform::close_own_console();
+        }
         self.state_log.record("frames", self.frame_count);
         self.log_state();
         ui_anchors::log_anchors(&ctx, &mut self.state_log);

@@ -23,7 +23,7 @@ const SIDE_MAX: u32 = 2048;
 pub struct CasePictures {
     /// SHA-256 of the exercise.
     exercise: String,
-    /// Textures by the picture's index; `None` for a file that is no picture, as in a damaged recording.
+    /// Textures by the picture's index; `None` for a file that cannot be read as a picture.
     textures: BTreeMap<usize, Option<egui::TextureHandle>>,
 }
 
@@ -67,7 +67,10 @@ pub fn thumbnails_ui(
         ui.horizontal(|ui| {
             for (index, picture) in scenario.pictures.iter().enumerate() {
                 let title = words.own(&scenario.texts, &picture.title);
-                let Some(texture) = pictures.texture(ui.ctx(), scenario, index) else { continue };
+                let Some(texture) = pictures.texture(ui.ctx(), scenario, index) else {
+                    ui.colored_label(theme::ERROR, words.format("picture.unreadable", &picture.file));
+                    continue;
+                };
                 let size = texture.size_vec2() * (THUMBNAIL_HEIGHT / texture.size_vec2().y);
                 let image = egui::Image::new(&texture).fit_to_exact_size(size).corner_radius(6).alt_text(title);
                 let button = ui.add(image.sense(egui::Sense::click())).on_hover_text(title);
@@ -114,7 +117,7 @@ pub fn picture_window(
     });
     let mut is_open = true;
     egui::Window::new(title)
-        .id(egui::Id::unique(("picture", index, corner)))
+        .id(egui::Id::unique((&scenario.sha256, index, corner)))
         .open(&mut is_open)
         .collapsible(false)
         .default_pos(corner.align_size_within_rect(size, screen.shrink2(egui::vec2(24.0, 60.0))).min)

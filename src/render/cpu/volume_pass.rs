@@ -196,7 +196,17 @@ mod tests {
         let grid = Grid { dims: [12, 4, 4], origin: Vec3::ZERO, spacing: Vec3::splat(0.1) };
         let cells = || grid.cells().map(|[x, ..]| x);
         let densities: Vec<Density> = cells().map(|x| if x < 8 { Density::FULL } else { Density::EMPTY }).collect();
-        let labels = cells().map(|x| if x < 4 { red } else { blue }).collect();
+        let labels = cells()
+            .map(|x| {
+                if x < 4 {
+                    red
+                } else if x < 8 {
+                    blue
+                } else {
+                    Label::AIR
+                }
+            })
+            .collect();
         let volume = Volume::new(grid, 0.1, densities, labels, red);
         let mut tables = vec![[[255, 255, 255, 200]; 256]; 256];
         tables[1] = [[255, 0, 0, 51]; 256];

@@ -298,10 +298,13 @@ impl Resolver<'_> {
                     continue;
                 }
             };
-            // What a recording holds was a picture when it was made, and is none of what is scored.
-            if self.mode != ResolveMode::FromRecording
-                && let Err(error) = picture::check(&bytes)
-            {
+            let wrong = match self.mode {
+                // What a recording holds was a picture when it was made, and is none of what is scored.
+                ResolveMode::FromRecording => None,
+                ResolveMode::ReadScans => picture::recognise(&bytes).err(),
+                ResolveMode::MakeWorkpiece | ResolveMode::Check => picture::check(&bytes).err(),
+            };
+            if let Some(error) = wrong {
                 self.complain(&path, error.code(), error.to_string(), error.help());
             }
             self.files.insert(file.clone(), bytes);
@@ -326,6 +329,11 @@ impl Resolver<'_> {
     fn read_shape(&mut self, shape: &mut ShapeEntry, path: &str) {
         match instrument_import::sampled_end(shape, self.library) {
             Ok(end) => {
+                if self.mode != ResolveMode::FromRecording
+                    && let Err(error) = instrument_import::check_tip(shape, &end)
+                {
+                    self.complain(path, error.code, error.message, error.help);
+                }
                 shape.sampled = Some(Arc::new(end));
                 let bytes = |name: &str| Some((name.to_string(), self.library.bytes(name).ok()?));
                 self.files.extend(shape.files().filter_map(bytes));
