@@ -192,7 +192,9 @@ fn a_missing_library_is_told_in_the_loaders_words() {
             assert!(text.message.len() > "cannot load ".len() + 20, "{text}");
         }
         let said = driver_by_name("openhaptics").unwrap().open(built("drd", &[]).to_str()).err().unwrap();
-        assert!(said.message.contains("hdInitDevice"), "{said}");
+        // Windows' loader does not name the function.
+        let is_named = cfg!(windows) || said.message.contains("hdInitDevice");
+        assert!(is_named && said.help.contains("too old"), "{said}");
     })
 }
 
