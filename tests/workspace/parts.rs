@@ -1,4 +1,4 @@
-//! What a build says of its parts, and the texts of a release of their version.
+//! Parts that a build lacks, and the version in the texts of a release.
 
 use regex_lite::Regex;
 use std::path::Path;

@@ -16,6 +16,6 @@ pub fn close_own_console() {
     }
 }
 
-/// Other systems open no console.
+/// Other systems, and a page, open no console.
 #[cfg(not(windows))]
 pub fn close_own_console() {}

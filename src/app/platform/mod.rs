@@ -2,14 +2,12 @@
 //!
 //! One file for a computer and one for a page in a browser, with the same functions.
 
-#[cfg(not(target_family = "wasm"))]
 mod console;
 #[cfg(not(target_family = "wasm"))]
 mod native;
 #[cfg(target_family = "wasm")]
 mod web;
 
-#[cfg(not(target_family = "wasm"))]
 pub use console::close_own_console;
 #[cfg(not(target_family = "wasm"))]
 pub use native::*;

@@ -122,6 +122,3 @@ pub fn open_log() -> Option<LogSink> {
     let write = |line: &str| web_sys::console::log_1(&JsValue::from_str(&format!("typodont: {line}")));
     query.contains(LOG_QUERY).then(|| Box::new(write) as LogSink)
 }
-
-/// A page has no console of its own.
-pub fn close_own_console() {}
