@@ -16,7 +16,8 @@ const STRENGTH_RANGE: [f32; 2] = [0.1, 3.3];
 /// Change of the strength by one step of the wheel, N.
 const STRENGTH_STEP: f32 = 0.1;
 
-/// Strength of a bur at the start, N: it cuts caries; in exercises whose tissues have a cutting force, not sound tissue.
+/// Strength of a bur at the start, N: it cuts caries; in exercises whose tissues have a cutting force, sound tissue only
+/// after the dwell.
 const BUR_STRENGTH: f32 = 1.2;
 
 /// Strength of any other instrument at the start, N: that of probing (0.25 N, World Health Organization) for probes, and

@@ -6,7 +6,7 @@
 use crate::support::tools::skip;
 use crate::support::window_driver::{SCREEN_SIZE, WindowDriver};
 use eframe::egui::accesskit::Role;
-use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Theme, Vec2};
+use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Theme, TouchDeviceId, TouchId, TouchPhase, Vec2};
 use eframe::egui_wgpu::WgpuSetup;
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, Node};
@@ -169,6 +169,47 @@ impl Window {
         self.move_to(to);
         self.proceed();
         self.set_button(false);
+    }
+
+    /// Left, top, right and bottom of a picture, by the name that a screen reader says; pixels.
+    pub fn view_of(&self, label: &str) -> [usize; 4] {
+        let rect = self.harness.get_by_role_and_label(Role::Canvas, label).rect();
+        let scale = self.harness.ctx.pixels_per_point();
+        [rect.min.x, rect.min.y, rect.max.x, rect.max.y].map(|at| (at * scale).round() as usize)
+    }
+
+    /// Puts a finger or a pen on the screen, pixels; `force`: that of a pen, 0 to 1.
+    pub fn touch(&mut self, id: u64, place: [i32; 2], force: Option<f32>) {
+        self.send_touch(id, TouchPhase::Start, place, force);
+    }
+
+    /// Moves a finger or a pen that touches the screen.
+    pub fn slide(&mut self, id: u64, place: [i32; 2], force: Option<f32>) {
+        self.send_touch(id, TouchPhase::Move, place, force);
+    }
+
+    /// Lifts a finger or a pen off the screen.
+    pub fn lift(&mut self, id: u64, place: [i32; 2]) {
+        self.send_touch(id, TouchPhase::End, place, None);
+    }
+
+    /// Sends the events of a touch as a system does: the first one acts as the pointer, too.
+    fn send_touch(&mut self, id: u64, phase: TouchPhase, place: [i32; 2], force: Option<f32>) {
+        let pos = Pos2::from(place.map(|pixels| pixels as f32)) / self.harness.ctx.pixels_per_point();
+        self.harness.event(Event::Touch { device_id: TouchDeviceId(1), id: TouchId(id), phase, pos, force });
+        let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+        let pointer = match (id, phase) {
+            (0, TouchPhase::Start) => {
+                vec![Event::PointerMoved(pos), Event::PointerButton { pos, button, pressed: true, modifiers }]
+            }
+            (0, TouchPhase::Move) => vec![Event::PointerMoved(pos)],
+            (0, TouchPhase::End | TouchPhase::Cancel) => {
+                vec![Event::PointerButton { pos, button, pressed: false, modifiers }, Event::PointerGone]
+            }
+            _ => Vec::new(),
+        };
+        pointer.into_iter().for_each(|event| self.harness.event(event));
+        self.frame();
     }
 
     fn click_on_widget(&mut self, role: Role, label: &str) {

@@ -6,6 +6,7 @@ mod arm_window;
 mod author_window;
 mod harness;
 mod lesson_window;
+mod pointer_window;
 mod trainee;
 #[cfg(all(unix, not(target_os = "macos")))]
 mod kiosk;
