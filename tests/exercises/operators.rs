@@ -333,9 +333,11 @@ fn operators_page(results: &OperatorResults) -> (String, Vec<String>) {
     let mut page = format!(
         "# Scripted operators in all graded exercises\n\nMean points, in brackets the least and the greatest, and the number of \
          sessions that were passed. The operators are\nthose of `content/operators/`; `idle` touches nothing and confirms every \
-         stage. Made on {day} from {commit}, scoring\nversion {SCORER_VERSION}, by\n\n    TYPODONT_SEEDS=10 TYPODONT_SPACINGS=0.1,0.25 \
-         TYPODONT_OPERATORS_PAGE=docs/operators.md \\\n    cargo test --release --all-features --test exercises points_of_all -- \
-         --ignored\n"
+         stage. Made on {day} from {commit}, scoring\nversion {SCORER_VERSION}. The points of every session are in \
+         [operators.csv](operators.csv): exercise, voxel size (mm), operator, seed, points,\nand whether it was passed. A session \
+         in that file is not run again by\n\n    TYPODONT_SEEDS=10 TYPODONT_SPACINGS=0.1,0.25 \
+         TYPODONT_OPERATORS_RESULTS=docs/operators.csv \\\n    TYPODONT_OPERATORS_PAGE=docs/operators.md cargo test --release \
+         --all-features --test exercises points_of_all -- --ignored\n"
     );
     let mut wrong = Vec::new();
     let mut spacings: Vec<&String> = results.keys().map(|(_, spacing, ..)| spacing).collect();
