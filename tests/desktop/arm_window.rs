@@ -191,9 +191,11 @@ fn the_clutch_moves_the_arm_alone_and_two_presses_recentre_it() {
     let Some(mut desk) = begun(&place, &arm) else { return };
     let world_from_device = world_from_view(&desk);
     let in_world = |in_device: Vec3| world_from_device * in_device * 0.5;
-    until_tip_at(&mut desk, in_world(arm.position()));
-    let start = tip(&desk);
     let wait = |desk: &mut Window| desk.wait(Duration::from_millis(500));
+    until_tip_at(&mut desk, in_world(arm.position()));
+    // It is near, and may still move on.
+    wait(&mut desk);
+    let start = tip(&desk);
     desk.set_key("O", true);
     desk.until("clutch", |clutch| clutch == "pressed");
     wait(&mut desk);
