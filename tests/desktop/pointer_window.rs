@@ -39,7 +39,7 @@ const VIEWS: [(&str, i32); 5] =
 /// One trial at a time: a trainee must see in time when to let go.
 static TRIAL: Mutex<()> = Mutex::new(());
 
-/// What points and presses.
+/// Pointing device of the trainee.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Pointer {
     Mouse,
@@ -154,8 +154,9 @@ impl Trial {
     fn clear_view(&mut self) -> usize {
         let (mut stuck, mut cleared) = (Vec::new(), 0);
         while !self.is_over() {
-            let Some(spot) = self.look().brownest(&stuck) else { break };
-            let before = self.look().brown_around(spot);
+            let seen = self.look();
+            let Some(spot) = seen.brownest(&stuck) else { break };
+            let before = seen.brown_around(spot);
             self.point(spot);
             self.press(spot, true);
             let (mut least, mut since) = (before, Instant::now());
