@@ -10,7 +10,8 @@ use phantom::{HARD, SOFT};
 use rig::{Rig, SharedHand};
 use simulated::Simulated;
 use staged::Staged;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, Reading, Wrench};
 use typodont_core::frame::Vec3;
@@ -146,6 +147,51 @@ fn a_servo_without_a_thread_makes_up_for_a_tenth_of_a_second_and_counts_the_rest
     }
     assert!(ticks.iter().any(|tick| tick.step.touch.is_some()), "the bur touched nothing");
     assert_eq!(edits.len(), ticks.iter().map(|tick| tick.edits).sum::<usize>());
+}
+
+/// A hand like [`InHand`] that feels nothing, as that of a mouse.
+struct Unfelt {
+    device: InHand,
+    last: Option<Instant>,
+    /// Number of exchanges more than a millisecond after the one before.
+    awakenings: Arc<AtomicU32>,
+}
+
+impl Device for Unfelt {
+    fn spec(&self) -> &DeviceSpec {
+        &self.device.spec
+    }
+
+    fn renders_force(&self) -> bool {
+        false
+    }
+
+    fn exchange(&mut self, output: &Wrench) -> Result<Reading, DeviceError> {
+        let now = Instant::now();
+        let last = self.last.replace(now);
+        if last.is_none_or(|last| now - last > Duration::from_millis(1)) {
+            self.awakenings.fetch_add(1, Ordering::Relaxed);
+        }
+        self.device.exchange(output)
+    }
+}
+
+#[test]
+fn a_servo_whose_force_nobody_feels_runs_every_tick_and_wakes_seldom() {
+    // Aim: a lesson with a mouse spares the processor and loses no tick. Method: run a servo for a second; count the ticks
+    // and the times when the thread slept before one; step the readings again by hand.
+    let hand = SharedHand::at_rest(0.0);
+    let awakenings = Arc::new(AtomicU32::new(0));
+    let device = Unfelt { device: InHand::new(&hand), last: None, awakenings: awakenings.clone() };
+    let (ticks, ended, elapsed) = turn_for(device, Duration::from_secs(1), |ms, _| wander(&hand, 4 * ms));
+    let run = ended.timing.late.count() + ended.timing.missed;
+    assert!(elapsed.contains(&(run as f64)) || run as f64 + 5.0 >= *elapsed.start(), "{run} ticks in {elapsed:?} ms");
+    let awakenings = awakenings.load(Ordering::Relaxed) as usize;
+    assert!(awakenings * 3 < ticks.len(), "awake {awakenings} times in {} ticks", ticks.len());
+    assert_eq!((ended.timing.late_releases, ended.timing.dropped_events), (0, 0));
+    let mut again = Simulation::new(world());
+    assert!(ticks.iter().all(|tick| again.step(&tick.reading) == tick.step));
+    assert!(ticks.iter().any(|tick| tick.step.touch.is_some()), "the bur touched nothing");
 }
 
 #[test]

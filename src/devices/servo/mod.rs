@@ -3,13 +3,14 @@
 //! Takes a simulation, an open device and commands. Gives events: every tick with its edits, and every command with
 //! the tick before which it was carried out. While running it never allocates, locks, logs or waits for anything but
 //! the next tick. It reads a monotonic clock to keep the rate; the result of a tick depends only on readings and
-//! commands.
+//! commands. Where nobody feels the force of a device, a mouse for example, the thread wakes every few milliseconds and
+//! runs the ticks that are due one after the other.
 //!
 //! Every failure releases the hand: after a late tick, with a device that is not ready or lost, and with an invalid
 //! reading, the simulation is stepped with [`Reading::ABSENT`], which gives zero force; forces fade in again over
 //! half a second.
 
-mod inline;
+mod batched;
 mod second_hand;
 mod suction_tip;
 mod timing;
@@ -20,7 +21,7 @@ pub use timing::{DurationHistogram, TimingStats, TimingSummary};
 
 use crate::realtime;
 use crate::realtime::Priority;
-use inline::InlineServo;
+use batched::{BatchedServo, may_batch};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
@@ -90,7 +91,7 @@ enum ServoRunner {
         thread: JoinHandle<ServoExit>,
     },
     /// On the session's own thread, when it polls.
-    Inline(Box<InlineServo>),
+    Inline(Box<BatchedServo>),
     Stopped,
 }
 
@@ -162,7 +163,7 @@ impl Servo {
         timing: TimingStats,
     ) -> Servo {
         let (servo_loop, mut servo) = ServoLoop::new(simulation, device, second, timing);
-        servo.runner = ServoRunner::Inline(Box::new(InlineServo::new(servo_loop)));
+        servo.runner = ServoRunner::Inline(Box::new(BatchedServo::new(servo_loop, Priority::Ordinary)));
         servo
     }
 
@@ -331,6 +332,9 @@ impl ServoLoop {
     /// Runs the servo until it is stopped or its device fails.
     fn run(mut self, should_stop: &AtomicBool) -> ServoExit {
         let priority = realtime::raise_thread_priority();
+        if self.second.is_none() && may_batch(&*self.device) {
+            return BatchedServo::new(self, priority).run(should_stop);
+        }
         self.sink.send(ServoEvent::Started(priority));
         let device_error = self.run_ticks(TickTimer::new(&*self.device, priority), should_stop);
         self.exit(priority, device_error)
