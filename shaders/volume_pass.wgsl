@@ -88,7 +88,13 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
         // In a uniform brick all samples are equal, so one sample stands for all of them.
         let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
         while z < out {
-            let found = mixed_entry(start + along * z);
+            let here = start + along * z;
+            var found = vec4f(0.0);
+            if is_even {
+                found = entry(here);
+            } else {
+                found = mixed_entry(here);
+            }
             if found.a > 0.0 {
                 let opacity = select(found.a, 1.0 - pow(1.0 - found.a, samples), is_even);
                 blended.colour += vec4f(found.rgb, 1.0) * (opacity * (1.0 - blended.colour.a));

@@ -77,7 +77,10 @@ fn blend(sampler: &VolumeSampler, tables: &[TransferTable], ray: &Ray, pace: f32
         // In a uniform brick all samples are equal, so one sample stands for all of them.
         let samples = if brick == UNIFORM { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
         while z < out {
-            let [r, g, b, a] = mixed_entry(sampler.volume, tables, ray.at(z));
+            let [r, g, b, a] = match brick == UNIFORM {
+                true => entry(sampler, tables, ray.at(z)).map(|v| f32::from(v) / 255.0),
+                false => mixed_entry(sampler.volume, tables, ray.at(z)),
+            };
             if a > 0.0 {
                 let opacity = if brick == UNIFORM { 1.0 - libm::powf(1.0 - a, samples) } else { a };
                 let share = opacity * (1.0 - blended.alpha);
@@ -144,29 +147,35 @@ fn film(depth: f32) -> f32 {
 /// voxels, so that no face of a voxel shows where tissues meet.
 fn mixed_entry(volume: &Volume, tables: &[TransferTable], at: Vec3) -> [f32; 4] {
     let corner = at.floor();
-    let (grid, share) = (volume.grid(), at - corner);
-    let last = Vec3::from(grid.dims.map(|n| n as f32 - 1.0));
-    let around: [(Label, f32); 8] = std::array::from_fn(|i| {
-        let step = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
-        let near = (1.0 - share) * (1.0 - step) + share * step;
-        let voxel = (corner + step).clamp(Vec3::ZERO, last);
-        let index = grid.index([voxel.x as u32, voxel.y as u32, voxel.z as u32]);
-        let matter = f32::from(volume.densities()[index].bits()) / 255.0;
-        (volume.labels()[index], near.x * near.y * near.z * matter)
-    });
+    let [dx, dy, dz] = volume.grid().dims;
+    let pair = |at: f32, count: u32| [at, at + 1.0].map(|at| at.clamp(0.0, (count - 1) as f32) as usize);
+    let (xs, ys, zs) = (pair(corner.x, dx), pair(corner.y, dy), pair(corner.z, dz));
+    let around: [usize; 8] =
+        std::array::from_fn(|i| (zs[i >> 2] * dy as usize + ys[i >> 1 & 1]) * dx as usize + xs[i & 1]);
+    let labels = around.map(|index| volume.labels()[index]);
     let density = (volume.density_in_grid(at) * 255.0 + 0.5) as usize;
     let entry = |label: Label| tables[usize::from(label.0)][density.min(255)].map(|v| f32::from(v) / 255.0);
-    let matter: f32 = around.iter().map(|(_, weight)| weight).sum();
-    if matter <= 0.0 || around.iter().all(|(label, _)| *label == around[0].0) {
-        return entry(around[0].0);
+    if labels.iter().all(|label| *label == labels[0]) {
+        return entry(labels[0]);
     }
+    let share = at - corner;
+    let mut matter = 0.0;
     // Colours multiplied by opacity.
     let mut sum = [0.0; 4];
-    for (label, weight) in around.into_iter().filter(|(_, weight)| *weight > 0.0) {
-        let [r, g, b, a] = entry(label);
-        for (part, value) in sum.iter_mut().zip([r * a, g * a, b * a, a]) {
-            *part += value * weight;
+    for (i, (label, index)) in labels.into_iter().zip(around).enumerate() {
+        let step = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let near = (1.0 - share) * (1.0 - step) + share * step;
+        let weight = near.x * near.y * near.z * f32::from(volume.densities()[index].bits()) / 255.0;
+        if weight > 0.0 {
+            let [r, g, b, a] = entry(label);
+            for (part, value) in sum.iter_mut().zip([r * a, g * a, b * a, a]) {
+                *part += value * weight;
+            }
+            matter += weight;
         }
+    }
+    if matter <= 0.0 {
+        return entry(labels[0]);
     }
     let [r, g, b, a] = sum;
     let opacity = a.max(1e-9);
