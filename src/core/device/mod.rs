@@ -123,8 +123,8 @@ pub trait Device {
         Pacing::Host
     }
 
-    /// Returns true if a person feels the force. The servo of a device without motors spares the processor instead of
-    /// keeping each tick to some microseconds.
+    /// Returns true if a person feels the force. The servo of a device without motors spares the processor: it runs ticks
+    /// several at once, up to some milliseconds late, and does not release the hand after a late one.
     fn renders_force(&self) -> bool {
         true
     }

@@ -2,8 +2,8 @@
 //!
 //! Takes the servo's state. Runs the ticks that have become due since the last call, all with the same clock time: on a
 //! thread that sleeps a few milliseconds between two calls, or, in a browser's page, which has no threads, when its owner
-//! asks. Never runs more than [`CATCH_UP_TICKS`] at once: a page that was hidden, or a computer that slept, goes on where
-//! it stopped, and the ticks in between are counted as missed.
+//! asks. Never runs more ticks at once than a limit: a page that was hidden, or a thread that was held up, goes on where it
+//! stopped, and the ticks in between are counted as missed.
 
 use super::ServoEvent;
 use super::tick_timer::TickTimer;
@@ -14,12 +14,15 @@ use std::thread;
 use typodont_core::device::{Device, DeviceError, Pacing};
 use web_time::Duration;
 
-/// Ticks that are made up for in one call. A frame of a slow computer takes a tenth of a second; whoever waits longer has
+/// Ticks that a page makes up for in one call. A frame of a slow computer takes a tenth of a second; whoever waits longer has
 /// lost sight of the instrument.
-const CATCH_UP_TICKS: u32 = 100;
+const PAGE_LIMIT: u32 = 100;
 
-/// Sleep of the thread between two calls: less than the time between two frames of a display, and a quarter of the wake-ups
-/// of a servo that runs every tick by itself.
+/// Ticks that the thread makes up for in one call: a frame of a display and some of the next.
+const THREAD_LIMIT: u32 = 25;
+
+/// Sleep of the thread between two calls: no longer than a frame of a display at 240 Hz, with a quarter of the wake-ups of
+/// a servo that runs every tick by itself.
 const BATCH_INTERVAL: Duration = Duration::from_millis(4);
 
 /// Returns true if ticks of this device may run several at once: nobody feels its force, and it does not set the pace.
@@ -44,21 +47,27 @@ impl BatchedServo {
 
     /// Runs the servo on this thread until it is stopped or its device fails.
     pub fn run(mut self, should_stop: &AtomicBool) -> ServoExit {
-        while !should_stop.load(Ordering::Acquire) && !self.has_ended() {
+        while !self.has_ended() {
             thread::sleep(BATCH_INTERVAL);
-            self.advance();
+            if should_stop.load(Ordering::Acquire) {
+                break;
+            }
+            self.run_due(THREAD_LIMIT);
         }
         self.stop()
     }
 
-    /// Runs the ticks that have become due.
+    /// Runs the ticks of a page that have become due.
     pub fn advance(&mut self) {
-        if self.has_ended() {
-            return;
+        if !self.has_ended() {
+            self.run_due(PAGE_LIMIT);
         }
-        for _ in 0..self.timer.ticks_due(CATCH_UP_TICKS, &mut self.servo.sink.timing) {
+    }
+
+    fn run_due(&mut self, limit: u32) {
+        for _ in 0..self.timer.ticks_due(limit, &mut self.servo.sink.timing) {
             let exchanged = self.servo.device.exchange(&self.servo.output);
-            // The hand is stepped at the same ticks, and feels no force: a late tick need not release it.
+            // The hand moves with the ticks and feels no force, so a late tick need not release it.
             if let Err(gone) = self.servo.process(exchanged, Duration::ZERO) {
                 self.device_error = Some(gone);
                 return;

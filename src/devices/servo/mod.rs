@@ -6,7 +6,7 @@
 //! commands. Where nobody feels the force of a device, a mouse for example, the thread wakes every few milliseconds and
 //! runs the ticks that are due one after the other.
 //!
-//! Every failure releases the hand: after a late tick, with a device that is not ready or lost, and with an invalid
+//! Every failure releases the hand: after a late tick of a device that renders force, with a device that is not ready or lost, and with an invalid
 //! reading, the simulation is stepped with [`Reading::ABSENT`], which gives zero force; forces fade in again over
 //! half a second.
 
@@ -226,7 +226,7 @@ impl Drop for Servo {
     fn drop(&mut self) {
         if let ServoRunner::Thread { stop, thread } = std::mem::replace(&mut self.runner, ServoRunner::Stopped) {
             stop.store(true, Ordering::Release);
-            // The thread checks the flag every tick; the device is closed together with the thread's result.
+            // The thread checks the flag every few milliseconds; the device is closed together with the thread's result.
             let _ = thread.join();
         }
     }
@@ -332,6 +332,7 @@ impl ServoLoop {
     /// Runs the servo until it is stopped or its device fails.
     fn run(mut self, should_stop: &AtomicBool) -> ServoExit {
         let priority = realtime::raise_thread_priority();
+        // Who holds a second hand feels how this one leads it.
         if self.second.is_none() && may_batch(&*self.device) {
             return BatchedServo::new(self, priority).run(should_stop);
         }
