@@ -36,30 +36,32 @@ fn entry(at: vec3f) -> vec4f {
 fn mixed_entry(at: vec3f) -> vec4f {
     let corner = floor(at);
     let share = at - corner;
-    var weights = array<f32, 8>();
-    var labels = array<f32, 8>();
-    var matter = 0.0;
+    var around = array<vec2f, 8>();
     var is_alike = true;
     for (var i = 0u; i < 8u; i++) {
         let step = vec3f(f32(i & 1u), f32((i >> 1u) & 1u), f32(i >> 2u));
-        let near = mix(1.0 - share, share, step);
-        let found = voxel(vec3i(corner + step));
-        weights[i] = near.x * near.y * near.z * found.r;
-        labels[i] = found.g;
-        matter += weights[i];
-        is_alike = is_alike && labels[i] == labels[0];
+        around[i] = voxel(vec3i(corner + step));
+        is_alike = is_alike && around[i].g == around[0].g;
     }
     let here = density(at);
-    if is_alike || matter <= 0.0 {
-        return table_entry(here, labels[0]);
+    if is_alike {
+        return table_entry(here, around[0].g);
     }
+    var matter = 0.0;
     // Colours multiplied by opacity.
     var sum = vec4f(0.0);
     for (var i = 0u; i < 8u; i++) {
-        if weights[i] > 0.0 {
-            let found = table_entry(here, labels[i]);
-            sum += vec4f(found.rgb * found.a, found.a) * weights[i];
+        let step = vec3f(f32(i & 1u), f32((i >> 1u) & 1u), f32(i >> 2u));
+        let near = mix(1.0 - share, share, step);
+        let weight = near.x * near.y * near.z * around[i].r;
+        if weight > 0.0 {
+            let found = table_entry(here, around[i].g);
+            sum += vec4f(found.rgb * found.a, found.a) * weight;
+            matter += weight;
         }
+    }
+    if matter <= 0.0 {
+        return table_entry(here, around[0].g);
     }
     return vec4f(sum.rgb / max(sum.a, 1e-9), sum.a / matter);
 }
@@ -88,12 +90,12 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
         // In a uniform brick all samples are equal, so one sample stands for all of them.
         let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
         while z < out {
-            let here = start + along * z;
+            let place = start + along * z;
             var found = vec4f(0.0);
             if is_even {
-                found = entry(here);
+                found = entry(place);
             } else {
-                found = mixed_entry(here);
+                found = mixed_entry(place);
             }
             if found.a > 0.0 {
                 let opacity = select(found.a, 1.0 - pow(1.0 - found.a, samples), is_even);

@@ -75,14 +75,15 @@ fn blend(sampler: &VolumeSampler, tables: &[TransferTable], ray: &Ray, pace: f32
         }
         let out = out.min(end);
         // In a uniform brick all samples are equal, so one sample stands for all of them.
-        let samples = if brick == UNIFORM { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
+        let is_uniform = brick == UNIFORM;
+        let samples = if is_uniform { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
         while z < out {
-            let [r, g, b, a] = match brick == UNIFORM {
+            let [r, g, b, a] = match is_uniform {
                 true => entry(sampler, tables, ray.at(z)).map(|v| f32::from(v) / 255.0),
                 false => mixed_entry(sampler.volume, tables, ray.at(z)),
             };
             if a > 0.0 {
-                let opacity = if brick == UNIFORM { 1.0 - libm::powf(1.0 - a, samples) } else { a };
+                let opacity = if is_uniform { 1.0 - libm::powf(1.0 - a, samples) } else { a };
                 let share = opacity * (1.0 - blended.alpha);
                 blended.colour += Vec3::new(r, g, b) * share;
                 blended.alpha += share;
@@ -154,9 +155,9 @@ fn mixed_entry(volume: &Volume, tables: &[TransferTable], at: Vec3) -> [f32; 4] 
         std::array::from_fn(|i| (zs[i >> 2] * dy as usize + ys[i >> 1 & 1]) * dx as usize + xs[i & 1]);
     let labels = around.map(|index| volume.labels()[index]);
     let density = (volume.density_in_grid(at) * 255.0 + 0.5) as usize;
-    let entry = |label: Label| tables[usize::from(label.0)][density.min(255)].map(|v| f32::from(v) / 255.0);
+    let entry_of = |label: Label| tables[usize::from(label.0)][density.min(255)].map(|v| f32::from(v) / 255.0);
     if labels.iter().all(|label| *label == labels[0]) {
-        return entry(labels[0]);
+        return entry_of(labels[0]);
     }
     let share = at - corner;
     let mut matter = 0.0;
@@ -167,7 +168,7 @@ fn mixed_entry(volume: &Volume, tables: &[TransferTable], at: Vec3) -> [f32; 4] 
         let near = (1.0 - share) * (1.0 - step) + share * step;
         let weight = near.x * near.y * near.z * f32::from(volume.densities()[index].bits()) / 255.0;
         if weight > 0.0 {
-            let [r, g, b, a] = entry(label);
+            let [r, g, b, a] = entry_of(label);
             for (part, value) in sum.iter_mut().zip([r * a, g * a, b * a, a]) {
                 *part += value * weight;
             }
@@ -175,7 +176,7 @@ fn mixed_entry(volume: &Volume, tables: &[TransferTable], at: Vec3) -> [f32; 4] 
         }
     }
     if matter <= 0.0 {
-        return entry(labels[0]);
+        return entry_of(labels[0]);
     }
     let [r, g, b, a] = sum;
     let opacity = a.max(1e-9);
