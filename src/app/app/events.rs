@@ -19,7 +19,10 @@ const LESSON_FRAME_INTERVAL: Duration = Duration::from_millis(16);
 
 /// Frame interval of the other screens: soon after an input, and at rest.
 const BUSY_FRAME_INTERVAL: Duration = Duration::from_millis(100);
-const IDLE_FRAME_INTERVAL: Duration = Duration::from_secs(1);
+const IDLE_FRAME_INTERVAL: Duration = Duration::from_secs(2);
+
+/// Time between two frames of a lesson whose clock stands still: whatever changes requests a frame by itself.
+const STANDING_FRAME_INTERVAL: Duration = Duration::from_secs(4);
 
 /// Time after an input during which a screen is busy, s.
 const BUSY_TIME: f64 = 2.0;
@@ -213,6 +216,7 @@ impl App {
                 let is_hand_moving = lesson.pointer_hand.is_pressing || lesson.is_hand_placement_pending();
                 match is_view_active || is_hand_moving {
                     true => LESSON_FRAME_INTERVAL,
+                    false if lesson.is_awaiting_movement || lesson.is_standing_still() => STANDING_FRAME_INTERVAL,
                     // Only the clock moves. Movement of the hand requests a frame at once.
                     false => lesson.time_to_next_second(),
                 }
