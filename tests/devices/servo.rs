@@ -193,9 +193,9 @@ fn a_servo_whose_force_nobody_feels_runs_its_ticks_several_at_once() {
 #[test]
 fn ticks_several_at_once_wait_for_the_hand_and_end_with_the_device() {
     // Aim: a mouse is waited for and lost as an arm is. Method: nothing moves until 500 ms have passed; the device ends after
-    // 800 exchanges.
+    // 650 exchanges.
     let hand = SharedHand::at_rest(10.0);
-    let device = Unfelt { exchanges: 800, ..Unfelt::new(&hand) };
+    let device = Unfelt { exchanges: 650, ..Unfelt::new(&hand) };
     let (ticks, ended, _) = turn_for(device, Duration::from_millis(1200), |ms, servo| match ms {
         0 => assert!(servo.send(ServoCommand::AwaitMovement)),
         500 => hand.reach(Vec3::new(0.0, 20.0, 0.0)),

@@ -6,9 +6,9 @@
 //! commands. Where nobody feels the force of a device, a mouse for example, the thread wakes every few milliseconds and
 //! runs the ticks that are due one after the other.
 //!
-//! Every failure releases the hand: after a late tick of a device that renders force, with a device that is not ready or lost, and with an invalid
-//! reading, the simulation is stepped with [`Reading::ABSENT`], which gives zero force; forces fade in again over
-//! half a second.
+//! Every failure releases the hand: after a late tick of a device that renders force, with a device that is not ready or
+//! lost, and with an invalid reading, the simulation is stepped with [`Reading::ABSENT`], which gives zero force; forces
+//! fade in again over half a second.
 
 mod batched;
 mod second_hand;
