@@ -74,8 +74,8 @@ fn set_min_timer_slack() {}
 
 /// Asks RealtimeKit, which desktops run for their sound servers, where the system does not let a user's thread raise
 /// its own priority. RealtimeKit grants SCHED_RR up to priority 20 and first requires a limit: a thread that computes
-/// for 200 ms without waiting may be killed. The servo waits after each batch of ticks, which
-/// takes a few milliseconds at most.
+/// for 200 ms without waiting may be killed. The servo waits after every tick or batch of ticks, which take
+/// a few milliseconds at most.
 #[cfg(target_os = "linux")]
 fn ask_rtkit() -> bool {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
