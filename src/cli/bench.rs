@@ -1,6 +1,7 @@
 //! `typodont bench`: measures the program's speed and memory on this computer.
 
 mod percentiles;
+mod pictures;
 mod session;
 mod ticks;
 mod volumes;
@@ -27,6 +28,9 @@ pub struct Arguments {
     /// Measure only the ticks of the servo
     #[arg(long)]
     ticks: bool,
+    /// Measure only pictures, also those of the whole mouth for both eyes at 3840×2160 pixels
+    #[arg(long, conflicts_with = "ticks")]
+    pictures: bool,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
@@ -56,7 +60,10 @@ struct BenchResults {
     tick_us: BTreeMap<String, BTreeMap<&'static str, Percentiles>>,
     mesh_ms: BTreeMap<String, Percentiles>,
     remesh_ms: BTreeMap<String, Percentiles>,
-    frame_ms: BTreeMap<String, volumes::FrameTimings>,
+    frame_ms: BTreeMap<String, pictures::FrameTimings>,
+    /// Pictures of the whole mouth for both eyes.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    stereo_4k_ms: BTreeMap<String, pictures::StereoTimings>,
     edt_ms: BTreeMap<String, Percentiles>,
     load_ms: BTreeMap<String, Percentiles>,
     /// Volume removed by the same path at each size, mm³.
@@ -91,7 +98,12 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 }
 
 fn measure(arguments: &Arguments, results: &mut BenchResults) -> Result<(), String> {
-    let measure_tooth = if arguments.ticks { measure_ticks } else { measure_all };
+    let measure_tooth = match arguments {
+        Arguments { ticks: true, .. } => measure_ticks,
+        Arguments { pictures: true, .. } => measure_pictures,
+        _ => measure_all,
+    };
+    let is_partial = arguments.ticks || arguments.pictures;
     for path in &arguments.volume {
         let image = nrrd::read(path).map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
         let spacing = arguments.tooth_spacing_mm.map(|mm| [mm; 3]);
@@ -103,14 +115,16 @@ fn measure(arguments: &Arguments, results: &mut BenchResults) -> Result<(), Stri
         for dims in DIMS {
             measure_tooth(grow_tooth(dims)?, results)?;
         }
-        for spacing in VOXEL_SIZES {
-            measure_ticks(grow_tooth_of_spacing(spacing)?, results)?;
+        if !arguments.pictures {
+            for spacing in VOXEL_SIZES {
+                measure_ticks(grow_tooth_of_spacing(spacing)?, results)?;
+            }
         }
-        if !arguments.ticks {
+        if !is_partial {
             measure_sessions(results)?;
         }
     }
-    if !arguments.ticks {
+    if !is_partial {
         results.startup_ms = Some(volumes::startup_ms()?);
     }
     Ok(())
@@ -134,10 +148,20 @@ fn measure_all(tooth: Volume, results: &mut BenchResults) -> Result<(), String> 
     let work = volumes::measure(&tooth)?;
     results.mesh_ms.insert(name.clone(), work.mesh_ms);
     results.remesh_ms.insert(name.clone(), work.remesh_ms);
-    results.frame_ms.insert(name.clone(), work.frames);
+    results.frame_ms.insert(name.clone(), pictures::measure_tooth(&tooth)?);
     results.edt_ms.insert(name.clone(), work.edt_ms);
     results.load_ms.insert(name, work.load_ms);
     measure_ticks(tooth, results)
+}
+
+/// Measures pictures of one tooth.
+fn measure_pictures(tooth: Volume, results: &mut BenchResults) -> Result<(), String> {
+    let name = name_of(tooth.grid().dims);
+    results.voxel_mm.insert(name.clone(), f64::from(tooth.grid().spacing.max_element()));
+    results.frame_ms.insert(name.clone(), pictures::measure_tooth(&tooth)?);
+    let (scenario, workpiece) = volumes::grinding_workpiece(tooth)?;
+    results.stereo_4k_ms.insert(name, pictures::measure_exercise(&scenario, &workpiece)?);
+    Ok(())
 }
 
 /// Measures the ticks of the servo on one tooth.
@@ -193,6 +217,11 @@ impl BenchResults {
             line(format!("frame_ms.{dims}.surface_specks"), &cases.surface_specks);
             line(format!("frame_ms.{dims}.iso"), &cases.iso);
             line(format!("frame_ms.{dims}.volume"), &cases.volume);
+        }
+        for (dims, cases) in &self.stereo_4k_ms {
+            line(format!("stereo_4k_ms.{dims}.surface"), &cases.surface);
+            line(format!("stereo_4k_ms.{dims}.iso"), &cases.iso);
+            line(format!("stereo_4k_ms.{dims}.volume"), &cases.volume);
         }
         let tables = [
             ("mesh_ms", &self.mesh_ms),

@@ -29,10 +29,15 @@ const RUNS_MAX: usize = 9;
 const TIME_MAX: Duration = Duration::from_secs(4);
 
 /// Measures `work` repeatedly, in a unit of which `per_second` make a second.
-pub fn time_repeated(per_second: f64, mut work: impl FnMut()) -> Percentiles {
+pub fn time_repeated(per_second: f64, work: impl FnMut()) -> Percentiles {
+    time_up_to(RUNS_MAX, per_second, work)
+}
+
+/// The same, with another maximum number of repetitions.
+pub fn time_up_to(runs: usize, per_second: f64, mut work: impl FnMut()) -> Percentiles {
     let begun = Instant::now();
     let mut times = Vec::new();
-    while times.is_empty() || (times.len() < RUNS_MAX && begun.elapsed() < TIME_MAX) {
+    while times.is_empty() || (times.len() < runs && begun.elapsed() < TIME_MAX) {
         let start = Instant::now();
         work();
         times.push(start.elapsed().as_secs_f64() * per_second);

@@ -1,12 +1,11 @@
-//! Measurements on whole volumes: distances, files, surfaces and images; and the start-up time of the program.
+//! Measurements on whole volumes: distances, files and surfaces; and the start-up time of the program.
 
 use super::percentiles::{Percentiles, time_repeated};
-use serde::Serialize;
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::Arc;
 use typodont_anatomy::TissueLabels;
-use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::frame::Vec3;
 use typodont_core::volume::{Label, Volume, Voxel, distance, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario;
@@ -15,10 +14,7 @@ use typodont_formats::Library;
 use typodont_formats::diagnostic::{SourceText, headlines};
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
-use typodont_render::{
-    Appearance, Changes, LabelPalette, OffscreenRenderer, Orbit, Particle, RenderMode, RenderScene, TransferFunction,
-    VolumeInstance,
-};
+use typodont_render::LabelPalette;
 
 /// The exercise on which the measurements are taken.
 const GRINDING: (&str, &str) = ("scenarios/5-grinding.json", include_str!("../../../scenarios/5-grinding.json"));
@@ -59,21 +55,6 @@ pub struct VolumeTimings {
     pub mesh_ms: Percentiles,
     /// Surface update that one tick of cutting makes necessary, ms.
     pub remesh_ms: Percentiles,
-    pub frames: FrameTimings,
-}
-
-/// Time to render an image of 780×690 pixels, in each display mode, ms.
-#[derive(Serialize)]
-pub struct FrameTimings {
-    /// Renderer: the name of a graphics adapter, or `cpu`.
-    pub adapter: String,
-    pub surface: Percentiles,
-    /// The surface with smoothed edges.
-    pub surface_smooth: Percentiles,
-    /// The surface with the maximum amount of dust and water.
-    pub surface_specks: Percentiles,
-    pub iso: Percentiles,
-    pub volume: Percentiles,
 }
 
 pub fn measure(tooth: &Volume) -> Result<VolumeTimings, String> {
@@ -84,7 +65,7 @@ pub fn measure(tooth: &Volume) -> Result<VolumeTimings, String> {
         std::hint::black_box(surface::extract(tooth));
     });
     let load_ms = load_ms(tooth)?;
-    Ok(VolumeTimings { edt_ms, load_ms, mesh_ms, remesh_ms: remesh_ms(tooth), frames: frames(tooth)? })
+    Ok(VolumeTimings { edt_ms, load_ms, mesh_ms, remesh_ms: remesh_ms(tooth) })
 }
 
 /// Time to rebuild the surface after one cut by a bur of 0.7 mm radius at the highest cusp.
@@ -112,74 +93,11 @@ fn remesh_ms(tooth: &Volume) -> Percentiles {
     })
 }
 
-fn frames(tooth: &Volume) -> Result<FrameTimings, String> {
-    let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();
+/// The colours of the shipped tissues.
+pub fn palette() -> Result<LabelPalette, String> {
     let table = TissueTable::read(&Library::shipped()).map_err(|found| headlines(&found))?;
-    let palette =
-        LabelPalette::from_colours(|label| table.by_label(label).map_or([0.5; 3], |tissue| tissue.rgb()), 0.2);
-    let function = Arc::new(TransferFunction::tissue(&palette));
-    let grid = tooth.grid();
-    let bounds = grid.extent_of(&tooth.bounding_box().unwrap_or_default());
-    let upright = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
-    let orbit = Orbit::around(upright * bounds.centre(), bounds.half_size().length());
-    let mut failed = None;
-    let middle = upright * bounds.centre();
-    let (grains, drops) = (particle_ball(middle, 2000, 1.0), particle_ball(middle, 800, 0.3));
-    let mut times = |shown: RenderMode, is_smooth: bool, specks: [&[Particle]; 2]| {
-        let mut view = orbit;
-        // Shaders are compiled with the first image; the times of the following ones are those a trainee experiences.
-        let mut changes = Changes::All;
-        let mut picture = || {
-            let seen = VolumeInstance {
-                volume: tooth,
-                changes,
-                world_from_tooth: upright,
-                palette: &palette,
-                mode: shown.clone(),
-            };
-            let [grains, drops] = specks;
-            let scene = RenderScene {
-                tooth: Some(seen),
-                is_antialiased: is_smooth,
-                opaque_particles: grains,
-                translucent_particles: drops,
-                ..RenderScene::empty()
-            };
-            let drawn = painter.draw_only(&scene, &view.viewpoint(), None, [780, 690]);
-            failed = drawn.err().or(failed.take());
-            changes = Changes::Bricks(&[]);
-            view = view.rotated(STEP_AROUND, 0.0);
-        };
-        picture();
-        time_repeated(1e3, picture)
-    };
-    let [surface, iso, volume] =
-        [RenderMode::Surface, RenderMode::Iso, RenderMode::Volume(function)].map(|shown| times(shown, false, [&[]; 2]));
-    let surface_smooth = times(RenderMode::Surface, true, [&[]; 2]);
-    let surface_specks = times(RenderMode::Surface, false, [&grains, &drops]);
-    match failed {
-        Some(error) => Err(error.to_string()),
-        None => {
-            let adapter = painter.adapter().to_string();
-            Ok(FrameTimings { adapter, surface, surface_smooth, surface_specks, iso, volume })
-        }
-    }
+    Ok(LabelPalette::from_colours(|label| table.by_label(label).map_or([0.5; 3], |tissue| tissue.rgb()), 0.2))
 }
-
-/// Particles of 0.1 mm, spread evenly over a ball of 9 mm by a Fibonacci lattice, the farthest first.
-fn particle_ball(middle: Vec3, count: usize, opacity: f32) -> Vec<Particle> {
-    let finish = Appearance { colour: [0.9; 3], gloss: 0.1 };
-    let speck = |i: usize| {
-        let height = 1.0 - 2.0 * (i as f32 + 0.5) / count as f32;
-        let (ring, angle) = ((1.0 - height * height).max(0.0).sqrt(), 2.399_963 * i as f32);
-        let place = middle + 9.0 * Vec3::new(ring * libm::cosf(angle), ring * libm::sinf(angle), -height);
-        Particle { position: place, radius: 0.1, facing: None, appearance: finish, opacity }
-    };
-    (0..count).map(speck).collect()
-}
-
-/// Camera step between two images, rad: 40°, so that nine images make one turn around the tooth.
-const STEP_AROUND: f32 = 0.698;
 
 /// Time to read the tooth from a compressed NRRD file.
 fn load_ms(tooth: &Volume) -> Result<Percentiles, String> {
