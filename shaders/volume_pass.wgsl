@@ -77,9 +77,10 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
     while z < end {
         let at = start + along * z;
         let brick = brick_of(at);
-        let known = textureLoad(empty, vec3i(brick), 0).r;
-        let is_even = known == EVEN;
-        let steps = f32(select(known, 0u, is_even));
+        let known = textureLoad(empty, vec3i(brick), 0).rg;
+        let is_even = known.r == EVEN;
+        let is_one_tissue = known.r == ONE_TISSUE;
+        let steps = f32(select(known.r, 0u, is_even || is_one_tissue));
         var out = z + way_out(at, along, brick, steps);
         if steps > 0.0 {
             number = max(ceil(out / pace), number + 1.0);
@@ -94,6 +95,8 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
             var found = vec4f(0.0);
             if is_even {
                 found = entry(place);
+            } else if is_one_tissue {
+                found = table_entry(density(place), f32(known.g) / 255.0);
             } else {
                 found = mixed_entry(place);
             }
@@ -131,7 +134,7 @@ fn optical_depth(start: vec3f, along: vec3f, pace: f32, behind: f32) -> f32 {
         let at = start + along * z;
         let known = textureLoad(empty, vec3i(brick_of(at)), 0).r;
         let is_even = known == EVEN;
-        let steps = f32(select(known, 0u, is_even));
+        let steps = f32(select(known, 0u, is_even || known == ONE_TISSUE));
         var out = z + way_out(at, along, brick_of(at), steps);
         if steps > 0.0 {
             number = max(ceil(out / pace), number + 1.0);

@@ -15,11 +15,21 @@ struct BrickSummary {
     labels: u64,
     /// True when all voxels have the same density and the same label.
     is_uniform: bool,
+    /// Labels of its matter, [`Label::AIR`] in unused places; `None` if there are more.
+    tissues: Option<[Label; MAX_TISSUES]>,
 }
+
+/// Number of labels in a brick up to which it can be marked as [`ONE_TISSUE`], if they look alike.
+const MAX_TISSUES: usize = 4;
+
+/// Entry of a brick for rays, as the shaders read it: a distance in bricks, [`UNIFORM`] or [`ONE_TISSUE`]; and the label that
+/// goes with the latter.
+pub type BrickEntry = [u8; 2];
 
 /// Distance (Chebyshev, in bricks) from each brick to the nearest one that may be visible; 0 for visible bricks.
 ///
-/// An entry may be [`UNIFORM`]: all samples in that brick are equal.
+/// A visible brick may be marked as [`UNIFORM`], where all samples are equal, or as [`ONE_TISSUE`], where all matter looks
+/// alike.
 ///
 /// After a change, the entries of the changed bricks and of all bricks that are now closer to a visible one are
 /// exact. Where matter vanished, distances stay too small, which costs a little time but never a pixel.
@@ -27,8 +37,10 @@ struct BrickSummary {
 pub struct EmptySpaceMap {
     dims: [u32; 3],
     summaries: Vec<BrickSummary>,
-    entries: Vec<u8>,
+    entries: Vec<BrickEntry>,
     mode: RenderMode,
+    /// In direct volume rendering, what its transfer function shows.
+    visible: Option<VisibleDensities>,
 }
 
 /// Maximum distance stored: 15 bricks are 120 voxels, which is a sufficient skip.
@@ -38,11 +50,15 @@ const MAX_DISTANCE: u8 = 15;
 /// `tooth.wgsl`.
 pub const UNIFORM: u8 = 0x80;
 
+/// Marks a visible brick whose matter has one label, or labels that look alike, in direct volume rendering with a transfer
+/// function that does not show empty space: no labels need to be mixed there. In step with `ONE_TISSUE` in `tooth.wgsl`.
+pub const ONE_TISSUE: u8 = 0x40;
+
 impl EmptySpaceMap {
     pub fn new(volume: &Volume, mode: &RenderMode) -> EmptySpaceMap {
         let summaries: Vec<BrickSummary> = par_map(volume.bricks().len(), |brick| summarize(volume, brick));
-        let mut map =
-            EmptySpaceMap { dims: volume.bricks().dims(), summaries, entries: Vec::new(), mode: mode.clone() };
+        let (dims, entries, mode, visible) = (volume.bricks().dims(), Vec::new(), mode.clone(), None);
+        let mut map = EmptySpaceMap { dims, summaries, entries, mode, visible };
         map.rebuild();
         map
     }
@@ -51,8 +67,8 @@ impl EmptySpaceMap {
         self.dims
     }
 
-    /// Entries of the bricks, x fastest: a distance in bricks, or [`UNIFORM`].
-    pub fn entries(&self) -> &[u8] {
+    /// Entries of the bricks, x fastest.
+    pub fn entries(&self) -> &[BrickEntry] {
         &self.entries
     }
 
@@ -78,7 +94,7 @@ impl EmptySpaceMap {
             }
             let entry = match (is_visible, self.entries[brick]) {
                 (true, _) => self.entry_for(brick),
-                (false, 0 | UNIFORM) => 1,
+                (false, known) if distance(known) == 0 => [1, 0],
                 (false, known) => known,
             };
             if self.entries[brick] != entry {
@@ -92,36 +108,39 @@ impl EmptySpaceMap {
     }
 
     fn rebuild(&mut self) {
-        let are_visible: Vec<bool> = match &self.mode {
-            RenderMode::Volume(function) => {
-                let visible = VisibleDensities::new(function);
-                self.summaries.iter().map(|c| visible.any(c)).collect()
-            }
-            _ => self.summaries.iter().map(is_solid).collect(),
+        self.visible = match &self.mode {
+            RenderMode::Volume(function) => Some(VisibleDensities::new(function)),
+            _ => None,
         };
-        self.entries = are_visible.into_iter().map(|s| if s { 0 } else { MAX_DISTANCE }).collect();
+        let bricks = 0..self.summaries.len();
+        let mut distances: Vec<u8> =
+            bricks.clone().map(|brick| if self.is_visible(brick) { 0 } else { MAX_DISTANCE }).collect();
         for axis in 0..3 {
-            spread_along_axis(&mut self.entries, self.dims, axis);
+            spread_along_axis(&mut distances, self.dims, axis);
         }
-        for brick in 0..self.entries.len() {
-            if self.entries[brick] == 0 {
-                self.entries[brick] = self.entry_for(brick);
-            }
-        }
+        let entry = |brick: usize| match distances[brick] {
+            0 => self.entry_for(brick),
+            distance => [distance, 0],
+        };
+        self.entries = bricks.map(entry).collect();
     }
 
     /// Returns the entry of a visible brick.
-    fn entry_for(&self, brick: usize) -> u8 {
-        match self.mode {
-            RenderMode::Volume(_) if self.summaries[brick].is_uniform => UNIFORM,
-            _ => 0,
+    fn entry_for(&self, brick: usize) -> BrickEntry {
+        let (summary, Some(visible)) = (&self.summaries[brick], &self.visible) else { return [0; 2] };
+        let is_even = summary.min == summary.max;
+        match visible.sole_tissue(summary) {
+            Some(_) if is_even => [UNIFORM, 0],
+            _ if summary.is_uniform => [UNIFORM, 0],
+            Some(Label(label)) => [ONE_TISSUE, label],
+            None => [0; 2],
         }
     }
 
     fn is_visible(&self, brick: usize) -> bool {
-        match &self.mode {
-            RenderMode::Volume(function) => VisibleDensities::new(function).any(&self.summaries[brick]),
-            _ => is_solid(&self.summaries[brick]),
+        match &self.visible {
+            Some(visible) => visible.any(&self.summaries[brick]),
+            None => is_solid(&self.summaries[brick]),
         }
     }
 
@@ -136,7 +155,7 @@ impl EmptySpaceMap {
                     let distance = [x, y, z].iter().zip(at).map(|(v, a)| v.abs_diff(a)).max().unwrap_or(0) as u8;
                     let index = volume.bricks().index([x, y, z]);
                     if self::distance(self.entries[index]) > distance {
-                        self.entries[index] = distance;
+                        self.entries[index] = [distance, 0];
                         differing.push(index);
                     }
                 }
@@ -145,9 +164,9 @@ impl EmptySpaceMap {
     }
 }
 
-/// Returns the distance in bricks to the nearest brick that may be visible; 0 for [`UNIFORM`].
-pub fn distance(entry: u8) -> u8 {
-    entry & !UNIFORM
+/// Returns the distance in bricks to the nearest brick that may be visible; 0 for a marked brick.
+pub fn distance([code, _]: BrickEntry) -> u8 {
+    code & !(UNIFORM | ONE_TISSUE)
 }
 
 fn is_solid(content: &BrickSummary) -> bool {
@@ -155,9 +174,14 @@ fn is_solid(content: &BrickSummary) -> bool {
 }
 
 /// Densities that a transfer function makes visible, by label.
+#[derive(Clone, Debug)]
 struct VisibleDensities {
     /// Per label and index: the number of densities below the index that have opacity.
     opaque_counts: Vec<[u16; 257]>,
+    /// True if a label has opacity where there is no matter.
+    shows_empty_space: bool,
+    /// For each label, the first that looks like it.
+    alike: [Label; 256],
 }
 
 impl VisibleDensities {
@@ -170,7 +194,9 @@ impl VisibleDensities {
             }
             counts
         };
-        VisibleDensities { opaque_counts: (0..=255).map(count).collect() }
+        let opaque_counts: Vec<[u16; 257]> = (0..=255).map(count).collect();
+        let shows_empty_space = opaque_counts.iter().any(|counts| counts[1] > 0);
+        VisibleDensities { opaque_counts, shows_empty_space, alike: function.alike_labels() }
     }
 
     fn any(&self, content: &BrickSummary) -> bool {
@@ -178,6 +204,23 @@ impl VisibleDensities {
         let has = |label: usize| content.labels >> (label % 64) & 1 == 1;
         (0..256).any(|label| has(label) && self.opaque_counts[label][most + 1] > self.opaque_counts[label][least])
     }
+
+    /// Returns the label that stands for all matter of a brick, if none of its samples needs another.
+    fn sole_tissue(&self, summary: &BrickSummary) -> Option<Label> {
+        let tissues = summary.tissues.filter(|_| !self.shows_empty_space)?;
+        let mut looks =
+            tissues.iter().filter(|&&label| label != Label::AIR).map(|label| self.alike[usize::from(label.0)]);
+        let first = looks.next()?;
+        looks.all(|look| look == first).then_some(first)
+    }
+}
+
+/// Adds a label to a list that ends with [`Label::AIR`]; `None` if it is full.
+fn with_label(tissues: [Label; MAX_TISSUES], label: Label) -> Option<[Label; MAX_TISSUES]> {
+    let place = tissues.iter().position(|&known| known == label || known == Label::AIR)?;
+    let mut more = tissues;
+    more[place] = label;
+    Some(more)
 }
 
 /// Returns the changed bricks and the ones before them along each axis, whose cells reach into them.
@@ -204,7 +247,9 @@ fn summarize(volume: &Volume, brick: usize) -> BrickSummary {
         max: 0,
         labels: u64::from(at_border),
         is_uniform: false,
+        tissues: Some([Label::AIR; MAX_TISSUES]),
     };
+    let mut last_tissue = Label::AIR;
     let first_label = volume.labels()[grid.index(corner)];
     let mut is_one_label = !at_border || first_label == Label::AIR;
     for z in corner[2]..end[2] {
@@ -218,6 +263,13 @@ fn summarize(volume: &Volume, brick: usize) -> BrickSummary {
             let labels = &volume.labels()[row];
             summary.labels |= labels.iter().fold(0, |all, l| all | 1u64 << (l.0 % 64));
             is_one_label &= labels.iter().all(|&label| label == first_label);
+            // Most rows hold nothing but the tissue before.
+            if labels.iter().any(|&label| label != last_tissue && label != Label::AIR) {
+                for &label in labels.iter().filter(|&&label| label != Label::AIR) {
+                    summary.tissues = summary.tissues.and_then(|tissues| with_label(tissues, label));
+                    last_tissue = label;
+                }
+            }
         }
     }
     summary.is_uniform = is_one_label && summary.min == summary.max;
@@ -273,21 +325,24 @@ mod tests {
         for brick in 0..empty.entries.len() {
             let apart = |&o: &usize| (0..3).map(|a| at(brick)[a].abs_diff(at(o)[a])).max().unwrap();
             let nearest = solid.iter().map(apart).min().unwrap() as u8;
-            assert_eq!(empty.entries[brick], nearest.min(MAX_DISTANCE), "brick {brick}");
+            assert_eq!(empty.entries[brick], [nearest.min(MAX_DISTANCE), 0], "brick {brick}");
         }
     }
 
     #[test]
-    fn a_brick_is_uniform_where_every_sample_is_the_same() {
-        // Aim: one sample stands for a whole brick. Method: compute the entries of a ball of two tissues, then check
-        // every voxel of each brick's cells.
+    fn a_brick_is_marked_where_all_samples_or_their_labels_are_the_same() {
+        // Aim: one sample stands for a whole uniform brick, and one label for all matter of a brick of one tissue. Method:
+        // compute the entries of a ball of two tissues, then check every voxel of each visible brick's cells.
         let mut volume = phantom::ball([96; 3], Vec3::splat(0.2), 8.0);
         let middle = volume.grid().cell(volume.grid().len() / 2)[2];
         let cells: Vec<u32> = volume.grid().cells().map(|[_, _, z]| z).collect();
         volume.relabel(|index, label| if cells[index] < middle { Label(65) } else { label });
         let all = super::super::transfer_function::table([1.0; 3], |d| d);
-        let empty =
-            EmptySpaceMap::new(&volume, &RenderMode::Volume(Arc::new(TransferFunction::single_table(all, 0.2, 0.0))));
+        let half = super::super::transfer_function::table([1.0; 3], |d| 0.5 * d);
+        let function = TransferFunction::single_table(all, 0.2, 0.0).with_table([Label(65)], half);
+        let alike = function.alike_labels();
+        let mode = RenderMode::Volume(Arc::new(function));
+        let empty = EmptySpaceMap::new(&volume, &mode);
         let dims = volume.grid().dims;
         for (brick, entry) in empty.entries.iter().enumerate() {
             let corner = volume.bricks().corner(brick);
@@ -297,9 +352,24 @@ mod tests {
             };
             let is_same =
                 (0..729).all(|n| voxel(n) == voxel(0)) && voxel(0).density > typodont_core::volume::Density::EMPTY;
-            assert_eq!(*entry == UNIFORM, is_same, "brick {brick}");
+            assert_eq!(entry[0] == UNIFORM, is_same, "brick {brick}");
+            let mut tissues: Vec<Label> =
+                (0..729).map(|n| voxel(n).label).filter(|&label| label != Label::AIR).collect();
+            tissues.sort_by_key(|label| label.0);
+            tissues.dedup();
+            if distance(*entry) == 0 && !is_same {
+                let is_alone = matches!(tissues[..], [_]);
+                let look = tissues.first().map_or(0, |tissue| alike[usize::from(tissue.0)].0);
+                assert_eq!(*entry, if is_alone { [ONE_TISSUE, look] } else { [0; 2] }, "brick {brick}");
+            }
         }
-        assert!(empty.entries.iter().filter(|e| **e == UNIFORM).count() > 10);
+        for code in [UNIFORM, ONE_TISSUE, 0] {
+            assert!(empty.entries.iter().filter(|e| e[0] == code).count() > 10, "{code}");
+        }
+
+        // Decay that looks like the tissue around it changes no mark.
+        volume.relabel(|index, label| if label == Label(65) || index % 7 > 0 { label } else { Label(66) });
+        assert!(EmptySpaceMap::new(&volume, &mode).entries == empty.entries);
     }
 
     #[test]
@@ -320,7 +390,9 @@ mod tests {
             let differing = empty.update(&volume, &changed);
             let anew = EmptySpaceMap::new(&volume, &shown);
             assert!(empty.entries.iter().zip(&anew.entries).all(|(now, exact)| distance(*now) <= distance(*exact)));
-            let marked = |empty: &EmptySpaceMap| empty.entries.iter().map(|e| e & UNIFORM).collect::<Vec<_>>();
+            let marked = |empty: &EmptySpaceMap| -> Vec<BrickEntry> {
+                empty.entries.iter().map(|&[code, label]| [code & (UNIFORM | ONE_TISSUE), label]).collect()
+            };
             assert_eq!(marked(&empty), marked(&anew));
             assert!(empty.summaries == anew.summaries);
             assert!(differing.len() < 60, "{} entries for a few bricks", differing.len());

@@ -160,16 +160,15 @@ impl SurfaceColours {
         let place = ((at + 0.5) / self.cell_voxels as f32 - 0.5).clamp(Vec3::ZERO, last);
         let base = place.floor();
         let part = place - base;
-        let next = (base + 1.0).min(last);
-        let mut sum = [0.0; 4];
-        for n in 0..8u32 {
-            let is_next = [0, 1, 2].map(|a| n >> a & 1 == 1);
-            let cell = [0, 1, 2].map(|a| if is_next[a] { next[a] } else { base[a] } as u32);
-            let weight: f32 = (0..3).map(|a| if is_next[a] { part[a] } else { 1.0 - part[a] }).product();
-            let texel = self.texels[self.index(cell)];
-            (0..4).for_each(|c| sum[c] += f32::from(texel[c]) * weight / 255.0);
-        }
-        let [r, g, b, gloss] = sum;
+        let start = self.index([base.x as u32, base.y as u32, base.z as u32]);
+        // The last cell of an axis is its own neighbour.
+        let steps = [1, self.dims[0] as usize, self.dims[0] as usize * self.dims[1] as usize];
+        let [dx, dy, dz] = [0, 1, 2].map(|a| if base[a] < last[a] { steps[a] } else { 0 });
+        let texel = |place: usize| self.texels[place].map(f32::from);
+        let mix = |a: [f32; 4], b: [f32; 4], share: f32| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share);
+        let row = |place: usize| mix(texel(place), texel(place + dx), part.x);
+        let slice = |place: usize| mix(row(place), row(place + dy), part.y);
+        let [r, g, b, gloss] = mix(slice(start), slice(start + dz), part.z).map(|v: f32| v * (1.0 / 255.0));
         Appearance { colour: [r, g, b], gloss }
     }
 

@@ -101,7 +101,7 @@ impl ToothTextures {
         use wgpu::TextureFormat as Format;
         let space = |label, dims, format| resources::volume_texture(device, label, dims, format);
         let voxels = space("voxels", dims, Format::Rg8Unorm);
-        let empty_texture = space("empty", empty_space.dims(), Format::R8Uint);
+        let empty_texture = space("empty", empty_space.dims(), Format::Rg8Uint);
         let occlusion_texture = space("occlusion", occlusion.dims(), Format::R8Unorm);
         let colour_texture = space("colours", colours.dims(), Format::Rgba8Unorm);
         let transfer_texture = resources::table_texture(device, "transfer", [256, 256], Format::Rgba8Unorm);
@@ -158,7 +158,8 @@ impl ToothTextures {
     }
 
     fn upload_empty_space(&self, queue: &wgpu::Queue) {
-        resources::write_box(queue, &self.empty_texture, [0; 3], self.empty_space.dims(), self.empty_space.entries());
+        let entries = self.empty_space.entries().as_flattened();
+        resources::write_box(queue, &self.empty_texture, [0; 3], self.empty_space.dims(), entries);
     }
 
     /// True when these textures can be updated with a volume's changes.
@@ -183,13 +184,8 @@ impl ToothTextures {
         } else {
             for brick in differing {
                 let place = tooth.volume.bricks().corner(brick).map(|c| c / BRICK);
-                resources::write_box(
-                    queue,
-                    &self.empty_texture,
-                    place,
-                    [1; 3],
-                    &self.empty_space.entries()[brick..=brick],
-                );
+                let entry = &self.empty_space.entries()[brick];
+                resources::write_box(queue, &self.empty_texture, place, [1; 3], entry);
             }
         }
         for cube in self.occlusion.update(tooth.volume, changed) {

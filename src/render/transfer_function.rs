@@ -82,6 +82,13 @@ impl TransferFunction {
         self.table_of_label.iter().map(|&t| tables[usize::from(t)]).collect()
     }
 
+    /// Returns, for each label, the first label that has the same table: where a tissue is to look like another, samples of
+    /// both must not differ in the last bit either.
+    pub(super) fn alike_labels(&self) -> [Label; 256] {
+        let first = |label: u8| (0..=label).map(Label).find(|&other| self.table(other) == self.table(Label(label)));
+        std::array::from_fn(|label| first(label as u8).unwrap_or(Label(label as u8)))
+    }
+
     /// Translucent tissue in its own colours: the pulp is seen through dentine and enamel.
     pub fn tissue(palette: &LabelPalette) -> TransferFunction {
         let faint = table([0.8, 0.8, 0.8], |d| 0.10 * linear_ramp(d, 0.35, 0.9));

@@ -2,6 +2,7 @@
 
 use super::volume_sampler::{Ray, VolumeSampler};
 use super::{CpuView, Framebuffer};
+use crate::empty_space;
 use typodont_core::volume::ISO;
 
 /// Step within a surface, in voxels: even a single voxel is solid for longer than that.
@@ -35,9 +36,9 @@ fn first_hit(sampler: &VolumeSampler, ray: &Ray, near: f32) -> Option<f32> {
     let mut z = first.max(near);
     let (mut before, mut density_before) = (z, 0.0);
     while z < last {
-        let (steps, way_out) = sampler.leap(ray.at(z), ray.along);
+        let (brick, way_out) = sampler.leap(ray, ray.at(z));
         let out = z + way_out;
-        if steps > 0 {
+        if empty_space::distance(brick) > 0 {
             (z, before, density_before) = (out, out, 0.0);
             continue;
         }

@@ -21,6 +21,8 @@ use super::mirror::{self, PlaneMirror};
 use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
 use super::surface_colours::SurfaceColours;
 use super::{ambient_occlusion::OcclusionVolume, empty_space::EmptySpaceMap};
+use std::sync::OnceLock;
+use surface_pass::SurfaceTriangles;
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
 use volume_sampler::VolumeSampler;
@@ -36,33 +38,47 @@ struct CachedVolume {
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
     colours: SurfaceColours,
+    /// Computed when they are drawn for the first time.
+    surface: OnceLock<SurfaceTriangles>,
+}
+
+impl CachedVolume {
+    fn new(tooth: &VolumeInstance) -> CachedVolume {
+        let VolumeInstance { volume, mode, palette, .. } = tooth;
+        CachedVolume {
+            dims: volume.grid().dims,
+            empty_space: EmptySpaceMap::new(volume, mode),
+            occlusion: OcclusionVolume::new(volume),
+            colours: SurfaceColours::new(volume, palette),
+            surface: OnceLock::new(),
+        }
+    }
+
+    fn update(&mut self, tooth: &VolumeInstance, changed: &[usize]) {
+        let VolumeInstance { volume, mode, palette, .. } = tooth;
+        self.empty_space.set_mode(mode);
+        self.empty_space.update(volume, changed);
+        self.occlusion.update(volume, changed);
+        if self.colours.has_palette(palette) {
+            self.colours.update(volume, changed);
+        } else {
+            self.colours = SurfaceColours::new(volume, palette);
+        }
+        if !changed.is_empty() {
+            self.surface = OnceLock::new();
+        }
+    }
 }
 
 impl CpuRenderer {
     /// Applies the changes of the scene's tooth. Must be called once before the scene is drawn, for any number of eyes.
     pub fn prepare(&mut self, scene: &RenderScene) {
         let Some(tooth) = &scene.tooth else { return };
-        let VolumeInstance { volume, changes, mode, palette, .. } = tooth;
-        let dims = volume.grid().dims;
-        match (&mut self.cached, changes) {
-            (Some(known), Changes::Bricks(changed)) if known.dims == dims => {
-                known.empty_space.set_mode(mode);
-                known.empty_space.update(volume, changed);
-                known.occlusion.update(volume, changed);
-                if known.colours.has_palette(palette) {
-                    known.colours.update(volume, changed);
-                } else {
-                    known.colours = SurfaceColours::new(volume, palette);
-                }
+        match (&mut self.cached, tooth.changes) {
+            (Some(known), Changes::Bricks(changed)) if known.dims == tooth.volume.grid().dims => {
+                known.update(tooth, changed);
             }
-            _ => {
-                self.cached = Some(CachedVolume {
-                    dims,
-                    empty_space: EmptySpaceMap::new(volume, mode),
-                    occlusion: OcclusionVolume::new(volume),
-                    colours: SurfaceColours::new(volume, palette),
-                });
-            }
+            _ => self.cached = Some(CachedVolume::new(tooth)),
         }
     }
 
@@ -97,7 +113,10 @@ impl CpuRenderer {
         if let (Some(tooth), Some(known)) = (&scene.tooth, &self.cached) {
             let sampler = VolumeSampler::new(tooth, known);
             match &tooth.mode {
-                RenderMode::Surface => surface_pass::tooth(&sampler, &view, &mut framebuffer),
+                RenderMode::Surface => {
+                    let surface = known.surface.get_or_init(|| SurfaceTriangles::extract(tooth.volume));
+                    surface_pass::tooth(surface, &sampler, &view, &mut framebuffer);
+                }
                 RenderMode::Iso => iso_pass::iso_pass(&sampler, &view, &mut framebuffer),
                 RenderMode::Volume(function) => volume_pass::volume_pass(&sampler, function, &view, &mut framebuffer),
             }

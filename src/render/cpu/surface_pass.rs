@@ -7,7 +7,7 @@ use crate::scene::{Appearance, MeshInstance};
 use crate::surface_mesh;
 use crate::vertex::Vertex;
 use typodont_core::frame::{Pose, Vec3};
-use typodont_core::volume::surface;
+use typodont_core::volume::{Volume, surface};
 
 pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer) {
     let vertices = surface_mesh::instance_vertices(solid);
@@ -25,14 +25,32 @@ pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer
     );
 }
 
-pub fn tooth(sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Framebuffer) {
-    let mesh = surface::extract(sampler.volume);
-    let vertices = surface_mesh::tooth_vertices(&mesh);
+/// Surface of the tooth, in tooth space.
+pub struct SurfaceTriangles {
+    vertices: Vec<Vertex>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl SurfaceTriangles {
+    pub fn extract(volume: &Volume) -> SurfaceTriangles {
+        let mesh = surface::extract(volume);
+        SurfaceTriangles { vertices: surface_mesh::tooth_vertices(&mesh), triangles: mesh.triangles }
+    }
+}
+
+pub fn tooth(surface: &SurfaceTriangles, sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Framebuffer) {
     let grid = sampler.volume.grid();
-    triangles(&vertices, &mesh.triangles, sampler.world_from_tooth, view, framebuffer, |own, normal, _, point| {
-        let at = grid.from_tooth(own);
-        view.shade(sampler.appearance(at), sampler.openness(at, normal), point, normal)
-    });
+    triangles(
+        &surface.vertices,
+        &surface.triangles,
+        sampler.world_from_tooth,
+        view,
+        framebuffer,
+        |own, normal, _, point| {
+            let at = grid.from_tooth(own);
+            view.shade(sampler.appearance(at), sampler.openness(at, normal), point, normal)
+        },
+    );
 }
 
 /// Draws triangles; `shade` is given the place in the solid's space, the unit normal, the finish and the place in the world.

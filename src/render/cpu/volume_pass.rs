@@ -3,12 +3,12 @@
 use super::volume_sampler::{Ray, VolumeSampler};
 use super::{CpuView, Framebuffer};
 use crate::empty_space;
-use crate::empty_space::UNIFORM;
+use crate::empty_space::{ONE_TISSUE, UNIFORM};
 use crate::integration_step;
 use crate::scene::Appearance;
 use crate::transfer_function::{MOST_ATTENUATION, TransferFunction, TransferTable};
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::{Density, Label, Volume};
 
 /// Opacity at which nothing behind is visible.
 const OPAQUE: f32 = 0.99;
@@ -27,7 +27,7 @@ pub fn volume_pass(
     framebuffer: &mut Framebuffer,
 ) {
     let step = integration_step(sampler.volume);
-    let tables = function.per_step(step);
+    let tables = StepTables { of_label: function.per_step(step), alike: function.alike_labels() };
     framebuffer.for_each_pixel(|x, y, pixel| {
         let (ray, direction) = sampler.ray(view, x, y);
         let behind = view.eye.depth(pixel.depth);
@@ -49,6 +49,20 @@ pub fn volume_pass(
     });
 }
 
+/// Tables of a transfer function for one step.
+struct StepTables {
+    of_label: Vec<TransferTable>,
+    /// For each label, the first that has the same table.
+    alike: [Label; 256],
+}
+
+impl StepTables {
+    /// Entry of a label's table for a density, 0 to 1.
+    fn entry(&self, label: Label, density: f32) -> [u8; 4] {
+        self.of_label[usize::from(label.0)][((density * 255.0 + 0.5) as usize).min(255)]
+    }
+}
+
 struct Blended {
     /// Multiplied by opacity.
     colour: Vec3,
@@ -58,7 +72,7 @@ struct Blended {
 }
 
 /// From front to back until nothing shines through or the scene ends the ray.
-fn blend(sampler: &VolumeSampler, tables: &[TransferTable], ray: &Ray, pace: f32, near: f32, behind: f32) -> Blended {
+fn blend(sampler: &VolumeSampler, tables: &StepTables, ray: &Ray, pace: f32, near: f32, behind: f32) -> Blended {
     let [first, last] = sampler.span(ray);
     let end = last.min(behind);
     // Samples lie at whole steps from the eye, so that leaping over nothing changes nothing.
@@ -66,7 +80,7 @@ fn blend(sampler: &VolumeSampler, tables: &[TransferTable], ray: &Ray, pace: f32
     let mut z = number * pace;
     let mut blended = Blended { colour: Vec3::ZERO, alpha: 0.0, first: None };
     while z < end {
-        let (brick, way_out) = sampler.leap(ray.at(z), ray.along);
+        let (brick, way_out) = sampler.leap(ray, ray.at(z));
         let out = z + way_out;
         if empty_space::distance(brick) > 0 {
             number = (out / pace).ceil().max(number + 1.0);
@@ -75,12 +89,14 @@ fn blend(sampler: &VolumeSampler, tables: &[TransferTable], ray: &Ray, pace: f32
         }
         let out = out.min(end);
         // In a uniform brick all samples are equal, so one sample stands for all of them.
-        let is_uniform = brick == UNIFORM;
+        let [code, label] = brick;
+        let is_uniform = code == UNIFORM;
         let samples = if is_uniform { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
         while z < out {
-            let [r, g, b, a] = match is_uniform {
-                true => entry(sampler, tables, ray.at(z)).map(|v| f32::from(v) / 255.0),
-                false => mixed_entry(sampler.volume, tables, ray.at(z)),
+            let [r, g, b, a] = match code {
+                UNIFORM => unit(entry(sampler, tables, ray.at(z))),
+                ONE_TISSUE => unit(tables.entry(Label(label), sampler.density(ray.at(z)))),
+                _ => mixed_entry(sampler.volume, tables, ray.at(z)),
             };
             if a > 0.0 {
                 let opacity = if is_uniform { 1.0 - libm::powf(1.0 - a, samples) } else { a };
@@ -101,21 +117,14 @@ fn blend(sampler: &VolumeSampler, tables: &[TransferTable], ray: &Ray, pace: f32
 
 /// Line integral of the attenuation along a ray, per mm and step, up to the end of the scene. The steps are those of
 /// [`blend`], but no ray ends early.
-fn optical_depth(
-    sampler: &VolumeSampler,
-    tables: &[TransferTable],
-    ray: &Ray,
-    pace: f32,
-    near: f32,
-    behind: f32,
-) -> f32 {
+fn optical_depth(sampler: &VolumeSampler, tables: &StepTables, ray: &Ray, pace: f32, near: f32, behind: f32) -> f32 {
     let [first, last] = sampler.span(ray);
     let end = last.min(behind);
     let mut number = (first.max(near) / pace).ceil();
     let mut z = number * pace;
     let mut sum = 0.0;
     while z < end {
-        let (brick, way_out) = sampler.leap(ray.at(z), ray.along);
+        let (brick, way_out) = sampler.leap(ray, ray.at(z));
         let out = z + way_out;
         if empty_space::distance(brick) > 0 {
             number = (out / pace).ceil().max(number + 1.0);
@@ -123,7 +132,7 @@ fn optical_depth(
             continue;
         }
         let out = out.min(end);
-        let samples = if brick == UNIFORM { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
+        let samples = if brick[0] == UNIFORM { ((out / pace).ceil() - number).max(1.0) } else { 1.0 };
         while z < out {
             let [high, low, ..] = entry(sampler, tables, ray.at(z));
             sum += (f32::from(high) * 256.0 + f32::from(low)) * samples;
@@ -146,29 +155,39 @@ fn film(depth: f32) -> f32 {
 
 /// Colour and opacity at a place: the entries of the eight labels around it for the density there, by the matter of their
 /// voxels, so that no face of a voxel shows where tissues meet.
-fn mixed_entry(volume: &Volume, tables: &[TransferTable], at: Vec3) -> [f32; 4] {
-    let corner = at.floor();
-    let [dx, dy, dz] = volume.grid().dims;
-    let pair = |at: f32, count: u32| [at, at + 1.0].map(|at| at.clamp(0.0, (count - 1) as f32) as usize);
-    let (xs, ys, zs) = (pair(corner.x, dx), pair(corner.y, dy), pair(corner.z, dz));
-    let around: [usize; 8] =
-        std::array::from_fn(|i| (zs[i >> 2] * dy as usize + ys[i >> 1 & 1]) * dx as usize + xs[i & 1]);
-    let labels = around.map(|index| volume.labels()[index]);
-    let density = (volume.density_in_grid(at) * 255.0 + 0.5) as usize;
-    let entry_of = |label: Label| tables[usize::from(label.0)][density.min(255)].map(|v| f32::from(v) / 255.0);
-    if labels.iter().all(|label| *label == labels[0]) {
+fn mixed_entry(volume: &Volume, tables: &StepTables, at: Vec3) -> [f32; 4] {
+    let (corner, labels, densities) = voxels_around(volume, at);
+    let labels = labels.map(|label| tables.alike[usize::from(label.0)]);
+    let density = volume.density_in_grid(at);
+    let entry_of = |label: Label| unit(tables.entry(label, density));
+    if labels == [labels[0]; 8] {
         return entry_of(labels[0]);
     }
-    let share = at - corner;
+    let ([near_x, near_y, near_z], [far_x, far_y, far_z]) =
+        ((1.0 - (at - corner)).to_array(), (at - corner).to_array());
+    let [near, far] = [near_z, far_z].map(|z| [near_y * z, far_y * z]);
+    let along_rows = [near[0], near[1], far[0], far[1]];
+    let weights: [f32; 8] = std::array::from_fn(|i| {
+        let along_x = if i & 1 == 0 { near_x } else { far_x };
+        along_x * along_rows[i >> 1] * f32::from(densities[i].bits())
+    });
     let mut matter = 0.0;
     // Colours multiplied by opacity.
     let mut sum = [0.0; 4];
-    for (i, (label, index)) in labels.into_iter().zip(around).enumerate() {
-        let step = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
-        let near = (1.0 - share) * (1.0 - step) + share * step;
-        let weight = near.x * near.y * near.z * f32::from(volume.densities()[index].bits()) / 255.0;
+    // Each label is looked up once, with the weight of all its voxels.
+    let mut left = [true; 8];
+    for i in 0..8 {
+        if !left[i] {
+            continue;
+        }
+        let mut weight = 0.0;
+        for j in 0..8 {
+            let is_same = labels[j] == labels[i];
+            weight += if is_same { weights[j] } else { 0.0 };
+            left[j] &= !is_same;
+        }
         if weight > 0.0 {
-            let [r, g, b, a] = entry_of(label);
+            let [r, g, b, a] = entry_of(labels[i]);
             for (part, value) in sum.iter_mut().zip([r * a, g * a, b * a, a]) {
                 *part += value * weight;
             }
@@ -183,20 +202,57 @@ fn mixed_entry(volume: &Volume, tables: &[TransferTable], at: Vec3) -> [f32; 4] 
     [r / opacity, g / opacity, b / opacity, a / matter]
 }
 
+/// Position, labels and densities of the eight voxels around a place, x fastest; beyond the grid, labels and densities are
+/// those of its nearest voxel.
+fn voxels_around(volume: &Volume, at: Vec3) -> (Vec3, [Label; 8], [Density; 8]) {
+    let grid = volume.grid();
+    let last = Vec3::from(grid.dims.map(|n| n as f32 - 1.0));
+    if at.cmpge(Vec3::ZERO).all() && at.cmplt(last).all() {
+        let [nx, ny, _] = grid.dims.map(|n| n as usize);
+        // The conversion rounds down. By way of `i32` it takes one instruction, `floor` a call.
+        let cell = at.to_array().map(|v| v as i32 as u32);
+        let start = grid.index(cell);
+        let starts = [start, start + nx, start + nx * ny, start + nx * ny + nx];
+        let corner = Vec3::from(cell.map(|n| n as f32));
+        return (corner, pairs(volume.labels(), starts), pairs(volume.densities(), starts));
+    }
+    let corner = at.floor();
+    let index = |i: usize| {
+        let step = Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let cell = (corner + step).clamp(Vec3::ZERO, last);
+        grid.index([cell.x as u32, cell.y as u32, cell.z as u32])
+    };
+    let around: [usize; 8] = std::array::from_fn(index);
+    (corner, around.map(|index| volume.labels()[index]), around.map(|index| volume.densities()[index]))
+}
+
+/// The values at each of four places and behind it.
+fn pairs<T: Copy>(values: &[T], starts: [usize; 4]) -> [T; 8] {
+    let [a, b, c, d] = starts.map(|start| {
+        let pair = &values[start..start + 2];
+        [pair[0], pair[1]]
+    });
+    [a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]]
+}
+
 /// Entry of the table of the nearest voxel's label for the density at a place.
-fn entry(sampler: &VolumeSampler, tables: &[TransferTable], at: Vec3) -> [u8; 4] {
+fn entry(sampler: &VolumeSampler, tables: &StepTables, at: Vec3) -> [u8; 4] {
     let grid = sampler.volume.grid();
     let last = Vec3::from(grid.dims.map(|n| n as f32 - 1.0));
     let nearest = (at + 0.5).floor().clamp(Vec3::ZERO, last);
     let label = sampler.volume.labels()[grid.index([nearest.x as u32, nearest.y as u32, nearest.z as u32])];
-    let density = (sampler.density(at) * 255.0 + 0.5) as usize;
-    tables[usize::from(label.0)][density.min(255)]
+    tables.entry(label, sampler.density(at))
+}
+
+/// Colour and opacity of an entry, 0 to 1.
+fn unit(entry: [u8; 4]) -> [f32; 4] {
+    entry.map(|v| f32::from(v) * (1.0 / 255.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use typodont_core::volume::{Density, Grid};
+    use typodont_core::volume::Grid;
 
     #[test]
     fn a_border_between_tissues_has_no_steps_and_air_no_colour() {
@@ -218,9 +274,10 @@ mod tests {
             })
             .collect();
         let volume = Volume::new(grid, 0.1, densities, labels, red);
-        let mut tables = vec![[[255, 255, 255, 200]; 256]; 256];
-        tables[1] = [[255, 0, 0, 51]; 256];
-        tables[2] = [[0, 0, 255, 102]; 256];
+        let mut of_label = vec![[[255, 255, 255, 200]; 256]; 256];
+        of_label[1] = [[255, 0, 0, 51]; 256];
+        of_label[2] = [[0, 0, 255, 102]; 256];
+        let tables = StepTables { of_label, alike: std::array::from_fn(|label| Label(label as u8)) };
         let at = |x: f32| mixed_entry(&volume, &tables, Vec3::new(x, 1.3, 1.6));
         let close = |found: [f32; 4], expected: [f32; 4]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5);
         assert!(close(at(2.7), [1.0, 0.0, 0.0, 0.2]), "{:?}", at(2.7));

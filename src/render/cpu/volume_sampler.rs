@@ -4,7 +4,7 @@ use super::{CachedVolume, CpuView};
 use crate::ambient_occlusion::OcclusionVolume;
 use crate::bounds_of_matter;
 use crate::empty_space;
-use crate::empty_space::EmptySpaceMap;
+use crate::empty_space::{BrickEntry, EmptySpaceMap};
 use crate::scene::{Appearance, VolumeInstance};
 use crate::surface_colours::SurfaceColours;
 use typodont_core::aabb::Aabb;
@@ -29,6 +29,8 @@ pub struct VolumeSampler<'a> {
 pub struct Ray {
     pub start: Vec3,
     pub along: Vec3,
+    /// Depth, mm, in which the ray crosses one voxel along each axis.
+    per_voxel: Vec3,
 }
 
 impl Ray {
@@ -51,7 +53,8 @@ impl<'a> VolumeSampler<'a> {
         let tooth_from_world = self.world_from_tooth.inverse();
         let grid = self.volume.grid();
         let start = grid.from_tooth(tooth_from_world * view.eye.position);
-        (Ray { start, along: tooth_from_world.rotate(direction) / grid.spacing }, direction)
+        let along = tooth_from_world.rotate(direction) / grid.spacing;
+        (Ray { start, along, per_voxel: along.abs().max(Vec3::splat(1e-9)).recip() }, direction)
     }
 
     pub fn density(&self, at: Vec3) -> f32 {
@@ -70,11 +73,12 @@ impl<'a> VolumeSampler<'a> {
         [first, last]
     }
 
-    /// The entry of the brick around a place, and how far on the ray leaves the cube of bricks in which there is no other.
-    pub fn leap(&self, at: Vec3, along: Vec3) -> (u8, f32) {
+    /// The entry of the brick around a place on a ray, and how far on the ray leaves the cube of bricks in which there is no
+    /// other.
+    pub fn leap(&self, ray: &Ray, at: Vec3) -> (BrickEntry, f32) {
         let dims = self.empty_space.dims();
-        let brick: [u32; 3] =
-            std::array::from_fn(|a| ((at[a] / BRICK as f32).floor().max(0.0) as u32).min(dims[a] - 1));
+        // The conversion rounds down, and to 0 before the grid.
+        let brick: [u32; 3] = std::array::from_fn(|a| (((at[a] / BRICK as f32) as i32).max(0) as u32).min(dims[a] - 1));
         let entry = self.empty_space.entries()[((brick[2] * dims[1] + brick[1]) * dims[0] + brick[0]) as usize];
         let reach = f32::from(empty_space::distance(entry).max(1));
         let mut exit = f32::INFINITY;
@@ -83,8 +87,8 @@ impl<'a> VolumeSampler<'a> {
             let first = brick[axis] as f32 + 1.0 - reach;
             let low = if first <= 0.0 { -1.0 } else { first } * BRICK as f32;
             let high = (brick[axis] as f32 + reach) * BRICK as f32;
-            let room = if along[axis] > 0.0 { high - at[axis] } else { at[axis] - low };
-            exit = exit.min((room.max(0.0) + NUDGE) / along[axis].abs().max(1e-9));
+            let room = if ray.along[axis] > 0.0 { high - at[axis] } else { at[axis] - low };
+            exit = exit.min((room.max(0.0) + NUDGE) * ray.per_voxel[axis]);
         }
         (entry, exit)
     }
