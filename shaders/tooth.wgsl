@@ -21,7 +21,7 @@ struct Tooth {
 // Density and label (of 255).
 @group(1) @binding(1) var voxels: texture_3d<f32>;
 @group(1) @binding(2) var between: sampler;
-// Bricks to the nearest that may show something, EVEN, or ONE_TISSUE with its label in green.
+// Bricks to the nearest that may show something, EVEN, or ONE_TISSUE with the label to look up in green.
 @group(1) @binding(3) var empty: texture_3d<u32>;
 // Mean density of cubes.
 @group(1) @binding(4) var hollow: texture_3d<f32>;
@@ -33,7 +33,7 @@ struct Tooth {
 const BRICK: f32 = 8.0;
 // A brick in which every sample is the same.
 const EVEN: u32 = 0x80u;
-// A brick whose matter has one label.
+// A brick whose matter looks alike.
 const ONE_TISSUE: u32 = 0x40u;
 // Share of a voxel that surely leads across a border between bricks, however numbers are rounded.
 const NUDGE: f32 = 0.004;

@@ -32,7 +32,7 @@ fn entry(at: vec3f) -> vec4f {
 }
 
 // Colour and opacity at a place: the entries of the eight labels around it for the density there, by the matter of their
-// voxels, so that no face of a voxel shows where tissues meet.
+// voxels, so that no face of a voxel shows where tissues meet. Where all entries are equal, that one, to the last bit.
 fn mixed_entry(at: vec3f) -> vec4f {
     let corner = floor(at);
     let share = at - corner;
@@ -47,6 +47,8 @@ fn mixed_entry(at: vec3f) -> vec4f {
     if is_alike {
         return table_entry(here, around[0].g);
     }
+    let first = table_entry(here, around[0].g);
+    is_alike = true;
     var matter = 0.0;
     // Colours multiplied by opacity.
     var sum = vec4f(0.0);
@@ -54,14 +56,13 @@ fn mixed_entry(at: vec3f) -> vec4f {
         let step = vec3f(f32(i & 1u), f32((i >> 1u) & 1u), f32(i >> 2u));
         let near = mix(1.0 - share, share, step);
         let weight = near.x * near.y * near.z * around[i].r;
-        if weight > 0.0 {
-            let found = table_entry(here, around[i].g);
-            sum += vec4f(found.rgb * found.a, found.a) * weight;
-            matter += weight;
-        }
+        let found = table_entry(here, around[i].g);
+        is_alike = is_alike && all(found == first);
+        sum += vec4f(found.rgb * found.a, found.a) * weight;
+        matter += weight;
     }
-    if matter <= 0.0 {
-        return table_entry(here, around[0].g);
+    if is_alike || matter <= 0.0 {
+        return first;
     }
     return vec4f(sum.rgb / max(sum.a, 1e-9), sum.a / matter);
 }

@@ -28,7 +28,7 @@ pub struct Arguments {
     /// Measure only the ticks of the servo
     #[arg(long)]
     ticks: bool,
-    /// Measure only pictures, also those of the whole mouth for both eyes at 3840×2160 pixels
+    /// Measure only pictures, also those of the whole mouth for both eyes at 3840×2160 pixels; `--volume` applies
     #[arg(long, conflicts_with = "ticks")]
     pictures: bool,
     /// Print JSON instead of a table

@@ -241,6 +241,32 @@ fn after_a_cut_only_its_bricks_travel_and_the_picture_is_as_made_anew() {
 }
 
 #[test]
+fn after_a_cut_the_processor_draws_the_tooth_as_anew() {
+    // Aim: what the processor keeps between pictures never shows matter that is gone. Method: cut, draw with the changed
+    // bricks, and compare with a painter that has never seen the tooth before.
+    let palette = palette();
+    let viewpoint =
+        Orbit { middle: Vec3::new(0.0, 1.0, 0.0), azimuth: 0.5, elevation: 0.9, distance: 40.0 }.viewpoint();
+    for shown in [RenderMode::Surface, RenderMode::Iso, tissue(&palette)] {
+        let mut volume = molar([96, 96, 60]);
+        let mut painter = OffscreenRenderer::cpu();
+        let mut draw = |painter: &mut OffscreenRenderer, volume: &Volume, changes: Changes| {
+            let instance = VolumeInstance { changes, ..tooth(volume, &palette, shown.clone()) };
+            let scene = RenderScene { tooth: Some(instance), ..RenderScene::empty() };
+            painter.draw(&scene, &viewpoint, None, [200, 200]).unwrap()
+        };
+        let before = draw(&mut painter, &volume, Changes::All);
+        assert!(draw(&mut painter, &volume, Changes::Bricks(&[])) == before);
+        let highest = surface::extract(&volume).positions.iter().copied().max_by(|a, b| a.z.total_cmp(&b.z)).unwrap();
+        carve(&mut volume, highest, 1.2);
+        let changed = volume.take_dirty();
+        let after = draw(&mut painter, &volume, Changes::Bricks(&changed));
+        assert!(after == draw(&mut OffscreenRenderer::cpu(), &volume, Changes::All), "{shown:?}");
+        assert!(after != before, "{shown:?}: the cut is seen");
+    }
+}
+
+#[test]
 fn matter_at_the_grids_end_is_drawn_closed() {
     // Aim: rays come out of the grid wherever matter touches its end. Method: a grid all full, seen from eight corners; a
     // ray once went back and forth in the first brick for ever.

@@ -44,7 +44,8 @@ const WINDOW: [u32; 2] = [780, 690];
 /// Size of the large screen, pixels.
 const SCREEN: [u32; 2] = [3840, 2160];
 
-/// Each eye has all pixels of the screen, as with shutter glasses or two projectors. The distance of the eyes is in mm.
+/// Each eye's image has all pixels of the screen; then every second row of each is shown. The distance of the eyes, mm, suits
+/// a mouth that is larger than life.
 const BOTH_EYES: Stereo = Stereo { layout: StereoLayout::Rows, eye_distance: 10.0 };
 
 /// Maximum number of images that are measured.
@@ -131,7 +132,8 @@ struct TurningView<'a> {
 }
 
 impl TurningView<'_> {
-    /// Measures up to `count` images, ms each, of the scene for changes of its volume and a position of the camera.
+    /// Measures up to `count` images, ms each, of the scene for changes of its volume and a position of the camera (world
+    /// space, mm).
     fn time<'s>(
         &mut self,
         count: usize,
