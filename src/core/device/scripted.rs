@@ -34,8 +34,18 @@ pub enum Move {
     ///
     /// The lead is at most `max_lead` mm and is reduced while the force exceeds `force` N. Where the tip does not
     /// follow, the hand waits for up to `max_wait` s before it moves on. With `backs_off`, the lead is taken back
-    /// quickly where the tip is beyond the path: soft tissue that is being carved gives way suddenly.
-    TrackTip { path: Vec<Vec3>, speed: f32, max_lead: f32, force: f32, max_wait: f32, backs_off: bool },
+    /// quickly where the tip is beyond the path: soft tissue that is being carved gives way suddenly. With
+    /// `limits_force`, the spring of the grip never pulls with more than `force`, however far the path has gone ahead
+    /// (damping and impact still add to it); otherwise the lag of the tip adds to the force.
+    TrackTip {
+        path: Vec<Vec3>,
+        speed: f32,
+        max_lead: f32,
+        force: f32,
+        max_wait: f32,
+        backs_off: bool,
+        limits_force: bool,
+    },
     /// Holds still for a time, s.
     Wait { seconds: f32 },
 }
@@ -192,7 +202,12 @@ impl ScriptedDevice {
             self.progress = MoveProgress::begin(current, self.hand.goal);
         }
         self.progress.seconds += DT;
-        let hand = SensedHand { force, position: self.hand.position(), goal: self.hand.goal };
+        let hand = SensedHand {
+            force,
+            position: self.hand.position(),
+            goal: self.hand.goal,
+            grip_stiffness: self.hand.model().grip_stiffness,
+        };
         let (goal, done) = self.progress.advance(current, &hand, self.observed_tip);
         self.hand.goal = goal;
         if done {
@@ -212,6 +227,8 @@ struct SensedHand {
     position: Vec3,
     /// Intended position, mm.
     goal: Vec3,
+    /// N/mm.
+    grip_stiffness: f32,
 }
 
 /// Force that a move seeks and then holds.
@@ -248,7 +265,7 @@ impl MoveProgress {
                 let (on_path, at_end) = self.travel(path, speed);
                 (on_path + along * overtravel, at_end)
             }
-            Move::TrackTip { ref path, speed, max_lead, force, max_wait, backs_off } => {
+            Move::TrackTip { ref path, speed, max_lead, force, max_wait, backs_off, limits_force } => {
                 let (on_path, at_end) = point_along(path, self.travelled);
                 let lag = on_path - tip;
                 self.lead_tip(lag, max_lead, backs_off);
@@ -256,7 +273,12 @@ impl MoveProgress {
                     self.lead *= 1.0 - 5.0 * DT;
                 }
                 let is_waiting = self.wait_or_travel(lag, speed, max_wait);
-                (on_path + self.lead, at_end && !is_waiting)
+                let mut goal = on_path + self.lead;
+                if limits_force {
+                    let displacement = goal - hand.position;
+                    goal = hand.position + displacement.clamp_length_max(force / hand.grip_stiffness);
+                }
+                (goal, at_end && !is_waiting)
             }
             Move::Wait { seconds } => (hand.goal, self.seconds >= seconds),
         }
@@ -399,5 +421,39 @@ impl Device for ScriptedDevice {
         let reading = self.hand.step(output);
         self.hand.goal = steady;
         Ok(Reading { pose: Pose { orientation: UPRIGHT, ..reading.pose }, ..reading })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hand_that_limits_its_force_waits_at_a_wall() {
+        // Aim: however long a bur is held up, the hand presses with the force of its file, and with more without the limit.
+        // Method: a path of 12 mm into a stiff wall at its start, followed to its end.
+        let pressed = |limits_force: bool| -> f32 {
+            let model = HandModel::holding(0.045, 0.0);
+            let mut device = ScriptedDevice::new(DeviceSpec::phantom_omni(), model, Tremor::new(0.0, 1), Vec3::ZERO);
+            device.push(Move::TrackTip {
+                path: vec![Vec3::ZERO, Vec3::new(0.0, -12.0, 0.0)],
+                speed: 4.0,
+                max_lead: 4.0,
+                force: 1.5,
+                max_wait: 0.2,
+                backs_off: false,
+                limits_force,
+            });
+            let mut last = Wrench::default();
+            for _ in 0..2500 {
+                let reading = device.exchange(&last).unwrap();
+                let depth = (-reading.pose.position.y).max(0.0);
+                last = Wrench { force: Vec3::Y * (2.0 * depth), ..Wrench::default() };
+                device.observe_tip(Vec3::ZERO);
+            }
+            last.force.y
+        };
+        assert!((pressed(true) - 1.5).abs() < 0.05, "{}", pressed(true));
+        assert!(pressed(false) > 2.0, "{}", pressed(false));
     }
 }

@@ -57,6 +57,10 @@ impl SimulatedHand {
         self.velocity
     }
 
+    pub fn model(&self) -> &HandModel {
+        &self.model
+    }
+
     /// Replaces the grip; the hand stays at its position.
     pub fn set_model(&mut self, model: HandModel) {
         self.model = model;

@@ -209,6 +209,10 @@ pub struct CutFile {
     /// The hand backs off at once where the bur is beyond its path, as before a thin wall that gives way.
     #[serde(default)]
     pub backs_off: bool,
+    /// At rest the hand never presses with more than `press_n`. Without it, the hand presses harder the longer the bur is
+    /// held up, as most hands do.
+    #[serde(default)]
+    pub limits_force: bool,
 }
 
 /// Place a filling into the prepared cavity, press by press, from its floor up.

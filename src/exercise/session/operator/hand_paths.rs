@@ -20,19 +20,21 @@ pub(super) struct StrokeParams {
     patience: f32,
     /// True if the hand backs off at once when the tip is beyond the path.
     yields: bool,
+    /// True if the hand never presses with more than `force`.
+    limits_force: bool,
 }
 
 impl From<&CutFile> for StrokeParams {
     fn from(file: &CutFile) -> StrokeParams {
         let CutFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
-        StrokeParams { speed, lean, force, patience, yields: file.backs_off }
+        StrokeParams { speed, lean, force, patience, yields: file.backs_off, limits_force: file.limits_force }
     }
 }
 
 impl From<&CarveFile> for StrokeParams {
     fn from(file: &CarveFile) -> StrokeParams {
         let CarveFile { speed_mm_s: speed, lean_mm: lean, press_n: force, patience_s: patience, .. } = *file;
-        StrokeParams { speed, lean, force, patience, yields: true }
+        StrokeParams { speed, lean, force, patience, yields: true, limits_force: false }
     }
 }
 
@@ -141,8 +143,8 @@ impl Operator {
     /// Returns a task that leads the tip along a path in tooth space, mm.
     pub(super) fn guide_task(&self, stroke: StrokeParams, path_in_tooth: impl Iterator<Item = Vec3>) -> OperatorTask {
         let path = path_in_tooth.map(|place| self.in_world(place)).collect();
-        let StrokeParams { speed, lean, force, patience, yields } = stroke;
-        OperatorTask::Move(Move::TrackTip { path, speed, max_lead: lean, force, max_wait: patience, backs_off: yields })
+        let StrokeParams { speed, lean: max_lead, force, patience: max_wait, yields: backs_off, limits_force } = stroke;
+        OperatorTask::Move(Move::TrackTip { path, speed, max_lead, force, max_wait, backs_off, limits_force })
     }
 
     /// Returns moves up, across, and down onto a point whose surface lies at about `height` (tooth space, mm);
