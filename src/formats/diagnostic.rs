@@ -68,8 +68,8 @@ impl Diagnostic {
         if !self.path.is_empty() {
             line += &format!("{}: ", self.path);
         }
-        // A message may quote the author's text, which must not break the line.
-        line + &one_line(&self.message)
+        // The name of the file, the path and the message may quote the author's text, which must not break the line.
+        one_line(&(line + &self.message))
     }
 }
 
@@ -181,6 +181,8 @@ mod tests {
         let shown = complaint(&text, start..start + 2).to_string();
         assert!(shown.len() < 2000, "{}", shown.len());
         assert!(!complaint("a", 0..1).to_string().contains('\u{0}'));
+        let broken_key = Diagnostic { path: "/stages/0/time\nlimit".into(), ..complaint("a", 0..1) };
+        assert_eq!(broken_key.headline().lines().count(), 1);
     }
 
     #[test]
