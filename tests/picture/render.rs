@@ -250,7 +250,7 @@ fn after_a_cut_the_processor_draws_the_tooth_as_anew() {
     for shown in [RenderMode::Surface, RenderMode::Iso, tissue(&palette)] {
         let mut volume = molar([96, 96, 60]);
         let mut painter = OffscreenRenderer::cpu();
-        let mut draw = |painter: &mut OffscreenRenderer, volume: &Volume, changes: Changes| {
+        let draw = |painter: &mut OffscreenRenderer, volume: &Volume, changes: Changes| {
             let instance = VolumeInstance { changes, ..tooth(volume, &palette, shown.clone()) };
             let scene = RenderScene { tooth: Some(instance), ..RenderScene::empty() };
             painter.draw(&scene, &viewpoint, None, [200, 200]).unwrap()
