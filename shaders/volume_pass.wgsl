@@ -44,10 +44,10 @@ fn mixed_entry(at: vec3f) -> vec4f {
         is_alike = is_alike && around[i].g == around[0].g;
     }
     let here = density(at);
-    if is_alike {
-        return table_entry(here, around[0].g);
-    }
     let first = table_entry(here, around[0].g);
+    if is_alike {
+        return first;
+    }
     is_alike = true;
     var matter = 0.0;
     // Colours multiplied by opacity.

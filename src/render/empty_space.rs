@@ -50,8 +50,9 @@ const MAX_DISTANCE: u8 = 15;
 /// `tooth.wgsl`.
 pub const UNIFORM: u8 = 0x80;
 
-/// Marks a visible brick whose matter has one label, or labels that look alike, in direct volume rendering with a transfer
-/// function that does not show empty space: no labels need to be mixed there. In step with `ONE_TISSUE` in `tooth.wgsl`.
+/// Marks a visible brick whose matter has one label, or labels that look alike, in direct volume rendering: no labels need to
+/// be mixed there. A brick with an empty place is marked only if the transfer function shows nothing in such places. In step
+/// with `ONE_TISSUE` in `tooth.wgsl`.
 pub const ONE_TISSUE: u8 = 0x40;
 
 impl EmptySpaceMap {
