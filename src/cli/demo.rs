@@ -6,6 +6,8 @@ use clap::Args;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::thread;
+use typodont_core::parallel::available_threads;
 use typodont_exercise::scenario;
 use typodont_exercise::scenario::ResolveMode;
 use typodont_formats::Library;
@@ -38,9 +40,9 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     super::check_output_folder(&arguments.out)?;
     let library = Library::shipped();
     let operator = operator(&arguments.operator, &library)?;
-    for (name, text) in EXERCISES {
+    let play = |(name, text): (&str, &str)| -> Result<(String, PathBuf), CliError> {
         let scenario = scenario::resolve(SourceText::new(name, text), &library, ResolveMode::MakeWorkpiece)?;
-        print_line(format!("{}: {}", scenario.id, scenario.title))?;
+        let title = format!("{}: {}", scenario.id, scenario.title);
         let run = RunRequest {
             scenario: Arc::new(scenario),
             driver: SessionDriver::Script(Box::new(operator.clone())),
@@ -49,7 +51,18 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
             out: &arguments.out,
             digests: BTreeMap::new(),
         };
-        print_line(format!("  {}", run_session(run)?.join("report.html").display()))?;
+        Ok((title, run_session(run)?.join("report.html")))
+    };
+    for batch in EXERCISES.chunks(available_threads()) {
+        thread::scope(|scope| {
+            let sessions: Vec<_> = batch.iter().map(|exercise| scope.spawn(|| play(*exercise))).collect();
+            for session in sessions {
+                let (title, report) = session.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+                print_line(title)?;
+                print_line(format!("  {}", report.display()))?;
+            }
+            Ok::<_, CliError>(())
+        })?;
     }
     let mut cohort = Cohort::read(&arguments.out);
     cohort.verify(&verification::verifier()?, |_| ());
