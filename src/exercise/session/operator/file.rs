@@ -213,6 +213,11 @@ pub struct CutFile {
     /// held up, as most hands do.
     #[serde(default)]
     pub limits_force: bool,
+    /// Distance from the pulp, which a radiograph shows, within which caries is left, mm: 0 to 3. Without effect on
+    /// ellipsoidal lesions.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 3.0))]
+    pub clear_of_pulp_mm: f32,
 }
 
 /// Place a filling into the prepared cavity, press by press, from its floor up.

@@ -7,7 +7,7 @@ use crate::session::operator::excavation::Excavation;
 use crate::session::operator::file::CutFile;
 use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT};
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::{Label, Volume, distance};
 
 /// Progress of inspecting a cavity and cutting it again.
 #[derive(Clone, Debug)]
@@ -86,9 +86,11 @@ impl Operator {
             let away = lesion.centre.distance_squared(place);
             lesions.iter().all(|other| other.centre.distance_squared(place) >= away)
         };
+        let is_near_pulp = self.near_pulp(cut.clear_of_pulp_mm);
         let excavation = Excavation { radius, below: radius, pitch: cut.pitch_mm, margin: cut.margin_mm };
-        let path = excavation
-            .path(&workpiece.volume, |place, label| tissues.role(label) == Some(TissueRole::Decay) && is_own(place));
+        let path = excavation.path(&workpiece.volume, |place, label| {
+            tissues.role(label) == Some(TissueRole::Decay) && is_own(place) && !is_near_pulp(place)
+        });
         let Some(first) = path.first() else { return };
         let above = Vec3::new(first.x, first.y, self.top() + radius + TOUCH_HEIGHT);
         self.travel_to(above);
@@ -104,14 +106,27 @@ impl Operator {
         let can_cut = |label: Label| materials.as_ref().is_some_and(|m| m.get(label).cut_force.is_some());
         let radius = BOWL * scenario.instruments[instrument].to_instrument().face_radius();
         let excavation = Excavation { radius, below: 0.0, pitch: cut.pitch_mm, margin: cut.margin_mm };
-        let volume = self.workpiece.volume.clone();
-        let path = excavation
-            .path(&volume, |_, label| scenario.tissues.role(label) == Some(TissueRole::Decay) && can_cut(label));
+        let (volume, is_near_pulp) = (self.workpiece.volume.clone(), self.near_pulp(cut.clear_of_pulp_mm));
+        let path = excavation.path(&volume, |place, label| {
+            scenario.tissues.role(label) == Some(TissueRole::Decay) && can_cut(label) && !is_near_pulp(place)
+        });
         let Some(first) = path.first() else { return };
         let above = first.with_z(self.top() + TOUCH_HEIGHT);
         for _ in 0..cut.passes {
             self.travel_to(above);
             self.lead_bur(cut, [above].into_iter().chain(path.iter().copied()));
+        }
+    }
+
+    /// Returns a test of whether a voxel's centre (tooth space, mm) lies closer than `clearance` (mm) to the pulp.
+    fn near_pulp(&self, clearance: f32) -> impl Fn(Vec3) -> bool + use<> {
+        let (volume, tissues) = (&self.workpiece.volume, &self.scenario.tissues);
+        let grid = *volume.grid();
+        let is_pulp = |index: usize| tissues.role(volume.labels()[index]) == Some(TissueRole::Vulnerable);
+        let distances = (clearance > 0.0).then(|| distance::to_set(&grid, is_pulp));
+        move |place| {
+            let index = grid.nearest(place).map(|cell| grid.index(cell));
+            distances.as_ref().zip(index).is_some_and(|(distances, index)| distances[index] < clearance)
         }
     }
 
@@ -166,4 +181,71 @@ fn remaining_target(visible_volume: &Volume, is_meant: impl Fn(Vec3) -> bool) ->
     let grid = visible_volume.grid();
     let solid = visible_volume.densities().iter().enumerate().filter(|(_, density)| density.is_solid());
     solid.map(|(index, _)| grid.centre(grid.cell(index))).filter(|place| is_meant(*place)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::{ResolveMode, Workpiece, resolve};
+    use crate::session::operator::OperatorFile;
+    use std::sync::Arc;
+    use typodont_core::device::{DeviceSpec, Move};
+    use typodont_formats::Library;
+    use typodont_formats::diagnostic::SourceText;
+
+    #[test]
+    fn a_bur_that_keeps_clear_of_the_pulp_turns_back_above_it() {
+        // Aim: the clearance holds for the path, and changes nothing far from the pulp. Method: the planned paths over deep
+        // caries; a bur of 0.5 mm that removes a voxel's layer reaches down to a voxel above the clearance.
+        const SPACING: f32 = 0.25;
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/12-deep-caries.json");
+        let text = std::fs::read_to_string(path).unwrap().replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.25");
+        let library = Library::shipped();
+        let scenario = Arc::new(resolve(SourceText::new("12.json", text), &library, ResolveMode::ReadScans).unwrap());
+        let workpiece = Arc::new(Workpiece::make(&scenario, 1).unwrap());
+        let file = OperatorFile::read(&library, "careful").unwrap();
+        let lesion = workpiece.lesions[0].clone();
+        let grid = *workpiece.volume.grid();
+        let is_pulp =
+            |index: usize| scenario.tissues.role(workpiece.volume.labels()[index]) == Some(TissueRole::Vulnerable);
+        let pulp_distances = distance::to_set(&grid, is_pulp);
+        // Smallest distance of the bur's surface from the pulp along the path, mm, and the path's number of points.
+        let nearest = |clear_of_pulp_mm: f32| {
+            let mut operator =
+                Operator::new(file.clone(), scenario.clone(), workpiece.clone(), DeviceSpec::phantom_omni(), 1);
+            let instrument = scenario.instruments.iter().position(|i| i.is_bur()).unwrap();
+            let radius = operator.radius(instrument);
+            let cut = CutFile { clear_of_pulp_mm, ..any_cut() };
+            operator.excavate(&cut, &lesion, radius);
+            let path = operator.plan.iter().find_map(|task| match task {
+                OperatorTask::Move(Move::TrackTip { path, .. }) => Some(path.clone()),
+                _ => None,
+            });
+            let tooth_from_world = workpiece.world_from_tooth.inverse();
+            let path: Vec<Vec3> = path.unwrap().into_iter().map(|place| tooth_from_world * place).collect();
+            let distances =
+                path.iter().filter_map(|tip| Some(pulp_distances[grid.index(grid.nearest(*tip)?)] - radius));
+            (distances.fold(f32::INFINITY, f32::min), path.len())
+        };
+        let (without, with) = (nearest(0.0), nearest(1.0));
+        assert!(without.0 < 1.0 - SPACING, "the caries reaches within {} mm of the pulp", without.0);
+        assert!(with.0 > 1.0 - SPACING, "the bur comes within {} mm of the pulp", with.0);
+        assert!(with.1 > without.1 / 2, "{} of {} points are left", with.1, without.1);
+    }
+
+    fn any_cut() -> CutFile {
+        CutFile {
+            press_n: 1.0,
+            patience_s: 1.0,
+            speed_mm_s: 1.0,
+            pitch_mm: 0.4,
+            lean_mm: 4.0,
+            margin_mm: 0.0,
+            passes: 1,
+            until_cleared_pct: 100.0,
+            backs_off: true,
+            limits_force: true,
+            clear_of_pulp_mm: 0.0,
+        }
+    }
 }
