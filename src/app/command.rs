@@ -41,6 +41,8 @@ pub enum AppCommand {
     OpenReport,
     /// Gives the bundle to the user as one file; only in a page.
     DownloadBundle,
+    /// Lets the browser ask for a ZIP file that is to be verified; only in a page.
+    ChooseZip,
     /// Shows the instructions of the exercise whose results are shown again.
     TryAgain,
     /// Scores the interrupted session that the list offers, and makes its bundle.

@@ -1,6 +1,7 @@
 //! The making of a bundle after its session: of a lesson in this window, or of a session that was interrupted.
 
 use crate::lesson_state::LessonState;
+use crate::platform;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use typodont_lesson::InterruptedSession;
 use typodont_report::bundle::{BundleFolder, CompletionStep};
@@ -56,6 +57,7 @@ pub struct Completion(CompletionSource);
 enum CompletionSource {
     Lesson(Box<LessonState>),
     Interrupted(InterruptedCompletion),
+    Kept(KeptCompletion),
 }
 
 /// The completion of an interrupted session, on a thread of its own.
@@ -63,6 +65,18 @@ struct InterruptedCompletion {
     messages: Receiver<CompletionMessage>,
     state: CompletionState,
 }
+
+/// The completion of an interrupted session in a page, which has no threads: within a frame.
+struct KeptCompletion {
+    /// `None` once it is done.
+    session: Option<(InterruptedSession, Templates)>,
+    /// Frames that are still drawn before, so that the screen says what is being done.
+    frames_left: u32,
+    state: CompletionState,
+}
+
+/// Frames that a page draws before it completes an interrupted session.
+const FRAMES_BEFORE_WORK: u32 = 2;
 
 enum CompletionMessage {
     Step(CompletionStep),
@@ -83,6 +97,11 @@ impl Completion {
         templates: Templates,
         wake: Box<dyn Fn() + Send>,
     ) -> std::io::Result<Completion> {
+        if platform::IS_PAGE {
+            let state = CompletionState::default();
+            let kept = KeptCompletion { session: Some((session, templates)), frames_left: FRAMES_BEFORE_WORK, state };
+            return Ok(Completion(CompletionSource::Kept(kept)));
+        }
         let (sender, messages) = mpsc::channel();
         std::thread::Builder::new().name("completion".into()).spawn(move || {
             // The window may be closed meanwhile; the bundle is made in any case.
@@ -102,13 +121,20 @@ impl Completion {
         match &mut self.0 {
             CompletionSource::Lesson(lesson) => lesson.poll_completion(),
             CompletionSource::Interrupted(completion) => completion.poll(),
+            CompletionSource::Kept(completion) => completion.poll(),
         }
+    }
+
+    /// True if the completion goes on only with further frames.
+    pub fn needs_frames(&self) -> bool {
+        matches!(&self.0, CompletionSource::Kept(kept) if kept.session.is_some())
     }
 
     pub fn state(&self) -> &CompletionState {
         match &self.0 {
             CompletionSource::Lesson(lesson) => &lesson.completion,
             CompletionSource::Interrupted(completion) => &completion.state,
+            CompletionSource::Kept(completion) => &completion.state,
         }
     }
 
@@ -116,6 +142,7 @@ impl Completion {
         match &mut self.0 {
             CompletionSource::Lesson(lesson) => lesson.completion.first_result.take(),
             CompletionSource::Interrupted(completion) => completion.state.first_result.take(),
+            CompletionSource::Kept(completion) => completion.state.first_result.take(),
         }
     }
 }
@@ -134,5 +161,18 @@ impl InterruptedCompletion {
                 }
             }
         }
+    }
+}
+
+impl KeptCompletion {
+    fn poll(&mut self) {
+        if self.frames_left > 0 {
+            self.frames_left -= 1;
+            return;
+        }
+        let Some((session, templates)) = self.session.take() else { return };
+        let state = &mut self.state;
+        let ended = session.finish(&templates, &mut |step| state.apply(step));
+        state.outcome = Some(ended.map(|completed| completed.folder));
     }
 }

@@ -45,14 +45,18 @@ mod tests {
     use std::collections::BTreeMap;
     use std::sync::Arc;
     use std::time::{Duration, Instant};
+    use typodont_exercise::record::FILE_NAME;
     use typodont_exercise::scenario;
     use typodont_exercise::scenario::ResolveMode;
     use typodont_exercise::session::Input;
     use typodont_formats::Library;
     use typodont_formats::diagnostic::SourceText;
-    use typodont_lesson::SessionSeed;
+    use typodont_lesson::{InterruptedSession, SessionSeed};
     use typodont_report::Templates;
     use typodont_report::bundle::{BundleFolder, VerificationOutcome, verify};
+
+    /// Bytes at the end of a recording without which it has no end.
+    const END_BYTES: usize = 300;
 
     #[test]
     fn a_lesson_within_frames_makes_a_bundle_in_memory_that_holds() {
@@ -98,8 +102,19 @@ mod tests {
             std::thread::sleep(Duration::from_millis(2));
         }
         let bundle = bundle.expect("the lesson has a bundle");
-        assert!(matches!(bundle, BundleFolder::InMemory { .. }));
+        let BundleFolder::InMemory { name, files } = &bundle else { panic!("the bundle is on the disk") };
         let verification = verify(&bundle, &[Templates::shipped()]).unwrap();
         assert_eq!(verification.outcome(), VerificationOutcome::Verified, "{:?}", verification.complaints);
+
+        // A page that was closed before the recording's end has kept the rest of it.
+        let whole = &files[FILE_NAME];
+        let kept =
+            InterruptedSession::kept(name, whole[..whole.len() - END_BYTES].to_vec()).expect("a person's session");
+        assert_eq!((kept.scenario_id.as_str(), kept.participant.as_str()), ("5-grinding", "P01"));
+        let finished = kept.finish(&Templates::shipped(), &mut |_| ()).unwrap();
+        assert!(!finished.remarks.is_empty(), "the end of the recording is not missed");
+        let verification = verify(&finished.folder, &[Templates::shipped()]).unwrap();
+        assert_eq!(verification.outcome(), VerificationOutcome::Verified, "{:?}", verification.complaints);
+        assert_eq!(InterruptedSession::kept(name, whole[..20].to_vec()), None);
     }
 }

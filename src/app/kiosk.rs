@@ -64,6 +64,7 @@ pub fn is_refused(command: &AppCommand) -> bool {
             | AppCommand::EditExercise
             | AppCommand::Editor(_)
             | AppCommand::OpenReport
+            | AppCommand::ChooseZip
     )
 }
 

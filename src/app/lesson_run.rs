@@ -5,6 +5,7 @@
 
 use crate::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent};
 use crate::lesson_sound::LessonSound;
+use crate::platform;
 use crate::snapshot::{LessonSnapshot, LimitWarning, SNAPSHOT_WORDS};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,7 +19,7 @@ use typodont_devices::mouse::Mouse;
 use typodont_exercise::session::Input;
 use typodont_lesson::live::LiveEvent;
 use typodont_lesson::{Lesson, LessonError, PendingSecondHand, PreparedSession, RecordedSession, SessionConfig};
-use typodont_report::bundle::CompletionStep;
+use typodont_report::bundle::{CompletionStep, RecordingGrowth};
 use web_time::{Duration, Instant};
 
 /// Minimum time between two frames that movement of the hand requests.
@@ -26,6 +27,9 @@ const WAKE_INTERVAL: Duration = Duration::from_millis(16);
 
 /// Interval between attempts to find a disconnected device.
 const RECONNECT_INTERVAL: Duration = Duration::from_millis(500);
+
+/// Interval at which the growth of a recording in memory is kept.
+const KEEP_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Capacity of the command queue and of the event queue, messages.
 const EVENT_CAPACITY: usize = 256;
@@ -56,6 +60,41 @@ struct RunningLesson {
     /// Opens the device again when it was disconnected.
     reconnect: Option<(&'static dyn Driver, Option<String>)>,
     last_attempt: Instant,
+    /// Copy of the recording that is kept beyond this program's memory; `None` where the recording is in a folder.
+    kept: Option<KeptRecording>,
+}
+
+/// Copy of a growing recording, which the browser keeps.
+struct KeptRecording {
+    session: String,
+    growth: RecordingGrowth,
+    /// Number of changes so far.
+    changes: u32,
+    last_change: Instant,
+}
+
+impl KeptRecording {
+    fn new(session: String, growth: RecordingGrowth) -> KeptRecording {
+        platform::begin_keeping(&session);
+        let mut kept = KeptRecording { session, growth, changes: 0, last_change: Instant::now() };
+        kept.keep();
+        kept
+    }
+
+    /// Keeps what was written since the last time, if that was long enough ago.
+    fn keep_if_due(&mut self) {
+        if self.last_change.elapsed() >= KEEP_INTERVAL {
+            self.keep();
+        }
+    }
+
+    fn keep(&mut self) {
+        self.last_change = Instant::now();
+        if let Some(change) = self.growth.take_change() {
+            platform::keep_change(&self.session, self.changes, &change);
+            self.changes += 1;
+        }
+    }
 }
 
 impl LessonRun {
@@ -172,6 +211,7 @@ impl LessonPort {
         // It is drawn while its recording is opened.
         self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
         let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
+        let kept = prepared.growth().map(|growth| KeptRecording::new(prepared.name(), growth));
         let (mut lesson, events) = prepared.begin(device, second)?;
         self.send_events(events);
         lesson.await_movement();
@@ -179,7 +219,7 @@ impl LessonPort {
             // The buttons of a mouse have other functions.
             lesson.use_clutch_button();
         }
-        Ok(RunningLesson { lesson, reconnect, last_attempt: Instant::now() })
+        Ok(RunningLesson { lesson, reconnect, last_attempt: Instant::now(), kept })
     }
 
     /// Passes on what happened; ends the session when it is complete or the window asks for it.
@@ -191,18 +231,25 @@ impl LessonPort {
             is_over = self.handle_commands(&mut running.lesson)? || running.lesson.session().is_complete();
         }
         if !is_over {
+            if let Some(kept) = &mut running.kept {
+                kept.keep_if_due();
+            }
             return Ok(LessonPhase::Running(running));
         }
         self.publish(&mut running.lesson)?;
         self.sound.silence();
-        let recorded = running.lesson.end()?;
+        let RunningLesson { lesson, mut kept, .. } = *running;
+        let recorded = lesson.end()?;
+        if let Some(kept) = &mut kept {
+            kept.keep();
+        }
         self.send_event(LessonEvent::Completing(CompletionStep::Scoring));
         Ok(LessonPhase::Recorded(Box::new(recorded)))
     }
 
     /// Looks for a disconnected device.
     fn reconnect(&mut self, running: &mut RunningLesson) -> Result<(), LessonError> {
-        let RunningLesson { lesson, reconnect, last_attempt } = running;
+        let RunningLesson { lesson, reconnect, last_attempt, .. } = running;
         if lesson.live().is_suspended()
             && last_attempt.elapsed() > RECONNECT_INTERVAL
             && let Some((driver, argument)) = reconnect

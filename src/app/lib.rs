@@ -29,6 +29,8 @@ mod i18n;
 mod answer_draft;
 mod results;
 mod completion;
+mod given_file;
+mod zip_verification;
 mod session_history;
 mod snapshot;
 mod settings;

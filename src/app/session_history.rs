@@ -13,6 +13,8 @@ use typodont_report::{SessionFile, Templates};
 pub struct SessionHistory {
     sessions: SessionFolder,
     reader: Option<Receiver<SessionFolder>>,
+    /// Interrupted sessions that a page has kept; they arrive one by one.
+    kept: Option<Receiver<InterruptedSession>>,
 }
 
 /// Results as a page keeps them; bundles are kept by the user who downloads them.
@@ -68,7 +70,9 @@ impl SessionHistory {
     pub fn read(folder: &Path, templates: Templates, wake: Box<dyn Fn() + Send>) -> SessionHistory {
         if platform::IS_PAGE {
             let sessions = SessionFolder { attempts: kept_attempts(), ..SessionFolder::default() };
-            return SessionHistory { sessions, reader: None };
+            let (sender, kept) = mpsc::channel();
+            platform::read_kept_recordings(sender, wake);
+            return SessionHistory { sessions, reader: None, kept: Some(kept) };
         }
         let (sender, reader) = mpsc::channel();
         let folder: PathBuf = folder.to_path_buf();
@@ -77,11 +81,12 @@ impl SessionHistory {
             wake();
         });
         // Without a thread the list of exercises is shown without results.
-        SessionHistory { sessions: SessionFolder::default(), reader: started.is_ok().then_some(reader) }
+        SessionHistory { sessions: SessionFolder::default(), reader: started.is_ok().then_some(reader), kept: None }
     }
 
     /// Takes over the sessions once they have been read.
     pub fn poll(&mut self) {
+        self.sessions.interrupted.extend(self.kept.iter().flat_map(Receiver::try_iter));
         let Some(read) = self.reader.as_ref().and_then(|reader| reader.try_recv().ok()) else { return };
         self.reader = None;
         let added = std::mem::replace(&mut self.sessions, read);

@@ -18,7 +18,7 @@ use typodont_exercise::record::{Recorder, RecordingEndFile, RecordingHeadFile, S
 use typodont_exercise::scenario::{Scenario, Workpiece, hex};
 use typodont_exercise::session::{Operator, OperatorFile, RunEnd, Session};
 use typodont_report::Templates;
-use typodont_report::bundle::{BundleFolder, CompletionObserver, PartialBundle};
+use typodont_report::bundle::{BundleFolder, CompletionObserver, PartialBundle, RecordingGrowth};
 
 /// Configuration of a session.
 pub struct SessionConfig<'a> {
@@ -118,6 +118,16 @@ fn bundle_name(head: &RecordingHeadFile, started: Timestamp) -> String {
 }
 
 impl PreparedSession {
+    /// Name of the bundle that the session will have.
+    pub fn name(&self) -> String {
+        self.partial_bundle.name()
+    }
+
+    /// The growing recording of a session in memory; `None` for one that is recorded in a folder.
+    pub fn growth(&self) -> Option<RecordingGrowth> {
+        self.partial_bundle.growth()
+    }
+
     /// Begins a session with a device that a person operates, in real time. Returns the first events.
     ///
     /// # Errors

@@ -5,7 +5,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use typodont_exercise::record::{self, Recording, SeedOriginFile};
+use typodont_exercise::record::{self, Recording, RecordingHeadFile, SeedOriginFile};
 use typodont_formats::read_file;
 use typodont_report::bundle::{
     BundleFolder, CompletedBundle, CompletionObserver, PartialBundle, SESSION_FILE, is_in_use, is_partial,
@@ -40,13 +40,24 @@ pub struct Attempt {
 /// A session that was interrupted before its bundle was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterruptedSession {
-    pub folder: PathBuf,
+    place: RecordingPlace,
     pub scenario_id: String,
     pub participant: String,
     /// Start of the session, RFC 3339.
     pub started: String,
     /// True if the session can be scored only with the examiner's code.
     pub is_sealed: bool,
+}
+
+/// The place of an interrupted session's recording.
+#[derive(Clone, Debug, PartialEq)]
+enum RecordingPlace {
+    Folder(PathBuf),
+    /// A recording that was kept elsewhere than in a folder, as far as it goes.
+    Memory {
+        name: String,
+        recording: Vec<u8>,
+    },
 }
 
 /// The sessions of a folder.
@@ -111,23 +122,52 @@ impl InterruptedSession {
     ///
     /// When the recording cannot be scored or a file cannot be written; the message says why.
     pub fn finish(&self, templates: &Templates, observer: CompletionObserver) -> Result<CompletedBundle, String> {
-        let unfinished = PartialBundle::resume(&self.folder).map_err(|e| e.to_string())?;
+        let unfinished = match &self.place {
+            RecordingPlace::Folder(folder) => PartialBundle::resume(folder).map_err(|e| e.to_string())?,
+            RecordingPlace::Memory { name, recording } => PartialBundle::in_memory_from(name, recording.clone()),
+        };
         unfinished.complete_interrupted(templates, observer).map_err(|e| e.to_string())
     }
 
-    /// Moves the session's folder to the folder `set-aside`, where `typodont finish` can still complete it. Returns its
-    /// new place.
+    /// Moves the session's folder to the folder `set-aside`, where `typodont finish` can still complete it. A recording
+    /// that is in no folder is left to its keeper.
     ///
     /// # Errors
     ///
     /// When the folder cannot be moved; the message says why.
-    pub fn set_aside(&self) -> Result<PathBuf, String> {
-        let name = self.folder.file_name().unwrap_or_default();
-        let aside = self.folder.with_file_name(SET_ASIDE);
+    pub fn set_aside(&self) -> Result<(), String> {
+        let RecordingPlace::Folder(folder) = &self.place else { return Ok(()) };
+        let name = folder.file_name().unwrap_or_default();
+        let aside = folder.with_file_name(SET_ASIDE);
         let to = aside.join(name);
-        let moved = fs::create_dir_all(&aside).and_then(|()| fs::rename(&self.folder, &to));
-        moved.map_err(|e| format!("{}: unwritable-file: {e}", to.display()))?;
-        Ok(to)
+        let moved = fs::create_dir_all(&aside).and_then(|()| fs::rename(folder, &to));
+        moved.map_err(|e| format!("{}: unwritable-file: {e}", to.display()))
+    }
+
+    /// The interrupted session of a person whose recording was kept in memory; `None` if the recording has no beginning.
+    /// `name` is that of the bundle.
+    pub fn kept(name: &str, recording: Vec<u8>) -> Option<InterruptedSession> {
+        let head = Recording::parse_head(record::FILE_NAME, &recording).ok()?;
+        InterruptedSession::of(&head, RecordingPlace::Memory { name: name.to_string(), recording })
+    }
+
+    /// Name of the bundle and the bytes of a recording that is in no folder.
+    pub fn kept_recording(&self) -> Option<(&str, &[u8])> {
+        match &self.place {
+            RecordingPlace::Folder(_) => None,
+            RecordingPlace::Memory { name, recording } => Some((name, recording)),
+        }
+    }
+
+    /// A person's interrupted session; `None` for that of a script.
+    fn of(head: &RecordingHeadFile, place: RecordingPlace) -> Option<InterruptedSession> {
+        head.operator.is_none().then(|| InterruptedSession {
+            place,
+            is_sealed: head.seed_origin == Some(SeedOriginFile::Sealed),
+            scenario_id: head.scenario_id.clone(),
+            participant: head.participant.clone(),
+            started: head.started.clone(),
+        })
     }
 }
 
@@ -146,12 +186,5 @@ fn interrupted(folder: PathBuf) -> Option<InterruptedSession> {
     }
     let bytes = read_file(&folder.join(record::FILE_NAME)).ok()?;
     let head = Recording::parse_head(record::FILE_NAME, &bytes).ok()?;
-    let is_persons = head.operator.is_none();
-    is_persons.then(|| InterruptedSession {
-        folder,
-        is_sealed: head.seed_origin == Some(SeedOriginFile::Sealed),
-        scenario_id: head.scenario_id,
-        participant: head.participant,
-        started: head.started,
-    })
+    InterruptedSession::of(&head, RecordingPlace::Folder(folder))
 }

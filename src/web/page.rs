@@ -19,7 +19,10 @@ pub fn open() {
         let Some(canvas) = canvas else { return };
         match options(&window).await {
             Ok(options) => match open_page(canvas, options).await {
-                Ok(()) => status(&document, None),
+                Ok(()) => {
+                    status(&document, None);
+                    label_text_input(&document);
+                }
                 Err(why) => status(&document, Some(("failed", &why))),
             },
             Err(why) => status(&document, Some(("no-exercise", &why))),
@@ -39,6 +42,15 @@ async fn options(window: &Window) -> Result<AppOptions, String> {
         on_bundle: Some(Box::new(move |bundle| announce(&teller, bundle))),
         ..AppOptions::at_exercise_list("", Templates::shipped())
     })
+}
+
+/// Names the field into which the window system beside the canvas takes typed text, for screen readers.
+fn label_text_input(document: &Document) {
+    let language = document.document_element().and_then(|root| root.get_attribute("lang"));
+    let label = if language.as_deref() == Some("tr") { "Klavye girişi" } else { "Keyboard input" };
+    if let Ok(Some(input)) = document.query_selector("input[type=text]:not([aria-label])") {
+        let _ = input.set_attribute("aria-label", label);
+    }
 }
 
 /// Shows why nothing can be drawn, or removes the status. The class of the status selects the sentence before the reason.

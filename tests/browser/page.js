@@ -6,92 +6,27 @@
 // place of the caries, `x y z` in mm, is read from the input. In others the instrument is moved and pressed in every stage. Prints what
 // was measured as JSON. Exits with 1 and a line per claim that does not hold.
 
-const fs = require('fs');
-const http = require('http');
 const path = require('path');
 const readline = require('readline');
+const { PATIENCE, claim, main, open } = require('./served_page.js');
 
 const [playwright, executablePath, folder, pictures, zip, adapter, exercise] = process.argv.slice(2);
-const { chromium } = require(playwright);
-
-const PATIENCE = 180000;
-const started = Date.now();
-const wrong = [];
-/** Prints at once, so that a test that waits in vain says why. */
-const tell = what => console.error(`${((Date.now() - started) / 1000).toFixed(1)} s: ${what}`);
-const complain = what => { wrong.push(what); tell(what); };
-const claim = (holds, what) => { if (!holds) complain(what); };
-
-const TYPES = { '.html': 'text/html', '.js': 'text/javascript', '.css': 'text/css', '.wasm': 'application/wasm', '.png': 'image/png' };
-const server = http.createServer((request, response) => {
-  const name = new URL(request.url, 'http://page').pathname.replace(/^\/$/, '/index.html');
-  const file = path.join(folder, path.normalize(name));
-  if (!fs.existsSync(file)) return response.writeHead(404).end();
-  // The headers that docs/it.md asks a school's server for.
-  response.writeHead(200, {
-    'content-type': TYPES[path.extname(file)] || 'application/octet-stream',
-    'cache-control': /-[0-9a-f]{12}\.(js|wasm)$/.test(file) ? 'public, max-age=31536000, immutable' : 'no-cache',
-    'content-security-policy': "frame-ancestors 'self'", 'x-content-type-options': 'nosniff', 'referrer-policy': 'no-referrer',
-  }).end(fs.readFileSync(file));
-});
-
-const ADAPTERS = {
-  webgl: ['--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--disable-features=WebGPU'],
-  webgpu: ['--enable-unsafe-webgpu', '--enable-features=Vulkan,WebGPU', '--use-webgpu-adapter=swiftshader', '--use-gl=angle',
-    '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
-};
-
-const state = {};
-let heard = () => {};
-/** Waits until a topic of the state log has a value that the condition accepts. */
-const until = async (topic, condition) => {
-  const end = Date.now() + PATIENCE;
-  while (!(topic in state && condition(state[topic]))) {
-    if (Date.now() > end) throw new Error(`${topic} stays ${state[topic]}; ${JSON.stringify(state)}`);
-    await Promise.race([new Promise(done => { heard = done; }), new Promise(done => setTimeout(done, 1000))]);
-  }
-  return state[topic];
-};
 
 const numbers = text => text.split(' ').map(Number);
 
 /** A vector of the world as one sees it in the picture: right, up, toward the eye. */
-const inView = ([x, y, z]) => {
-  const [azimuth, elevation] = numbers(state.view);
+const inView = ([x, y, z], view) => {
+  const [azimuth, elevation] = numbers(view);
   const [c, s] = [Math.cos(azimuth), Math.sin(azimuth)];
   [x, z] = [c * x - s * z, s * x + c * z];
   const [d, t] = [Math.cos(elevation), Math.sin(elevation)];
   return [x, d * y - t * z, t * y + d * z];
 };
 
-(async () => {
-  await new Promise(done => server.listen(0, '127.0.0.1', done));
-  const address = `http://127.0.0.1:${server.address().port}/`;
-  const browser = await chromium.launch({ executablePath, args: ['--no-sandbox', ...ADAPTERS[adapter]] });
-  const context = await browser.newContext({ viewport: { width: 1280, height: 780 }, locale: 'en-GB', acceptDownloads: true });
-  await context.route(url => !url.href.startsWith(address) && !/^(data|blob):/.test(url.protocol), route => { complain(`asked for ${route.request().url()}`); route.abort(); });
-  const page = await context.newPage();
-  page.on('console', message => {
-    const line = message.text();
-    if (line.startsWith('typodont: ')) {
-      const [, topic, value] = line.match(/^typodont: (\S+) ?(.*)$/s);
-      if (topic === 'screen' && value !== state[topic]) tell(`screen ${value}`);
-      state[topic] = value;
-      heard();
-    } else if (message.type() === 'error') {
-      complain(`logged: ${line}`);
-    }
-  });
-  page.on('pageerror', error => complain(`thrown: ${error.stack || error.message}`));
-  page.on('crash', () => complain('the page crashed'));
-  page.on('dialog', dialog => { complain(`a dialog: ${dialog.message()}`); dialog.dismiss(); });
-  await page.addInitScript(() => localStorage.setItem('typodont.settings', '{ "introduction_first": false }'));
+main(async () => {
+  const { page, context, address, state, until, click, close } = await open({ playwright, executablePath, folder, adapter });
   const picture = name => page.screenshot({ path: path.join(pictures, `page-${adapter}-${exercise}-${name}.png`) });
   const press = async (key, topic, value) => { await page.keyboard.press(key); await until(topic, now => now === value); };
-  const click = async mark => {
-    const at = (await until('marks', marks => marks.includes(`${mark}=`))).match(new RegExp(`${mark.replace('.', '\\.')}=(\\d+),(\\d+)`));
-    await page.mouse.click(Number(at[1]), Number(at[2]));
-  };
 
   const began = Date.now();
   await page.goto(`${address}?state-log`);
@@ -129,7 +64,7 @@ const inView = ([x, y, z]) => {
     for (;;) {
       await page.waitForTimeout(250);
       const hand = numbers(state.hand);
-      const [right, up] = inView(place.map((goal, i) => goal - hand[i]));
+      const [right, up] = inView(place.map((goal, i) => goal - hand[i]), state.view);
       if (Math.hypot(right, up) < 0.4) return;
       if (Date.now() > end) throw new Error(`the hand stays at ${hand}, away from ${place}`);
       const pixels = mm => Math.max(-120, Math.min(120, Math.round(8 * mm)));
@@ -146,6 +81,8 @@ const inView = ([x, y, z]) => {
   const grind = async () => {
     console.log(`seed ${state.seed}`);
     const goal = numbers(await new Promise(done => readline.createInterface({ input: process.stdin }).once('line', done)));
+    // An open input would keep this process after its last line.
+    process.stdin.destroy();
     await pointAt(goal);
     const cutting = now();
     for (let round = 0; round < 40 && Number(state.cleared) < 10; round += 1) {
@@ -200,8 +137,6 @@ const inView = ([x, y, z]) => {
   const report = await opening;
   await report.waitForFunction(() => document.documentElement.dataset.shown, null, { timeout: PATIENCE });
   await report.screenshot({ path: path.join(pictures, `page-${adapter}-${exercise}-7-report.png`) });
-  await browser.close();
-  server.close();
+  await close();
   console.log(JSON.stringify({ adapter, exercise, shown_ms, made_ms, scored_ms, completed_ms, late, ...pace }));
-  if (wrong.length) throw new Error(wrong.join('\n'));
-})().catch(error => { console.error(error.stack || error); process.exit(1); });
+});

@@ -73,9 +73,13 @@ impl App {
     }
 
     pub(super) fn set_interrupted_aside(&mut self) {
-        let moved = self.history.take_interrupted().map(|session| session.set_aside());
-        if let Some(Err(why)) = moved {
-            self.complaints.push(why);
+        let Some(session) = self.history.take_interrupted() else { return };
+        self.complaints.extend(session.set_aside().err());
+        if let Some((name, recording)) = session.kept_recording() {
+            match platform::download_recording(name, recording) {
+                Some(complaint) => self.complaints.push(complaint),
+                None => platform::forget_recording(name),
+            }
         }
     }
 
@@ -106,6 +110,7 @@ impl App {
             }
             AppCommand::OpenReport => self.open_report(ctx),
             AppCommand::DownloadBundle => self.download_bundle(),
+            AppCommand::ChooseZip => platform::ask_for_zip(self.inbox.clone(), ctx),
             AppCommand::TryAgain => {
                 self.leave_results();
                 self.screen = Screen::Briefing;
@@ -177,6 +182,9 @@ impl App {
         {
             let complaint = platform::download(bundle);
             results.is_downloaded = complaint.is_none();
+            if results.is_downloaded {
+                platform::forget_recording(&bundle.name());
+            }
             self.complaints.extend(complaint);
         }
     }
@@ -190,6 +198,7 @@ impl App {
             | Screen::Briefing
             | Screen::Completion(_)
             | Screen::Results(_)
+            | Screen::Verification(_)
             | Screen::Failed(_) => return,
         };
         *orbit = match command {

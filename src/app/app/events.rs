@@ -1,6 +1,6 @@
 //! Events that are taken over before each frame: of lessons, bundles, kiosks and of the window itself.
 
-use super::{App, CloseState};
+use super::{App, CloseState, repaint_waker};
 use crate::AppOptions;
 use crate::completion::{Completion, CompletionProgress};
 use crate::hand_placement;
@@ -8,6 +8,7 @@ use crate::platform;
 use crate::results::{BundleState, LessonResults};
 use crate::screen::Screen;
 use crate::ui::{shortcuts, theme};
+use crate::zip_verification::ZipVerification;
 use eframe::egui::{self, ViewportCommand};
 use std::time::Duration;
 use typodont_exercise::scenario::QuestionnaireTime;
@@ -34,6 +35,11 @@ impl App {
             editor.poll(ctx.input(|input| input.time));
         }
         self.history.poll();
+        self.poll_given_file(ctx);
+        if let Some(why) = platform::keeping_failure() {
+            let what = "the browser does not keep this session; save the results before you leave the page";
+            self.complaints.push(format!("unkept-recording: {what} ({why})"));
+        }
         self.poll_kiosk(ctx);
         for completion in &mut self.completions {
             completion.poll();
@@ -71,7 +77,34 @@ impl App {
                     finish_bundle(&self.options, bundle);
                 }
             }
+            Screen::Verification(verification) => verification.poll(),
             _ => {}
+        }
+    }
+
+    /// Verifies a file that the user chose or dropped while the list or an earlier answer was shown. At any other time, and in
+    /// a kiosk, files are ignored.
+    fn poll_given_file(&mut self, ctx: &egui::Context) {
+        let is_taking = match &self.screen {
+            Screen::ExerciseList => true,
+            Screen::Verification(verification) => verification.answer.is_some(),
+            _ => false,
+        };
+        let is_covered = self.overlay.shortcuts || self.overlay.settings || self.closing != CloseState::No;
+        // In a page, a bundle that is still being made would wait for the answer.
+        let is_busy = platform::IS_PAGE && !self.completions.is_empty();
+        let file = self.inbox.take();
+        if !is_taking || is_covered || is_busy || self.options.kiosk().is_some() {
+            return;
+        }
+        let dropped = ctx.input(|input| input.raw.dropped_files.clone());
+        if let Some(first) = dropped.first().cloned() {
+            platform::receive_dropped(first, dropped.len() - 1, self.inbox.clone(), ctx);
+        }
+        if let Some(file) = file.or_else(|| self.inbox.take()) {
+            let templates = self.options.templates.clone();
+            let verification = ZipVerification::begin(file, templates, repaint_waker(ctx));
+            self.screen = Screen::Verification(Box::new(verification));
         }
     }
 
@@ -221,6 +254,9 @@ impl App {
                     false => lesson.time_to_next_second(),
                 }
             }
+            Screen::Completion(completion) if completion.needs_frames() => Duration::ZERO,
+            Screen::Verification(verification) if verification.needs_frames() => Duration::ZERO,
+            Screen::Verification(verification) if verification.answer.is_none() => theme::PROGRESS_DOT_INTERVAL,
             _ if now - self.last_input < BUSY_TIME => BUSY_FRAME_INTERVAL,
             _ => IDLE_FRAME_INTERVAL,
         }

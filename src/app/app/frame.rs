@@ -10,6 +10,7 @@ use crate::ui::case_pictures::picture_window;
 use crate::ui::exercise_list::{ListContext, exercise_list_ui};
 use crate::ui::results::{ResultTexts, results_ui};
 use crate::ui::settings_screen::{kiosk_settings_ui, settings_ui};
+use crate::ui::zip_verification::zip_verification_ui;
 use crate::ui::{briefing, kiosk_exit, practice, questionnaire, shortcuts, theme, ui_anchors};
 use eframe::egui;
 
@@ -90,6 +91,7 @@ impl App {
                 let texts = ResultTexts { words, languages: options.templates.languages() };
                 results_ui(ui, results, is_test_run, &texts, commands);
             }
+            Screen::Verification(verification) => zip_verification_ui(ui, verification, words, commands),
             Screen::Failed(why) => theme::centered_column(ui, |ui| {
                 ui.heading(words.get("desk.failed"));
                 ui.label(why.as_str());

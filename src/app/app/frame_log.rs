@@ -52,6 +52,10 @@ impl App {
                 }
                 state_log.record("screen", "results");
             }
+            Screen::Verification(verification) => {
+                state_log.record("verification", verification.answer_word());
+                state_log.record("screen", "verification");
+            }
             Screen::Failed(why) => state_log.record("screen", format!("failed {why}")),
         }
     }

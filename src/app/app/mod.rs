@@ -12,6 +12,7 @@ use crate::AppOptions;
 use crate::completion::Completion;
 use crate::editor::EditorState;
 use crate::exercise_list::ExerciseList;
+use crate::given_file::FileInbox;
 use crate::i18n::{self, Translations};
 use crate::kiosk::KioskExit;
 use crate::platform;
@@ -39,6 +40,8 @@ pub struct App {
     history: SessionHistory,
     /// Bundles that are still being made after their results were left.
     completions: Vec<Completion>,
+    /// Files that the user gives to the window.
+    inbox: FileInbox,
     participant: String,
     /// Examiner's code for the next session, as typed in the briefing. Forgotten when that session begins.
     examiner_code: String,
@@ -109,6 +112,7 @@ impl App {
         let mut app = App {
             history,
             completions: Vec::new(),
+            inbox: FileInbox::default(),
             words: i18n::select_language(&languages, &settings.language),
             participant: options.participant.clone(),
             examiner_code: String::new(),

@@ -1,13 +1,17 @@
 //! A computer: settings in a file of the user's configuration folder, bundles in a folder.
 
 use super::LogSink;
+use crate::given_file::{FileInbox, GivenContent, GivenFile};
 use crate::user_folder::UserFolder;
 use directories::{ProjectDirs, UserDirs};
+use eframe::egui;
 use std::fs;
 use std::fs::File;
 use std::io::Write;
 use std::path::PathBuf;
-use typodont_report::bundle::{BundleFolder, REPORT_FILE};
+use std::sync::mpsc::Sender;
+use typodont_lesson::InterruptedSession;
+use typodont_report::bundle::{BundleFolder, REPORT_FILE, RecordingChange};
 
 /// True for a page in a browser: it has no folders, and one device, the pointer.
 pub const IS_PAGE: bool = false;
@@ -37,6 +41,38 @@ pub fn set_unsaved_work(_: bool) {}
 
 /// Bundles are in folders here: there is nothing to download.
 pub fn download(_: &BundleFolder) -> Option<String> {
+    None
+}
+
+/// This window has no dialog for files: they are dropped into it, or verified by `typodont verify`.
+pub fn ask_for_zip(_: FileInbox, _: &egui::Context) {}
+
+/// Takes a file that was dropped into the window, with `left_out` others.
+pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: FileInbox, ctx: &egui::Context) {
+    let path = file.path();
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    inbox.put(GivenFile { name, content: GivenContent::OnDisk(path.to_path_buf()), left_out }, ctx);
+}
+
+/// Recordings grow in folders here: none is kept elsewhere.
+pub fn begin_keeping(_: &str) {}
+
+/// Keeps nothing: see [`begin_keeping`].
+pub fn keep_change(_: &str, _: u32, _: &RecordingChange) {}
+
+/// Deletes nothing: see [`begin_keeping`].
+pub fn forget_recording(_: &str) {}
+
+/// Never fails: see [`begin_keeping`].
+pub fn keeping_failure() -> Option<String> {
+    None
+}
+
+/// Nothing is kept: see [`begin_keeping`].
+pub fn read_kept_recordings(_: Sender<InterruptedSession>, _: Box<dyn Fn() + Send>) {}
+
+/// Recordings are in folders here: there is nothing to download.
+pub fn download_recording(_: &str, _: &[u8]) -> Option<String> {
     None
 }
 

@@ -1,10 +1,16 @@
 //! A page in a browser: settings in the page's own storage, bundles in memory and as downloads.
 
 use super::LogSink;
+use crate::given_file::{FileInbox, GivenContent, GivenFile};
 use crate::user_folder::UserFolder;
+use eframe::egui;
 use std::path::PathBuf;
-use typodont_report::bundle::{BundleFolder, REPORT_FILE};
+use std::sync::mpsc::Sender;
+use typodont_lesson::InterruptedSession;
+use typodont_report::bundle::{BundleFolder, REPORT_FILE, RecordingChange};
+use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
+use wasm_bindgen_futures::{JsFuture, spawn_local};
 
 /// True for a page in a browser: it has no folders, and one device, the pointer.
 pub const IS_PAGE: bool = true;
@@ -73,6 +79,129 @@ fn object_url(bytes: &[u8], media_type: &str) -> Result<String, JsValue> {
     web_sys::Url::create_object_url_with_blob(&blob)
 }
 
+/// Maximum size of a file that is read into the page, bytes; the largest bundles have some 50 MB.
+const FILE_MAX: f64 = (400 << 20) as f64;
+
+/// Id of the element by which the browser offers files.
+const FILE_INPUT: &str = "typodont-file";
+
+/// Lets the browser ask the user for a ZIP file.
+pub fn ask_for_zip(inbox: FileInbox, ctx: &egui::Context) {
+    if let Err(error) = offer_files(inbox.clone(), ctx.clone()) {
+        let why = format!("unreadable-file: the browser offers no files ({}); drop the file here", reason(&error));
+        inbox.put(GivenFile { name: String::new(), content: GivenContent::Read(Err(why)), left_out: 0 }, ctx);
+    }
+}
+
+fn offer_files(inbox: FileInbox, ctx: egui::Context) -> Result<(), JsValue> {
+    let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
+    // The element of a question that was not answered is still there.
+    if let Some(earlier) = document.get_element_by_id(FILE_INPUT) {
+        earlier.remove();
+    }
+    let input: web_sys::HtmlInputElement = document.create_element("input")?.dyn_into()?;
+    input.set_id(FILE_INPUT);
+    input.set_type("file");
+    input.set_accept(".zip,application/zip");
+    input.set_hidden(true);
+    document.body().ok_or("no body")?.append_child(&input)?;
+    let offered = input.clone();
+    let chosen = Closure::once_into_js(move || {
+        offered.remove();
+        if let Some(file) = offered.files().and_then(|files| files.get(0)) {
+            spawn_local(async move {
+                let content = GivenContent::Read(read(&file).await);
+                inbox.put(GivenFile { name: file.name(), content, left_out: 0 }, &ctx);
+            });
+        }
+    });
+    input.set_onchange(Some(chosen.unchecked_ref()));
+    input.click();
+    Ok(())
+}
+
+/// Bytes of a file that the user chose, or the reason why they cannot be read.
+async fn read(file: &web_sys::File) -> Result<Vec<u8>, String> {
+    if file.size() > FILE_MAX {
+        return Err(format!("too-large: the file has {:.0} MB; the page reads up to 400 MB", file.size() / 1e6));
+    }
+    let buffer = JsFuture::from(file.array_buffer()).await;
+    buffer
+        .map(|buffer| js_sys::Uint8Array::new(&buffer).to_vec())
+        .map_err(|error| format!("unreadable-file: {}; choose the file again", reason(&error)))
+}
+
+/// Reads a file that was dropped into the page, with `left_out` others.
+pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: FileInbox, ctx: &egui::Context) {
+    let ctx = ctx.clone();
+    spawn_local(async move {
+        let name = file.path().to_string_lossy().into_owned();
+        let read = file.bytes_async().await;
+        let content = GivenContent::Read(read.map_err(|why| format!("unreadable-file: {why}; drop the file again")));
+        inbox.put(GivenFile { name, content, left_out }, &ctx);
+    });
+}
+
+/// The message of an error, without its stack.
+fn reason(error: &JsValue) -> String {
+    let message = js_sys::Reflect::get(error, &"message".into()).ok().and_then(|message| message.as_string());
+    message.or_else(|| error.as_string()).unwrap_or_else(|| format!("{error:?}"))
+}
+
+/// Tells other pages of the same origin that a session runs in this one.
+pub fn begin_keeping(session: &str) {
+    call_keeper("begin", [session.into()]);
+}
+
+/// Keeps a change of a running session's recording in the browser, in case the page is closed or crashes.
+pub fn keep_change(session: &str, number: u32, change: &RecordingChange) {
+    let bytes = js_sys::Uint8Array::from(&change.bytes[..]);
+    call_keeper("keep", [session.into(), number.into(), (change.offset as f64).into(), bytes.into()]);
+}
+
+/// Deletes the kept recording of a session whose bundle is saved, or which is set aside.
+pub fn forget_recording(session: &str) {
+    call_keeper("forget", [session.into()]);
+}
+
+/// The reason why a change could not be kept; it is told once.
+pub fn keeping_failure() -> Option<String> {
+    call_keeper("complaint", [])?.as_string()
+}
+
+/// Reads the kept recordings of sessions that were interrupted. `wake` is called after each.
+pub fn read_kept_recordings(interrupted: Sender<InterruptedSession>, wake: Box<dyn Fn() + Send>) {
+    let Some(promise) = call_keeper("read", []).and_then(|read| read.dyn_into::<js_sys::Promise>().ok()) else {
+        return;
+    };
+    spawn_local(async move {
+        // A browser that keeps nothing has nothing to offer.
+        let Ok(kept) = JsFuture::from(promise).await else { return };
+        for pair in js_sys::Array::from(&kept).iter().map(|pair| js_sys::Array::from(&pair)) {
+            let (name, recording) =
+                (pair.get(0).as_string().unwrap_or_default(), js_sys::Uint8Array::new(&pair.get(1)));
+            if let Some(session) = InterruptedSession::kept(&name, recording.to_vec()) {
+                let _ = interrupted.send(session);
+                wake();
+            }
+        }
+    });
+}
+
+/// Lets the browser save a recording that is set aside; returns a complaint if that fails.
+pub fn download_recording(session: &str, recording: &[u8]) -> Option<String> {
+    let name = format!("{session}.mcap");
+    let saved = save_as(&name, recording, "application/octet-stream");
+    saved.err().map(|error| format!("{name}: unwritable-file: {}", reason(&error)))
+}
+
+/// Calls a function of `page/kept.js` in the crate `web`; `None` in a page without it.
+fn call_keeper<const N: usize>(function: &str, arguments: [JsValue; N]) -> Option<JsValue> {
+    let keeper = js_sys::Reflect::get(&js_sys::global(), &"typodontKept".into()).ok()?;
+    let function = js_sys::Reflect::get(&keeper, &function.into()).ok()?.dyn_into::<js_sys::Function>().ok()?;
+    function.apply(&keeper, &arguments.into_iter().collect()).ok()
+}
+
 /// Name of the place where settings are kept, for messages.
 pub fn settings_place(_: &UserFolder) -> String {
     format!("localStorage/{SETTINGS_KEY}")
@@ -80,7 +209,7 @@ pub fn settings_place(_: &UserFolder) -> String {
 
 /// Text of the settings; `None` if none are kept, or if the browser keeps nothing for this page.
 pub fn read_settings(_: &UserFolder) -> Option<String> {
-    read(SETTINGS_KEY)
+    stored(SETTINGS_KEY)
 }
 
 /// Keeps the text of the settings; returns the reason if that fails.
@@ -90,7 +219,7 @@ pub fn write_settings(_: &UserFolder, text: &str) -> Option<String> {
 
 /// Text of the results of earlier sessions; `None` if none are kept.
 pub fn read_history() -> Option<String> {
-    read(HISTORY_KEY)
+    stored(HISTORY_KEY)
 }
 
 /// Keeps the text of the results; returns the reason if that fails.
@@ -98,7 +227,7 @@ pub fn write_history(text: &str) -> Option<String> {
     write(HISTORY_KEY, text)
 }
 
-fn read(key: &str) -> Option<String> {
+fn stored(key: &str) -> Option<String> {
     storage()?.get_item(key).ok().flatten()
 }
 

@@ -9,6 +9,7 @@ use crate::settings::Settings;
 use crate::ui::text_field::{participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
+use crate::ui::zip_verification::verify_button_ui;
 use eframe::egui;
 use typodont_lesson::{self as lesson, InterruptedSession};
 
@@ -71,6 +72,9 @@ pub fn exercise_list_ui(
                 }
             }
         });
+        if !context.is_kiosk {
+            verify_button_ui(ui, words, commands);
+        }
         if platform::IS_PAGE {
             return;
         }

@@ -30,3 +30,4 @@ pub mod view_refresh;
 pub mod viewport;
 pub mod viewport_input;
 pub mod views;
+pub mod zip_verification;

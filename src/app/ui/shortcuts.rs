@@ -141,11 +141,18 @@ pub fn collect_commands(
         Screen::Briefing if pressed(Key::Escape) => commands.push(AppCommand::BackToList),
         Screen::Lesson(lesson) if lesson.are_stages_over => questionnaire_shortcuts(ctx, lesson, is_done, commands),
         Screen::Lesson(lesson) => practice_shortcuts(ctx, lesson, is_done, commands),
-        Screen::Results(_) | Screen::Failed(_) if pressed(Key::Enter) || pressed(Key::Escape) => {
+        Screen::Results(_) | Screen::Verification(_) | Screen::Failed(_)
+            if pressed(Key::Enter) || pressed(Key::Escape) =>
+        {
             commands.push(AppCommand::BackToList);
         }
         Screen::Results(_) if pressed(Key::R) => commands.push(AppCommand::OpenReport),
-        Screen::Editor(_) | Screen::Briefing | Screen::Completion(_) | Screen::Results(_) | Screen::Failed(_) => {}
+        Screen::Editor(_)
+        | Screen::Briefing
+        | Screen::Completion(_)
+        | Screen::Results(_)
+        | Screen::Verification(_)
+        | Screen::Failed(_) => {}
     }
 }
 

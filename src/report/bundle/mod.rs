@@ -17,7 +17,8 @@ pub use comparison::{Verification, VerificationOutcome, compare_results, verify,
 pub(super) use comparison::{compare_facts, compare_files, compare_scores, unlisted_complaint, unlisted_files};
 pub(super) use derived_files::derive_maps;
 pub use partial_bundle::{
-    BundleError, CompletedBundle, CompletionObserver, CompletionStep, PartialBundle, is_in_use, is_partial,
+    BundleError, CompletedBundle, CompletionObserver, CompletionStep, PartialBundle, RecordingChange, RecordingGrowth,
+    is_in_use, is_partial,
 };
 pub(super) use template_name::named_template;
 

@@ -84,21 +84,34 @@ struct PartialFolder {
 
 /// A file in memory, which its writer and the bundle share.
 #[derive(Clone, Debug, Default)]
-struct MemoryFile(Arc<Mutex<Cursor<Vec<u8>>>>);
+struct MemoryFile(Arc<Mutex<MemoryContent>>);
+
+#[derive(Debug, Default)]
+struct MemoryContent {
+    cursor: Cursor<Vec<u8>>,
+    /// Position from which the file may differ from its last [`RecordingChange`], bytes.
+    changed_from: usize,
+}
 
 impl MemoryFile {
-    fn lock(&self) -> MutexGuard<'_, Cursor<Vec<u8>>> {
+    fn of(bytes: Vec<u8>) -> MemoryFile {
+        MemoryFile(Arc::new(Mutex::new(MemoryContent { cursor: Cursor::new(bytes), changed_from: 0 })))
+    }
+
+    fn lock(&self) -> MutexGuard<'_, MemoryContent> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn bytes(&self) -> Vec<u8> {
-        self.lock().get_ref().clone()
+        self.lock().cursor.get_ref().clone()
     }
 }
 
 impl Write for MemoryFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.lock().write(bytes)
+        let mut content = self.lock();
+        content.changed_from = content.changed_from.min(content.cursor.position() as usize);
+        content.cursor.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -108,7 +121,29 @@ impl Write for MemoryFile {
 
 impl Seek for MemoryFile {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.lock().seek(to)
+        self.lock().cursor.seek(to)
+    }
+}
+
+/// The growing recording of a bundle in memory, for whoever keeps a copy of it elsewhere.
+#[derive(Debug)]
+pub struct RecordingGrowth(MemoryFile);
+
+/// A part of a recording that is new or was written again: it replaces everything from its offset on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordingChange {
+    /// Position of the first byte in the recording.
+    pub offset: usize,
+    pub bytes: Vec<u8>,
+}
+
+impl RecordingGrowth {
+    /// Everything that was written since the last call; `None` if that is nothing.
+    pub fn take_change(&self) -> Option<RecordingChange> {
+        let mut content = self.0.lock();
+        let (offset, end) = (content.changed_from, content.cursor.get_ref().len());
+        content.changed_from = end;
+        (offset < end).then(|| RecordingChange { offset, bytes: content.cursor.get_ref()[offset..].to_vec() })
     }
 }
 
@@ -201,6 +236,11 @@ impl PartialBundle {
         PartialBundle(Storage::Memory { name: name.to_string(), recording: MemoryFile::default() })
     }
 
+    /// The bundle of a session that was interrupted, of whose recording these bytes were kept.
+    pub fn in_memory_from(name: &str, recording: Vec<u8>) -> PartialBundle {
+        PartialBundle(Storage::Memory { name: name.to_string(), recording: MemoryFile::of(recording) })
+    }
+
     /// Reopens the folder of a session that was interrupted.
     ///
     /// # Errors
@@ -274,6 +314,22 @@ impl PartialBundle {
         self.folder().map(|folder| folder.join(record::FILE_NAME))
     }
 
+    /// The growing recording in memory; `None` on disk.
+    pub fn growth(&self) -> Option<RecordingGrowth> {
+        match &self.0 {
+            Storage::Disk(_) => None,
+            Storage::Memory { recording, .. } => Some(RecordingGrowth(recording.clone())),
+        }
+    }
+
+    /// Name of the finished bundle.
+    pub fn name(&self) -> String {
+        match &self.0 {
+            Storage::Disk(folder) => folder.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            Storage::Memory { name, .. } => name.clone(),
+        }
+    }
+
     /// Bytes of the recording as far as they are written; none if it was never created.
     ///
     /// # Errors
@@ -300,8 +356,9 @@ impl PartialBundle {
             Storage::Disk(folder) => folder.reveal_seed(code),
             Storage::Memory { name, recording } => {
                 let mut recording = recording.lock();
-                let revealed = record::reveal(recording.get_ref(), code);
-                *recording = Cursor::new(revealed.map_err(|why| BundleError::new(Path::new(name), why))?);
+                let revealed = record::reveal(recording.cursor.get_ref(), code);
+                let bytes = revealed.map_err(|why| BundleError::new(Path::new(name), why))?;
+                *recording = MemoryContent { cursor: Cursor::new(bytes), changed_from: 0 };
                 Ok(())
             }
         }
@@ -414,5 +471,38 @@ impl PartialFolder {
         fs::rename(&partial, &path).map_err(|e| unwritten("the folder cannot be renamed", &e))?;
         sync_folder(path.parent().unwrap_or(Path::new(".")));
         Ok(path)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_changes_of_a_growing_recording_make_the_recording() {
+        // Aim: a copy that is kept elsewhere is the recording, also where the writer goes back to fill in a length.
+        let mut file = MemoryFile::default();
+        let growth = RecordingGrowth(file.clone());
+        assert_eq!(growth.take_change(), None);
+        let mut copy = Vec::new();
+        let mut keep = |expected: Option<usize>| {
+            let change = growth.take_change();
+            assert_eq!(change.as_ref().map(|change| change.offset), expected);
+            if let Some(RecordingChange { offset, bytes }) = change {
+                copy.truncate(offset);
+                copy.extend(bytes);
+            }
+            copy.clone()
+        };
+        file.write_all(b"head....").unwrap();
+        assert_eq!(keep(Some(0)), b"head....");
+        file.write_all(b"chunk").unwrap();
+        file.seek(SeekFrom::Start(4)).unwrap();
+        file.write_all(b"0005").unwrap();
+        file.seek(SeekFrom::End(0)).unwrap();
+        assert_eq!(keep(Some(4)), b"head0005chunk");
+        assert_eq!(keep(None), file.bytes());
+        file.write_all(b"more").unwrap();
+        assert_eq!(keep(Some(13)), b"head0005chunkmore");
     }
 }
