@@ -57,7 +57,7 @@ pub struct Completion(CompletionSource);
 enum CompletionSource {
     Lesson(Box<LessonState>),
     Interrupted(InterruptedCompletion),
-    Kept(KeptCompletion),
+    Kept(Box<KeptCompletion>),
 }
 
 /// The completion of an interrupted session, on a thread of its own.
@@ -100,7 +100,7 @@ impl Completion {
         if platform::IS_PAGE {
             let state = CompletionState::default();
             let kept = KeptCompletion { session: Some((session, templates)), frames_left: FRAMES_BEFORE_WORK, state };
-            return Ok(Completion(CompletionSource::Kept(kept)));
+            return Ok(Completion(CompletionSource::Kept(Box::new(kept))));
         }
         let (sender, messages) = mpsc::channel();
         std::thread::Builder::new().name("completion".into()).spawn(move || {

@@ -73,6 +73,12 @@ pub struct ExerciseList {
 }
 
 impl ExerciseList {
+    /// True if the exercise of this id in the list has this digest; `None` if the list has none of this id.
+    pub fn has_same(&self, id: &str, sha256: &str) -> Option<bool> {
+        let own = self.exercises.iter().filter_map(|exercise| exercise.scenario.as_ref().ok());
+        own.filter(|scenario| scenario.id == id).map(|scenario| scenario.sha256 == sha256).reduce(|a, b| a || b)
+    }
+
     /// Loads the shipped exercises, and those of `folder` if its path is not empty.
     pub fn load(folder: &Path) -> ExerciseList {
         let mut library = Library::shipped();

@@ -1,7 +1,6 @@
 //! Files that the user gives to the window: chosen in the browser, or dropped.
 
 use eframe::egui;
-use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A file that the user gave to the window.
@@ -19,7 +18,8 @@ pub enum GivenContent {
     /// The bytes, or the reason why they cannot be read.
     Read(Result<Vec<u8>, String>),
     /// A file on this computer.
-    OnDisk(PathBuf),
+    #[cfg(not(target_family = "wasm"))]
+    OnDisk(std::path::PathBuf),
 }
 
 impl GivenContent {
@@ -30,10 +30,7 @@ impl GivenContent {
     pub fn read(self) -> Result<Vec<u8>, String> {
         match self {
             GivenContent::Read(read) => read,
-            GivenContent::OnDisk(path) if path.is_dir() => {
-                Err("wrong-zip: this is a folder; give the ZIP file of a bundle, or use `typodont verify FOLDER`"
-                    .into())
-            }
+            #[cfg(not(target_family = "wasm"))]
             GivenContent::OnDisk(path) => typodont_formats::read_file(&path).map_err(|complaint| complaint.headline()),
         }
     }

@@ -97,6 +97,13 @@ impl KeptRecording {
     }
 }
 
+impl Drop for KeptRecording {
+    /// Keeps the rest, also where the lesson ends with an error.
+    fn drop(&mut self) {
+        self.keep();
+    }
+}
+
 impl LessonRun {
     /// Creates a lesson that has not begun, and the window's ends of its queues.
     pub fn new(config: LessonConfig, sounds: SoundSender) -> (LessonClient, LessonRun) {
@@ -238,11 +245,9 @@ impl LessonPort {
         }
         self.publish(&mut running.lesson)?;
         self.sound.silence();
-        let RunningLesson { lesson, mut kept, .. } = *running;
+        // What is kept receives the recording's end when it is dropped.
+        let RunningLesson { lesson, kept: _kept, .. } = *running;
         let recorded = lesson.end()?;
-        if let Some(kept) = &mut kept {
-            kept.keep();
-        }
         self.send_event(LessonEvent::Completing(CompletionStep::Scoring));
         Ok(LessonPhase::Recorded(Box::new(recorded)))
     }

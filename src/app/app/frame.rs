@@ -91,7 +91,9 @@ impl App {
                 let texts = ResultTexts { words, languages: options.templates.languages() };
                 results_ui(ui, results, is_test_run, &texts, commands);
             }
-            Screen::Verification(verification) => zip_verification_ui(ui, verification, words, commands),
+            Screen::Verification(verification) => {
+                zip_verification_ui(ui, verification, exercise_list, words, commands);
+            }
             Screen::Failed(why) => theme::centered_column(ui, |ui| {
                 ui.heading(words.get("desk.failed"));
                 ui.label(why.as_str());

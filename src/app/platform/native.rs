@@ -51,7 +51,14 @@ pub fn ask_for_zip(_: FileInbox, _: &egui::Context) {}
 pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: FileInbox, ctx: &egui::Context) {
     let path = file.path();
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    inbox.put(GivenFile { name, content: GivenContent::OnDisk(path.to_path_buf()), left_out }, ctx);
+    let content = match path.is_dir() {
+        true => {
+            let why = "wrong-zip: this is a folder; give the ZIP file of a bundle, or use `typodont verify FOLDER`";
+            GivenContent::Read(Err(why.to_string()))
+        }
+        false => GivenContent::OnDisk(path.to_path_buf()),
+    };
+    inbox.put(GivenFile { name, content, left_out }, ctx);
 }
 
 /// Recordings grow in folders here: none is kept elsewhere.

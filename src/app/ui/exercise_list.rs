@@ -130,7 +130,9 @@ fn interrupted_ui(
     ui.add_space(8.0);
     frame.show(ui, |ui| {
         ui.set_width(ui.available_width());
-        ui.strong(words.format("shelf.interrupted", format!("{title} · {when} UTC")));
+        let whose = [title, &session.participant, &format!("{when} UTC")];
+        let whose: Vec<&str> = whose.into_iter().filter(|part| !part.is_empty()).collect();
+        ui.strong(words.format("shelf.interrupted", whose.join(" · ")));
         ui.label(words.get(if session.is_sealed { "shelf.interrupted_sealed" } else { "shelf.interrupted_about" }));
         ui.horizontal_wrapped(|ui| {
             let asked =

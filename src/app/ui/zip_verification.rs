@@ -1,6 +1,7 @@
 //! The page that verifies a result which was handed in as a ZIP file, and the way to it from the list.
 
 use crate::command::AppCommand;
+use crate::exercise_list::ExerciseList;
 use crate::i18n::Translations;
 use crate::platform;
 use crate::ui::theme;
@@ -35,6 +36,7 @@ pub fn verify_button_ui(ui: &mut egui::Ui, words: &Translations, commands: &mut 
 pub fn zip_verification_ui(
     ui: &mut egui::Ui,
     verification: &ZipVerification,
+    list: &ExerciseList,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -50,7 +52,7 @@ pub fn zip_verification_ui(
                 ui.label(words.get(if platform::IS_PAGE { "verify.running_page" } else { "verify.running" }));
                 theme::progress_dots(ui);
             }
-            Some(answer) => answer_ui(ui, answer, words),
+            Some(answer) => answer_ui(ui, answer, list, words),
         }
         ui.add_space(16.0);
         ui.horizontal(|ui| {
@@ -64,9 +66,9 @@ pub fn zip_verification_ui(
     });
 }
 
-fn answer_ui(ui: &mut egui::Ui, answer: &ZipAnswer, words: &Translations) {
+fn answer_ui(ui: &mut egui::Ui, answer: &ZipAnswer, list: &ExerciseList, words: &Translations) {
     match &answer.findings {
-        Ok(findings) => findings_ui(ui, findings, words),
+        Ok(findings) => findings_ui(ui, findings, list, words),
         Err(why) => {
             verdict_ui(ui, "verify.unreadable", theme::ERROR, words);
             ui.label(why);
@@ -83,7 +85,7 @@ fn verdict_ui(ui: &mut egui::Ui, key: &str, colour: egui::Color32, words: &Trans
     ui.label(egui::RichText::new(words.get(key)).size(24.0).strong().color(colour));
 }
 
-fn findings_ui(ui: &mut egui::Ui, findings: &BundleFindings, words: &Translations) {
+fn findings_ui(ui: &mut egui::Ui, findings: &BundleFindings, list: &ExerciseList, words: &Translations) {
     let (key, about, colour) = match findings.outcome() {
         VerificationOutcome::Verified => ("verify.verified", "verify.verified_about", theme::SUCCESS),
         VerificationOutcome::PartlyVerified => ("verify.partly", "verify.partly_about", theme::WARNING),
@@ -94,6 +96,12 @@ fn findings_ui(ui: &mut egui::Ui, findings: &BundleFindings, words: &Translation
     if let Some(session) = &findings.session {
         ui.add_space(8.0);
         session_ui(ui, session, words);
+        // Whoever hands in a result may have changed the exercise before.
+        match list.has_same(&session.scenario.id, &session.scenario.sha256) {
+            Some(true) => ui.label(words.get("verify.exercise_same")),
+            Some(false) => ui.colored_label(theme::WARNING, words.get("verify.exercise_other")),
+            None => ui.colored_label(theme::WARNING, words.get("verify.exercise_unknown")),
+        };
     }
     let count = findings.lines().count();
     if count > 0 {

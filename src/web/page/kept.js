@@ -2,79 +2,133 @@
 // the last second. The program calls these functions (`platform/web.rs` in the crate `app`).
 //
 // A recording is kept as its changes, in order; each replaces everything from its offset on. A lock of the session's name tells
-// other pages that it is still running.
+// other pages that it is still running; where a browser has no locks, as by HTTP, the time of its last change does. A session is
+// offered only at the address at which it was begun, so that nobody finishes another learner's work within a learning platform.
 
 const STORE = "changes";
-const lockOf = (session) => `typodont ${session}`;
-const keyRange = (session) => IDBKeyRange.bound([session], [session, []]);
 
-const opened = new Promise((resolve, reject) => {
+/** Sessions that are offered at once: their recordings are read as a whole. */
+const OFFERED_MAX = 3;
+
+/** Time after which a session that nobody finished is deleted, ms. */
+const EXPIRY = 30 * 24 * 3600 * 1000;
+
+/** Time for which a session without a lock counts as running after its last change, ms. */
+const RUNNING = 15000;
+
+const lockOf = (session) => `typodont ${session}`;
+const keysOf = (session) => IDBKeyRange.bound([session], [session, []]);
+
+/** The page's address, and for whom and with which exercise it was opened. */
+const place = (() => {
+  const asked = new URLSearchParams(location.search);
+  return [location.pathname.replace(/index\.html$/, ""), asked.get("exercise") ?? "", asked.get("participant") ?? ""].join(" ");
+})();
+
+let opened;
+const open = () => opened ??= new Promise((resolve, reject) => {
   const request = indexedDB.open("typodont", 1);
   request.onupgradeneeded = () => request.result.createObjectStore(STORE, { keyPath: ["session", "number"] });
-  request.onsuccess = () => resolve(request.result);
+  request.onsuccess = () => {
+    // A browser may close it, as when the user clears the page's data.
+    request.result.onclose = () => { opened = undefined; };
+    resolve(request.result);
+  };
   request.onerror = () => reject(request.error);
-});
-// Read by `complaint`, too.
-opened.catch(() => {});
-
-/** The first failure, until it is told. Later ones say nothing new. */
-let failure;
-let isTold = false;
+}).catch((error) => { opened = undefined; throw error; });
 
 /** Runs a transaction; resolves with the request's result once the transaction is complete. */
 const transact = async (mode, work) => {
-  const database = await opened;
+  const database = await open();
   return new Promise((resolve, reject) => {
     const transaction = database.transaction(STORE, mode);
     const request = work(transaction.objectStore(STORE));
-    transaction.oncomplete = () => resolve(request.result);
+    transaction.oncomplete = () => resolve(request?.result);
     transaction.onabort = () => reject(transaction.error);
   });
 };
 
+/** Changes that are not kept yet, in order; those that could not be are tried again with the next. */
+let waiting = [];
+let isWriting = false;
+let failure;
+let isTold = false;
+
+const write = async () => {
+  if (isWriting) return;
+  isWriting = true;
+  while (waiting.length > 0) {
+    const changes = waiting;
+    waiting = [];
+    try {
+      await transact("readwrite", (store) => changes.forEach((change) => store.put(change)));
+    } catch (error) {
+      waiting = [...changes, ...waiting];
+      failure ??= String(error);
+      break;
+    }
+  }
+  isWriting = false;
+};
+
 const releases = new Map();
+
+const remove = (session) => transact("readwrite", (store) => store.delete(keysOf(session)));
 
 globalThis.typodontKept = {
   /** Marks a session as running in this page. */
   begin(session) {
-    navigator.locks?.request(lockOf(session), () => new Promise((release) => releases.set(session, release)));
+    failure = undefined;
+    isTold = false;
+    waiting = [];
+    const held = new Promise((release) => releases.set(session, release));
+    navigator.locks?.request(lockOf(session), () => held).catch(() => {});
   },
 
   /** Keeps a change of a session's recording. */
   keep(session, number, offset, bytes) {
-    transact("readwrite", (store) => store.put({ session, number, offset, bytes })).catch((error) => { failure ??= String(error); });
+    waiting.push({ session, number, offset, bytes, place, at: Date.now() });
+    write();
   },
 
   /** Deletes a session's recording. */
   forget(session) {
-    releases.get(session)?.();
-    releases.delete(session);
-    transact("readwrite", (store) => store.delete(keyRange(session))).catch(() => {});
+    waiting = waiting.filter((change) => change.session !== session);
+    remove(session).catch(() => {}).then(() => {
+      releases.get(session)?.();
+      releases.delete(session);
+    });
   },
 
-  /** The reason why a change could not be kept, the first time that it is asked for. */
+  /** The reason why a change could not be kept, once for each session. */
   complaint() {
     if (isTold || failure === undefined) return undefined;
     isTold = true;
     return failure;
   },
 
-  /** The recordings of sessions that run in no page, as pairs of name and bytes, oldest first. */
+  /** The recordings of sessions that were begun at this address and run in no page, as pairs of name and bytes. */
   async read() {
-    const changes = await transact("readonly", (store) => store.getAll());
-    const held = new Set((await navigator.locks?.query())?.held.map((lock) => lock.name));
-    const sessions = new Map();
-    for (const { session, offset, bytes } of changes) {
-      if (held.has(lockOf(session))) continue;
-      const whole = sessions.get(session) ?? { length: 0, parts: [] };
-      sessions.set(session, whole);
-      whole.parts.push({ offset, bytes });
-      whole.length = Math.max(whole.length, offset + bytes.length);
+    const locks = await navigator.locks?.query();
+    const held = new Set(locks?.held.map((lock) => lock.name));
+    const names = new Set((await transact("readonly", (store) => store.getAllKeys())).map(([session]) => session));
+    const offered = [];
+    for (const session of names) {
+      if (held.has(lockOf(session)) || offered.length === OFFERED_MAX) continue;
+      const changes = await transact("readonly", (store) => store.getAll(keysOf(session)));
+      const age = Date.now() - (changes.at(-1)?.at ?? 0);
+      // Nothing can be scored without the beginning.
+      if (age > EXPIRY || changes[0]?.number !== 0) {
+        await remove(session).catch(() => {});
+        continue;
+      }
+      if (changes[0].place !== place || (!locks && age < RUNNING)) continue;
+      const gap = changes.findIndex((change, index) => change.number !== index);
+      const whole = gap < 0 ? changes : changes.slice(0, gap);
+      const recording = new Uint8Array(Math.max(...whole.map(({ offset, bytes }) => offset + bytes.length)));
+      for (const { offset, bytes } of whole) recording.set(bytes, offset);
+      offered.push([session, recording]);
     }
-    return [...sessions].map(([session, { length, parts }]) => {
-      const recording = new Uint8Array(length);
-      for (const { offset, bytes } of parts) recording.set(bytes, offset);
-      return [session, recording];
-    });
+    return offered;
   },
 };

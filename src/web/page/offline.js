@@ -1,13 +1,13 @@
 // Keeps the page's own files in the browser, so that it opens without a network after the first visit.
 //
 // The program's files carry a digest in their names and never change. The others are asked for first, and taken from what was kept
-// where no server answers in time. Each version is kept as a whole when it is installed, and nothing is added to it later; older
-// versions are deleted once it is complete. No other address is touched.
+// where no server answers in time. Each version is kept as a whole when it is installed, and nothing is added to it later. It takes
+// over once no page of the version before is open, whose files are then deleted. No other address is touched.
 
 const OWN = `typodont ${registration.scope} `;
 const CACHE = OWN + "DIGEST";
 const PROGRAM = ["typodont-web.js", "typodont-web_bg.wasm"];
-const OTHERS = ["index.html", "start.js", "kept.js", "style.css", "icon.png", "page.webmanifest"];
+const OTHERS = ["./", "start.js", "kept.js", "style.css", "icon.png", "page.webmanifest"];
 
 /** Time for which a server is waited for where a file is kept, ms. */
 const PATIENCE = 5000;
@@ -17,7 +17,7 @@ const pathOf = (name) => new URL(name, registration.scope).pathname;
 addEventListener("install", (event) => {
   const named = (names, cache) => names.map((name) => new Request(name, { cache, redirect: "error" }));
   const files = [...named(PROGRAM, "default"), ...named(OTHERS, "no-cache")];
-  event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(files)).then(() => skipWaiting()));
+  event.waitUntil(caches.open(CACHE).then((cache) => cache.addAll(files)));
 });
 
 addEventListener("activate", (event) => {
@@ -28,9 +28,10 @@ addEventListener("activate", (event) => {
 
 addEventListener("fetch", (event) => {
   const { request } = event;
-  // The page's address may end with the folder, and have parameters.
-  const { pathname } = new URL(request.url);
-  const path = pathname === pathOf(".") ? pathOf("index.html") : pathname;
+  const { origin, pathname } = new URL(request.url);
+  if (origin !== location.origin) return;
+  // The page's address may end with the folder or with the file, and have parameters.
+  const path = pathname === pathOf("index.html") ? pathOf("./") : pathname;
   const name = [...PROGRAM, ...OTHERS].find((name) => pathOf(name) === path);
   if (name && request.method === "GET") event.respondWith(answer(request, name));
 });
@@ -41,5 +42,7 @@ async function answer(request, name) {
   if (PROGRAM.includes(name)) return kept;
   const late = new Promise((resolve) => setTimeout(resolve, PATIENCE));
   const fresh = await Promise.race([fetch(request).catch(() => undefined), late]);
-  return fresh && fresh.status < 500 ? fresh : kept;
+  // A network that one must sign in to answers everything with its own page; only the user's own visit may lead there.
+  const isGood = request.mode === "navigate" ? fresh?.status < 500 : fresh?.ok && !fresh.redirected;
+  return isGood ? fresh : kept;
 }

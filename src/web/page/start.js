@@ -1,6 +1,5 @@
 // Loads the program. Whatever prevents that is shown in the page's status.
 import init from "./typodont-web.js";
-import "./kept.js";
 
 const asked = new URLSearchParams(location.search).get("language") || navigator.language;
 const language = asked.startsWith("tr") ? "tr" : "en";
@@ -8,6 +7,9 @@ document.documentElement.lang = language;
 for (const text of document.querySelectorAll("#status [lang]")) {
   text.hidden = text.lang !== language;
 }
+
+// A browser that keeps nothing can still be worked in.
+await import("./kept.js").catch(() => {});
 
 init({ module_or_path: new URL("typodont-web_bg.wasm", import.meta.url) }).catch((error) => {
   document.getElementById("status")?.classList.add("failed");
