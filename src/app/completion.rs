@@ -75,9 +75,6 @@ struct KeptCompletion {
     state: CompletionState,
 }
 
-/// Frames that a page draws before it completes an interrupted session.
-const FRAMES_BEFORE_WORK: u32 = 2;
-
 enum CompletionMessage {
     Step(CompletionStep),
     Ended(Result<BundleFolder, String>),
@@ -99,7 +96,11 @@ impl Completion {
     ) -> std::io::Result<Completion> {
         if platform::IS_PAGE {
             let state = CompletionState::default();
-            let kept = KeptCompletion { session: Some((session, templates)), frames_left: FRAMES_BEFORE_WORK, state };
+            let kept = KeptCompletion {
+                session: Some((session, templates)),
+                frames_left: platform::FRAMES_BEFORE_LONG_STEP,
+                state,
+            };
             return Ok(Completion(CompletionSource::Kept(Box::new(kept))));
         }
         let (sender, messages) = mpsc::channel();

@@ -2,9 +2,7 @@
 
 use crate::lesson_backend::LessonBackend;
 use crate::lesson_run::LessonRun;
-
-/// Frames that are drawn before a long step, so that the screen says what is being done.
-const FRAMES_BEFORE_LONG_STEP: u32 = 2;
+use crate::platform::FRAMES_BEFORE_LONG_STEP;
 
 pub struct InlineLesson {
     /// `None` when the lesson is over.

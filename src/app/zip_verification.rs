@@ -7,9 +7,6 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 use typodont_report::bundle::{BundleFolder, SESSION_FILE, Verification, VerificationOutcome, sha256, verify};
 use typodont_report::{SessionFile, Templates};
 
-/// Frames that a page draws before it verifies, so that the screen says what is being done.
-const FRAMES_BEFORE_WORK: u32 = 2;
-
 /// A ZIP file that is being verified, and the answer once there is one.
 pub struct ZipVerification {
     pub file_name: String,
@@ -54,7 +51,7 @@ impl ZipVerification {
     pub fn begin(file: GivenFile, templates: Templates, wake: Box<dyn Fn() + Send>) -> ZipVerification {
         let GivenFile { name: file_name, content, left_out } = file;
         if platform::IS_PAGE {
-            let work = VerificationWork::InFrame { content, templates, frames_left: FRAMES_BEFORE_WORK };
+            let work = VerificationWork::InFrame { content, templates, frames_left: platform::FRAMES_BEFORE_LONG_STEP };
             return ZipVerification { file_name, left_out, answer: None, work };
         }
         let (sender, answer) = mpsc::channel();

@@ -26,14 +26,20 @@ fn built_page() -> Option<PathBuf> {
     Some(page)
 }
 
+/// A script that works in the page; `None` without a browser or the page.
+fn page_script(name: &str) -> Option<Command> {
+    let mut node = Command::new("node");
+    node.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser").join(name))
+        .args(browser()?)
+        .arg(built_page()?);
+    Some(node)
+}
+
 fn goes_through_a_lesson(adapter: &str, exercise: &str) {
-    let (Some([playwright, chromium]), Some(page)) = (browser(), built_page()) else { return };
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let Some(mut node) = page_script("page.js") else { return };
     let out = folder(&format!("page_{adapter}_{exercise}"));
     let zip = out.join("bundle.zip");
-    let mut node = Command::new("node");
-    node.arg(root.join("tests/browser/page.js")).args([playwright, chromium]);
-    node.arg(page).arg(&out).arg(&zip).args([adapter, exercise]).stdin(Stdio::piped()).stdout(Stdio::piped());
+    node.arg(&out).arg(&zip).args([adapter, exercise]).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut running = node.spawn().unwrap();
     let lines = BufReader::new(running.stdout.take().unwrap()).lines().map_while(Result::ok);
     let mut answers = running.stdin.take().unwrap();
@@ -91,10 +97,8 @@ fn further_exercises_in_a_page_give_bundles_that_hold() {
 
 /// Lets the page verify files, each with the answer that it must give.
 fn verifies_in_the_page(adapter: &str, out: &Path, files: &[(&str, PathBuf)]) {
-    let (Some([playwright, chromium]), Some(page)) = (browser(), built_page()) else { return };
-    let mut node = Command::new("node");
-    node.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/verify_page.js")).args([playwright, chromium]);
-    node.arg(page).arg(out).arg(adapter);
+    let Some(mut node) = page_script("verify_page.js") else { return };
+    node.arg(out).arg(adapter);
     node.args(files.iter().map(|(answer, file)| format!("{answer}={}", file.display())));
     assert!(node.status().unwrap().success(), "the page gives other answers; see above");
 }
@@ -166,21 +170,17 @@ fn every_shipped_exercise_of_this_computer_is_verified_in_the_page() {
 #[ignore = "long: needs the page that scripts/web builds"]
 fn the_page_opens_without_a_network_after_one_visit() {
     // Aim: a tablet works in a room without a network. Method: one visit, then the server is gone.
-    let (Some([playwright, chromium]), Some(page)) = (browser(), built_page()) else { return };
-    let mut node = Command::new("node");
-    node.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/offline_page.js")).args([playwright, chromium]);
-    assert!(node.arg(page).status().unwrap().success(), "the page does not open; see above");
+    let Some(mut node) = page_script("offline_page.js") else { return };
+    assert!(node.status().unwrap().success(), "the page does not open; see above");
 }
 
 #[test]
 #[ignore = "long: needs the page that scripts/web builds"]
 fn nothing_around_the_canvas_is_a_barrier() {
     // Aim: whoever uses a screen reader learns what the page is, and why it shows no exercise. Method: axe-core's rules.
-    let (Some([playwright, chromium]), Some(page)) = (browser(), built_page()) else { return };
+    let Some(mut node) = page_script("axe_page.js") else { return };
     let Some(axe) = named_by("TYPODONT_AXE", "axe-core") else { return };
-    let mut node = Command::new("node");
-    node.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/axe_page.js")).args([playwright, chromium]);
-    assert!(node.arg(page).arg(axe).status().unwrap().success(), "axe finds barriers; see above");
+    assert!(node.arg(axe).status().unwrap().success(), "axe finds barriers; see above");
 }
 
 #[test]
@@ -188,12 +188,10 @@ fn nothing_around_the_canvas_is_a_barrier() {
 fn a_closed_page_loses_at_most_a_second_of_its_session() {
     // Aim: nothing that was done is lost with a tab. Method: the page is closed at twenty random moments of a lesson, without a
     // question; the next page scores what was kept. Its bundle holds, and lacks at most a second of the ticks that were seen.
-    let (Some([playwright, chromium]), Some(page)) = (browser(), built_page()) else { return };
+    let Some(mut node) = page_script("closed_page.js") else { return };
     let out = folder("page_closed");
-    let mut node = Command::new("node");
-    node.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/closed_page.js")).args([playwright, chromium]);
     let moments = if std::env::var_os("TYPODONT_LONG").is_some() { "20" } else { "3" };
-    assert!(node.arg(page).arg(&out).arg(moments).status().unwrap().success(), "a session is lost; see above");
+    assert!(node.arg(&out).arg(moments).status().unwrap().success(), "a session is lost; see above");
     let zips: Vec<PathBuf> = std::fs::read_dir(&out)
         .unwrap()
         .map(|entry| entry.unwrap().path())

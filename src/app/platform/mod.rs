@@ -14,5 +14,8 @@ pub use native::*;
 #[cfg(target_family = "wasm")]
 pub use web::*;
 
+/// Frames that a page, which has no threads, draws before a long step, so that the screen says what is being done.
+pub const FRAMES_BEFORE_LONG_STEP: u32 = 2;
+
 /// Writer of a line of the state log.
 pub type LogSink = Box<dyn FnMut(&str)>;

@@ -77,13 +77,18 @@ pub fn results_ui(
     });
 }
 
-fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ResultTexts) {
-    let words = texts.words;
-    let (key, colour) = match (grade.finished, grade.passed) {
+/// Text key and colour of a grade's verdict.
+pub fn verdict(grade: &GradeFile) -> (&'static str, egui::Color32) {
+    match (grade.finished, grade.passed) {
         (false, _) => ("results.unfinished", theme::WARNING),
         (true, true) => ("results.passed", theme::SUCCESS),
         (true, false) => ("results.failed", theme::ERROR),
-    };
+    }
+}
+
+fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ResultTexts) {
+    let words = texts.words;
+    let (key, colour) = verdict(grade);
     ui.horizontal_wrapped(|ui| {
         ui.label(egui::RichText::new(words.get(key)).size(24.0).strong().color(colour));
         ui.label(

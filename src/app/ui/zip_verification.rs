@@ -4,6 +4,7 @@ use crate::command::AppCommand;
 use crate::exercise_list::ExerciseList;
 use crate::i18n::Translations;
 use crate::platform;
+use crate::ui::results;
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use crate::zip_verification::{BundleFindings, ZipAnswer, ZipVerification};
@@ -12,7 +13,7 @@ use typodont_report::SessionFile;
 use typodont_report::bundle::VerificationOutcome;
 use typodont_report::display_format::{plain_number, points};
 
-/// Digits of an exercise's digest that are shown, as in the report.
+/// Digits of an exercise's digest that are shown.
 const SHOWN_DIGITS: usize = 16;
 
 /// Maximum number of findings that are listed.
@@ -123,11 +124,7 @@ fn session_ui(ui: &mut egui::Ui, session: &SessionFile, words: &Translations) {
     let grade = session.grade.as_ref().map_or_else(
         || words.get("results.no_grade").to_string(),
         |grade| {
-            let verdict = match (grade.finished, grade.passed) {
-                (false, _) => "results.unfinished",
-                (true, true) => "results.passed",
-                (true, false) => "results.failed",
-            };
+            let (verdict, _) = results::verdict(grade);
             let earned = points(grade.points, grade.pass_points);
             format!("{} / {} · {}", earned, plain_number(grade.max_points), words.get(verdict))
         },
