@@ -2,6 +2,7 @@
 //! folder are run as they are printed.
 
 use crate::support::bundle;
+use crate::support::coarse_exercise::coarse_text;
 use crate::support::folder;
 
 use bundle::{complained, program, told};
@@ -124,10 +125,7 @@ fn commands_in_the_guides_do_what_they_say() {
     // Method: in a folder with coarse exercises, as a reader has them, first the sessions and then all else in the order of
     // the pages.
     let folder = folder("documented_commands");
-    let coarse = std::fs::read_to_string("scenarios/5-grinding.json")
-        .unwrap()
-        .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.4")
-        .replace(r#""$schema": "scenario.schema.json","#, "");
+    let coarse = coarse_text("5-grinding", 0.4);
     for name in ["scenarios/5-grinding.json", "my-exercises/buccal-caries.json"] {
         std::fs::create_dir_all(folder.join(name).parent().unwrap()).unwrap();
         std::fs::write(folder.join(name), &coarse).unwrap();

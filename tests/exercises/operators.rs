@@ -1,6 +1,7 @@
 //! The four shipped operators are what their names say, in every exercise and every measure where it shows.
 
 use crate::support::bundle;
+use crate::support::coarse_exercise::coarse_exercise;
 use crate::support::folder;
 
 use bundle::*;
@@ -18,6 +19,9 @@ use typodont_exercise::session::{Operator, OperatorFile};
 use typodont_formats::Library;
 
 const OPERATORS: [&str; 4] = ["expert", "careful", "hasty", "timid"];
+
+/// Size of a voxel, mm, with which a session of minutes takes seconds.
+const COARSE: f32 = 0.2;
 
 /// Seeds of the exercises: lesions in different quarters and on either tooth.
 const SEEDS: [&str; 2] = ["1", "2"];
@@ -60,7 +64,7 @@ fn never_falls(mean: &impl Fn(&str, &str) -> Option<f64>, name: &str, operators:
 
 #[test]
 fn grinding_tells_them_apart() {
-    let mean = means("scenarios/5-grinding.json");
+    let mean = means(&coarse_exercise("5-grinding", COARSE, "operators"));
     grows(&mean, "time_to_clear_s", &["hasty", "careful"]);
     grows(&mean, "time_to_clear_s", &["expert", "careful"]);
     grows(&mean, "force_max_n", &["timid", "careful", "hasty"]);
@@ -105,18 +109,9 @@ fn excavating_a_fissure_tells_them_apart() {
     }
 }
 
-/// A shipped exercise with coarser voxels, so that a session of minutes takes seconds.
-fn coarse(name: &str) -> String {
-    let text = std::fs::read_to_string(format!("{}/scenarios/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
-    assert!(text.contains("\"spacing_mm\": 0.1"), "{name}");
-    let file = folder(&format!("coarse_{name}")).join(name);
-    std::fs::write(&file, text.replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.2")).unwrap();
-    file.to_str().unwrap().to_string()
-}
-
 /// One measure of one session each of some operators.
 fn played(name: &str, operators: &[&str]) -> impl Fn(&str, &str) -> Option<f64> {
-    let (scenario, out) = (coarse(name), folder(&format!("played_{name}")));
+    let (scenario, out) = (coarse_exercise(name, COARSE, "played"), folder(&format!("played_{name}")));
     let sessions: Vec<(String, Value)> =
         operators.iter().map(|o| (o.to_string(), session(&run(&scenario, o, &out, &[])))).collect();
     move |operator, name| {
@@ -128,7 +123,7 @@ fn played(name: &str, operators: &[&str]) -> impl Fn(&str, &str) -> Option<f64> 
 #[test]
 #[ignore = "scripts/test --long"]
 fn deep_decay_tells_them_apart() {
-    let mean = played("12-deep-caries.json", &["expert", "hasty"]);
+    let mean = played("12-deep-caries", &["expert", "hasty"]);
     grows(&mean, "dice", &["hasty", "expert"]);
     grows(&mean, "points", &["hasty", "expert"]);
     assert_eq!((mean("expert", "pulp_exposed"), mean("hasty", "pulp_exposed")), (Some(0.0), Some(1.0)));
@@ -138,7 +133,7 @@ fn deep_decay_tells_them_apart() {
 #[ignore = "scripts/test --long"]
 fn preparing_an_outline_tells_them_apart() {
     // Aim: who gives the bur its time cuts what is drawn and no more. Method: both outlines, in coarse voxels.
-    for name in ["10-class-one.json", "11-class-two.json"] {
+    for name in ["10-class-one", "11-class-two"] {
         let mean = played(name, &["expert", "careful", "hasty"]);
         for better in ["careful", "expert"] {
             grows(&mean, "points", &["hasty", better]);
@@ -152,7 +147,7 @@ fn preparing_an_outline_tells_them_apart() {
 #[test]
 #[ignore = "scripts/test --long"]
 fn scooping_soft_decay_tells_them_apart_and_leaves_sound_dentine() {
-    let mean = played("13-spoon.json", &["expert", "hasty"]);
+    let mean = played("13-spoon", &["expert", "hasty"]);
     grows(&mean, "zone_removed_pct(soft)", &["hasty", "expert"]);
     grows(&mean, "points", &["hasty", "expert"]);
     for operator in ["expert", "hasty"] {

@@ -1,6 +1,7 @@
 //! `verify` detects every later change of a bundle, and an interrupted session can be finished.
 
 use crate::support::bundle;
+use crate::support::coarse_exercise::coarse_exercise;
 use crate::support::folder;
 
 use bundle::*;
@@ -12,8 +13,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A short exercise with cutting.
-const GRINDING: &str = "scenarios/5-grinding.json";
+/// A short exercise with cutting, of large voxels: what is proved does not depend on their size.
+fn grinding(test: &str) -> String {
+    coarse_exercise("5-grinding", 0.2, test)
+}
 
 /// Copies a bundle, so that each forgery starts from an intact one.
 fn copy(bundle: &Path, name: &str) -> PathBuf {
@@ -66,7 +69,7 @@ fn flipped(file: &Path, at: usize) -> Vec<u8> {
 fn one_flipped_bit_anywhere_makes_verify_fail_and_name_the_file() {
     // Aim: no byte of a bundle is left out. Method: in the recording and in the session's file one bit at a time; in all
     // the others, which are compared one by one, the first byte of each at once, then the last, and one file alone.
-    let whole = run(GRINDING, "careful", &folder("flip_whole"), &[]);
+    let whole = run(&grinding("flip"), "careful", &folder("flip_whole"), &[]);
     verify(&whole).unwrap();
     let forged = copy(&whole, "flip_forged");
     let size = |file: &Path| fs::metadata(whole.join(file)).unwrap().len() as usize;
@@ -157,7 +160,7 @@ fn forge(whole: &Path, name: &str, recording: &[u8]) -> PathBuf {
 
 #[test]
 fn a_forgery_in_the_right_format_is_located_by_its_tick() {
-    let whole = run(GRINDING, "careful", &folder("forger_whole"), &[]);
+    let whole = run(&grinding("forger"), "careful", &folder("forger_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
     // A message has the encapsulation (4 bytes), the tick (8), the hand's position at byte 12 and the force at byte
     // 44.
@@ -236,7 +239,7 @@ fn events_added_after_the_end_or_dropped_are_detected() {
 #[test]
 fn a_forged_version_does_not_avoid_the_check() {
     // Aim: a forged result is detected even if it claims to come from another scorer, program or template.
-    let whole = run(GRINDING, "hasty", &folder("accused_whole"), &[]);
+    let whole = run(&grinding("accused"), "hasty", &folder("accused_whole"), &[]);
     for (name, part, value) in [
         ("scorer", "scorer_version", serde_json::json!(0)),
         ("program", "typodont_version", serde_json::json!("0.0.9")),
@@ -338,7 +341,7 @@ fn inside_a_chunk(recording: &[u8], place: usize) -> usize {
 fn an_interrupted_session_can_be_finished_but_not_passed() {
     // Aim: whatever a power cut leaves, the session before it is kept, its loss is told, and the bundle verifies as what
     // it is.
-    let whole = run(GRINDING, "careful", &folder("cut_whole"), &[]);
+    let whole = run(&grinding("cut"), "careful", &folder("cut_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
     let size = bytes.len();
     let mut flipped = bytes.clone();
@@ -377,7 +380,7 @@ fn an_unfinished_session_names_what_to_do() {
     fs::create_dir_all(&partial).unwrap();
     let path = partial.to_str().unwrap();
     // Killed in its first milliseconds: no recording, an empty one, or one without a tick.
-    let whole = run(GRINDING, "careful", &folder("unfinished_whole"), &[]);
+    let whole = run(&grinding("unfinished"), "careful", &folder("unfinished_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
     for content in [None, Some(&bytes[..0]), Some(&bytes[..60])] {
         if let Some(content) = content {
@@ -401,7 +404,7 @@ fn a_file_in_the_place_of_the_output_folder_is_named() {
     let file = folder("file_as_folder").join("file");
     fs::write(&file, "x").unwrap();
     for out in [file.clone(), file.join("below")] {
-        let output = typodont(&["run", GRINDING, "--headless", "--out", out.to_str().unwrap()]);
+        let output = typodont(&["run", "scenarios/5-grinding.json", "--headless", "--out", out.to_str().unwrap()]);
         assert_eq!(output.status.code(), Some(2));
         let expected = format!("--out: {} is a file, not a folder", file.display());
         assert_eq!(complained(&output).trim(), expected);
@@ -413,7 +416,8 @@ fn a_file_in_the_place_of_the_output_folder_is_named() {
 fn a_size_limit_ends_a_session_with_a_sentence_and_without_a_loss() {
     // Aim: the limit for files, like a full disk, is met while the session is recorded and while its report is made. Method:
     // `ulimit -f` in units of 512 bytes; first below the size of the recording, then between that and the report's.
-    let whole = run(GRINDING, "careful", &folder("limit_whole"), &[]);
+    let exercise = grinding("limit");
+    let whole = run(&exercise, "careful", &folder("limit_whole"), &[]);
     let size = |name: &str| fs::metadata(whole.join(name)).unwrap().len();
     let (recording, page) = (size("recording.mcap"), size("report.html"));
     assert!(page > recording + 20_000, "the page has {page} bytes, the recording {recording}");
@@ -423,7 +427,7 @@ fn a_size_limit_ends_a_session_with_a_sentence_and_without_a_loss() {
     ] {
         let out = folder(name);
         let command = format!("ulimit -f {}; exec \"$0\" \"$@\"", limit / 512);
-        let arguments = [program(), "run", GRINDING, "--headless", "--seed", "1", "--out", out.to_str().unwrap()];
+        let arguments = [program(), "run", &exercise, "--headless", "--seed", "1", "--out", out.to_str().unwrap()];
         let output = std::process::Command::new("sh").arg("-c").arg(command).args(arguments).output().unwrap();
         let complaint = complained(&output);
         assert_eq!(output.status.code(), Some(1), "{name}: {complaint}");
@@ -441,7 +445,7 @@ fn a_size_limit_ends_a_session_with_a_sentence_and_without_a_loss() {
 
 #[test]
 fn a_forged_grade_is_named() {
-    let whole = run(GRINDING, "hasty", &folder("grade_whole"), &[]);
+    let whole = run(&grinding("grade"), "hasty", &folder("grade_whole"), &[]);
     let forged = copy(&whole, "grade_forged");
     let mut better = session(&whole);
     better["metrics"]["healthy_per_decay_pct"] = 0.0.into();

@@ -3,6 +3,7 @@
 //! Needs `TYPODONT_PYTHON` and `TYPODONT_GLTF_VALIDATOR`, as `scripts/test` sets them.
 
 use crate::support::bundle;
+use crate::support::coarse_exercise::coarse_exercise;
 use crate::support::folder;
 
 use bundle::*;
@@ -53,16 +54,8 @@ const SENTENCES: [(&str, &[&str]); 4] = [
     ("4-diagnosis", &["hasty"]),
 ];
 
-/// A shipped exercise with voxels of a quarter of a millimetre, so that many sessions can be run; in a folder of the
-/// test's own, because tests run at the same time.
-fn coarse(name: &str, test: &str) -> String {
-    let text = std::fs::read_to_string(format!("{}/scenarios/{name}.json", env!("CARGO_MANIFEST_DIR"))).unwrap();
-    assert!(text.contains("\"spacing_mm\": 0.1"), "{name}");
-    let file = folder(&format!("coarse_{test}_{name}")).join(format!("{name}.json"));
-    let text = text.replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.25");
-    std::fs::write(&file, text.replace(r#""$schema": "scenario.schema.json","#, "")).unwrap();
-    file.to_str().unwrap().to_string()
-}
+/// Size of a voxel, mm, with which many sessions can be run.
+const COARSE: f32 = 0.25;
 
 /// Derives the facts of all sentences of some bundles again; `None` without Python.
 fn derive_sentences(bundles: &[PathBuf]) -> Option<Output> {
@@ -81,7 +74,8 @@ fn check_sentences(bundles: &[PathBuf]) {
 #[test]
 fn a_wrong_fact_in_the_feedback_is_found() {
     // Aim: the test below can fail. Method: one value of the evidence is changed at a time.
-    let bundle = run(&coarse("5-grinding", "wrong_sentences"), "hasty", &folder("wrong_sentences"), &[]);
+    let bundle =
+        run(&coarse_exercise("5-grinding", COARSE, "wrong_sentences"), "hasty", &folder("wrong_sentences"), &[]);
     let file = bundle.join("session.json");
     let original = session(&bundle);
     let episodes = original["episodes"].as_array().unwrap();
@@ -114,7 +108,7 @@ fn every_sentence_of_feedback_follows_from_the_recording() {
     // it was only to be found.
     let mut bundles = Vec::new();
     for (name, operators) in SENTENCES {
-        let scenario = coarse(name, "sentences");
+        let scenario = coarse_exercise(name, COARSE, "sentences");
         let out = folder(&format!("sentences_{name}"));
         bundles.extend(operators.iter().map(|operator| run(&scenario, operator, &out, &[])));
     }
@@ -127,7 +121,7 @@ fn every_sentence_of_two_hundred_sessions_follows_from_the_recording() {
     // Aim: as above, of all operators, in every exercise whose feedback names places, by many seeds.
     let mut bundles = Vec::new();
     for name in ["5-grinding", "7-spray", "8-fissure", "12-deep-caries", "3-detection", "4-diagnosis", "15-charting"] {
-        let scenario = coarse(name, "many_sentences");
+        let scenario = coarse_exercise(name, COARSE, "many_sentences");
         let out = folder(&format!("many_sentences_{name}"));
         for operator in ["expert", "careful", "hasty", "timid"] {
             let seeds: Vec<String> = (1..=8).map(|seed| seed.to_string()).collect();

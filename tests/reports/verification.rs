@@ -1,6 +1,7 @@
 //! No reader shows a result that does not follow from its recording without saying so.
 
 use crate::support::bundle;
+use crate::support::coarse_exercise::coarse_exercise;
 use crate::support::folder;
 
 use bundle::*;
@@ -16,8 +17,10 @@ use typodont_report::{Templates, VerificationStatus, Verifier};
 
 const EXERCISE: &str = "scenarios/1-introduction.json";
 
-/// An exercise with a rubric.
-const GRADED: &str = "scenarios/5-grinding.json";
+/// An exercise with a rubric, of large voxels.
+fn graded(test: &str) -> String {
+    coarse_exercise("5-grinding", 0.2, test)
+}
 
 /// The program with a cache of replays of this test alone.
 fn reader(cache: &Path, arguments: &[&str]) -> Output {
@@ -73,7 +76,7 @@ fn every_reader_says_which_results_follow_from_their_recordings() {
     // participant's own code; a copy under another code; a copy with a recording that is not the one of the digests.
     let out = folder("verification_readers");
     let (sessions, cache) = (out.join("sessions"), out.join("cache"));
-    let graded = GRADED;
+    let graded = &graded("readers");
     let honest = run(graded, "hasty", &sessions, &["--participant", "HONEST"]);
     let best = run(graded, "hasty", &sessions, &["--participant", "CHEAT", "--seed", "2"]);
     forge(&best, full_marks);
@@ -163,7 +166,7 @@ fn a_forged_copy_does_not_hide_the_session_that_it_copies() {
     // Aim: of two bundles with the same recording, person and time the one counts that its recording confirms. Method: a copy
     // with full marks in a folder that is read first.
     let place = folder("forged_copy");
-    let original = run(GRADED, "hasty", &place.join("berk"), &["--participant", "BERK"]);
+    let original = run(&graded("original"), "hasty", &place.join("berk"), &["--participant", "BERK"]);
     let forged = copy(&original, &place.join("aaa"));
     forge(&forged, full_marks);
     let mut cohort = Cohort::read(&place);

@@ -5,6 +5,7 @@
 pub mod browser;
 pub mod bundle;
 pub mod cluster;
+pub mod coarse_exercise;
 pub mod desk;
 pub mod folder;
 pub mod hearing;
