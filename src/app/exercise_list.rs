@@ -12,6 +12,7 @@ use typodont_exercise::scenario::{ResolveMode, Scenario};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::{SourceText, headlines};
 use typodont_lesson::{self as lesson, ToothScan};
+use typodont_report::bundle::sha256;
 
 /// Exercises built into the program, in the order of the course, so that they are available wherever it is installed.
 const SHIPPED: [(&str, &str); 15] = [
@@ -46,9 +47,56 @@ pub struct Exercise {
     pub scenario: Result<Arc<Scenario>, String>,
     /// SHA-256 of files that the exercise does not name, by name.
     pub digests: BTreeMap<String, String>,
+    /// State of an exercise that was opened or written in a page.
+    pub opened: Option<OpenedExercise>,
+}
+
+/// An exercise that was opened or written in a page, which has no file of it.
+#[derive(Clone)]
+pub struct OpenedExercise {
+    pub source: Arc<SourceText>,
+    /// The text without the changes that are not saved: that of the file, or that with which a new exercise began.
+    pub first_text: String,
+    /// True if `first_text` is that of a file.
+    pub is_saved: bool,
+    /// Identifies the exercise and its draft.
+    pub key: PathBuf,
+    /// True if the changes are kept nowhere but here.
+    pub is_unkept: bool,
+}
+
+impl OpenedExercise {
+    /// An exercise as a file has it.
+    pub fn of_file(source: Arc<SourceText>) -> OpenedExercise {
+        let (first_text, key) = (source.text.clone(), OpenedExercise::key_of_file(&source.name, &source.text));
+        OpenedExercise { source, first_text, is_saved: true, key, is_unkept: false }
+    }
+
+    /// Identifies a file by its name and content: a page sees no path.
+    pub fn key_of_file(name: &str, text: &str) -> PathBuf {
+        const DIGITS: usize = 16;
+        PathBuf::from(format!("{name} {}", &sha256(text.as_bytes())[..DIGITS]))
+    }
 }
 
 impl Exercise {
+    fn of_source(source: Arc<SourceText>, library: Library) -> Exercise {
+        let read = scenario::resolve(source.clone(), &library, ResolveMode::ReadScans);
+        Exercise {
+            name: source.name.clone(),
+            path: None,
+            library,
+            scenario: read.map(Arc::new).map_err(|found| headlines(&found)),
+            digests: BTreeMap::new(),
+            opened: None,
+        }
+    }
+
+    /// True for an exercise that is built into the program.
+    fn is_shipped(&self) -> bool {
+        self.path.is_none() && self.opened.is_none()
+    }
+
     /// Title in the user's language; the file's name if it is not a valid exercise.
     pub fn title<'a>(&'a self, words: &Translations) -> &'a str {
         self.scenario.as_ref().map_or(&self.name, |scenario| words.own(&scenario.texts, &scenario.title))
@@ -63,12 +111,14 @@ impl Exercise {
 /// All exercises, and the selected one.
 pub struct ExerciseList {
     pub exercises: Vec<Exercise>,
+    /// True for a page that was opened for one exercise: it has no way to others, nor to the author's screen.
+    pub is_only: bool,
     pub selected: usize,
     /// True if the list is to scroll to the selected exercise.
     pub scroll_to_selected: bool,
     /// The folder as it is being typed.
     pub folder: String,
-    /// Reason why the folder could not be read.
+    /// Reason why the folder, or a file that was opened, could not be read.
     pub complaint: Option<String>,
 }
 
@@ -91,10 +141,12 @@ impl ExerciseList {
                 library: library.clone(),
                 scenario: read.map(Arc::new).map_err(|found| headlines(&found)),
                 digests: BTreeMap::new(),
+                opened: None,
             }
         });
         let mut list = ExerciseList {
             exercises: shipped.into(),
+            is_only: false,
             selected: 0,
             scroll_to_selected: false,
             folder: folder.display().to_string(),
@@ -111,18 +163,35 @@ impl ExerciseList {
 
     /// A list of one exercise only.
     pub fn only(given: GivenExercise) -> ExerciseList {
-        let GivenExercise { source, library } = given;
-        let name = source.name.clone();
-        let read = scenario::resolve(source, &library, ResolveMode::ReadScans);
-        let scenario = read.map(Arc::new).map_err(|found| headlines(&found));
-        let exercise = Exercise { name, path: None, library, scenario, digests: BTreeMap::new() };
         ExerciseList {
-            exercises: vec![exercise],
+            exercises: vec![Exercise::of_source(given.source, given.library)],
+            is_only: true,
             selected: 0,
             scroll_to_selected: false,
             folder: String::new(),
             complaint: None,
         }
+    }
+
+    /// Adds an exercise that was opened or written in a page and selects it, in place of the one with the key `replaced` or its
+    /// own key.
+    pub fn put_opened(&mut self, opened: OpenedExercise, library: Library, replaced: Option<&Path>) {
+        let is_same = |old: &OpenedExercise| Some(old.key.as_path()) == replaced || old.key == opened.key;
+        let place = self.exercises.iter().position(|old| old.opened.as_ref().is_some_and(is_same));
+        let exercise = Exercise { opened: Some(opened.clone()), ..Exercise::of_source(opened.source, library) };
+        match place {
+            Some(place) => (self.exercises[place], self.selected) = (exercise, place),
+            None => {
+                self.exercises.push(exercise);
+                self.selected = self.exercises.len() - 1;
+            }
+        }
+        self.scroll_to_selected = true;
+    }
+
+    /// True if changes of an exercise are kept nowhere but in this list.
+    pub fn has_unkept(&self) -> bool {
+        self.exercises.iter().any(|exercise| exercise.opened.as_ref().is_some_and(|opened| opened.is_unkept))
     }
 
     /// Adds files, except those that are copies of an exercise that the list has already.
@@ -169,7 +238,7 @@ impl ExerciseList {
 
     /// The shipped exercises in order.
     pub fn course(&self) -> Vec<&Scenario> {
-        let shipped = self.exercises.iter().filter(|exercise| exercise.path.is_none());
+        let shipped = self.exercises.iter().filter(|exercise| exercise.is_shipped());
         shipped.filter_map(|exercise| exercise.scenario.as_deref().ok()).collect()
     }
 
@@ -182,7 +251,7 @@ impl ExerciseList {
         settings: &Settings,
     ) -> Option<&Exercise> {
         let (first, asked) = (self.exercises.first()?, self.exercises.get(place)?);
-        let is_waiting = settings.introduction_first && place > 0 && asked.path.is_none();
+        let is_waiting = settings.introduction_first && place > 0 && asked.is_shipped();
         let is_passed = || history.is_read() && history.summary(first.id(), participant).is_passed;
         (is_waiting && !is_passed()).then_some(first)
     }
@@ -214,5 +283,6 @@ fn from_file(path: &Path) -> Exercise {
         library: lesson::library_for(path),
         scenario,
         digests: BTreeMap::new(),
+        opened: None,
     }
 }

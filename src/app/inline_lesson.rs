@@ -74,6 +74,7 @@ mod tests {
             input_device: InputDevice::Mouse,
             second: None,
             digests: BTreeMap::new(),
+            is_kept: true,
             wake: Arc::new(|| ()),
         };
         let (mut client, run) = LessonRun::new(config, typodont_audio::sound_channel().0);

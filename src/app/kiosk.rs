@@ -65,6 +65,7 @@ pub fn is_refused(command: &AppCommand) -> bool {
             | AppCommand::Editor(_)
             | AppCommand::OpenReport
             | AppCommand::ChooseZip
+            | AppCommand::ChooseExercise
     )
 }
 

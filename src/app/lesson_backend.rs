@@ -63,6 +63,8 @@ pub struct LessonConfig {
     pub second: Option<(second_hand::SecondHandSource, SecondHandRole)>,
     /// SHA-256 of files that the exercise does not name, by name.
     pub digests: BTreeMap<String, String>,
+    /// True if a page keeps the recording in case it is closed; an author's test run is not kept.
+    pub is_kept: bool,
     /// Called when the window should draw a new frame.
     pub wake: Arc<dyn Fn() + Send + Sync>,
 }

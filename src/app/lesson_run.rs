@@ -187,7 +187,17 @@ impl LessonPort {
     /// Makes the workpiece and begins the session.
     fn open(&mut self, config: LessonConfig, mouse: PointerDevice) -> Result<RunningLesson, LessonError> {
         let LessonConfig {
-            scenario, seed, participant, out, templates, started, input_device, second, digests, ..
+            scenario,
+            seed,
+            participant,
+            out,
+            templates,
+            started,
+            input_device,
+            second,
+            digests,
+            is_kept,
+            ..
         } = config;
         let open_device = match input_device {
             InputDevice::Mouse => None,
@@ -218,7 +228,7 @@ impl LessonPort {
         // It is drawn while its recording is opened.
         self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
         let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
-        let kept = prepared.growth().map(|growth| KeptRecording::new(prepared.name(), growth));
+        let kept = prepared.growth().filter(|_| is_kept).map(|growth| KeptRecording::new(prepared.name(), growth));
         let (mut lesson, events) = prepared.begin(device, second)?;
         self.send_events(events);
         lesson.await_movement();

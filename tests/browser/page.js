@@ -8,7 +8,7 @@
 
 const path = require('path');
 const readline = require('readline');
-const { PATIENCE, claim, main, open } = require('./served_page.js');
+const { PATIENCE, claim, finishLesson, main, open, openExercise, saveBundle } = require('./served_page.js');
 
 const [playwright, executablePath, folder, pictures, zip, adapter, exercise] = process.argv.slice(2);
 
@@ -24,9 +24,9 @@ const inView = ([x, y, z], view) => {
 };
 
 main(async () => {
-  const { page, context, address, state, until, click, close } = await open({ playwright, executablePath, folder, adapter });
+  const opened = await open({ playwright, executablePath, folder, adapter });
+  const { page, context, address, state, until, close } = opened;
   const picture = name => page.screenshot({ path: path.join(pictures, `page-${adapter}-${exercise}-${name}.png`) });
-  const press = async (key, topic, value) => { await page.keyboard.press(key); await until(topic, now => now === value); };
 
   const began = Date.now();
   await page.goto(`${address}?state-log`);
@@ -35,22 +35,13 @@ main(async () => {
   await page.mouse.move(640, 400);
   await picture('1-shelf');
   claim((await page.$('#status')) === null, 'the status is removed once the program draws');
-  while (state.chosen !== exercise) {
-    const before = state.chosen;
-    await page.keyboard.press('ArrowDown');
-    await until('chosen', chosen => chosen !== before);
-  }
-  await click('shelf.open');
-  await until('screen', screen => screen === 'briefing');
-  await picture('2-briefing');
-  await click('briefing.begin');
-  const making = Date.now();
-  await until('screen', screen => screen === 'practice');
-  await until('hand', () => true);
+  let making;
+  await openExercise(opened, exercise, async () => {
+    await picture('2-briefing');
+    making = Date.now();
+  });
   const made_ms = Date.now() - making;
-  await until('clock', clock => clock === 'stopped');
   await picture('3-task');
-  await press('o', 'pointer', 'held');
 
   let at = [640, 400];
   const move = async (right, down) => {
@@ -108,28 +99,15 @@ main(async () => {
   };
   const pace = exercise === '5-grinding' ? await grind() : await touch();
   const late = state.late;
-  await press('Escape', 'pointer', 'free');
   await picture('5-worked');
-  let ended;
-  while (state.screen === 'practice') {
-    await press('Control+Enter', 'asked', 'finish');
-    ended = Date.now();
-    await page.keyboard.press('Enter');
-    await Promise.race([until('asked', asked => asked === 'nothing'), until('screen', screen => screen !== 'practice')]);
-    await page.waitForTimeout(500);
-  }
+  const ended = await finishLesson(opened);
   await until('screen', screen => screen === 'results');
   const scored_ms = Date.now() - ended;
   await until('bundle', () => true);
   const completed_ms = Date.now() - ended;
   await page.waitForTimeout(1000);
   await picture('6-results');
-
-  const waiting = page.waitForEvent('download', { timeout: PATIENCE });
-  await click('results.download');
-  const download = await waiting;
-  await download.saveAs(zip);
-  claim(download.suggestedFilename() === `${state.bundle}.zip`, `the bundle is saved as ${download.suggestedFilename()}`);
+  await saveBundle(opened, zip);
 
   // The report opens from the page, with its own script.
   const opening = context.waitForEvent('page', { timeout: PATIENCE });

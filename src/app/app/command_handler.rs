@@ -52,7 +52,9 @@ impl App {
     /// Leaves the results; a bundle that is still being made is completed in the background. A page keeps no bundle: one
     /// that was not saved is saved now.
     pub(super) fn leave_results(&mut self) {
-        if platform::IS_PAGE && matches!(&self.screen, Screen::Results(results) if !results.is_downloaded) {
+        // Of a test run the author has seen the results.
+        let is_kept = platform::IS_PAGE && self.test_run_origin.is_none();
+        if is_kept && matches!(&self.screen, Screen::Results(results) if !results.is_downloaded) {
             self.download_bundle();
         }
         if let Screen::Results(results) = std::mem::replace(&mut self.screen, Screen::ExerciseList)
@@ -110,7 +112,8 @@ impl App {
             }
             AppCommand::OpenReport => self.open_report(ctx),
             AppCommand::DownloadBundle => self.download_bundle(),
-            AppCommand::ChooseZip => platform::ask_for_zip(self.inbox.clone(), ctx),
+            AppCommand::ChooseZip => platform::ask_for_file(".zip", self.inbox.clone(), ctx),
+            AppCommand::ChooseExercise => platform::ask_for_file(".json", self.inbox.clone(), ctx),
             AppCommand::TryAgain => {
                 self.leave_results();
                 self.screen = Screen::Briefing;
@@ -244,6 +247,10 @@ impl App {
     /// Opens the selected exercise at the author's screen; a shipped exercise is opened as a copy.
     pub(super) fn edit_selected(&mut self, ctx: &egui::Context) {
         let Some(exercise) = self.exercise_list.selected_exercise() else { return };
+        if let Some(opened) = &exercise.opened {
+            let editor = EditorState::opened(opened, exercise.library.clone(), repaint_waker(ctx));
+            return self.show_editor(Box::new(editor));
+        }
         match (exercise.path.clone(), exercise_list::shipped_text(&exercise.name)) {
             (Some(path), _) => self.open_editor(&path, OpenMode::Edit, ctx),
             (None, Some(text)) => {
@@ -281,10 +288,17 @@ impl App {
     pub(super) fn leave_editor(&mut self) {
         let Screen::Editor(editor) = &mut self.screen else { return };
         editor.autosave();
-        let path = editor.path.clone();
-        self.exercise_list = ExerciseList::load(&self.settings.exercises);
-        if let Some(path) = path {
-            self.exercise_list.select_file(&path);
+        if platform::IS_PAGE {
+            if editor.is_for_list() {
+                let (opened, replaced) = editor.to_opened();
+                self.exercise_list.put_opened(opened, editor.library.clone(), replaced);
+            }
+        } else {
+            let path = editor.path.clone();
+            self.exercise_list = ExerciseList::load(&self.settings.exercises);
+            if let Some(path) = path {
+                self.exercise_list.select_file(&path);
+            }
         }
         self.screen = Screen::ExerciseList;
     }
@@ -303,7 +317,8 @@ impl App {
             Err(_) => return editor.execute(EditorCommand::Check),
         };
         let library = editor.library.clone();
-        let out = self.user_folder.test_runs();
+        // A page has no folders.
+        let out = if platform::IS_PAGE { PathBuf::new() } else { self.user_folder.test_runs() };
         let _ = std::fs::remove_dir_all(&out);
         let left = std::mem::replace(&mut self.screen, Screen::ExerciseList);
         if let Screen::Editor(editor) = left {
@@ -372,6 +387,7 @@ impl App {
             input_device,
             second: self.options.second.clone(),
             digests,
+            is_kept: self.test_run_origin.is_none(),
             wake: Arc::from(repaint_waker(ctx)),
         };
         // A sealed seed is shown nowhere; the sound does not need it.

@@ -3,6 +3,8 @@
 use super::{App, CloseState, repaint_waker};
 use crate::AppOptions;
 use crate::completion::{Completion, CompletionProgress};
+use crate::exercise_list::OpenedExercise;
+use crate::given_file::GivenFile;
 use crate::hand_placement;
 use crate::platform;
 use crate::results::{BundleState, LessonResults};
@@ -12,6 +14,7 @@ use crate::zip_verification::ZipVerification;
 use eframe::egui::{self, ViewportCommand};
 use std::time::Duration;
 use typodont_exercise::scenario::QuestionnaireTime;
+use typodont_formats::{Library, decode_text};
 use typodont_report::FirstResult;
 use typodont_report::bundle::BundleFolder;
 
@@ -82,8 +85,8 @@ impl App {
         }
     }
 
-    /// Verifies a file that the user chose or dropped while the list or an earlier answer was shown. At any other time, and in
-    /// a kiosk, files are ignored.
+    /// Verifies a file, or opens an exercise, that the user chose or dropped while the list or an earlier answer was shown.
+    /// At any other time, and in a kiosk, files are ignored.
     fn poll_given_file(&mut self, ctx: &egui::Context) {
         let is_taking = match &self.screen {
             Screen::ExerciseList => true,
@@ -101,10 +104,30 @@ impl App {
         if let Some(first) = dropped.first().cloned() {
             platform::receive_dropped(first, dropped.len() - 1, self.inbox.clone(), ctx);
         }
-        if let Some(file) = file.or_else(|| self.inbox.take()) {
+        let Some(file) = file.or_else(|| self.inbox.take()) else { return };
+        if file.name.to_ascii_lowercase().ends_with(".json")
+            && platform::opens_exercises()
+            && !self.exercise_list.is_only
+        {
+            self.open_given(file);
+        } else {
             let templates = self.options.templates.clone();
             let verification = ZipVerification::begin(file, templates, repaint_waker(ctx));
             self.screen = Screen::Verification(Box::new(verification));
+        }
+    }
+
+    /// Adds an exercise that was given to the page to the list.
+    fn open_given(&mut self, file: GivenFile) {
+        let GivenFile { name, content, left_out } = file;
+        self.screen = Screen::ExerciseList;
+        self.exercise_list.complaint =
+            (left_out > 0).then(|| format!("{name}: one file at a time: {left_out} more were not opened"));
+        match content.read().and_then(|bytes| decode_text(&name, bytes).map_err(|complaint| complaint.headline())) {
+            Ok(source) => {
+                self.exercise_list.put_opened(OpenedExercise::of_file(source), Library::shipped(), None);
+            }
+            Err(why) => self.exercise_list.complaint = Some(why),
         }
     }
 
@@ -228,7 +251,9 @@ impl App {
         match &self.screen {
             Screen::Lesson(_) | Screen::Completion(_) => true,
             Screen::Results(results) => !results.is_downloaded,
-            _ => !self.completions.is_empty(),
+            // The draft is saved one second after the last change.
+            Screen::Editor(editor) if editor.has_unsaved_draft() => true,
+            _ => !self.completions.is_empty() || self.exercise_list.has_unkept(),
         }
     }
 
@@ -255,6 +280,7 @@ impl App {
                 }
             }
             Screen::Completion(completion) if completion.needs_frames() => Duration::ZERO,
+            Screen::Editor(editor) if editor.needs_frames() => BUSY_FRAME_INTERVAL,
             Screen::Verification(verification) if verification.needs_frames() => Duration::ZERO,
             Screen::Verification(verification) if verification.answer.is_none() => theme::PROGRESS_DOT_INTERVAL,
             _ if now - self.last_input < BUSY_TIME => BUSY_FRAME_INTERVAL,

@@ -14,6 +14,7 @@ impl App {
     pub(super) fn log_state(&mut self) {
         let App { state_log, screen, exercise_list, overlay: open, closing, frame_count, kiosk_exit, .. } = self;
         state_log.record("kiosk", kiosk_exit.state());
+        state_log.record("complaint", self.complaints.last().map_or("", String::as_str));
         let view = &self.views.lesson;
         let (history, participant, settings) = (&self.history, &self.participant, &self.settings);
         state_log.record(

@@ -4,12 +4,13 @@ use crate::editor::build_worker::{BuildJob, BuildResult, BuildWorker};
 use crate::editor::editor_command::EditorCommand;
 use crate::editor::editor_section::EditorSection;
 use crate::editor::preview::PreviewState;
+use crate::exercise_list::OpenedExercise;
 use crate::platform;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use typodont_author::{
-    EditError, ExerciseDraft, FieldKind, FileStamp, Overwrite, SaveError, SchemaForm, autosave, default_entry, read,
-    save, surface_location,
+    EditError, ExerciseDraft, FieldKind, FileStamp, Overwrite, SaveError, SchemaForm, default_entry, read, save,
+    surface_location,
 };
 use typodont_core::frame::Vec3;
 use typodont_exercise::catalog::{InstrumentEntry, InstrumentTable, TissueEntry, TissueTable};
@@ -26,12 +27,26 @@ const FILE_POLL_S: f64 = 1.0;
 /// Delay after the last change before the draft is saved automatically beside the settings, s.
 const AUTOSAVE_DELAY_S: f64 = 1.0;
 
+/// Folder that stands for that of the shipped exercises, which have no path.
+const SHIPPED: &str = "/shipped";
+
+/// Stands for a new exercise that was never saved.
+const NEW: &str = "new";
+
 pub struct EditorState {
     pub draft: ExerciseDraft,
     /// File in which the exercise is saved; `None` while it is new.
     pub path: Option<PathBuf>,
-    /// Stands for the shipped exercise of which this is a copy; names the automatically saved draft.
+    /// Stands for an exercise without a path, a copy of a shipped one or one of a page; names the automatically saved draft.
     copied_from: Option<PathBuf>,
+    /// Key under which a page's list has the exercise.
+    list_key: Option<PathBuf>,
+    /// Name of the file that a page opened or saved.
+    opened_name: Option<String>,
+    /// The text without unsaved changes, in a page.
+    first_text: String,
+    /// True if the last change could not be saved as a draft.
+    is_draft_lost: bool,
     /// The text of the file as it was last read or written.
     saved_text: Option<String>,
     file_stamp: Option<FileStamp>,
@@ -96,8 +111,42 @@ impl EditorState {
     /// A copy of a shipped exercise, which is saved elsewhere; an unsaved draft of an earlier run is restored.
     pub fn copy(name: &str, text: &str, drafts_folder: Option<PathBuf>, wake: Box<dyn Fn() + Send>) -> EditorState {
         let mut editor = EditorState::from_text(text.to_string(), None, Library::shipped(), drafts_folder, wake);
-        editor.copied_from = Some(Path::new("/shipped").join(name));
+        editor.copied_from = Some(Path::new(SHIPPED).join(name));
         editor.with_restored_draft()
+    }
+
+    /// An exercise of a page's list, with its unsaved changes as a step that can be undone; if it has none, an unsaved draft of an
+    /// earlier visit is restored.
+    pub fn opened(opened: &OpenedExercise, library: Library, wake: Box<dyn Fn() + Send>) -> EditorState {
+        let OpenedExercise { source, first_text, is_saved, key, .. } = opened;
+        let mut editor = EditorState::from_text(first_text.clone(), None, library, None, wake);
+        editor.saved_text = is_saved.then(|| first_text.clone());
+        editor.opened_name = is_saved.then(|| source.name.clone());
+        (editor.copied_from, editor.list_key) = (Some(key.clone()), Some(key.clone()));
+        if source.text == *first_text {
+            return editor.with_restored_draft();
+        }
+        editor.draft.replace(source.text.clone());
+        editor.is_autosaved = false;
+        editor.request_build();
+        editor
+    }
+
+    /// The exercise as a page's list has it, and the key of the one whose place it takes there.
+    pub fn to_opened(&self) -> (OpenedExercise, Option<&Path>) {
+        let opened = OpenedExercise {
+            source: SourceText::new(self.file_name(), self.draft.text()),
+            first_text: self.first_text.clone(),
+            is_saved: self.saved_text.is_some(),
+            key: self.draft_path().map_or(PathBuf::from(NEW), Path::to_path_buf),
+            is_unkept: self.has_unsaved_draft(),
+        };
+        (opened, self.list_key.as_deref())
+    }
+
+    /// True if a page's list has this exercise, or will have it because something was changed.
+    pub fn is_for_list(&self) -> bool {
+        self.list_key.is_some() || self.draft.can_undo()
     }
 
     /// Opens a file; an unsaved draft of an earlier run is restored unless the file is read-only.
@@ -120,7 +169,7 @@ impl EditorState {
 
     /// Restores the automatically saved draft, if there is one, as a step that can be undone.
     fn with_restored_draft(mut self) -> EditorState {
-        let draft = self.drafts_folder.as_deref().and_then(|folder| autosave::load(folder, self.draft_path()));
+        let draft = platform::load_draft(self.drafts_folder.as_deref(), self.draft_path());
         if let Some(kept) = draft.filter(|kept| kept != self.draft.text()) {
             self.draft.replace(kept);
             self.notice = Some(("author.brought_back", String::new()));
@@ -129,7 +178,7 @@ impl EditorState {
         self
     }
 
-    /// The path that identifies the automatically saved draft: the file, or the shipped exercise it was copied from.
+    /// The path that identifies the automatically saved draft: the file, or what stands for an exercise without one.
     fn draft_path(&self) -> Option<&Path> {
         self.path.as_deref().or(self.copied_from.as_deref())
     }
@@ -142,9 +191,13 @@ impl EditorState {
         wake: Box<dyn Fn() + Send>,
     ) -> EditorState {
         let mut editor = EditorState {
-            draft: ExerciseDraft::new(text),
+            draft: ExerciseDraft::new(text.clone()),
             path,
             copied_from: None,
+            list_key: None,
+            opened_name: None,
+            first_text: text,
+            is_draft_lost: false,
             saved_text: None,
             file_stamp: None,
             tissues: TissueTable::read(&library).map(|table| table.entries().to_vec()).unwrap_or_default(),
@@ -207,7 +260,7 @@ impl EditorState {
 
     /// Takes over finished builds and changes of the file. `now`: time since the window opened, s.
     pub fn poll(&mut self, now: f64) {
-        while let Some(event) = self.worker.next_event() {
+        while let Some(event) = self.worker.next_event(now) {
             if event.number == self.job_number {
                 if let Some(complaints) = event.complaints {
                     self.complaints = complaints;
@@ -274,10 +327,15 @@ impl EditorState {
 
     /// Saves unsaved changes as a draft beside the settings. Also called when the window closes.
     pub fn autosave(&mut self) {
-        let Some(folder) = self.drafts_folder.clone().filter(|_| !self.is_read_only) else { return };
+        if self.is_read_only {
+            return;
+        }
         self.is_autosaved = true;
         if self.is_unsaved() && self.draft.can_undo() {
-            if let Err(why) = autosave::store(&folder, self.draft_path(), self.draft.text()) {
+            let (folder, path) = (self.drafts_folder.as_deref(), self.draft_path());
+            let stored = platform::store_draft(folder, path, self.draft.text());
+            self.is_draft_lost = stored.is_err();
+            if let Err(why) = stored {
                 self.notice = Some(("author.failed", why));
             }
         } else {
@@ -286,10 +344,10 @@ impl EditorState {
     }
 
     fn discard_autosave(&mut self) {
-        self.is_autosaved = true;
+        (self.is_autosaved, self.is_draft_lost) = (true, false);
         // A read-only view has no draft of its own: an existing one belongs to the author.
-        if let Some(folder) = self.drafts_folder.as_deref().filter(|_| !self.is_read_only) {
-            autosave::remove(folder, self.draft_path());
+        if !self.is_read_only {
+            platform::remove_draft(self.drafts_folder.as_deref(), self.draft_path());
         }
     }
 
@@ -362,11 +420,51 @@ impl EditorState {
         self.request_build();
     }
 
-    /// Saves in the exercise's file; asks for a path if it has none.
+    /// True until the last change is saved as a draft.
+    pub fn has_unsaved_draft(&self) -> bool {
+        !self.is_autosaved || self.is_draft_lost
+    }
+
+    /// True if the tooth of the present text is still to be built.
+    pub fn is_tooth_pending(&self) -> bool {
+        !self.is_checked && self.wanted_build != self.last_build
+    }
+
+    /// True if the build goes on only with further frames.
+    pub fn needs_frames(&self) -> bool {
+        self.worker.needs_frames()
+    }
+
+    /// Name of the file in which the exercise is saved, without a folder.
+    pub fn file_name(&self) -> String {
+        let name = self.path.as_ref().and_then(|path| path.file_name());
+        let name = name.map(|name| name.to_string_lossy().into_owned()).or(self.opened_name.clone());
+        let id = self.draft.value_at("/id").and_then(Value::as_str).unwrap_or("exercise");
+        name.unwrap_or_else(|| format!("{id}.json"))
+    }
+
+    /// Saves in the exercise's file; asks for a path if it has none. A page has the browser save it.
     fn save_or_ask_path(&mut self) {
         match self.path.clone() {
             Some(path) => self.save(path, false),
+            None if platform::IS_PAGE => self.download(),
             None => self.show_save_as(),
+        }
+    }
+
+    /// Has the browser save the text.
+    fn download(&mut self) {
+        let name = self.file_name();
+        match platform::download_text(&name, self.draft.text()) {
+            Some(why) => self.notice = Some(("author.failed", why)),
+            None => {
+                self.discard_autosave();
+                self.first_text = self.draft.text().to_string();
+                self.saved_text = Some(self.first_text.clone());
+                self.copied_from = Some(OpenedExercise::key_of_file(&name, &self.first_text));
+                self.opened_name = Some(name.clone());
+                self.notice = Some(("author.saved", name));
+            }
         }
     }
 

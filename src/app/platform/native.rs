@@ -8,8 +8,9 @@ use eframe::egui;
 use std::fs;
 use std::fs::File;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
+use typodont_author::autosave;
 use typodont_lesson::InterruptedSession;
 use typodont_report::bundle::{BundleFolder, REPORT_FILE, RecordingChange};
 
@@ -44,8 +45,38 @@ pub fn download(_: &BundleFolder) -> Option<String> {
     None
 }
 
-/// This window has no dialog for files: they are dropped into it, or verified by `typodont verify`.
-pub fn ask_for_zip(_: FileInbox, _: &egui::Context) {}
+/// Exercises are in folders here: none is opened from a file that is given to the window.
+pub fn opens_exercises() -> bool {
+    false
+}
+
+/// Exercises are saved in files here: there is nothing to download.
+pub fn download_text(_: &str, _: &str) -> Option<String> {
+    None
+}
+
+/// This window has no dialog for files: they are dropped into it, or named to the command line.
+pub fn ask_for_file(_: &str, _: FileInbox, _: &egui::Context) {}
+
+/// Keeps the unsaved text of an exercise in the folder for drafts; without one, nowhere. `path` identifies the exercise.
+///
+/// # Errors
+/// A message if the text cannot be written.
+pub fn store_draft(folder: Option<&Path>, path: Option<&Path>, text: &str) -> Result<(), String> {
+    folder.map_or(Ok(()), |folder| autosave::store(folder, path, text))
+}
+
+/// The unsaved text of an exercise; `None` if there is none.
+pub fn load_draft(folder: Option<&Path>, path: Option<&Path>) -> Option<String> {
+    autosave::load(folder?, path)
+}
+
+/// Deletes the unsaved text of an exercise.
+pub fn remove_draft(folder: Option<&Path>, path: Option<&Path>) {
+    if let Some(folder) = folder {
+        autosave::remove(folder, path);
+    }
+}
 
 /// Takes a file that was dropped into the window, with `left_out` others.
 pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: FileInbox, ctx: &egui::Context) {

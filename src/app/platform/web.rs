@@ -4,7 +4,7 @@ use super::LogSink;
 use crate::given_file::{FileInbox, GivenContent, GivenFile};
 use crate::user_folder::UserFolder;
 use eframe::egui;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use typodont_lesson::InterruptedSession;
 use typodont_report::bundle::{BundleFolder, REPORT_FILE, RecordingChange};
@@ -20,6 +20,9 @@ const SETTINGS_KEY: &str = "typodont.settings";
 
 /// Key of the results of earlier sessions in the page's own storage.
 const HISTORY_KEY: &str = "typodont.history";
+
+/// Beginning of the keys of exercises' unsaved texts in the page's own storage.
+const DRAFT_KEY: &str = "typodont.draft.";
 
 /// Part of the page's address after the `?` that asks for the state log in the browser's console.
 const LOG_QUERY: &str = "state-log";
@@ -60,6 +63,17 @@ pub fn download(bundle: &BundleFolder) -> Option<String> {
     saved.err().map(|why| format!("{folder}.zip: unwritable-file: {why}"))
 }
 
+/// True if exercises can be opened and written here: not within another page, which would receive their results.
+pub fn opens_exercises() -> bool {
+    web_sys::window().is_some_and(|window| matches!(window.parent(), Ok(Some(parent)) if parent == window))
+}
+
+/// Lets the browser save a text as a file; returns a complaint if that fails.
+pub fn download_text(name: &str, text: &str) -> Option<String> {
+    let saved = save_as(name, text.as_bytes(), "application/json");
+    saved.err().map(|error| format!("{name}: unwritable-file: {}", reason(&error)))
+}
+
 fn save_as(name: &str, bytes: &[u8], media_type: &str) -> Result<(), JsValue> {
     let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
     let link: web_sys::HtmlAnchorElement = document.create_element("a")?.dyn_into()?;
@@ -85,15 +99,15 @@ const FILE_MAX: f64 = (400 << 20) as f64;
 /// Id of the element by which the browser offers files.
 const FILE_INPUT: &str = "typodont-file";
 
-/// Lets the browser ask the user for a ZIP file.
-pub fn ask_for_zip(inbox: FileInbox, ctx: &egui::Context) {
-    if let Err(error) = offer_files(inbox.clone(), ctx.clone()) {
+/// Lets the browser ask the user for a file whose name ends as told, such as `.zip`.
+pub fn ask_for_file(ending: &str, inbox: FileInbox, ctx: &egui::Context) {
+    if let Err(error) = offer_files(ending, inbox.clone(), ctx.clone()) {
         let why = format!("unreadable-file: the browser offers no files ({}); drop the file here", reason(&error));
         inbox.put(GivenFile { name: String::new(), content: GivenContent::Read(Err(why)), left_out: 0 }, ctx);
     }
 }
 
-fn offer_files(inbox: FileInbox, ctx: egui::Context) -> Result<(), JsValue> {
+fn offer_files(ending: &str, inbox: FileInbox, ctx: egui::Context) -> Result<(), JsValue> {
     let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
     // The element of a question that was not answered is still there.
     if let Some(earlier) = document.get_element_by_id(FILE_INPUT) {
@@ -102,7 +116,7 @@ fn offer_files(inbox: FileInbox, ctx: egui::Context) -> Result<(), JsValue> {
     let input: web_sys::HtmlInputElement = document.create_element("input")?.dyn_into()?;
     input.set_id(FILE_INPUT);
     input.set_type("file");
-    input.set_accept(".zip,application/zip");
+    input.set_accept(ending);
     input.set_hidden(true);
     document.body().ok_or("no body")?.append_child(&input)?;
     let offered = input.clone();
@@ -225,6 +239,31 @@ pub fn read_history() -> Option<String> {
 /// Keeps the text of the results; returns the reason if that fails.
 pub fn write_history(text: &str) -> Option<String> {
     write(HISTORY_KEY, text)
+}
+
+/// Key of the unsaved text of an exercise in the page's own storage.
+fn draft_key(path: Option<&Path>) -> String {
+    format!("{DRAFT_KEY}{}", path.map_or("new".into(), |path| path.display().to_string()))
+}
+
+/// Keeps the unsaved text of an exercise in the page's own storage. `path` identifies the exercise.
+///
+/// # Errors
+/// A message if the browser keeps nothing for this page.
+pub fn store_draft(_: Option<&Path>, path: Option<&Path>, text: &str) -> Result<(), String> {
+    write(&draft_key(path), text).map_or(Ok(()), |why| Err(format!("{why}; save the exercise before you leave it")))
+}
+
+/// The unsaved text of an exercise; `None` if there is none.
+pub fn load_draft(_: Option<&Path>, path: Option<&Path>) -> Option<String> {
+    stored(&draft_key(path))
+}
+
+/// Deletes the unsaved text of an exercise.
+pub fn remove_draft(_: Option<&Path>, path: Option<&Path>) {
+    if let Some(storage) = storage() {
+        let _ = storage.remove_item(&draft_key(path));
+    }
 }
 
 fn stored(key: &str) -> Option<String> {

@@ -62,9 +62,11 @@ pub fn exercise_list_ui(
             if open.clicked() {
                 commands.push(AppCommand::OpenBriefing);
             }
-            // The author's screen keeps files and builds teeth on a thread: a page has neither.
+            let has_authoring =
+                !context.is_kiosk && !list.is_only && (!platform::IS_PAGE || platform::opens_exercises());
+            let file = platform::opens_exercises().then_some(("shelf.open_file", AppCommand::ChooseExercise));
             let authoring = [("shelf.edit", AppCommand::EditExercise), ("shelf.new", AppCommand::NewExercise)];
-            for (key, command) in authoring.into_iter().filter(|_| !platform::IS_PAGE && !context.is_kiosk) {
+            for (key, command) in authoring.into_iter().chain(file).filter(|_| has_authoring) {
                 let button = ui.button(words.get(key));
                 ui_anchors::anchor(ui, key, button.rect);
                 if button.clicked() {
@@ -75,10 +77,7 @@ pub fn exercise_list_ui(
         if !context.is_kiosk {
             verify_button_ui(ui, words, commands);
         }
-        if platform::IS_PAGE {
-            return;
-        }
-        if !context.is_kiosk {
+        if !context.is_kiosk && !platform::IS_PAGE {
             folder_ui(ui, &list.folder, words, commands);
         }
         if let Some(complaint) = &list.complaint {

@@ -1,6 +1,7 @@
 //! Commands for the whole exercise: try, check, save, undo, leave.
 
 use crate::editor::EditorCommand;
+use crate::platform;
 use crate::ui::editor::FormContext;
 use crate::ui::theme;
 use crate::ui::ui_anchors::anchor;
@@ -22,7 +23,10 @@ pub fn toolbar_ui(ui: &mut egui::Ui, form: &mut FormContext) {
             ("save_as", "author.save_as", EditorCommand::ShowSaveAs(true), !editor.is_read_only),
             ("try", "author.try", EditorCommand::TestRun, true),
         ];
-        for (name, key, command, is_enabled) in buttons {
+        // A page has the browser save, which asks for the place itself.
+        for (name, key, command, is_enabled) in
+            buttons.into_iter().filter(|(name, ..)| !platform::IS_PAGE || *name != "save_as")
+        {
             let text = egui::RichText::new(words.get(key));
             let button = match name {
                 "try" => egui::Button::new(text.color(egui::Color32::WHITE).strong()).fill(theme::ACCENT),
@@ -39,10 +43,16 @@ pub fn toolbar_ui(ui: &mut egui::Ui, form: &mut FormContext) {
             ui.colored_label(theme::ERROR, words.format("author.wrong_count", count));
         } else if editor.is_checked {
             ui.colored_label(theme::SUCCESS, words.get("author.nothing_wrong"));
+        } else {
+            ui.weak(words.get("author.checking"));
         }
     });
     ui.horizontal_wrapped(|ui| {
-        let name = editor.path.as_ref().map_or(words.get("author.unnamed").to_string(), |p| p.display().to_string());
+        let name = match &editor.path {
+            Some(path) => path.display().to_string(),
+            None if platform::IS_PAGE => editor.file_name(),
+            None => words.get("author.unnamed").to_string(),
+        };
         let more = if editor.is_unsaved() { format!(" · {}", words.get("author.unsaved")) } else { String::new() };
         ui.small(format!("{name}{more}"));
         if let Some((key, about)) = &editor.notice {

@@ -121,8 +121,8 @@ fn tooth_ui(
 /// Hint on the effect of a click, and a notice while the preview is not yet that of the present text.
 fn hint_ui(ui: &mut egui::Ui, editor: &EditorState, rect: Rect, words: &Translations) {
     let key = if editor.section == EditorSection::Decay { "author.point" } else { "author.point_cuts" };
-    let is_old = editor.build.as_ref().is_some_and(|made| made.is_quick) || !editor.is_checked;
-    let more = if is_old { format!(" · {}", words.get("author.being_made")) } else { String::new() };
+    let more =
+        if editor.is_tooth_pending() { format!(" · {}", words.get("author.being_made")) } else { String::new() };
     let text = egui::RichText::new(format!("{}{more}", words.get(key))).color(Color32::WHITE).size(13.0);
     let width = (rect.width() - 16.0).max(40.0);
     let galley = egui::WidgetText::from(text).into_galley(
