@@ -27,7 +27,7 @@ const COARSE: f32 = 0.2;
 const SEEDS: [&str; 2] = ["1", "2"];
 
 /// A measure's mean over the seeds, by operator; `None` where none of an operator's sessions has it.
-fn means(scenario: &str) -> impl Fn(&str, &str) -> Option<f64> {
+fn means(scenario: &str) -> impl Fn(&str, &str) -> Option<f64> + use<> {
     means_over(scenario, &SEEDS)
 }
 
