@@ -192,8 +192,8 @@ const saveBundle = async ({ page, state, until, click }, zip) => {
   claim(download.suggestedFilename() === `${state.bundle}.zip`, `the bundle is saved as ${download.suggestedFilename()}`);
 };
 
-/** Runs a script's work; exits with 1 and a line per claim that did not hold. */
-const main = work => work().then(() => { if (wrong.length) throw new Error(wrong.join('\n')); })
+/** Runs a script's work; exits with 1 and a line per claim that did not hold, and at once, whatever is still waited for. */
+const main = work => work().then(() => { if (wrong.length) throw new Error(wrong.join('\n')); process.exit(0); })
   .catch(error => { console.error(error.stack || error); process.exit(1); });
 
 /** The result in the ZIP file of a bundle. */
