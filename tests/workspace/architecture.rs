@@ -214,3 +214,19 @@ fn unsafe_stands_only_where_c_is_called() {
         );
     }
 }
+
+#[test]
+fn every_suite_is_run_by_scripts_test() {
+    // Aim: a new suite is not forgotten, because the script names those that wait and the others. Method: each folder of tests/ with a
+    // main.rs is named there.
+    let script = fs::read_to_string(root().join("scripts/test")).unwrap();
+    let script: BTreeSet<&str> = script.split_whitespace().collect();
+    let suites = fs::read_dir(root().join("tests")).unwrap().map(|entry| entry.unwrap().path());
+    let suites: Vec<String> = suites
+        .filter(|path| path.join("main.rs").is_file())
+        .map(|path| path.file_name().unwrap().to_string_lossy().into_owned())
+        .collect();
+    assert!(suites.len() >= 10);
+    let forgotten: Vec<&String> = suites.iter().filter(|suite| !script.contains(suite.as_str())).collect();
+    assert!(forgotten.is_empty(), "scripts/test does not run {forgotten:?}");
+}
