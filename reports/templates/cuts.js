@@ -207,7 +207,9 @@ class Cut {
     }
     context.font = 'bold 13px sans-serif';
     context.textAlign = 'center';
-    const letter = (vector, axis, end) => LETTERS[axis][((vector[axis] > 0) === end) === (axis === 1 && this.voxels.mirrored) ? 0 : 1];
+    // The teeth of an arch have only the occlusal side in common.
+    const letter = (vector, axis, end) => this.voxels.jaw && axis < 2
+      ? '' : LETTERS[axis][((vector[axis] > 0) === end) === (axis === 1 && this.voxels.mirrored) ? 0 : 1];
     const text = (t, x, y) => {
       context.lineWidth = 3;
       context.strokeStyle = '#fff';

@@ -114,8 +114,12 @@ class Page {
   /** The directions and distances of a place from the middle of the tooth, in words. */
   wayTo(place) {
     const way = (axis, high, low) => this.say(`script.${place[axis] >= 0 ? high : low}`, { mm: Math.abs(place[axis]).toFixed(1) });
+    const z = way(2, 'up', 'down');
+    // The teeth of an arch have no common directions; left and right are the patient's.
+    const { jaw } = this.voxels;
+    if (jaw) return { x: way(0, 'front', 'back'), y: jaw === 'lower' ? way(1, 'left', 'right') : way(1, 'right', 'left'), z };
     const y = this.voxels.mirrored ? way(1, 'mesial', 'distal') : way(1, 'distal', 'mesial');
-    return { x: way(0, 'buccal', 'lingual'), y, z: way(2, 'up', 'down') };
+    return { x: way(0, 'buccal', 'lingual'), y, z };
   }
 
   tell() {

@@ -30,6 +30,8 @@ class Voxels {
     this.spacing = about.spacing_mm;
     /** True where y runs toward mesial. */
     this.mirrored = about.is_mirrored;
+    /** The jaw of which all teeth are shown, if it is one. */
+    this.jaw = about.jaw;
     const part = {};
     let from = 0;
     for (const [name, length] of about.parts) {

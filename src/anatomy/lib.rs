@@ -1,4 +1,4 @@
-//! Procedural teeth: forms of all 32 permanent teeth, their volumes, caries and periodontium.
+//! Procedural teeth: forms of all 32 permanent teeth, their volumes, caries, periodontium and dental arches.
 //!
 //! Takes forms (lengths in mm) and a grid. Gives volumes of enamel, dentine and pulp in tooth space, crown up. Never
 //! reads a file, knows the name of a label, or uses random numbers.
@@ -37,6 +37,7 @@ pub mod caliper;
 pub mod caries;
 pub mod periodontium;
 pub mod crown_contour;
+pub mod jaw;
 
 pub use form::ToothForm;
 pub use grow::{grid_fitting, grid_of_spacing, grow};

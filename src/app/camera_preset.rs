@@ -35,8 +35,13 @@ impl CameraPreset {
     /// Presets available for a lesson's scene, with their text keys.
     pub fn available(scene: &LessonScene) -> impl Iterator<Item = (CameraPreset, &'static str)> {
         let has_mouth = scene.mouth.is_some();
-        let is_offered =
-            move |view: &CameraPreset| has_mouth || matches!(view, CameraPreset::Work | CameraPreset::Side(_));
+        let is_arch = scene.workpiece.arch_jaw().is_some();
+        let is_offered = move |view: &CameraPreset| match view {
+            CameraPreset::Work | CameraPreset::Side(ToothSide::Occlusal) => true,
+            // The teeth of an arch have no sides in common.
+            CameraPreset::Side(_) => !is_arch,
+            CameraPreset::Front | CameraPreset::Arch | CameraPreset::Quadrant(_) => has_mouth,
+        };
         CameraPreset::ALL.into_iter().filter(move |(view, _)| is_offered(view))
     }
 

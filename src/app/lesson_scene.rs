@@ -5,7 +5,7 @@ use std::cell::OnceCell;
 use std::sync::Arc;
 use typodont_core::volume::{Edit, Label, Volume};
 use typodont_exercise::catalog::{TissueRole, TissueTable};
-use typodont_exercise::scenario::{Scenario, SceneLayout, Stage, Workpiece};
+use typodont_exercise::scenario::{Scenario, Stage, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::Diagnostic;
 use typodont_render::{LabelPalette, MeshInstance, RenderMode, TransferFunction};
@@ -59,7 +59,7 @@ impl LessonScene {
         let mut volume = Volume::clone(&workpiece.volume);
         volume.take_dirty();
         let palette = scene::tissue_palette(tissues, is_decay_shown);
-        let is_in_jaw = scenario.scene.layout == SceneLayout::Jaw;
+        let is_in_jaw = scenario.scene.is_in_mouth();
         let mouth = Mouth::around(&workpiece, tissues).filter(|_| is_in_jaw);
         let drawn = scenario.instruments.iter().map(|entry| scene::instrument_solid(entry, library));
         let (instruments, complaints): (Vec<MeshInstance>, Vec<_>) = drawn.unzip();

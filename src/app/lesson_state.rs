@@ -12,15 +12,17 @@ use crate::lesson_thread::LessonThread;
 use crate::messages::{self, PauseReason, SecondHandStatus};
 use crate::pointer_hand::{PointedPlace, PointerHand};
 use crate::snapshot::LessonSnapshot;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer, SoundSender};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::{Command as Tell, HandFrame};
 use typodont_core::touch::{Coefficient, Materials};
 use typodont_core::volume::Label;
-use typodont_exercise::scenario::{Scenario, Stage};
-use typodont_exercise::session::{AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input, TraineeView};
+use typodont_exercise::scenario::{QuestionKind, Scenario, Stage};
+use typodont_exercise::session::{
+    AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input, InputError, TraineeView,
+};
 use typodont_formats::Library;
 use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
@@ -49,8 +51,10 @@ pub struct LessonState {
     pub answered: Vec<bool>,
     /// Text typed but not yet submitted, by question.
     pub drafts: BTreeMap<String, String>,
-    /// Last submitted answer, by question.
+    /// Last accepted answer, by question.
     pub answers: BTreeMap<String, AnswerValue>,
+    /// Answers that are neither accepted nor refused yet, in order.
+    submitted: VecDeque<(String, AnswerValue)>,
     /// Reason why the last input was not accepted: a key of the language file.
     pub refusal_key: Option<&'static str>,
     /// Reason why the lesson is suspended by the system, if it is.
@@ -132,6 +136,7 @@ impl LessonState {
             answered: Vec::new(),
             drafts: BTreeMap::new(),
             answers: BTreeMap::new(),
+            submitted: VecDeque::new(),
             chart: Vec::new(),
             refusal_key: None,
             pause_reason: None,
@@ -353,6 +358,7 @@ impl LessonState {
                 self.answered = vec![false; self.scenario.stages[*stage].ask.len()];
                 self.drafts.clear();
                 self.answers.clear();
+                self.submitted.clear();
                 self.chart.clear();
                 self.refusal_key = None;
                 self.controls = ControlsProgress::default();
@@ -366,6 +372,12 @@ impl LessonState {
             Effect::Answered { question, .. } => {
                 if let Some(answered) = self.answered.get_mut(*question) {
                     *answered = true;
+                }
+                if let Some((id, value)) = self.submitted.pop_front() {
+                    let is_other = self.answers.insert(id, value.clone()).is_some_and(|before| before != value);
+                    if is_other {
+                        self.forget_quarter(*question);
+                    }
                 }
                 self.refusal_key = None;
             }
@@ -382,7 +394,12 @@ impl LessonState {
                 self.ended = Some(Instant::now());
                 self.release_pointer();
             }
-            Effect::Refused { why } => self.refusal_key = Some(messages::refusal_key(*why)),
+            Effect::Refused { why } => {
+                if matches!(why, InputError::NotAsked | InputError::NoAnswer | InputError::NotExamined) {
+                    self.submitted.pop_front();
+                }
+                self.refusal_key = Some(messages::refusal_key(*why));
+            }
             Effect::Command(Tell::SetCoefficient { label, coefficient, value }) => {
                 self.materials.set(*label, self.materials.get(*label).with(*coefficient, *value));
             }
@@ -432,8 +449,24 @@ impl LessonState {
     /// Answers a question of the running stage.
     pub fn answer_question(&mut self, question: String, value: AnswerValue) {
         let Some(stage) = self.stage else { return };
-        self.answers.insert(question.clone(), value.clone());
-        self.send(LessonCommand::StageInput(stage, Input::Answer { question, value }));
+        let answer = (question.clone(), value.clone());
+        if self.send(LessonCommand::StageInput(stage, Input::Answer { question, value })) {
+            self.submitted.push_back(answer);
+        }
+    }
+
+    /// After another tooth was named, asks for its quarter again: quarters have their names by the tooth.
+    fn forget_quarter(&mut self, changed: usize) {
+        let questions = self.stage().map(|stage| stage.ask.clone()).unwrap_or_default();
+        if !matches!(questions.get(changed).map(|question| &question.kind), Some(QuestionKind::ToothWith { .. })) {
+            return;
+        }
+        for (question, answered) in questions.iter().zip(&mut self.answered) {
+            if matches!(question.kind, QuestionKind::QuadrantOf { .. }) {
+                self.answers.remove(&question.id);
+                *answered = false;
+            }
+        }
     }
 
     /// Records an entry in the running stage's periodontal chart, at the site of the instrument.

@@ -9,6 +9,9 @@ use typodont_formats::pointer::child;
 /// Time limit of a new stage, s; the file of an exercise has no default, and a stage without a limit has none.
 pub const STAGE_TIME_LIMIT_S: u32 = 300;
 
+/// Voxel size of an arch whose file gives none, mm.
+pub const ARCH_SPACING_MM: f64 = 0.2;
+
 /// Returns a short, readable exercise: a molar in its jaw, one decay, one stage, a rubric of three items. The texts are
 /// given in the author's language.
 pub fn new_exercise(title: &str, stage: &str, instruction: &str, lines: [&str; 3], fail: &str) -> String {
@@ -80,6 +83,7 @@ pub fn default_entry(form: &SchemaForm, whole: &Value, pointer: &str) -> Value {
         "decay" => json!({
             "id": id("lesion"), "shape": { "sphere": { "radius_mm": 1.5 } }, "surface": "O", "at": "centre", "depth_mm": 0.4
         }),
+        "teeth" => arch_tooth(whole, unlisted_tooth(whole, list.map_or(&[], Vec::as_slice))),
         "stains" => json!({
             "id": id("stain"), "shape": { "fissure": { "reaches": ["outer_enamel"], "length_mm": 4, "spread_mm": 0.8 } }
         }),
@@ -123,6 +127,25 @@ pub fn default_entry(form: &SchemaForm, whole: &Value, pointer: &str) -> Value {
             schema.map_or(Value::Null, |schema| minimal_value(form, whole, schema, pointer))
         }
     }
+}
+
+/// Returns a sound tooth for the list of an arch; `whole` is the scenario so far.
+pub fn arch_tooth(whole: &Value, fdi: u8) -> Value {
+    let spacing = whole.pointer("/scene/dental_arch/spacing_mm").cloned().unwrap_or(json!(ARCH_SPACING_MM));
+    json!({ "id": fdi.to_string(), "fdi": fdi, "form": { "procedural": { "spacing_mm": spacing } } })
+}
+
+/// Returns the first tooth of an arch's jaw that its list does not have.
+fn unlisted_tooth(whole: &Value, list: &[Value]) -> u8 {
+    let listed: Vec<u64> = list.iter().filter_map(|tooth| tooth.get("fdi")?.as_u64()).collect();
+    let missing = whole.pointer("/scene/dental_arch/arch/missing").and_then(Value::as_array);
+    let missing: Vec<u64> = missing.into_iter().flatten().filter_map(Value::as_u64).collect();
+    let quadrants = if listed.first().is_some_and(|fdi| *fdi < 30) { [1, 2] } else { [3, 4] };
+    // Third molars last.
+    let numbers = [6, 7, 5, 4, 3, 2, 1, 8];
+    let mut all = numbers.into_iter().flat_map(|number| quadrants.map(|quadrant: u8| 10 * quadrant + number));
+    let is_free = |fdi: &u8| !listed.contains(&u64::from(*fdi)) && !missing.contains(&u64::from(*fdi));
+    all.find(is_free).unwrap_or(10 * quadrants[0] + 6)
 }
 
 /// Returns the smallest value that a schema accepts, as far as the schema determines it.

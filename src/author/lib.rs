@@ -22,7 +22,7 @@ mod file_io;
 mod json_format;
 mod picking;
 
-pub use defaults::{STAGE_TIME_LIMIT_S, default_entry, default_variant, new_exercise};
+pub use defaults::{ARCH_SPACING_MM, STAGE_TIME_LIMIT_S, arch_tooth, default_entry, default_variant, new_exercise};
 pub use draft::ExerciseDraft;
 pub use edit::{EditError, pointer_at};
 pub use file_io::{FileStamp, Overwrite, SaveError, autosave, read, save};

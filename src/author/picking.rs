@@ -1,8 +1,8 @@
 //! The conversion of a point selected on the tooth to the position of decay in the scenario.
 
 use typodont_core::frame::Vec3;
-use typodont_exercise::scenario::ToothBounds;
 use typodont_exercise::scenario::file::SurfaceFile;
+use typodont_exercise::scenario::{ToothBounds, distal};
 
 /// A position on one of a tooth's five surfaces, as in a scenario.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,10 @@ pub struct SurfaceLocation {
 pub fn surface_location(tooth: &ToothBounds, point_in_tooth: Vec3, outward: Vec3) -> SurfaceLocation {
     /// Weight of the occlusal surface: because cusps are steep, slopes of up to 56° from horizontal belong to it.
     const CUSPS: f32 = 1.5;
-    let distal = tooth.distal();
+    // In the tooth's own axes.
+    let own_from_tooth = tooth.tooth_from_own.inverse();
+    let (point, outward) = (own_from_tooth * point_in_tooth, own_from_tooth.rotate(outward));
+    let distal = distal(tooth.fdi);
     let candidates = [
         (SurfaceFile::O, Vec3::Z, [Vec3::X, distal]),
         (SurfaceFile::B, Vec3::X, [distal, Vec3::Z]),
@@ -30,8 +33,7 @@ pub fn surface_location(tooth: &ToothBounds, point_in_tooth: Vec3, outward: Vec3
     // The list is not empty.
     let (surface, _, axes) =
         candidates.into_iter().max_by(|a, b| facing(a).total_cmp(&facing(b))).unwrap_or(candidates[0]);
-    let middle = tooth.crown.centre();
-    let from_middle = point_in_tooth - middle;
+    let from_middle = point - tooth.own_crown.centre();
     SurfaceLocation { surface, offset: axes.map(|axis| (from_middle.dot(axis) * 10.0).round() / 10.0) }
 }
 

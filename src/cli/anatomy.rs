@@ -4,13 +4,14 @@ use super::{CliError, print_line, write_file};
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use typodont_anatomy::jaw::Jaw;
 use typodont_anatomy::{TissueLabels, age, caliper, teeth};
 use typodont_core::volume::{Label, Volume, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario;
 use typodont_formats::{Library, obj};
 use typodont_report::{SurfacePart, surfaces_glb, tissue_map};
-use typodont_scene::{Jaw, StandaloneJaw};
+use typodont_scene::StandaloneJaw;
 
 #[derive(Args)]
 pub struct Arguments {

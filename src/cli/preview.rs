@@ -5,7 +5,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use typodont_author as author;
-use typodont_exercise::scenario::{ResolveMode, Scenario, SceneLayout, Workpiece};
+use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
 use typodont_lesson as lesson;
 use typodont_render::{Changes, Lamp, Lights, OffscreenRenderer, RenderMode, RenderScene, RgbaImage, VolumeInstance};
 use typodont_report::{PREVIEW_SIZE, preview_png};
@@ -79,7 +79,7 @@ fn open_editor(_: &Path) -> Result<(), CliError> {
 fn draw_preview(arguments: &Arguments, output: &Path) -> Result<(), CliError> {
     let scenario = lesson::read_scenario(&arguments.scenario, ResolveMode::MakeWorkpiece)?;
     let workpiece = Workpiece::make(&scenario, arguments.seed).map_err(CliError::wrong)?;
-    let is_in_mouth = arguments.jaw || (!arguments.no_jaw && scenario.scene.layout == SceneLayout::Jaw);
+    let is_in_mouth = arguments.jaw || (!arguments.no_jaw && scenario.scene.is_in_mouth());
     let first_view = render_first_view(&scenario, &workpiece, is_in_mouth)?;
     super::write_file(output, preview_png(&scenario, &workpiece, &first_view))
 }

@@ -77,7 +77,8 @@ pub struct Arguments {
     /// Voxel spacing of that volume, if its header does not state it
     #[arg(long, value_name = "MM", requires = "tooth", value_parser = spacing)]
     tooth_spacing_mm: Option<f32>,
-    /// FDI number of the tooth in that volume, such as 13; by default the number of the exercise's own tooth
+    /// FDI number of the tooth in that volume, such as 13; by default the number of the exercise's own tooth. In an
+    /// exercise with a whole arch, the number of the tooth that the volume replaces
     #[arg(long, value_name = "NUMBER", requires = "tooth", value_parser = tooth_number)]
     fdi: Option<u8>,
     /// Participant code of the trainee; never a name

@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use typodont_exercise::scenario;
-use typodont_exercise::scenario::{Scenario, ToothSource, hex};
+use typodont_exercise::scenario::{Scenario, SceneLayout, ToothSource, hex};
 use typodont_exercise::tooth_import;
 use typodont_formats::nrrd;
 
@@ -38,16 +38,24 @@ impl ToothScan {
         &self.digest
     }
 
-    /// Replaces every tooth of a scenario by the scan.
+    /// Replaces every tooth of a scenario by the scan; of an arch, the tooth with the scan's FDI number.
     ///
     /// # Errors
     ///
-    /// [`LessonError::WrongVolume`] if the scan does not contain a tooth with the tissues of the scenario.
+    /// [`LessonError::WrongVolume`] if the scan does not contain a tooth with the tissues of the scenario, or if its FDI
+    /// number is not that of a tooth of the arch.
     pub fn replace_teeth(&self, scenario: &mut Scenario) -> Result<(), LessonError> {
         let tissues = scenario::anatomy_tissues(&scenario.tissues);
         let spacing = self.spacing.map(|mm| [mm; 3]);
         let volume = tooth_import::tooth_volume(&self.image, spacing, &scenario.tissues, &tissues);
         let volume = Arc::new(volume.map_err(|why| wrong_volume(&self.path, why))?);
+        if matches!(scenario.scene.layout, SceneLayout::Arch { .. }) {
+            let why = "the exercise has all teeth of a jaw; --fdi with the number of one of them says which the volume replaces";
+            let mut teeth = scenario.scene.teeth.iter_mut();
+            let tooth = teeth.find(|tooth| self.fdi == Some(tooth.fdi));
+            tooth.ok_or_else(|| wrong_volume(&self.path, why.into()))?.source = ToothSource::Given(volume);
+            return Ok(());
+        }
         for tooth in &mut scenario.scene.teeth {
             tooth.source = ToothSource::Given(volume.clone());
         }

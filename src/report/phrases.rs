@@ -2,7 +2,9 @@
 
 use super::display_format;
 use super::language::Message;
-use super::session_file::{AnswerResultFile, CriticalErrorFile, EvidenceFile, GradeFile, ItemResultFile};
+use super::session_file::{
+    AnswerResultFile, ArchJaw, CriticalErrorFile, EvidenceFile, GradeFile, ItemResultFile, SessionFile,
+};
 use serde_json::Value as Json;
 use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::scenario::metric::MetricArgument;
@@ -63,17 +65,24 @@ fn share_of_other(
     Message::text(key, &[("title", title), ("percent", percent)])
 }
 
-/// Place (directions and mm from the crown's centre) and time at which a measure arose. `tooth_fdi` is the FDI number
-/// of the tooth; without it, y is taken for distal.
-pub fn place(evidence: &EvidenceFile, tooth_fdi: Option<u8>) -> Message {
+/// Place (directions and mm from the crown's centre; in an arch from its midline) and time at which a measure arose in a
+/// session.
+pub fn place(evidence: &EvidenceFile, session: &SessionFile) -> Message {
     let part = |v: f64, positive: &str, negative: &str| {
         let direction = if v >= 0.0 { positive } else { negative };
         Message::text(format!("way.{direction}"), &[("mm", Message::plain(format!("{:.1}", v.abs())))])
     };
     let [x, y, z] = evidence.place_mm;
-    let distal = y * f64::from(tooth_fdi.map_or(1.0, |fdi| distal(fdi).y));
-    let place =
-        [("x", part(x, "buccal", "lingual")), ("y", part(distal, "distal", "mesial")), ("z", part(z, "up", "down"))];
+    let [x, y] = match session.jaw {
+        // The patient's left and right.
+        Some(ArchJaw::Lower) => [part(x, "front", "back"), part(y, "left", "right")],
+        Some(ArchJaw::Upper) => [part(x, "front", "back"), part(y, "right", "left")],
+        None => {
+            let distal = session.tooth_fdi.map_or(1.0, |fdi| distal(fdi).y);
+            [part(x, "buccal", "lingual"), part(y * f64::from(distal), "distal", "mesial")]
+        }
+    };
+    let place = [("x", x), ("y", y), ("z", part(z, "up", "down"))];
     let place = Message::text("place.at", &place);
     match evidence.at_s {
         Some(at) => {
@@ -81,6 +90,16 @@ pub fn place(evidence: &EvidenceFile, tooth_fdi: Option<u8>) -> Message {
         }
         None => place,
     }
+}
+
+/// Name of a view or a section: of the tooth, or of an arch, whose teeth have no sides in common.
+pub fn side(view: &str, session: &SessionFile) -> Message {
+    let names = match session.jaw {
+        None => "side",
+        Some(ArchJaw::Upper) => "upper",
+        Some(ArchJaw::Lower) => "lower",
+    };
+    Message::text(format!("{names}.{view}"), &[])
 }
 
 /// Limit beyond which a critical error fails the exercise.

@@ -9,7 +9,7 @@ use typodont_core::tick::Tick;
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{CoefficientName, TissueRole, TissueTable};
 use typodont_exercise::record::{DeviceSpecFile, Recording, SeedOriginFile, ServoStatsFile, ended_by_name};
-use typodont_exercise::scenario::{Limit, QuestionKind, Questionnaire, Scenario, Workpiece, hex};
+use typodont_exercise::scenario::{Jaw, Limit, QuestionKind, Questionnaire, Scenario, Workpiece, hex};
 use typodont_exercise::score;
 use typodont_exercise::score::{EpisodeKind, ErrorEpisode, Evidence, Grade, SCORER_VERSION, Scored, SiteResult};
 use typodont_exercise::session::{AnswerRecord, AnswerValue};
@@ -76,9 +76,12 @@ pub struct SessionFile {
     pub operator: Option<String>,
     #[serde(default)]
     pub device: Option<DeviceFile>,
-    /// Number of the tooth that places are measured on, the first of several.
+    /// Number of the tooth that places are measured on, the first of two; null for all teeth of a jaw.
     #[serde(default)]
     pub tooth_fdi: Option<u8>,
+    /// Jaw of which all teeth are in the exercise; left out for one or two teeth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub jaw: Option<ArchJaw>,
     /// Size of a voxel of the tooth along its three axes, mm; absent for values entered by hand.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub voxel_mm: Option<[f64; 3]>,
@@ -264,6 +267,23 @@ pub struct GradeFile {
     pub hard_fail_checks: Vec<CriticalErrorFile>,
 }
 
+/// Jaw of which all teeth are in an exercise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ArchJaw {
+    Upper,
+    Lower,
+}
+
+impl From<Jaw> for ArchJaw {
+    fn from(jaw: Jaw) -> ArchJaw {
+        match jaw {
+            Jaw::Upper => ArchJaw::Upper,
+            Jaw::Lower => ArchJaw::Lower,
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ItemResultFile {
     pub title: String,
@@ -325,6 +345,7 @@ impl SessionFile {
     pub fn of(recording: &Recording, scored: &Scored) -> SessionFile {
         let head = &recording.head;
         let scenario = &recording.scenario;
+        let jaw = scored.replay.workpiece.arch_jaw();
         let metrics = scored.measures.all.iter().map(|m| (m.metric.name(), m.value.map(round_to_nine_decimals)));
         let evidence =
             scored.measures.all.iter().filter_map(|m| Some((m.metric.name(), evidence_file(scenario, &m.evidence?))));
@@ -349,7 +370,8 @@ impl SessionFile {
             ended_because: ended,
             operator: head.operator.clone(),
             device: Some(DeviceFile::from(&DeviceSpec::from(&head.device))),
-            tooth_fdi: scenario.scene.teeth.first().map(|tooth| tooth.fdi),
+            tooth_fdi: scenario.scene.teeth.first().filter(|_| jaw.is_none()).map(|tooth| tooth.fdi),
+            jaw: jaw.map(ArchJaw::from),
             voxel_mm: Some(voxel_mm(&scored.replay.workpiece)),
             tooth_sha256: Some(tooth_sha256(&scored.replay.workpiece, &scenario.tissues)),
             stages: stages(recording, scored),

@@ -412,7 +412,7 @@ impl ReportLocalizer<'_> {
     fn figure(&self, picture: &EncodedPicture) -> ReportFigure {
         let data = base64::engine::general_purpose::STANDARD.encode(&picture.png);
         let (when, what) = picture.name.split_once('-').unwrap_or(("", &picture.name));
-        let what = Message::text(format!("side.{what}"), &[]);
+        let what = phrases::side(what, self.session);
         ReportFigure {
             id: picture.name.clone(),
             title: self.html(&Message::text(format!("picture.{when}"), &[("what", what)])),
@@ -431,8 +431,8 @@ impl ReportLocalizer<'_> {
 
     /// Place and time at which a measure arose, in words.
     fn place(&self, metric: &str) -> Value {
-        let tooth = self.session.tooth_fdi;
-        self.session.evidence.get(metric).map_or(Value::from(""), |e| self.html(&phrases::place(e, tooth)))
+        let evidence = self.session.evidence.get(metric);
+        evidence.map_or(Value::from(""), |e| self.html(&phrases::place(e, self.session)))
     }
 
     fn evidence_place(&self, metric: &str) -> Option<ReportPlace> {

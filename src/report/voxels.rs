@@ -3,6 +3,7 @@
 //! Takes the volume before and after, and the removal of each voxel. Gives a header and one packed text, small enough
 //! for a page that is opened from a disk. From these the page shows the cavity as it was at any moment.
 
+use crate::session_file::ArchJaw;
 use base64::Engine;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
@@ -37,6 +38,8 @@ pub struct VoxelHeader {
     pub origin_mm: [f32; 3],
     /// True where y of tooth space runs toward mesial: in the upper left and the lower right.
     pub is_mirrored: bool,
+    /// Jaw of which all teeth are shown; they have no common directions.
+    pub jaw: Option<ArchJaw>,
     /// Index of the first voxel within the bundle's label maps.
     pub first: [u32; 3],
     /// Step, in voxels of the label maps along each axis, between voxels that the page contains.
@@ -95,6 +98,7 @@ fn pack_with_stride(scored: &Scored, stride: u32) -> Option<PackedVoxels> {
         spacing_mm: (matter_box.grid.spacing * stride as f32).to_array(),
         origin_mm: matter_box.grid.centre(first).to_array(),
         is_mirrored: scored.replay.workpiece.distal().y < 0.0,
+        jaw: scored.replay.workpiece.arch_jaw().map(ArchJaw::from),
         first,
         stride,
         changed_low: std::array::from_fn(|a| (changed_box.first[a] - first[a]) / stride),

@@ -272,10 +272,7 @@ impl ReviewLocalizer<'_> {
     }
 
     fn place(&self, metric: &str) -> String {
-        self.session
-            .evidence
-            .get(metric)
-            .map_or_else(String::new, |e| self.translate(&phrases::place(e, self.session.tooth_fdi)))
+        self.session.evidence.get(metric).map_or_else(String::new, |e| self.translate(&phrases::place(e, self.session)))
     }
 
     fn grade(

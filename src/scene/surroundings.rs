@@ -1,6 +1,5 @@
 //! Solids around the tooth, drawn as they are touched.
 
-use super::jaw::{compute_normals, smooth_normals};
 use super::palette::GLOSS;
 use std::sync::Arc;
 use typodont_core::aabb::Aabb;
@@ -67,8 +66,8 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
         // A neighbour that was grown is as fine as it needs to be.
         let mut mesh = obstacle.mesh();
         mesh.positions.iter_mut().for_each(|p| *p = shape.tooth_from_collider * *p);
-        compute_normals(&mut mesh);
-        smooth_normals(&mut mesh, SMOOTHING);
+        mesh.compute_normals();
+        mesh.smooth_normals(SMOOTHING);
         return mesh;
     }
     if let (ColliderGeometry::Sdf(field), Some(gum)) = (&shape.geometry, &workpiece.periodontium) {
@@ -84,7 +83,7 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
         let gum_field = SdfGrid::from_fn(grid, Compliance::default(), |p| gum.gum_sdf_visual(p) + dive(p));
         let mut mesh =
             surface::extract(&Volume::from_distance(grid, 2.0 * GUM_SPACING, |p| (gum_field.distance(p), Label(1))));
-        smooth_normals(&mut mesh, SMOOTHING);
+        mesh.smooth_normals(SMOOTHING);
         return mesh;
     }
     let grid = Grid::covering(low, high, Vec3::splat(SPACING), 3);

@@ -2,7 +2,7 @@
 
 use super::jaw::Mouth;
 use typodont_core::frame::Vec3;
-use typodont_exercise::scenario::{ToothBounds, Workpiece};
+use typodont_exercise::scenario::Workpiece;
 use typodont_render::{Orbit, Quadrant};
 
 /// A side of the tooth, looked at squarely.
@@ -47,7 +47,7 @@ const QUADRANT_MIDDLE: [f32; 2] = [18.0, 20.0];
 pub fn tooth_view(workpiece: &Workpiece, side: ToothSide) -> Orbit {
     let crowns = workpiece.crown_bounds();
     let middle = workpiece.world_from_tooth * crowns.centre();
-    let distal = workpiece.teeth.first().map_or(Vec3::Y, ToothBounds::distal);
+    let distal = workpiece.distal();
     let radius = 0.5 * CROWN_ROOM * crowns.size().max_element();
     orbit_toward(middle, radius, workpiece.world_from_tooth.rotate(side.toward_eye(distal)))
 }

@@ -1,12 +1,13 @@
 //! Both dental arches, measured as on plaster: a caliper on the surfaces of the teeth that are made, where they stand.
 
+use typodont_anatomy::jaw::Jaw;
 use typodont_anatomy::{TissueLabels, grid_of_spacing, grow, teeth};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::touch::ClosedMesh;
 use typodont_core::volume::{Label, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_formats::Library;
-use typodont_scene::{Jaw, StandaloneJaw};
+use typodont_scene::StandaloneJaw;
 
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 

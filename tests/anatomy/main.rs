@@ -5,4 +5,5 @@ mod support;
 mod age;
 mod arches;
 mod caries;
+mod dental_arch;
 mod teeth;

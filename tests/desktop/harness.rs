@@ -136,6 +136,11 @@ impl Window {
         self.click_on_widget(Role::RadioButton, label);
     }
 
+    /// True if there is a radio button of this name.
+    pub fn offers(&self, label: &str) -> bool {
+        self.harness.query_by_role_and_label(Role::RadioButton, label).is_some()
+    }
+
     /// Chooses an entry of a list that opens, by the names that a screen reader says.
     pub fn choose_from(&mut self, list: &str, entry: &str) {
         self.click_on_widget(Role::ComboBox, list);

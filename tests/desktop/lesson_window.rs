@@ -162,6 +162,36 @@ fn a_code_that_was_cleared_is_not_brought_back_by_undoing() {
 }
 
 #[test]
+fn a_tooth_of_an_arch_is_touched_and_its_quarter_named() {
+    // Aim: whoever examines an arch answers with a tooth and, by its anatomical name, with a quarter of it. Method: the mouse goes to one
+    // of the possible sites; another tooth, which was not touched, is refused; with both answers the next trial begins.
+    let place = folder("arch_window");
+    let exercise = "scenarios/16-arch-diagnosis.json";
+    let options = AppOptions { begins_at_once: true, ..exercise_options(&place, exercise) };
+    let Some(mut desk) = Window::open(&place, options) else { return };
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("hand", |_| true);
+    desk.until("tooth", |tooth| tooth == "drawn");
+    desk.press("o", "pointer", "held");
+    // The first site: tooth 37, distobuccal.
+    desk.point_at(lesion_in_world(exercise, 0));
+    desk.set_button(true);
+    desk.wait(Duration::from_millis(1500));
+    desk.picture("21-arch");
+    desk.set_button(false);
+    desk.press("Escape", "pointer", "free");
+    let quarter = "Which quarter of its occlusal surface?: distobuccal";
+    desk.choose("Which tooth is carious?: 36");
+    desk.wait(Duration::from_millis(500));
+    assert!(!desk.offers(quarter), "an answer about a tooth that was not touched is taken");
+    desk.choose("Which tooth is carious?: 37");
+    desk.wait(Duration::from_millis(500));
+    desk.picture("21-arch-quarter");
+    desk.choose(quarter);
+    desk.until("stage", |stage| stage == "1");
+}
+
+#[test]
 fn one_stroke_draws_all_channels_that_are_switched_on() {
     // Aim: the editor begins at y = x with all channels, and a stroke changes the tooth. Method: the names of the drawing say
     // which channels are drawn; the screen before and after a stroke that lowers all channels but green.

@@ -571,6 +571,37 @@ fn cavities_fillings_and_own_instruments() {
 }
 
 #[test]
+fn teeth_that_cannot_stand_in_one_arch() {
+    let arch = |pointer: &str, value: Value| {
+        edited("16-arch-diagnosis.json", &format!("/scene/dental_arch/{pointer}"), Some(value))
+    };
+    check_text("the shipped one", &shipped("16-arch-diagnosis.json"), &[]);
+    check_text(
+        "of both jaws",
+        &arch("teeth/7/fdi", json!(17)),
+        &[("two-jaws", "/scene/dental_arch/teeth/7/fdi"), ("duplicate-id", "/scene/dental_arch/teeth/7/id")],
+    );
+    check_text(
+        "twice",
+        &arch("teeth/0/fdi", json!(36)),
+        &[("duplicate-id", "/scene/dental_arch/teeth/0/id"), ("duplicate-tooth", "/scene/dental_arch/teeth/1/fdi")],
+    );
+    let coarse = json!({ "procedural": { "spacing_mm": 0.3 } });
+    let unequal = [("unequal-spacing", "/scene/dental_arch/teeth/0/form/procedural")];
+    check_text("larger voxels", &arch("teeth/0/form", coarse), &unequal);
+    check_text(
+        "another's name",
+        &arch("teeth/0/id", json!("33")),
+        &[("duplicate-id", "/scene/dental_arch/teeth/0/id")],
+    );
+    let missing = arch("arch", json!({ "missing": [37] }));
+    check_text("there and missing", &missing, &[("wrong-tooth", "/scene/dental_arch/arch/missing/0")]);
+    check_text("rotated", &arch("arch", json!({ "rotated": [{ "fdi": 37, "degrees": 10 }] })), &[]);
+    check_text("none", &arch("teeth", json!([])), &[("wrong-count", "/scene/dental_arch/teeth")]);
+    check_text("too fine", &arch("spacing_mm", json!(0.05)), &[("out-of-range", "/scene/dental_arch/spacing_mm")]);
+}
+
+#[test]
 fn points_that_nobody_could_earn() {
     let charting = |pointer: &str, value: Option<Value>| edited("15-charting.json", pointer, value);
     let complaints = |text: &str| -> Vec<(String, String)> {

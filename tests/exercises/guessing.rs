@@ -20,7 +20,8 @@ use typodont_exercise::scenario::metric_id::TrialMetric;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece, resolve};
 use typodont_exercise::score::TrialSummary;
 use typodont_exercise::session::{
-    AnswerValue, Effect, Input, InputError, Observer, Operator, OperatorFile, Session, SessionEvent, run, setup,
+    AnswerRecord, AnswerValue, Effect, Input, InputError, Observer, Operator, OperatorFile, Session, SessionEvent, run,
+    setup,
 };
 use typodont_formats::Library;
 use typodont_formats::diagnostic::SourceText;
@@ -29,7 +30,7 @@ use typodont_report::cohort::read_session;
 use typodont_report::{Templates, VerificationStatus, Verifier};
 
 /// The shipped exercises in which caries is to be found.
-const SEARCHES: [&str; 3] = ["3-detection", "4-diagnosis", "9-stain"];
+const SEARCHES: [&str; 4] = ["3-detection", "4-diagnosis", "9-stain", "16-arch-diagnosis"];
 
 fn shipped(id: &str) -> String {
     std::fs::read_to_string(format!("{}/scenarios/{id}.json", env!("CARGO_MANIFEST_DIR"))).unwrap()
@@ -37,7 +38,9 @@ fn shipped(id: &str) -> String {
 
 /// A shipped exercise with large voxels, which makes no difference to somebody who guesses.
 fn coarse(id: &str) -> String {
-    let text = shipped(id).replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.4");
+    let text = shipped(id)
+        .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.4")
+        .replace("\"spacing_mm\": 0.2", "\"spacing_mm\": 0.4");
     assert_ne!(text, shipped(id));
     text
 }
@@ -79,7 +82,13 @@ fn guessed(scenario: &Arc<Scenario>, workpiece: Workpiece, seed: u64) -> TrialSu
     let mut performed = Session::new(scenario.clone(), &workpiece);
     let mut trainee = Operator::new(file, scenario.clone(), workpiece.clone(), spec, seed);
     run(&mut performed, &mut simulation, &mut trainee, &mut Nobody).unwrap();
-    TrialSummary::of(scenario, &workpiece, &performed.outcome()).unwrap()
+    let outcome = performed.outcome();
+    let summary = TrialSummary::of(scenario, &workpiece, &outcome).unwrap();
+    // A trial that asks for the tooth and for its quarter is correct only if both answers are.
+    let is_correct = |answer: &Option<AnswerRecord>| answer.as_ref().is_some_and(|a| a.correct == Some(true));
+    let correct = outcome.stages.iter().filter(|stage| stage.answers.iter().all(is_correct)).count();
+    assert_eq!(summary.correct, correct);
+    summary
 }
 
 #[test]

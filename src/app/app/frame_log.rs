@@ -85,6 +85,9 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState, view: &LessonView) {
     } else {
         log.record("screen", if lesson.stage.is_some() { "practice" } else { "making" });
     }
+    if let Some(stage) = lesson.stage {
+        log.record("stage", stage);
+    }
     log.record("pointer", if lesson.is_pointer_captured { "held" } else { "free" });
     log.record("paused", lesson.is_paused);
     log.record("clock", if lesson.is_awaiting_movement { "stopped" } else { "running" });

@@ -7,12 +7,15 @@ use crate::platform;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use typodont_exercise::scenario;
-use typodont_exercise::scenario::{ResolveMode, Scenario, ToothSource, Workpiece};
+use typodont_exercise::scenario::{ResolveMode, Scenario, SceneLayout, ToothSource, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::{Diagnostic, SourceText};
 
 /// Voxel spacing of the quick first build, mm; it takes an eighth of the work.
 const QUICK_SPACING: f32 = 0.2;
+
+/// The same for all teeth of an arch.
+const QUICK_ARCH_SPACING: f32 = 0.4;
 
 /// A text to be checked and made.
 pub struct BuildJob {
@@ -220,8 +223,10 @@ impl Build {
 
 /// The same scenario with coarse voxels; `None` where the teeth are scanned or a map is drawn on their voxels.
 fn quick_variant(scenario: &Scenario) -> Option<Scenario> {
+    let is_arch = matches!(scenario.scene.layout, SceneLayout::Arch { .. });
+    let quick_spacing = if is_arch { QUICK_ARCH_SPACING } else { QUICK_SPACING };
     let is_grown =
-        |form: &ToothSource| matches!(form, ToothSource::Procedural { spacing, .. } if *spacing < QUICK_SPACING);
+        |form: &ToothSource| matches!(form, ToothSource::Procedural { spacing, .. } if *spacing < quick_spacing);
     let has_maps = scenario.zones.iter().any(|zone| zone.region.map_dims().is_some());
     if has_maps || !scenario.scene.teeth.iter().all(|tooth| is_grown(&tooth.source)) {
         return None;
@@ -232,7 +237,10 @@ fn quick_variant(scenario: &Scenario) -> Option<Scenario> {
         .scene
         .teeth
         .iter_mut()
-        .for_each(|tooth| tooth.source = ToothSource::Procedural { spacing: QUICK_SPACING, age });
+        .for_each(|tooth| tooth.source = ToothSource::Procedural { spacing: quick_spacing, age });
+    if let SceneLayout::Arch { spacing } = &mut quick.scene.layout {
+        *spacing = quick_spacing;
+    }
     Some(quick)
 }
 

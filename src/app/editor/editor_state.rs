@@ -9,8 +9,8 @@ use crate::platform;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use typodont_author::{
-    EditError, ExerciseDraft, FieldKind, FileStamp, Overwrite, SaveError, SchemaForm, default_entry, read, save,
-    surface_location,
+    EditError, ExerciseDraft, FieldKind, FileStamp, Overwrite, SaveError, SchemaForm, arch_tooth, default_entry, read,
+    save, surface_location,
 };
 use typodont_core::frame::Vec3;
 use typodont_exercise::catalog::{InstrumentEntry, InstrumentTable, TissueEntry, TissueTable};
@@ -29,6 +29,9 @@ const AUTOSAVE_DELAY_S: f64 = 1.0;
 
 /// Folder that stands for that of the shipped exercises, which have no path.
 const SHIPPED: &str = "/shipped";
+
+/// The listed teeth of an arch.
+pub const ARCH_TEETH: &str = "/scene/dental_arch/teeth";
 
 /// Stands for a new exercise that was never saved.
 const NEW: &str = "new";
@@ -234,9 +237,11 @@ impl EditorState {
     }
 
     /// JSON pointers to the exercise's teeth.
-    pub fn tooth_pointers(&self) -> Vec<&'static str> {
+    pub fn tooth_pointers(&self) -> Vec<String> {
         let all = ["/scene/tooth", "/scene/jaw/tooth", "/scene/pair/left", "/scene/pair/right"];
-        all.into_iter().filter(|at| self.draft.value_at(at).is_some()).collect()
+        let listed = self.draft.value_at(ARCH_TEETH).and_then(Value::as_array).map_or(0, Vec::len);
+        let single = all.into_iter().map(String::from).filter(|at| self.draft.value_at(at).is_some());
+        single.chain((0..listed).map(|index| format!("{ARCH_TEETH}/{index}"))).collect()
     }
 
     /// JSON pointer to the selected decay.
@@ -409,10 +414,15 @@ impl EditorState {
 
     /// Sets the FDI number of the tooth with the selected decay, or of the first tooth.
     fn set_tooth_number(&mut self, fdi: u8) -> Result<(), EditError> {
-        match self.tooth_pointers().get(self.selected_decay.0).or(self.tooth_pointers().first()) {
-            Some(tooth) => self.draft.set(&format!("{tooth}/fdi"), &json!(fdi)),
-            None => Ok(()),
+        let teeth = self.tooth_pointers();
+        let Some(tooth) = teeth.get(self.selected_decay.0).or(teeth.first()) else { return Ok(()) };
+        let (number, id) = (format!("{tooth}/fdi"), format!("{tooth}/id"));
+        let former = self.draft.value_at(&number).map(Value::to_string);
+        if tooth.starts_with(ARCH_TEETH) && self.draft.value_at(&id).and_then(Value::as_str) == former.as_deref() {
+            // A tooth of an arch that is named by its number keeps a name that no other tooth has.
+            return self.draft.set_all(&number, &[(number.clone(), json!(fdi)), (id, json!(fdi.to_string()))]);
         }
+        self.draft.set(&number, &json!(fdi))
     }
 
     fn reroll(&mut self) {
@@ -479,10 +489,22 @@ impl EditorState {
     fn place_decay(&mut self, point: Vec3, outward: Vec3) -> Result<(), EditError> {
         self.preview.slice_point = point;
         let Some(build) = &self.build else { return Ok(()) };
-        // Of two teeth side by side the left one has y > 0.
-        let tooth = usize::from(build.workpiece.teeth.len() == 2 && point.y <= 0.0);
-        let Some((place, &at)) = build.workpiece.teeth.get(tooth).zip(self.tooth_pointers().get(tooth)) else {
-            return Ok(());
+        let Some(tooth) = build.workpiece.nearest_tooth(point) else { return Ok(()) };
+        let place = &build.workpiece.teeth[tooth];
+        let listed = self.tooth_pointers();
+        let has_number = |at: &String| self.draft.value_at(&format!("{at}/fdi")) == Some(&json!(place.fdi));
+        let tooth = match self.draft.value_at(ARCH_TEETH) {
+            None => tooth,
+            // The build may be of an older text, in which other teeth were listed.
+            Some(_) => listed.iter().position(has_number).unwrap_or(listed.len()),
+        };
+        let at = match listed.get(tooth) {
+            Some(at) => at.clone(),
+            // A tooth of an arch that is not listed yet.
+            None => {
+                self.draft.push(ARCH_TEETH, &arch_tooth(self.draft.value(), place.fdi))?;
+                format!("{ARCH_TEETH}/{tooth}")
+            }
         };
         let location = surface_location(place, point, outward);
         if self.selected_decay.0 != tooth || self.selected_decay_pointer().is_none() {

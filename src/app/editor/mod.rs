@@ -11,5 +11,5 @@ mod preview;
 
 pub use editor_command::EditorCommand;
 pub use editor_section::EditorSection;
-pub use editor_state::{Dialog, EditorState, OpenMode};
+pub use editor_state::{ARCH_TEETH, Dialog, EditorState, OpenMode};
 pub use preview::PreviewMode;

@@ -5,9 +5,10 @@ use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
 use crate::ui::theme;
+use crate::ui::ui_anchors::anchor;
 use eframe::egui;
 use typodont_exercise::local_text::LocalTexts;
-use typodont_exercise::scenario::{Question, QuestionKind, Stage};
+use typodont_exercise::scenario::{Question, QuestionKind, SceneLayout, Stage, distal};
 use typodont_exercise::session::AnswerValue;
 
 /// Every question of a stage.
@@ -19,7 +20,16 @@ pub fn questions_ui(
     commands: &mut Vec<AppCommand>,
 ) {
     let scenario = &lesson.scenario;
-    let teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
+    let mut teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
+    if scenario.scene.is_in_mouth() {
+        // As they stand before the trainee, from left to right; an upper arch lies on the bench, too.
+        teeth.sort_by_key(|(_, fdi)| match fdi / 10 {
+            2 | 4 => -i16::from(*fdi),
+            1 => i16::from(*fdi),
+            _ => i16::from(*fdi) + 100,
+        });
+    }
+    let is_in_arch = matches!(scenario.scene.layout, SceneLayout::Arch { .. });
     for (place, question) in stage.ask.iter().enumerate() {
         let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
         ui.add_space(10.0);
@@ -27,7 +37,8 @@ pub fn questions_ui(
         let draft = lesson.drafts.get(&question.id).map_or("", String::as_str);
         let current = lesson.answers.get(&question.id);
         ui.push_id(place, |ui| {
-            let shown = QuestionUi { question, current, texts: &scenario.texts, words };
+            let quarters = if is_in_arch { quarter_names(stage, lesson, &teeth) } else { QuarterNames::Numbers };
+            let shown = QuestionUi { question, current, texts: &scenario.texts, words, quarters };
             if let Some(answer) = shown.answer_ui(ui, &teeth, draft, commands) {
                 commands.push(AppCommand::Practice(PracticeCommand::AnswerQuestion(question.id.clone(), answer)));
             }
@@ -45,12 +56,43 @@ pub fn questions_ui(
     }
 }
 
-/// One question with its last submitted answer.
+/// Names of the quarters of an occlusal surface.
+#[derive(Clone, Copy)]
+enum QuarterNames {
+    /// 1 to 4 as the trainee sees them.
+    Numbers,
+    /// None until a tooth of the arch is named.
+    ToothFirst,
+    /// The anatomical ones on the tooth with this FDI number.
+    Anatomical(u8),
+}
+
+/// Names of the quarters in an arch: those on the tooth that the trainee has named in this stage.
+fn quarter_names(stage: &Stage, lesson: &LessonState, teeth: &[(String, u8)]) -> QuarterNames {
+    let asks_tooth = |question: &&Question| matches!(question.kind, QuestionKind::ToothWith { .. });
+    let Some(question) = stage.ask.iter().find(asks_tooth) else { return QuarterNames::Numbers };
+    let named = lesson.answers.get(&question.id);
+    let tooth = teeth.iter().find(|(id, _)| named == Some(&AnswerValue::Word(id.clone())));
+    tooth.map_or(QuarterNames::ToothFirst, |(_, fdi)| QuarterNames::Anatomical(*fdi))
+}
+
+/// One question with its last accepted answer.
 struct QuestionUi<'a> {
+    quarters: QuarterNames,
     question: &'a Question,
     current: Option<&'a AnswerValue>,
     texts: &'a LocalTexts,
     words: &'a Translations,
+}
+
+/// An answer in the names of screen positions.
+fn answer_word(answer: &AnswerValue) -> String {
+    match answer {
+        AnswerValue::Word(word) => word.clone(),
+        AnswerValue::Quadrant(quadrant) => quadrant.to_string(),
+        AnswerValue::YesNo(is_yes) => is_yes.to_string(),
+        AnswerValue::Number(number) => number.to_string(),
+    }
 }
 
 impl QuestionUi<'_> {
@@ -105,15 +147,35 @@ impl QuestionUi<'_> {
         chosen
     }
 
-    /// Quarters in occlusal view: 1 and 2 are away from the trainee.
+    /// Quarters in occlusal view: 1 and 2 are buccal, away from the trainee. In an arch, whose teeth are turned, they have
+    /// anatomical names.
     fn quadrants(&self, ui: &mut egui::Ui) -> Option<AnswerValue> {
         let mut chosen = None;
-        ui.weak(self.words.get("questions.from_above"));
+        let name: Box<dyn Fn(u8) -> String> = match self.quarters {
+            QuarterNames::Numbers => {
+                ui.weak(self.words.get("questions.from_above"));
+                Box::new(|quadrant| quadrant.to_string())
+            }
+            QuarterNames::ToothFirst => {
+                ui.weak(self.words.get("questions.tooth_first"));
+                return None;
+            }
+            QuarterNames::Anatomical(fdi) => Box::new(move |quadrant| {
+                let is_distal = (quadrant % 2 == 1) == (distal(fdi).y > 0.0);
+                let key = match (quadrant <= 2, is_distal) {
+                    (true, false) => "questions.mesiobuccal",
+                    (true, true) => "questions.distobuccal",
+                    (false, false) => "questions.mesiolingual",
+                    (false, true) => "questions.distolingual",
+                };
+                self.words.get(key).to_string()
+            }),
+        };
         egui::Grid::new("quadrants").spacing([6.0, 6.0]).show(ui, |ui| {
             for row in [[1u8, 2], [3, 4]] {
                 for quadrant in row {
                     let answer = AnswerValue::Quadrant(quadrant);
-                    if self.button(ui, &answer, &quadrant.to_string(), egui::vec2(64.0, 44.0)) {
+                    if self.button(ui, &answer, &name(quadrant), egui::vec2(64.0, 44.0)) {
                         chosen = Some(answer);
                     }
                 }
@@ -123,10 +185,11 @@ impl QuestionUi<'_> {
         chosen
     }
 
-    /// A button that is marked while its answer is the submitted one; returns true when clicked.
+    /// A button that is marked while its answer is the accepted one; returns true when clicked.
     fn button(&self, ui: &mut egui::Ui, answer: &AnswerValue, title: &str, min_size: egui::Vec2) -> bool {
         let is_current = self.current == Some(answer);
         let button = ui.add(egui::Button::selectable(is_current, title).frame_when_inactive(true).min_size(min_size));
+        anchor(ui, format!("answer:{}:{}", self.question.id, answer_word(answer)), button.rect);
         button.widget_info(|| {
             let name = format!("{}: {title}", self.words.own(self.texts, &self.question.text));
             egui::WidgetInfo::selected(egui::Role::RadioButton, true, is_current, name)

@@ -1,6 +1,7 @@
-//! The dental arches around the tooth in the scenario file. They are displayed; the only key that changes what can be
-//! touched is `missing`, which removes a neighbouring tooth.
+//! The dental arches in the scenario file. Around a single tooth they are displayed; the only key that changes what can be
+//! touched is `missing`, which removes a neighbouring tooth. In a `dental_arch`, all teeth and the mucosa can be touched.
 
+use super::file::ToothFile;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -25,6 +26,29 @@ pub struct ArchFile {
     #[serde(default)]
     #[schemars(length(max = 27))]
     pub rotated: Vec<RotatedFile>,
+}
+
+/// All teeth of one jaw in their arch, with its gingiva and its palate or the floor of its mouth. Teeth that are not listed
+/// are sound.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DentalArchFile {
+    /// The teeth with decay, stains or fillings, and those whose shape comes from a scan: one or more, of the same jaw. The
+    /// others are generated; each has its FDI number as its name.
+    #[schemars(length(min = 1, max = 16))]
+    pub teeth: Vec<ToothFile>,
+    /// Voxel size of the whole arch, mm: 0.14 (fine) to 0.4 (coarse). Generated teeth must have the same; scans may have
+    /// another.
+    #[serde(default = "fifth_of_mm")]
+    #[schemars(range(min = 0.14, max = 0.4))]
+    pub spacing_mm: f32,
+    /// Positions of the teeth.
+    #[serde(default)]
+    pub arch: ArchFile,
+}
+
+fn fifth_of_mm() -> f32 {
+    0.2
 }
 
 /// Form of one jaw's arch, by the beta function of Braun.

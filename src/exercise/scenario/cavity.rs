@@ -141,6 +141,7 @@ impl Workpiece {
             surroundings: Vec::new(),
             periodontium: None,
             arch: Default::default(),
+            tooth_from_arch: None,
             world_from_tooth: typodont_core::frame::Pose::IDENTITY,
         }
     }

@@ -163,6 +163,8 @@ pub enum SceneFile {
     Pair(PairFile),
     /// One tooth in its jaw, with gingiva and neighbouring teeth.
     Jaw(JawFile),
+    /// All teeth of one jaw, each of which can be examined and treated.
+    DentalArch(DentalArchFile),
 }
 
 impl SceneFile {
@@ -172,6 +174,7 @@ impl SceneFile {
             SceneFile::Tooth(tooth) => vec![tooth],
             SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
             SceneFile::Jaw(jaw) => vec![&jaw.tooth],
+            SceneFile::DentalArch(arch) => arch.teeth.iter().collect(),
         };
         teeth.into_iter().filter_map(|tooth| match &tooth.form {
             ToothSourceFile::Procedural(_) => None,

@@ -1,8 +1,8 @@
 //! Position of decay in its tooth, and the replacement of sound tissue by decay.
 
 use super::file::SurfaceFile;
-use super::tooth_bounds::{PairHalf, ToothBounds, anatomy_tissues};
-use super::{Decay, DecayOrigin, DecayPlace, DecayShape, GrownDecay, Stage};
+use super::tooth_bounds::{ToothBounds, VolumePart, anatomy_tissues};
+use super::{Decay, DecayOrigin, DecayPlace, DecayShape, GrownDecay, Stage, distal};
 use crate::catalog::{TissueRole, TissueTable};
 use typodont_anatomy::caries;
 use typodont_anatomy::caries::{Groove, LesionEntry, LesionSpec, SurfacePatch};
@@ -18,7 +18,7 @@ pub struct Lesion {
     pub label: Label,
     /// Centre of an ellipsoid; for decay that follows the tissues, the point of entry.
     pub centre: Vec3,
-    /// Semi-axes of an ellipsoid; `None` for decay that follows the tissues.
+    /// Semi-axes of an ellipsoid along the tooth's own axes; `None` for decay that follows the tissues.
     pub radii: Option<Vec3>,
     /// Quadrant, 1–4 as seen from above.
     pub quadrant: u8,
@@ -49,13 +49,14 @@ struct EntrySite {
 }
 
 impl EntrySite {
-    fn of(decay: &Decay, place: &ToothBounds, volume: &Volume, side: PairHalf, seed: u64) -> EntrySite {
+    fn of(decay: &Decay, place: &ToothBounds, volume: &Volume, part: VolumePart, seed: u64) -> EntrySite {
         /// Shares of half the crown: position of the centre of a quadrant, and maximum random offset from the centre of
         /// the surface.
         const INTO_QUADRANT: f32 = 0.42;
         const BY_CHANCE: f32 = 0.4;
-        let (middle, half) = (place.crown.centre(), place.crown.half_size());
-        let distal = place.distal();
+        // In the tooth's own axes.
+        let (middle, half) = (place.own_crown.centre(), place.own_crown.half_size());
+        let distal = distal(place.fdi);
         let (inward, u, v) = match decay.surface {
             SurfaceFile::O => (Vec3::NEG_Z, Vec3::X, distal),
             SurfaceFile::B => (Vec3::NEG_X, distal, Vec3::Z),
@@ -83,7 +84,9 @@ impl EntrySite {
         let outside = middle + offset - inward * (half.max_element() + 2.0);
         let by_author = !matches!(decay.place, DecayPlace::Random | DecayPlace::RandomQuadrant);
         let groove_within = if by_author { GROOVE_WITHIN } else { GROOVE_ANYWHERE };
-        EntrySite { surface: first_surface_along(volume, side, outside, inward), inward, axes: [u, v], groove_within }
+        let outside = place.tooth_from_own * outside;
+        let [inward, u, v] = [inward, u, v].map(|way| place.tooth_from_own.rotate(way));
+        EntrySite { surface: first_surface_along(volume, part, outside, inward), inward, axes: [u, v], groove_within }
     }
 
     /// Returns the unit normal of the surface, directed inward.
@@ -92,8 +95,8 @@ impl EntrySite {
         square.filter(|way| way.dot(self.inward) > 0.3).unwrap_or(self.inward)
     }
 
-    fn groove(&self, volume: &Volume, side: PairHalf, length: f32) -> Option<Groove> {
-        caries::nearest_groove(volume, self.surface, length, self.groove_within, |point| side.contains(point))
+    fn groove(&self, volume: &Volume, part: VolumePart, length: f32) -> Option<Groove> {
+        caries::nearest_groove(volume, self.surface, length, self.groove_within, |point| part.contains(point))
     }
 }
 
@@ -101,7 +104,7 @@ impl EntrySite {
 pub(super) fn occlusal_point(at: DecayPlace, place: &ToothBounds, volume: &Volume, seed: u64) -> Vec3 {
     let shape = DecayShape::Ellipsoid { radii: [1.0; 3], depth: 0.0 };
     let patch = Decay { id: "cavity".into(), label: Label::AIR, shape, surface: SurfaceFile::O, place: at };
-    EntrySite::of(&patch, place, volume, PairHalf::All, seed).surface
+    EntrySite::of(&patch, place, volume, VolumePart::All, seed).surface
 }
 
 /// Returns the position of a decay, in a volume that may already contain the decay.
@@ -110,14 +113,14 @@ pub(super) fn locate_lesion(
     tooth: usize,
     place: &ToothBounds,
     volume: &Volume,
-    side: PairHalf,
+    part: VolumePart,
     seed: u64,
 ) -> Lesion {
-    let site = EntrySite::of(decay, place, volume, side, seed);
+    let site = EntrySite::of(decay, place, volume, part, seed);
     let (centre, radii) = match &decay.shape {
         DecayShape::Ellipsoid { radii, depth } => (site.surface + site.inward * *depth, Some(Vec3::from(*radii))),
         DecayShape::Grown(GrownDecay { origin: DecayOrigin::Fissure { length }, .. }) => {
-            let groove = site.groove(volume, side, *length);
+            let groove = site.groove(volume, part, *length);
             (groove.map_or(site.surface, |groove| groove.line()[groove.nearest(site.surface)]), None)
         }
         DecayShape::Grown(GrownDecay { origin: DecayOrigin::Smooth { .. }, .. }) => (site.surface, None),
@@ -144,7 +147,7 @@ pub(super) fn apply_decay(
     tissues: &TissueTable,
     seed: u64,
 ) -> Result<Volume, DecayPlacementError> {
-    let site = EntrySite::of(decay, place, &volume, PairHalf::All, seed);
+    let site = EntrySite::of(decay, place, &volume, VolumePart::All, seed);
     match &decay.shape {
         DecayShape::Ellipsoid { radii, depth } => {
             apply_ellipsoid(volume, decay.label, site.surface + site.inward * *depth, Vec3::from(*radii), tissues)
@@ -182,7 +185,7 @@ fn apply_grown(
 ) -> Result<Volume, DecayPlacementError> {
     let entry = match grown.origin {
         DecayOrigin::Fissure { length } => {
-            LesionEntry::Groove(site.groove(&volume, PairHalf::All, length).ok_or(DecayPlacementError::NoGroove)?)
+            LesionEntry::Groove(site.groove(&volume, VolumePart::All, length).ok_or(DecayPlacementError::NoGroove)?)
         }
         DecayOrigin::Smooth { half } => {
             let inward = site.inward_normal(&volume);
@@ -208,12 +211,12 @@ fn apply_grown(
     Ok(Volume::new(*volume.grid(), volume.half_band(), volume.densities().to_vec(), labels, Label(1)))
 }
 
-/// Returns the first point of matter along a ray on a side of the scene, or the ray's far end if it meets none.
-fn first_surface_along(volume: &Volume, side: PairHalf, from: Vec3, along: Vec3) -> Vec3 {
+/// Returns the first point of matter along a ray in a part of the scene, or the ray's far end if it meets none.
+fn first_surface_along(volume: &Volume, part: VolumePart, from: Vec3, along: Vec3) -> Vec3 {
     let step = 0.5 * volume.grid().spacing.min_element();
     let steps = (30.0 / step) as u32;
     let point = |i: u32| from + along * (i as f32 * step);
-    (0..steps).map(point).find(|&p| side.contains(p) && volume.density_at(p) >= ISO).unwrap_or(point(steps))
+    (0..steps).map(point).find(|&p| part.contains(p) && volume.density_at(p) >= ISO).unwrap_or(point(steps))
 }
 
 /// Returns a number from a seed and a name (SplitMix64 over the name's bytes), the same on every machine.

@@ -4,6 +4,7 @@
 //! [`Workpiece`] from which a session starts. Never runs anything.
 
 mod arch_file;
+mod arch_volume;
 mod cavity;
 mod cavity_file;
 mod contact_limit;
@@ -43,6 +44,7 @@ pub use questionnaire::{Questionnaire, QuestionnaireCategory, QuestionnaireItem}
 pub use resolve::{ResolveMode, hex, resolve};
 pub use schema::schema_text;
 pub use tooth_bounds::{ToothBounds, anatomy_tissues};
+pub use typodont_anatomy::jaw::Jaw;
 pub use typodont_anatomy::periodontium::{Periodontium, Pockets, ProbingSite};
 pub use workpiece::{Workpiece, WorkpieceError};
 
@@ -52,6 +54,7 @@ use file::{AngleClassFile, SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_anatomy::caries::LesionDepth;
+use typodont_anatomy::jaw::{ArchPlan, DentalArch};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::touch::{CarvingParameters, Collider, Guidance, MaterialScales, Vibration};
@@ -126,13 +129,20 @@ impl OperatingField {
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub layout: SceneLayout,
-    /// One tooth, or two from left to right.
+    /// One tooth, two from left to right, or all teeth of an arch.
     pub teeth: Vec<ToothSpec>,
     /// Objects around a tooth in its jaw, tooth space; `None` for simple shapes of average size.
     pub surroundings: Option<Vec<Collider>>,
     /// Gingiva with pockets; `None` outside a jaw.
     pub pockets: Option<Pockets>,
     pub arch: DentalArches,
+}
+
+impl Scene {
+    /// Returns true if the teeth stand in a jaw that is drawn around them.
+    pub fn is_in_mouth(&self) -> bool {
+        matches!(self.layout, SceneLayout::Jaw | SceneLayout::Arch { .. })
+    }
 }
 
 /// Positions of the teeth in both jaws; mm.
@@ -148,6 +158,23 @@ pub struct DentalArches {
     /// Age shown by teeth and gingiva, years; `None` for unworn teeth with the pulp and the gingiva of an adult of 30
     /// years.
     pub age: Option<f32>,
+}
+
+impl DentalArches {
+    /// Returns what differs in one jaw from the average.
+    pub fn plan(&self, jaw: Jaw) -> ArchPlan {
+        let form = match jaw {
+            Jaw::Upper => self.upper,
+            Jaw::Lower => self.lower,
+        };
+        ArchPlan { width: form.width, depth: form.depth, rotated: self.rotated.clone(), age: self.age }
+    }
+
+    /// Returns the arch of one jaw, with third molars if one is among the given teeth.
+    pub fn of_jaw(&self, jaw: Jaw, teeth: impl IntoIterator<Item = u8>) -> DentalArch {
+        let count = if teeth.into_iter().any(|fdi| fdi % 10 == 8) { 8 } else { 7 };
+        DentalArch::new(jaw, count, None, &self.plan(jaw))
+    }
 }
 
 /// Arch form of one jaw, mm; `None` for the average.
@@ -166,6 +193,10 @@ pub enum SceneLayout {
     },
     /// A tooth with gingiva and neighbouring teeth.
     Jaw,
+    /// All teeth of one jaw in their arch, with its gingiva; `spacing` is the voxel size, mm.
+    Arch {
+        spacing: f32,
+    },
 }
 
 /// Specification of a tooth.
@@ -504,8 +535,11 @@ impl Scenario {
     /// instructions, questions and zones accordingly. The title remains: it identifies the exercise.
     ///
     /// # Errors
-    /// Returns a message if there is no tooth with this number.
+    /// Returns a message if there is no tooth with this number, or if the exercise has all teeth of a jaw.
     pub fn renumber_teeth(&mut self, fdi: u8) -> Result<(), String> {
+        if matches!(self.scene.layout, SceneLayout::Arch { .. }) {
+            return Err("the exercise has all teeth of a jaw, none of which can take another's number".into());
+        }
         let Some(former) = self.scene.teeth.first().map(|tooth| tooth.fdi) else { return Ok(()) };
         let Some(words) = tooth_words::Replacement::of(former, fdi) else {
             return Err(format!("there is no tooth {fdi}; the FDI number must be one of 11–18, 21–28, 31–38 or 41–48"));

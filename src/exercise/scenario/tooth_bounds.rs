@@ -1,31 +1,36 @@
 //! Place of a tooth in the volume of its workpiece, and the labels of its tissues.
 
-use super::{SceneLayout, distal};
+use super::distal;
 use crate::catalog::TissueTable;
 use typodont_core::aabb::Aabb;
-use typodont_core::frame::Vec3;
+use typodont_core::frame::{Pose, Vec3};
 use typodont_core::volume::Label;
 
-/// Position of a tooth, tooth space, mm.
+/// Position of a tooth, mm. Its *own axes* are those of tooth space, unless it stands in an arch: x lingual to buccal, y
+/// mesial to distal (the reverse for 21–28 and 41–48), z occlusal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ToothBounds {
     pub id: String,
     pub fdi: u8,
-    /// Bounding box of the whole tooth.
+    /// Bounding box of the whole tooth, tooth space.
     pub whole: Aabb,
-    /// Bounding box of the crown (the enamel).
+    /// Bounding box of the crown (the enamel), tooth space.
     pub crown: Aabb,
+    /// Bounding box of the crown along the tooth's own axes.
+    pub own_crown: Aabb,
+    pub tooth_from_own: Pose,
 }
 
 impl ToothBounds {
-    /// Unit vector toward distal in tooth space: +y in the upper right and the lower left quadrant, −y in the others.
+    /// Unit vector toward distal in tooth space: in the tooth's own axes +y in the upper right and the lower left
+    /// quadrant, −y in the others.
     pub fn distal(&self) -> Vec3 {
-        distal(self.fdi)
+        self.tooth_from_own.rotate(distal(self.fdi))
     }
 
     /// Returns the quadrant (1–4, as seen from above) of a point in tooth space on a tooth.
     pub fn quadrant(&self, point_in_tooth: Vec3) -> u8 {
-        let from_middle = point_in_tooth - self.crown.centre();
+        let from_middle = self.tooth_from_own.inverse() * point_in_tooth - self.own_crown.centre();
         match (from_middle.x > 0.0, from_middle.y > 0.0) {
             (true, true) => 1,
             (true, false) => 2,
@@ -35,29 +40,49 @@ impl ToothBounds {
     }
 }
 
+/// Seat of a tooth in an arch of voxels.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SeatedTooth {
+    pub tooth_from_own: Pose,
+    /// Half the crown's size, mm: buccolingual and mesiodistal.
+    pub half: [f32; 2],
+}
+
+impl SeatedTooth {
+    /// Distance of a point in tooth space from the tooth's axis, as a share of half its crown's size; above 1 outside.
+    fn share(&self, point_in_tooth: Vec3) -> f32 {
+        let own = self.tooth_from_own.inverse() * point_in_tooth;
+        (own.x.abs() / self.half[0]).max(own.y.abs() / self.half[1])
+    }
+}
+
 /// The part of a shared volume that belongs to a tooth.
 #[derive(Clone, Copy)]
-pub(super) enum PairHalf {
+pub(super) enum VolumePart<'a> {
     All,
     /// The half with y > 0, on the trainee's left.
     Left,
     Right,
+    /// Matter that is nearest to a tooth of an arch.
+    Seat {
+        seats: &'a [SeatedTooth],
+        tooth: usize,
+    },
 }
 
-impl PairHalf {
-    pub(super) fn of(layout: SceneLayout, tooth: usize) -> PairHalf {
-        match (layout, tooth) {
-            (SceneLayout::Pair { .. }, 0) => PairHalf::Left,
-            (SceneLayout::Pair { .. }, _) => PairHalf::Right,
-            _ => PairHalf::All,
-        }
-    }
-
+impl VolumePart<'_> {
     pub(super) fn contains(self, point_in_tooth: Vec3) -> bool {
+        /// Share of half a crown's size up to which matter can belong to it: roots spread, and crowns are not centred.
+        const REACH: f32 = 1.4;
         match self {
-            PairHalf::All => true,
-            PairHalf::Left => point_in_tooth.y > 0.0,
-            PairHalf::Right => point_in_tooth.y <= 0.0,
+            VolumePart::All => true,
+            VolumePart::Left => point_in_tooth.y > 0.0,
+            VolumePart::Right => point_in_tooth.y <= 0.0,
+            VolumePart::Seat { seats, tooth } => {
+                let own = seats[tooth].share(point_in_tooth);
+                own < REACH
+                    && seats.iter().enumerate().all(|(other, seat)| other == tooth || own <= seat.share(point_in_tooth))
+            }
         }
     }
 }

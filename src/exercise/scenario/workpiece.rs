@@ -3,12 +3,14 @@
 //! Takes a scenario and a seed, or a scenario and the volume of an earlier session. Gives the volume with its decay,
 //! the position of each tooth and each lesion, and the surroundings. The same inputs give the same voxels.
 
+use super::arch_volume::{ArchSeats, in_arch};
 use super::calculus_and_fillings::{apply_calculus, apply_old_filling};
 use super::cavity::CavityError;
 use super::lesion::{DecayPlacementError, Lesion, apply_decay, drawn_lesion, locate_lesion};
-use super::tooth_bounds::{PairHalf, ToothBounds, anatomy_tissues};
-use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec};
+use super::tooth_bounds::{ToothBounds, VolumePart, anatomy_tissues};
+use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec, distal};
 
+use super::Jaw;
 use crate::catalog::TissueTable;
 use std::fmt;
 use std::sync::Arc;
@@ -36,6 +38,9 @@ pub struct Workpiece {
     pub periodontium: Option<Arc<Periodontium>>,
     /// Positions of the teeth in both jaws.
     pub arch: DentalArches,
+    /// Pose of the arch space of the teeth's jaw (see [`typodont_anatomy::jaw`]); `None` unless all its teeth are in the
+    /// volume.
+    pub tooth_from_arch: Option<Pose>,
     pub world_from_tooth: Pose,
 }
 
@@ -117,8 +122,11 @@ impl Workpiece {
         let has_cavity = scenario.has_cavity();
         for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
             let mut volume = tooth_volume(tooth, &scenario.tissues)?;
-            let place =
+            let mut place =
                 bounds_of(tooth, &volume, &scenario.tissues).ok_or(WorkpieceError::NoEnamel { tooth: index })?;
+            if let (SceneLayout::Arch { .. }, ToothSource::Given(_)) = (scenario.scene.layout, &tooth.source) {
+                (volume, place) = moved_to_seat(tooth, volume, place, &scenario.tissues);
+            }
             for (number, decay) in tooth.decay.iter().enumerate() {
                 volume =
                     apply_decay(volume, decay, &place, &scenario.tissues, seed).map_err(|reason| match reason {
@@ -159,6 +167,11 @@ impl Workpiece {
             }
             SceneLayout::Pair { gap } => (side_by_side(&parts, &parts, gap)?, None),
             SceneLayout::Single | SceneLayout::Jaw => (parts.swap_remove(0), wholes.pop()),
+            SceneLayout::Arch { spacing } => {
+                let seats = ArchSeats::of(&scenario.scene);
+                let original = has_cavity.then(|| in_arch(&wholes, &seats, spacing)).transpose()?;
+                (in_arch(&parts, &seats, spacing)?, original)
+            }
         };
         let original = original.map(Arc::new);
         if volume.grid().len() as u64 > WORKPIECE_VOXELS_MAX {
@@ -184,13 +197,22 @@ impl Workpiece {
         seed: u64,
     ) -> Result<Workpiece, WorkpieceError> {
         let whole = original.as_ref().unwrap_or(&volume);
+        let seats = matches!(scenario.scene.layout, SceneLayout::Arch { .. }).then(|| ArchSeats::of(&scenario.scene));
         let mut teeth = Vec::new();
         let mut lesions = Vec::new();
         for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
-            let side = PairHalf::of(scenario.scene.layout, index);
-            let place = bounds_within(tooth, whole, &scenario.tissues, side);
+            let part = match (scenario.scene.layout, &seats) {
+                (_, Some(seats)) => VolumePart::Seat { seats: &seats.teeth, tooth: index },
+                (SceneLayout::Pair { .. }, _) if index == 0 => VolumePart::Left,
+                (SceneLayout::Pair { .. }, _) => VolumePart::Right,
+                _ => VolumePart::All,
+            };
+            let place = match &seats {
+                Some(seats) => seats.bounds(index, tooth, whole, &scenario.tissues),
+                None => bounds_within(tooth, whole, &scenario.tissues, part),
+            };
             let place = place.ok_or(WorkpieceError::NoEnamel { tooth: index })?;
-            lesions.extend(tooth.decay.iter().map(|decay| locate_lesion(decay, index, &place, whole, side, seed)));
+            lesions.extend(tooth.decay.iter().map(|decay| locate_lesion(decay, index, &place, whole, part, seed)));
             teeth.push(place);
         }
         let gum = scenario.scene.pockets.map(|pockets| periodontium(&volume, &teeth[0], pockets, &scenario.tissues));
@@ -204,14 +226,29 @@ impl Workpiece {
             (SceneLayout::Jaw, Some(meshes)) => meshes.clone(),
             (SceneLayout::Jaw, None) => surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues),
             (SceneLayout::Single | SceneLayout::Pair { .. }, _) => Vec::new(),
+            (SceneLayout::Arch { .. }, _) => {
+                seats.as_ref().map_or_else(Vec::new, |seats| seats.mucosa(&scenario.scene, &scenario.tissues))
+            }
         };
         let crowns = union(teeth.iter().map(|tooth| tooth.crown));
-        let world_from_tooth = world_from_tooth_above(crowns.centre().with_z(crowns.high.z));
+        let orientation = if seats.is_some() { ARCH_ORIENTATION } else { TOOTH_ORIENTATION };
+        let world_from_tooth = world_from_tooth_above(crowns.centre().with_z(crowns.high.z), orientation);
         let periodontium = gum.map(Arc::new);
         let drawn = Workpiece::draw(scenario, &lesions, seed);
         let arch = scenario.scene.arch.clone();
-        let surroundings = around;
-        Ok(Workpiece { volume, original, teeth, lesions, drawn, surroundings, periodontium, arch, world_from_tooth })
+        let tooth_from_arch = seats.map(|seats| seats.tooth_from_arch);
+        Ok(Workpiece {
+            volume,
+            original,
+            teeth,
+            lesions,
+            drawn,
+            surroundings: around,
+            periodontium,
+            arch,
+            tooth_from_arch,
+            world_from_tooth,
+        })
     }
 
     /// Returns, for each stage, the lesion that a seed draws, as an index into `lesions`; `None` without a draw.
@@ -229,6 +266,15 @@ impl Workpiece {
         }
     }
 
+    /// Returns the index of the tooth whose crown is nearest to a point in tooth space; `None` without teeth.
+    pub fn nearest_tooth(&self, point_in_tooth: Vec3) -> Option<usize> {
+        let distance = |tooth: &ToothBounds| {
+            let own = tooth.tooth_from_own.inverse() * point_in_tooth;
+            own.distance(tooth.own_crown.nearest(own))
+        };
+        (0..self.teeth.len()).min_by(|a, b| distance(&self.teeth[*a]).total_cmp(&distance(&self.teeth[*b])))
+    }
+
     /// Returns the bounding box of all teeth, tooth space, mm; without teeth the origin.
     pub fn bounds(&self) -> Aabb {
         union(self.teeth.iter().map(|tooth| tooth.whole))
@@ -239,19 +285,44 @@ impl Workpiece {
         union(self.teeth.iter().map(|tooth| tooth.crown))
     }
 
-    /// Unit vector toward distal of the first tooth, tooth space.
+    /// Returns the jaw whose teeth are all in the volume; `None` for one or two teeth.
+    pub fn arch_jaw(&self) -> Option<Jaw> {
+        self.tooth_from_arch?;
+        self.teeth.first().map(|tooth| Jaw::of(tooth.fdi))
+    }
+
+    /// Unit vector toward distal of the first tooth, tooth space; +y for a whole arch, whose teeth have no common one.
     pub fn distal(&self) -> Vec3 {
-        self.teeth.first().map_or(Vec3::Y, ToothBounds::distal)
+        self.common_distal().unwrap_or(Vec3::Y)
+    }
+
+    /// The same for all teeth; `None` for a whole arch.
+    pub fn common_distal(&self) -> Option<Vec3> {
+        let first = self.teeth.first().filter(|_| self.tooth_from_arch.is_none());
+        first.map(ToothBounds::distal)
+    }
+
+    /// Returns a direction in tooth space along the own axes of the tooth nearest to a point, and the sign of distal on
+    /// their y axis.
+    pub fn along_own_axes(&self, point_in_tooth: Vec3, direction: Vec3) -> (Vec3, f32) {
+        match self.nearest_tooth(point_in_tooth).map(|index| &self.teeth[index]) {
+            Some(tooth) => (tooth.tooth_from_own.inverse().rotate(direction), distal(tooth.fdi).y),
+            None => (direction, 1.0),
+        }
     }
 }
 
-/// Returns the pose of tooth space in world space, as the trainee sees it: the tooth stands upright, an upper tooth
-/// too, as in a model jaw on the bench. Its buccal side faces away from the trainee; +x of world space is −y of tooth
-/// space (mesial in the upper right and the lower left, distal elsewhere); the given point of tooth space is the centre
-/// of the device's workspace.
-fn world_from_tooth_above(origin_in_tooth: Vec3) -> Pose {
-    // x right = -y, y up = occlusal (z), z toward the user = lingual (-x).
-    let orientation = Quat::from_xyzw(-0.5, 0.5, 0.5, 0.5);
+/// Orientation of tooth space in world space, as the trainee sees it: the tooth stands upright, an upper tooth too, as in
+/// a model jaw on the bench. Its buccal side faces away from the trainee; +x of world space is −y of tooth space (mesial in
+/// the upper right and the lower left, distal elsewhere), +y is occlusal, +z, toward the trainee, lingual.
+const TOOTH_ORIENTATION: Quat = Quat::from_xyzw(-0.5, 0.5, 0.5, 0.5);
+
+/// The same for a whole arch, whose front (+x of tooth space) faces the trainee.
+const ARCH_ORIENTATION: Quat = Quat::from_xyzw(-0.5, -0.5, -0.5, 0.5);
+
+/// Returns the pose of tooth space in world space. The given point of tooth space is the centre of the device's
+/// workspace.
+fn world_from_tooth_above(origin_in_tooth: Vec3, orientation: Quat) -> Pose {
     Pose { position: -(orientation * origin_in_tooth), orientation }
 }
 
@@ -268,15 +339,39 @@ fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, Work
     }
 }
 
+/// Returns a tooth from a file, whose place in its file says nothing about the arch, where the generated tooth of the same
+/// number is: the middle of its crown and its lowest enamel.
+fn moved_to_seat(
+    tooth: &ToothSpec,
+    volume: Volume,
+    place: ToothBounds,
+    tissues: &TissueTable,
+) -> (Volume, ToothBounds) {
+    /// Voxel size of the generated tooth, mm.
+    const SPACING: f32 = 0.3;
+    let generated = ToothSpec { source: ToothSource::Procedural { spacing: SPACING, age: None }, ..tooth.clone() };
+    let seat = tooth_volume(&generated, tissues).ok().and_then(|volume| bounds_of(&generated, &volume, tissues));
+    let Some(seat) = seat else { return (volume, place) };
+    let foot = |bounds: &ToothBounds| bounds.crown.centre().with_z(bounds.crown.low.z);
+    let shift = foot(&seat) - foot(&place);
+    let grid = Grid { origin: volume.grid().origin + shift, ..*volume.grid() };
+    let moved = |bounds: Aabb| Aabb::new(bounds.low + shift, bounds.high + shift);
+    let (whole, crown) = (moved(place.whole), moved(place.crown));
+    let labels: Vec<Label> = volume.tissues().collect();
+    let moved = Volume::from_parts(grid, volume.half_band(), volume.densities().to_vec(), labels);
+    // The parts are those of a volume.
+    (moved.unwrap_or(volume), ToothBounds { whole, crown, own_crown: crown, ..place })
+}
+
 fn union(boxes: impl Iterator<Item = Aabb>) -> Aabb {
     boxes.reduce(Aabb::union).unwrap_or_default()
 }
 
 fn bounds_of(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable) -> Option<ToothBounds> {
-    bounds_within(tooth, volume, tissues, PairHalf::All)
+    bounds_within(tooth, volume, tissues, VolumePart::All)
 }
 
-fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, side: PairHalf) -> Option<ToothBounds> {
+fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, part: VolumePart) -> Option<ToothBounds> {
     let enamel = anatomy_tissues(tissues).enamel;
     let grid = volume.grid();
     let mut whole = Aabb::EMPTY;
@@ -284,7 +379,7 @@ fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, side
     let [nx, ny, nz] = grid.dims;
     for [y, z] in (0..nz).flat_map(|z| (0..ny).map(move |y| [y, z])) {
         let centre = |x: u32| grid.centre([x, y, z]);
-        if !side.contains(centre(0)) {
+        if !part.contains(centre(0)) {
             continue;
         }
         // The ends of each row are sufficient to determine the bounds.
@@ -299,7 +394,8 @@ fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, side
         ends(&mut whole, &|label| label != Label::AIR);
         ends(&mut crown, &|label| label == enamel);
     }
-    let place = ToothBounds { id: tooth.id.clone(), fdi: tooth.fdi, whole, crown };
+    let (id, tooth_from_own) = (tooth.id.clone(), Pose::IDENTITY);
+    let place = ToothBounds { id, fdi: tooth.fdi, whole, crown, own_crown: crown, tooth_from_own };
     (!crown.is_empty()).then_some(place)
 }
 

@@ -145,7 +145,7 @@ fn removal_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode> {
             || zones_of(ZoneRole::Target).any(|z| scored.zones[z].counted.contains(v))
     };
     let is_wrong = |v: usize| matches!(scored.verdicts[v], Verdict::Overcut | Verdict::VulnerableTouched);
-    let from_wanted = NearestOffsets::new(grid, scored.replay.workpiece.distal(), is_wanted, is_wrong);
+    let from_wanted = NearestOffsets::new(grid, &scored.replay.workpiece, is_wanted, is_wrong);
     let is_removed = |v: usize| scored.replay.volume.tissue(v) == Label::AIR;
     let protected: Vec<usize> = zones_of(ZoneRole::NeverRemove).collect();
     let mut voxels: BTreeMap<(EpisodeKind, Option<usize>), Vec<EpisodeVoxel>> = BTreeMap::new();
@@ -185,7 +185,7 @@ fn remaining_episodes(scenario: &Scenario, scored: &Scored) -> Vec<ErrorEpisode>
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
     let is_removed = |v: usize| before.tissue(v) != Label::AIR && after.tissue(v) == Label::AIR;
     let is_left = |v: usize| scored.verdicts[v] == Verdict::Left && !is_site[usize::from(before.tissue(v).0)];
-    let from_removed = NearestOffsets::new(before.grid(), scored.replay.workpiece.distal(), is_removed, is_left);
+    let from_removed = NearestOffsets::new(before.grid(), &scored.replay.workpiece, is_removed, is_left);
     let mut voxels: BTreeMap<(Option<AnatomicalDirection>, u8), Vec<EpisodeVoxel>> = BTreeMap::new();
     for voxel in (0..scored.verdicts.len()).filter(|&v| is_left(v)) {
         let tissue = before.tissue(voxel);

@@ -424,8 +424,8 @@ impl MeasureSource<'_> {
     ) -> ComputedValue {
         let Some((evidence, VoxelDistance { voxel, .. })) = computed.evidence.zip(farthest) else { return computed };
         let flags = &self.comparison.flags;
-        let distal = self.replay.workpiece.distal();
-        let offsets = NearestOffsets::new(&self.comparison.grid, distal, |v| is_in(flags[v]), |v| v == voxel);
+        let workpiece = &self.replay.workpiece;
+        let offsets = NearestOffsets::new(&self.comparison.grid, workpiece, |v| is_in(flags[v]), |v| v == voxel);
         let direction = offsets.of(voxel).map(|(_, direction)| direction);
         ComputedValue { evidence: Some(Evidence { direction, ..evidence }), ..computed }
     }

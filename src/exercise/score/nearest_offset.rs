@@ -1,5 +1,6 @@
 //! Distance and anatomical direction of voxels from the nearest voxel of a set.
 
+use crate::scenario::Workpiece;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::subgrid::SubGrid;
 use typodont_core::volume::{Grid, distance};
@@ -44,26 +45,26 @@ impl AnatomicalDirection {
 }
 
 /// The nearest voxel of a set, for the voxels within a box around all voxels in question.
-pub struct NearestOffsets {
+pub struct NearestOffsets<'a> {
     near: Option<(SubGrid, Vec<f32>, Vec<u32>)>,
-    /// Unit vector toward distal, tooth space.
-    distal: Vec3,
+    /// Names the directions: by the own axes of the tooth at which a voxel lies.
+    workpiece: &'a Workpiece,
 }
 
-impl NearestOffsets {
+impl<'a> NearestOffsets<'a> {
     /// `is_in` is true for the voxels of the set, `is_asked` for those whose offsets will be asked for.
     pub fn new(
         grid: &Grid,
-        distal: Vec3,
+        workpiece: &'a Workpiece,
         is_in: impl Fn(usize) -> bool,
         is_asked: impl Fn(usize) -> bool,
-    ) -> NearestOffsets {
+    ) -> NearestOffsets<'a> {
         let crop = SubGrid::around(grid, 1, (0..grid.len()).filter(|&v| is_in(v) || is_asked(v)));
         let near = crop.map(|crop| {
             let (distances, nearest) = distance::to_nearest(&crop.grid, |i| is_in(crop.whole_index(i)));
             (crop, distances, nearest)
         });
-        NearestOffsets { near, distal }
+        NearestOffsets { near, workpiece }
     }
 
     /// Returns the distance (mm) and direction of a voxel from the nearest voxel of the set; `None` for an empty set or
@@ -73,7 +74,8 @@ impl NearestOffsets {
         let place = crop.index_of(voxel).filter(|&i| distances[i].is_finite())?;
         let centre = |i: usize| crop.grid.centre(crop.grid.cell(i));
         let offset = centre(place) - centre(nearest[place] as usize);
-        Some((distances[place], AnatomicalDirection::of(offset, self.distal)))
+        let (offset, distal) = self.workpiece.along_own_axes(centre(place), offset);
+        Some((distances[place], AnatomicalDirection::of(offset, Vec3::Y * distal)))
     }
 }
 

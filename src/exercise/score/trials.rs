@@ -7,7 +7,7 @@
 use crate::record::Replay;
 use crate::scenario::metric_id::TrialMetric;
 use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece, anatomy_tissues};
-use crate::session::{SessionOutcome, StageResult};
+use crate::session::{AnswerRecord, SessionOutcome, StageResult};
 use typodont_core::frame::Vec3;
 use typodont_core::statistics;
 use typodont_core::tick::Tick;
@@ -49,28 +49,33 @@ impl TrialSummary {
         if stage.steps.is_some() {
             self.level_sum.get_or_insert(0.0);
         }
-        let question = stage.ask.iter().position(|question| is_about_draw(stage, &question.kind));
-        let answer = result.zip(question).and_then(|(result, question)| result.answers.get(question)?.as_ref());
-        let (Some(answer), Some(result)) = (answer, result) else {
+        // One question, or one for the tooth and one for its quadrant: the trial is correct if all its answers are.
+        let questions = stage.ask.iter().enumerate().filter(|(_, question)| is_about_draw(stage, &question.kind));
+        let answers: Option<Vec<&AnswerRecord>> =
+            questions.map(|(place, _)| result?.answers.get(place)?.as_ref()).collect();
+        let last = answers.iter().flatten().copied().max_by_key(|answer| answer.at);
+        let (Some(answers), Some(last), Some(result)) = (&answers, last, result) else {
             self.unanswered += 1;
             return;
         };
+        let is_correct = answers.iter().all(|answer| answer.correct == Some(true));
+        let answer = last;
         self.time_sum += answer.at.seconds_since(result.started);
-        let value = match answer.correct {
-            Some(true) => 1.0,
+        let value = match is_correct {
+            true => 1.0,
             // Where there is nothing to choose from, an answer shows nothing.
             _ if chance >= 1.0 => 0.0,
             _ => -chance / (1.0 - chance),
         };
-        match answer.correct {
-            Some(true) => self.correct += 1,
-            _ => self.incorrect += 1,
+        match is_correct {
+            true => self.correct += 1,
+            false => self.incorrect += 1,
         }
         if let (Some(sum), Some((level, _))) = (&mut self.level_sum, answer.step) {
             // The written coefficient: 0.7, not 0.699999988079071.
             *sum += value * (f64::from(level) * 1e6).round() / 1e6;
         }
-        if answer.correct != Some(true) && self.first_error.is_none() {
+        if !is_correct && self.first_error.is_none() {
             self.first_error = place.map(|place| (answer.at, place));
         }
     }
@@ -128,15 +133,19 @@ fn is_about_draw(stage: &Stage, kind: &QuestionKind) -> bool {
 }
 
 /// Returns the share of correct answers that a person expects who gives the most frequent correct answer to a stage's
-/// question without examining anything; 0 without a draw.
+/// questions without examining anything; 0 without a draw.
 fn chance(stage: &Stage, workpiece: &Workpiece) -> f64 {
     let Some(draw) = &stage.draw else { return 0.0 };
-    let Some(question) = stage.ask.iter().find(|question| is_about_draw(stage, &question.kind)) else { return 0.0 };
+    let about = || stage.ask.iter().map(|question| &question.kind).filter(|kind| is_about_draw(stage, kind));
+    if about().next().is_none() {
+        return 0.0;
+    }
+    let is_asked = |is_meant: fn(&QuestionKind) -> bool| about().any(is_meant);
+    let asks_tooth = is_asked(|kind| matches!(kind, QuestionKind::ToothWith { .. }));
+    let asks_quadrant = is_asked(|kind| matches!(kind, QuestionKind::QuadrantOf { .. }));
     let sites = workpiece.lesions.iter().filter(|lesion| draw.sites.contains(&lesion.id));
-    let answers: Vec<usize> = match question.kind {
-        QuestionKind::ToothWith { .. } => sites.map(|lesion| lesion.tooth).collect(),
-        _ => sites.map(|lesion| usize::from(lesion.quadrant)).collect(),
-    };
+    let answers: Vec<(Option<usize>, Option<u8>)> =
+        sites.map(|lesion| (asks_tooth.then_some(lesion.tooth), asks_quadrant.then_some(lesion.quadrant))).collect();
     let most = answers.iter().map(|answer| answers.iter().filter(|other| *other == answer).count()).max();
     most.unwrap_or(0) as f64 / answers.len().max(1) as f64
 }

@@ -635,9 +635,17 @@ impl Session {
     fn is_examined(&self, stage: &Stage, kind: &QuestionKind, value: &AnswerValue) -> bool {
         let (QuestionKind::ToothWith { decay } | QuestionKind::QuadrantOf { decay }) = kind else { return true };
         let Some(draw) = stage.draw.as_ref().filter(|draw| draw.id == *decay) else { return true };
+        // A quadrant is one of the tooth that the same stage's other answer names.
+        let other = stage.ask.iter().zip(&self.answers).find_map(|(question, answer)| match (&question.kind, answer) {
+            (QuestionKind::ToothWith { decay }, Some(answer)) if *decay == draw.id => Some(&answer.value),
+            _ => None,
+        });
+        let is_on = |truth: &GroundTruth, tooth: &AnswerValue| *tooth == AnswerValue::Word(truth.tooth.clone());
         let is_named = |truth: &GroundTruth| match value {
-            AnswerValue::Word(tooth) => truth.tooth == *tooth,
-            AnswerValue::Quadrant(quadrant) => truth.quadrant == *quadrant,
+            AnswerValue::Word(_) => is_on(truth, value),
+            AnswerValue::Quadrant(quadrant) => {
+                truth.quadrant == *quadrant && other.is_none_or(|tooth| is_on(truth, tooth))
+            }
             _ => false,
         };
         let sites = self.ground_truths.iter().zip(&self.touched).filter(|(truth, _)| draw.sites.contains(&truth.decay));

@@ -665,10 +665,12 @@ fn map_part(translator: Translator, removal: &RemovalMap, summary: &super::remov
 }
 
 /// Distal direction in a bundle's first tooth, in tooth space; +y (as in the lower left quadrant) if the tooth is not
-/// known.
-fn distal_of_bundle(bundle: &Path) -> Vec3 {
+/// known. `None` for an arch.
+fn distal_of_bundle(bundle: &Path) -> Option<Vec3> {
     let session = read_session(&bundle.join("session.json")).ok();
-    session.and_then(|session| session.tooth_fdi).map_or(Vec3::Y, typodont_exercise::scenario::distal)
+    let is_arch = session.as_ref().is_some_and(|session| session.jaw.is_some());
+    let distal = session.and_then(|session| session.tooth_fdi).map_or(Vec3::Y, typodont_exercise::scenario::distal);
+    (!is_arch).then_some(distal)
 }
 
 fn questionnaire(translator: Translator, summary: &QuestionnaireSummary) -> QuestionnairePart {

@@ -16,19 +16,14 @@ const HALO: f32 = 2.5;
 /// Space to the picture's edge, pixels.
 const MARGIN: f32 = 10.0;
 
-/// Lays a picture on white and adds directions and a scale bar. `distal` is the distal direction in tooth space.
-pub fn annotate(picture: &PixelBuffer, plane: &ImagePlane, distal: Vec3) -> PixelBuffer {
+/// Lays a picture on white and adds directions and a scale bar. `distal` is the distal direction in tooth space; without
+/// it there are no letters, for a tooth whose sides are not known and for several teeth with sides of their own.
+pub fn annotate(picture: &PixelBuffer, plane: &ImagePlane, distal: Option<Vec3>) -> PixelBuffer {
     let mut paper = PixelBuffer::filled(picture.width, picture.height, PAPER);
     paper.composite(picture);
-    draw_directions(&mut paper, plane, distal);
-    draw_scale_bar(&mut paper, plane);
-    paper
-}
-
-/// The same without letters, for a tooth whose sides are not known.
-pub fn annotate_scale(picture: &PixelBuffer, plane: &ImagePlane) -> PixelBuffer {
-    let mut paper = PixelBuffer::filled(picture.width, picture.height, PAPER);
-    paper.composite(picture);
+    if let Some(distal) = distal {
+        draw_directions(&mut paper, plane, distal);
+    }
     draw_scale_bar(&mut paper, plane);
     paper
 }

@@ -24,7 +24,7 @@ use typodont_core::frame::Vec3;
 use typodont_core::parallel::par_map;
 use typodont_core::volume::{Volume, surface};
 use typodont_exercise::record::{Recording, Replay};
-use typodont_exercise::scenario::ToothBounds;
+use typodont_exercise::scenario::{ToothBounds, Workpiece};
 use typodont_exercise::score::{Scored, Verdict};
 use verdict_colours::{TissueColours, VerdictColours};
 
@@ -135,7 +135,14 @@ fn side_pictures(
         (ViewKind::After, after_view.paint(after, |label, _| palette.tissue(label))),
         (ViewKind::Map, after_view.paint(after, |label, voxel| colours.colour_at(voxel, unchanged(label, voxel)))),
     ]
-    .map(|(shows, pixels)| RawPicture::new(shows, name, title, annotations::annotate(&pixels, &plane, distal)))
+    .map(|(shows, pixels)| {
+        RawPicture::new(
+            shows,
+            name,
+            title,
+            annotations::annotate(&pixels, &plane, scored.replay.workpiece.common_distal()),
+        )
+    })
 }
 
 fn is_unchanged(scored: &Scored) -> bool {
@@ -157,7 +164,7 @@ fn section_pictures(
 ) -> [RawPicture; 3] {
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
     let distal = scored.replay.workpiece.distal();
-    let plane = crown_image_plane(side, nearest_tooth(&scored.replay.workpiece.teeth, middle));
+    let plane = crown_image_plane(side, nearest_tooth(&scored.replay.workpiece, middle));
     let plane = ImagePlane { camera: plane.camera.with_mesial_left(distal), ..plane };
     let cut = |volume: &Volume| raycast::slice(volume, &plane, middle, |label, _| palette.tissue(label));
     let line = |volume: &Volume, colour| raycast::contour(volume, &plane, middle, colour, CONTOUR_WIDTH);
@@ -179,7 +186,12 @@ fn section_pictures(
         let mut layers = layers.into_iter();
         let mut pixels = layers.next().unwrap_or_else(|| PixelBuffer::transparent(SIZE, SIZE));
         layers.for_each(|layer| pixels.composite(&layer));
-        RawPicture::new(shows, name, title, annotations::annotate(&pixels, &plane, distal))
+        RawPicture::new(
+            shows,
+            name,
+            title,
+            annotations::annotate(&pixels, &plane, scored.replay.workpiece.common_distal()),
+        )
     })
 }
 
@@ -205,9 +217,9 @@ fn crown_image_plane(side: ViewSide, tooth: &ToothBounds) -> ImagePlane {
 }
 
 /// The tooth whose crown is nearest to a point.
-fn nearest_tooth(teeth: &[ToothBounds], point_in_tooth: Vec3) -> &ToothBounds {
-    let distance = |t: &&ToothBounds| point_in_tooth.distance(t.crown.nearest(point_in_tooth));
-    teeth.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a workpiece has a tooth")
+fn nearest_tooth(workpiece: &Workpiece, point_in_tooth: Vec3) -> &ToothBounds {
+    let nearest = workpiece.nearest_tooth(point_in_tooth).expect("a workpiece has a tooth");
+    &workpiece.teeth[nearest]
 }
 
 /// Centre of the work done and the work planned; the centre of the first crown if there is neither.

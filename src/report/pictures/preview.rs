@@ -37,16 +37,16 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, first_view: &Rgba
         if let Some(decay) = &decay {
             picture.composite(&highlight(&raycast::render_iso(decay, &shot, |_, _| DECAY_HIGHLIGHT)));
         }
-        annotations::annotate(&picture, &shot, tooth.distal())
+        annotations::annotate(&picture, &shot, workpiece.common_distal())
     };
-    let shot = crown_image_plane(ViewSide::Mesial, nearest_tooth(&workpiece.teeth, middle));
+    let shot = crown_image_plane(ViewSide::Mesial, nearest_tooth(workpiece, middle));
     let mut cut = raycast::slice(&workpiece.volume, &shot, middle, |label, _| palette.tissue(label));
     if let Some(decay) = &decay {
         cut.composite(&raycast::contour(decay, &shot, middle, DECAY_HIGHLIGHT, CONTOUR_WIDTH));
     }
     cut.composite(&raycast::contour(&workpiece.volume, &shot, middle, CONTOUR, CONTOUR_WIDTH));
     let sides = from(ViewSide::Occlusal).hconcat(&from(nearest_side(workpiece, middle)));
-    encode_png(&first.hconcat(&sides).hconcat(&annotations::annotate(&cut, &shot, tooth.distal())))
+    encode_png(&first.hconcat(&sides).hconcat(&annotations::annotate(&cut, &shot, workpiece.common_distal())))
 }
 
 /// The decay without the tooth.
@@ -58,7 +58,7 @@ fn decay_volume(scenario: &Scenario, volume: &Volume) -> Option<Volume> {
 
 /// The side of the tooth to which a point is nearest.
 fn nearest_side(workpiece: &Workpiece, point_in_tooth: Vec3) -> ViewSide {
-    let tooth = nearest_tooth(&workpiece.teeth, point_in_tooth);
+    let tooth = nearest_tooth(workpiece, point_in_tooth);
     let (low, high) = (point_in_tooth - tooth.crown.low, tooth.crown.high - point_in_tooth);
     let sides =
         [(ViewSide::Buccal, high.x), (ViewSide::Lingual, low.x), (ViewSide::Mesial, low.y), (ViewSide::Distal, high.y)];

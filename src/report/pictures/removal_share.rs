@@ -35,14 +35,14 @@ const DECAY_LINE: [f32; 3] = [1.0, 0.62, 0.24];
 const HALF_LINE_FACTOR: f32 = 1.8;
 
 /// The occlusal side and three sections through the centre of the removed matter. `tooth` is a label map; `distal` is
-/// the distal direction in its space; `share` is the share of people (0 to 1) per voxel of `grid`, in the same space.
+/// the distal direction in its space, `None` for an arch; `share` is the share of people (0 to 1) per voxel of `grid`, in the same space.
 ///
 /// # Errors
 ///
 /// When the label map cannot be read.
 pub fn draw_removal_share(
     tooth: &Path,
-    distal: Vec3,
+    distal: Option<Vec3>,
     grid: &Grid,
     share: &[f32],
 ) -> Result<Vec<EncodedPicture>, String> {
@@ -70,7 +70,8 @@ pub fn draw_removal_share(
     let mut drawn = vec![("occlusal", "Occlusal view", raycast::render_iso(&volume, &above, colour), above)];
     for (side, name, title) in SECTIONS {
         let shot = shot(side);
-        let shot = ImagePlane { camera: shot.camera.with_mesial_left(distal), ..shot };
+        let shot =
+            ImagePlane { camera: distal.map_or(shot.camera, |distal| shot.camera.with_mesial_left(distal)), ..shot };
         let mut pixels = raycast::slice(&volume, &shot, middle, colour);
         for (part, line, width) in
             [(&half, CONTOUR, HALF_LINE_FACTOR * CONTOUR_WIDTH), (&decay, DECAY_LINE, CONTOUR_WIDTH)]

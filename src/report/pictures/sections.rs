@@ -19,7 +19,7 @@ pub fn sections_png(volume: &Volume, tissues: &TissueTable) -> Vec<u8> {
             ImagePlane { camera: OrthographicCamera::framing_volume(side, volume, 1.0), width: SIZE, height: SIZE };
         let mut picture = raycast::slice(volume, &shot, through, |label, _| palette.tissue(label));
         picture.composite(&raycast::contour(volume, &shot, through, CONTOUR, CONTOUR_WIDTH));
-        annotations::annotate_scale(&picture, &shot)
+        annotations::annotate(&picture, &shot, None)
     };
     let upright = Vec3::new(crown.x, crown.y, whole.z);
     encode_png(

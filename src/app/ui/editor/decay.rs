@@ -10,6 +10,7 @@ use crate::ui::editor::field_parts::last_segment;
 use crate::ui::editor::labels::label;
 use crate::ui::editor::list::{add_ui, entries_ui, entry_ui};
 use crate::ui::editor::projection::project;
+use crate::ui::editor::sections::tooth_name;
 use crate::ui::theme;
 use crate::ui::ui_anchors::anchor;
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
@@ -29,7 +30,7 @@ pub fn decay_ui(ui: &mut egui::Ui, form: &mut FormContext) {
     let teeth = form.editor.tooth_pointers();
     for (tooth, at) in teeth.iter().enumerate() {
         if teeth.len() > 1 {
-            ui.strong(label(form.words, last_segment(at)));
+            ui.strong(tooth_name(form, at));
         }
         let list = child(at, "decay");
         let count = form.value(&list).and_then(Value::as_array).map_or(0, Vec::len);
@@ -161,19 +162,22 @@ fn size_handles(editor: &EditorState, workpiece: &Workpiece, decay: &str, tooth:
         let value = number(&pointer)?;
         Some(SizeHandle { pointer, along, value, share, limits })
     };
-    let distal = workpiece.teeth.get(tooth).map_or(Vec3::Y, |tooth| tooth.distal());
+    let place = workpiece.teeth.get(tooth);
+    let [x, y, z] =
+        [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| place.map_or(axis, |tooth| tooth.tooth_from_own.rotate(axis)));
+    let distal = place.map_or(Vec3::Y, |tooth| tooth.distal());
     let shape = format!("{decay}/shape");
     let surface = editor.draft.value_at(&format!("{decay}/surface")).and_then(Value::as_str).unwrap_or("O");
     let [wide, high] = match surface {
-        "O" => [Vec3::X, distal],
-        "B" | "L" => [distal, Vec3::Z],
-        _ => [Vec3::X, Vec3::Z],
+        "O" => [x, distal],
+        "B" | "L" => [distal, z],
+        _ => [x, z],
     };
     let all = [
         one(format!("{shape}/sphere/radius_mm"), Vec3::ZERO, 1.0, [0.2, 6.0]),
-        one(format!("{shape}/ellipsoid/radii_mm/0"), Vec3::X, 1.0, [0.2, 6.0]),
-        one(format!("{shape}/ellipsoid/radii_mm/1"), Vec3::Y, 1.0, [0.2, 6.0]),
-        one(format!("{shape}/ellipsoid/radii_mm/2"), Vec3::Z, 1.0, [0.2, 6.0]),
+        one(format!("{shape}/ellipsoid/radii_mm/0"), x, 1.0, [0.2, 6.0]),
+        one(format!("{shape}/ellipsoid/radii_mm/1"), y, 1.0, [0.2, 6.0]),
+        one(format!("{shape}/ellipsoid/radii_mm/2"), z, 1.0, [0.2, 6.0]),
         one(format!("{shape}/smooth/width_mm"), wide, 0.5, [0.4, 10.0]),
         one(format!("{shape}/smooth/height_mm"), high, 0.5, [0.4, 10.0]),
         one(format!("{shape}/fissure/length_mm"), distal, 0.5, [0.5, 15.0]),

@@ -12,6 +12,7 @@ const LABELS: &[(&str, &str)] = &[
     ("tooth", "label.tooth"),
     ("pair", "label.pair"),
     ("jaw", "label.jaw"),
+    ("dental_arch", "label.dental_arch"),
     ("left", "label.left"),
     ("right", "label.right"),
     ("gap_mm", "label.gap"),

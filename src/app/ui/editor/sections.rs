@@ -1,16 +1,16 @@
 //! The sections of an exercise in the order in which an author completes them, and the fields of each.
 
-use crate::editor::EditorCommand;
-use crate::editor::EditorSection;
+use crate::editor::{ARCH_TEETH, EditorCommand, EditorSection};
 use crate::ui::editor::diagnostics::{count_below, diagnostics_ui};
 use crate::ui::editor::field::{field_ui, remaining_fields_ui};
-use crate::ui::editor::field_parts::last_segment;
+use crate::ui::editor::field_parts::{last_segment, remove_ui};
 use crate::ui::editor::labels::label;
 use crate::ui::editor::{FormContext, decay, instruments_field, list, rubric, source_view, tissues, tooth_chart};
 use crate::ui::theme;
 use crate::ui::ui_anchors::anchor;
 use eframe::egui;
 use serde_json::{Value, json};
+use typodont_author::ARCH_SPACING_MM;
 use typodont_formats::pointer::child;
 
 const SECTIONS: [(EditorSection, &str); 9] = [
@@ -24,6 +24,9 @@ const SECTIONS: [(EditorSection, &str); 9] = [
     (EditorSection::Marks, "author.part_marks"),
     (EditorSection::Text, "author.part_text"),
 ];
+
+/// Number of teeth that an arch can list.
+const ARCH_TEETH_MAX: usize = 16;
 
 /// Top-level keys that are shown in a section of their own; all others are in the first section.
 const KEYS_WITH_SECTION: [&str; 16] = [
@@ -125,12 +128,15 @@ fn tooth_ui(ui: &mut egui::Ui, form: &mut FormContext) {
         if teeth.len() > 1 {
             ui.add_space(8.0);
             let is_chosen = form.editor.selected_decay.0 == place;
-            let radio = ui.radio(is_chosen, label(form.words, last_segment(at)));
+            let radio = ui.radio(is_chosen, tooth_name(form, at));
             if radio.clicked() {
                 form.send(EditorCommand::SelectDecay(place, 0));
             }
             if !is_chosen {
                 continue;
+            }
+            if at.starts_with(ARCH_TEETH) {
+                remove_ui(ui, form, at, &tooth_name(form, at));
             }
         }
         let fdi = form.value(&child(at, "fdi")).and_then(Value::as_u64).unwrap_or_default() as u8;
@@ -147,13 +153,27 @@ fn tooth_ui(ui: &mut egui::Ui, form: &mut FormContext) {
     if form.value("/scene/jaw").is_some() {
         remaining_fields_ui(ui, form, "/scene/jaw", &["tooth"]);
     }
+    if form.value("/scene/dental_arch").is_some() {
+        if teeth.len() < ARCH_TEETH_MAX {
+            list::add_ui(ui, form, ARCH_TEETH, &label(form.words, "tooth"));
+        }
+        remaining_fields_ui(ui, form, "/scene/dental_arch", &["teeth"]);
+    }
 }
 
-/// Choice between one tooth alone, one in its jaw, and two beside each other. The existing tooth is kept.
+/// Name of one of several teeth: its side or, in an arch, its number.
+pub fn tooth_name(form: &FormContext, at: &str) -> String {
+    match form.value(&child(at, "fdi")) {
+        Some(fdi) if at.starts_with(ARCH_TEETH) => format!("{} {fdi}", label(form.words, "tooth")),
+        _ => label(form.words, last_segment(at)),
+    }
+}
+
+/// Choice between one tooth alone, one in its jaw, two beside each other, and a whole arch. The first tooth is kept.
 fn scene_ui(ui: &mut egui::Ui, form: &mut FormContext) {
     let tooth = form.editor.tooth_pointers().first().and_then(|at| form.value(at)).cloned();
     ui.horizontal_wrapped(|ui| {
-        for kind in ["tooth", "jaw", "pair"] {
+        for kind in ["tooth", "jaw", "pair", "dental_arch"] {
             let is_it = form.value(&child("/scene", kind)).is_some();
             let radio = ui.radio(is_it, label(form.words, kind));
             anchor(ui, format!("scene:{kind}"), radio.rect);
@@ -174,6 +194,12 @@ fn scene_value(kind: &str, mut tooth: Value) -> Value {
     match kind {
         "tooth" => tooth,
         "jaw" => json!({ "tooth": tooth, "periodontium": {} }),
+        "dental_arch" => {
+            if let Some(spacing) = tooth.pointer_mut("/form/procedural/spacing_mm") {
+                *spacing = json!(ARCH_SPACING_MM);
+            }
+            json!({ "teeth": [tooth], "spacing_mm": ARCH_SPACING_MM })
+        }
         _ => {
             // The second tooth is sound: the decay to be found is in the first.
             let second = json!({ "id": "right", "fdi": tooth["fdi"], "form": tooth["form"] });

@@ -71,9 +71,11 @@ fn slice_ui(
     let id = slice_texture(ui, editor, (which, image), &shot);
     let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
     ui.painter().image(id, rect, whole, Color32::WHITE);
-    let distal_is_plus = editor.build.as_ref().is_none_or(|made| made.workpiece.distal().y > 0.0);
+    let distal = editor.build.as_ref().map_or(Some(Vec3::Y), |made| made.workpiece.common_distal());
     crosshair_ui(ui, editor.preview.slice_point, &shot, rect, scale);
-    orientation_letters_ui(ui, &shot.camera, rect, distal_is_plus);
+    if let Some(distal) = distal {
+        orientation_letters_ui(ui, &shot.camera, rect, distal.y > 0.0);
+    }
     if (view.clicked() || view.dragged())
         && let Some(at) = view.interact_pointer_pos()
     {

@@ -115,6 +115,7 @@ fn written_teeth(scene: &file::SceneFile) -> Vec<&file::ToothFile> {
         file::SceneFile::Tooth(tooth) => vec![tooth],
         file::SceneFile::Jaw(jaw) => vec![&jaw.tooth],
         file::SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
+        file::SceneFile::DentalArch(arch) => arch.teeth.iter().collect(),
     }
 }
 
@@ -123,6 +124,9 @@ fn tooth_path(scene: &file::SceneFile, tooth: usize) -> String {
         file::SceneFile::Tooth(_) => "/scene/tooth".into(),
         file::SceneFile::Jaw(_) => "/scene/jaw/tooth".into(),
         file::SceneFile::Pair(_) => format!("/scene/pair/{}", ["left", "right"][tooth.min(1)]),
+        file::SceneFile::DentalArch(arch) if tooth < arch.teeth.len() => format!("/scene/dental_arch/teeth/{tooth}"),
+        // A tooth that is not listed.
+        file::SceneFile::DentalArch(_) => "/scene/dental_arch/teeth".into(),
     }
 }
 

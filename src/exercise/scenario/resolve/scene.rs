@@ -1,6 +1,6 @@
 //! The teeth of a scene with their shapes and decay, and their surroundings.
 
-use super::{ResolveMode, Resolver, tooth_path};
+use super::{ResolveMode, Resolver, tooth_path, written_teeth};
 
 use crate::scenario::file;
 use crate::scenario::tooth_bounds::anatomy_tissues;
@@ -12,6 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use typodont_anatomy::age;
 use typodont_anatomy::caries::LesionDepth;
+use typodont_anatomy::jaw::Jaw;
 use typodont_core::frame::{Pose, Vec3, rotation_about_axes};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider};
@@ -35,11 +36,13 @@ impl Resolver<'_> {
     }
 
     pub(super) fn scene(&mut self, written: &file::SceneFile, age: Option<f32>) -> Option<Scene> {
-        let (layout, teeth) = match written {
-            file::SceneFile::Tooth(tooth) => (SceneLayout::Single, vec![tooth]),
-            file::SceneFile::Pair(pair) => (SceneLayout::Pair { gap: pair.gap_mm }, vec![&pair.left, &pair.right]),
-            file::SceneFile::Jaw(jaw) => (SceneLayout::Jaw, vec![&jaw.tooth]),
+        let layout = match written {
+            file::SceneFile::Tooth(_) => SceneLayout::Single,
+            file::SceneFile::Pair(pair) => SceneLayout::Pair { gap: pair.gap_mm },
+            file::SceneFile::Jaw(_) => SceneLayout::Jaw,
+            file::SceneFile::DentalArch(arch) => SceneLayout::Arch { spacing: arch.spacing_mm },
         };
+        let teeth = written_teeth(written);
         let paths: Vec<String> = (0..teeth.len()).map(|i| tooth_path(written, i)).collect();
         self.unique(teeth.iter().zip(&paths).map(|(t, p)| (t.id.as_str(), format!("{p}/id"))));
         let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
@@ -54,15 +57,15 @@ impl Resolver<'_> {
             teeth.iter().zip(&paths).flat_map(|(t, p)| t.old_fillings.iter().enumerate().map(move |(i, f)| (f, p, i)));
         let fillings = fillings.map(|(f, p, i)| (f.id.as_str(), format!("{p}/old_fillings/{i}/id")));
         self.unique(decay.chain(stains).chain(deposits).chain(fillings));
-        let teeth: Vec<Option<ToothSpec>> =
+        let mut teeth: Vec<Option<ToothSpec>> =
             teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path, age)).collect();
         let around = match written {
             file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
-            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+            _ => None,
         };
         let pockets = match written {
             file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(|gum| pockets(gum, age)),
-            file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => None,
+            _ => None,
         };
         if pockets.is_some() && around.is_some() {
             let help = "remove \"around\": a jaw with \"periodontium\" has its own adjacent teeth";
@@ -70,7 +73,17 @@ impl Resolver<'_> {
             self.complain("/scene/jaw/periodontium", "two-gums", message, help);
         }
         let arch = match written {
-            file::SceneFile::Jaw(jaw) => self.arch(&jaw.arch, jaw.tooth.fdi, age),
+            file::SceneFile::Jaw(jaw) => {
+                let own = |fdi, _| fdi == jaw.tooth.fdi;
+                self.arch(&jaw.arch, "/scene/jaw/arch", own, age)
+            }
+            file::SceneFile::DentalArch(written) => {
+                // A listed tooth can be rotated, but not be missing.
+                let own = |fdi, is_missing| is_missing && written.teeth.iter().any(|tooth| tooth.fdi == fdi);
+                let arch = self.arch(&written.arch, "/scene/dental_arch/arch", own, age);
+                teeth.extend(self.unlisted_teeth(written, age));
+                arch
+            }
             file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => DentalArches { age, ..DentalArches::default() },
         };
         let with_calculus = teeth.iter().position(|tooth| tooth.as_ref().is_some_and(|t| !t.calculus.is_empty()));
@@ -82,21 +95,84 @@ impl Resolver<'_> {
         Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, surroundings: around, pockets, arch })
     }
 
-    fn arch(&mut self, written: &file::ArchFile, own: u8, age: Option<f32>) -> DentalArches {
-        let missing = written.missing.iter().enumerate().map(|(i, fdi)| (*fdi, format!("/scene/jaw/arch/missing/{i}")));
+    /// Returns the sound teeth of an arch that the author did not list, and reports teeth that cannot stand in one arch.
+    fn unlisted_teeth(&mut self, written: &file::DentalArchFile, age: Option<f32>) -> Vec<Option<ToothSpec>> {
+        let jaw = written.teeth.first().map_or(Jaw::Lower, |tooth| Jaw::of(tooth.fdi));
+        let mut listed = BTreeSet::new();
+        for (index, tooth) in written.teeth.iter().enumerate() {
+            let path = format!("/scene/dental_arch/teeth/{index}");
+            if !listed.insert(tooth.fdi) {
+                let message = format!("tooth {} is listed more than once", tooth.fdi);
+                self.complain(&format!("{path}/fdi"), "duplicate-tooth", message, "list each tooth once");
+            }
+            if Jaw::of(tooth.fdi) != jaw {
+                let message = "the teeth belong to both jaws";
+                let help = "list teeth of one jaw: 11–28 or 31–48";
+                self.complain(&format!("{path}/fdi"), "two-jaws", message, help);
+            }
+            if let file::ToothSourceFile::Procedural(made) = &tooth.form
+                && made.spacing_mm != written.spacing_mm
+            {
+                let message =
+                    format!("the tooth has voxels of {} mm, the arch of {} mm", made.spacing_mm, written.spacing_mm);
+                let help = "set both spacing_mm to the same value";
+                self.complain(&format!("{path}/form/procedural"), "unequal-spacing", message, help);
+            }
+        }
+        let numbers = [1.0, -1.0].into_iter().flat_map(|side| (0..7).map(move |index| jaw.fdi(side, index)));
+        let numbers = numbers.filter(|fdi| !listed.contains(fdi) && !written.arch.missing.contains(fdi));
+        let source = || match self.mode {
+            ResolveMode::FromRecording => ToothSource::Recorded,
+            _ => ToothSource::Procedural { spacing: written.spacing_mm, age },
+        };
+        let sound = |fdi: u8| ToothSpec {
+            id: fdi.to_string(),
+            fdi,
+            source: source(),
+            decay: Vec::new(),
+            stains: Vec::new(),
+            cavity: None,
+            calculus: Vec::new(),
+            fillings: Vec::new(),
+        };
+        let teeth: Vec<ToothSpec> = numbers.map(sound).collect();
+        for (index, tooth) in written.teeth.iter().enumerate() {
+            if teeth.iter().any(|sound| sound.id == tooth.id) {
+                let message = format!("\"{}\" is the name of a tooth that is not listed", tooth.id);
+                let path = format!("/scene/dental_arch/teeth/{index}/id");
+                self.complain(&path, "duplicate-id", message, "name the tooth by its own FDI number");
+            }
+        }
+        teeth.into_iter().map(Some).collect()
+    }
+
+    /// `is_own` tells of a number, and of whether it is listed as missing, that it is a tooth of the exercise.
+    fn arch(
+        &mut self,
+        written: &file::ArchFile,
+        place: &str,
+        is_own: impl Fn(u8, bool) -> bool,
+        age: Option<f32>,
+    ) -> DentalArches {
+        let missing = written.missing.iter().enumerate();
+        let missing = missing.map(|(i, fdi)| (*fdi, true, format!("{place}/missing/{i}")));
         let rotated = written.rotated.iter().enumerate();
-        let rotated = rotated.map(|(i, r)| (r.fdi, format!("/scene/jaw/arch/rotated/{i}/fdi")));
+        let rotated = rotated.map(|(i, r)| (r.fdi, false, format!("{place}/rotated/{i}/fdi")));
+        let is_arch = place.starts_with("/scene/dental_arch");
         let mut named = BTreeSet::new();
-        for (fdi, path) in missing.chain(rotated) {
+        for (fdi, is_missing, path) in missing.chain(rotated) {
             if !named.insert(fdi) {
                 let help = "list each tooth once, either as missing or as rotated";
                 self.complain(&path, "duplicate-tooth", format!("tooth {fdi} is listed more than once"), help);
             } else if typodont_anatomy::teeth::tooth(fdi).is_none() {
                 let help = "the FDI number must be one of 11–18, 21–28, 31–38 or 41–48";
                 self.complain(&path, "unknown-tooth", format!("there is no tooth {fdi}"), help);
-            } else if fdi == own {
-                let message = format!("tooth {fdi} is the tooth of the exercise");
-                self.complain(&path, "wrong-tooth", message, "give one of the surrounding teeth");
+            } else if is_own(fdi, is_missing) {
+                let (message, help) = match is_arch {
+                    true => ("is listed under \"teeth\" and cannot be missing", "remove it from one of the two lists"),
+                    false => ("is the tooth of the exercise", "give one of the surrounding teeth"),
+                };
+                self.complain(&path, "wrong-tooth", format!("tooth {fdi} {message}"), help);
             }
         }
         let form = |f: file::ArchFormFile| ArchForm { width: f.width_mm, depth: f.depth_mm };

@@ -91,8 +91,12 @@ impl Resolver<'_> {
             file::AnswerFile::ToothWith(id) | file::AnswerFile::QuadrantOf(id) => *id == written.id,
             _ => false,
         };
-        if stage.ask.iter().filter(is_about).count() != 1 {
-            let message = "exactly one question of the stage must ask for the tooth or the quadrant that was drawn";
+        let asks_for_tooth = |q: &&&file::QuestionFile| matches!(q.answer, file::AnswerFile::ToothWith(_));
+        let about: Vec<&file::QuestionFile> = stage.ask.iter().filter(is_about).collect();
+        let for_tooth = about.iter().filter(asks_for_tooth).count();
+        if about.is_empty() || for_tooth > 1 || about.len() - for_tooth > 1 {
+            let message =
+                "one question of the stage must ask for the tooth or the quadrant that was drawn, or one for each";
             let help =
                 format!("add \"answer\": {{ \"tooth_with\": \"{}\" }} to one question under \"ask\"", written.id);
             self.complain(&at, "no-question", message, help);
@@ -269,13 +273,13 @@ impl Resolver<'_> {
         let kind = match &written.answer {
             file::AnswerFile::ToothWith(decay) => {
                 self.lesion(decay, lesions, &format!("{path}/answer/tooth_with"));
-                if !matches!(scenario.scene, file::SceneFile::Pair(_)) {
+                if !matches!(scenario.scene, file::SceneFile::Pair(_) | file::SceneFile::DentalArch(_)) {
                     let message = "there is only one tooth to choose from";
                     self.complain(
                         &format!("{path}/answer"),
                         "no-choice",
                         message,
-                        "use a scene of two teeth: { \"pair\": … }",
+                        "use a scene of several teeth: { \"pair\": … } or { \"dental_arch\": … }",
                     );
                 }
                 QuestionKind::ToothWith { decay: decay.clone() }

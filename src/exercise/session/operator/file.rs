@@ -64,7 +64,7 @@ pub enum WhenFile {
     Cutting,
     /// Stages that ask for a tooth or a quadrant with decay.
     Searching,
-    /// The stage with this id.
+    /// The stage with this id; if it has trials, each of them.
     Stage(String),
 }
 
@@ -175,6 +175,17 @@ pub struct ProbeFile {
     /// Share of the median stiffness below which a point is noticed as soft: 0.05 to 0.99.
     #[schemars(range(min = 0.05, max = 0.99))]
     pub notices_below: f32,
+    /// Share of the crown's width between the outermost points: 0.1 to 0.9. Beyond 0.62 the surface is too steep to
+    /// press on.
+    #[serde(default = "ProbeFile::usual_width")]
+    #[schemars(range(min = 0.1, max = 0.9))]
+    pub width: f32,
+}
+
+impl ProbeFile {
+    fn usual_width() -> f32 {
+        0.62
+    }
 }
 
 /// Cut out every decay, in rings from its floor up its walls.

@@ -2,6 +2,7 @@
 
 use crate::scenario::{Lesion, seeded_random};
 use crate::session::operator::file::{CarveFile, CutFile, PlaceFile};
+use crate::session::operator::palpation::over_crown;
 use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT, TOUCH_SPEED, TRAVEL_HEIGHT};
 use typodont_core::device::Move;
 use typodont_core::frame::Vec3;
@@ -57,15 +58,15 @@ impl Operator {
             PlaceFile::Site => self.random_site().map_or(0, |lesion| lesion.tooth),
             PlaceFile::Crown | PlaceFile::Quadrant(_) => 0,
         };
-        let (low, high) = (teeth[tooth].crown.low, teeth[tooth].crown.high);
-        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let high = teeth[tooth].crown.high;
+        let middle = over_crown(&teeth[tooth], 1.0, [0.0; 2]);
         let over = match place {
             PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(middle, |l| l.centre),
             PlaceFile::Site => self.random_site().map_or(middle, |lesion| lesion.centre),
             PlaceFile::Quadrant(quadrant) => {
                 let buccal = if *quadrant <= 2 { 0.42 } else { -0.42 };
                 let distal = if quadrant % 2 == 1 { 0.42 } else { -0.42 };
-                middle + Vec3::new(half.x * buccal, half.y * distal, 0.0)
+                over_crown(&teeth[tooth], 1.0, [buccal, distal])
             }
             PlaceFile::Crown | PlaceFile::Tooth(_) => middle,
         };

@@ -18,7 +18,7 @@ pub use file::{ActionFile, OperatorFile};
 
 use crate::catalog::WorkingEndEntry;
 use crate::scenario::file::ZoneRole;
-use crate::scenario::{QuestionKind, Scenario, Stage, Workpiece};
+use crate::scenario::{Draw, QuestionKind, Scenario, Stage, Workpiece};
 use crate::session::{ChartInput, Input, Session, Trainee};
 use file::{AnswerActionFile, WhenFile};
 use palpation::PalpatedPoint;
@@ -292,7 +292,11 @@ fn rule_applies(when: &WhenFile, stage: &Stage) -> bool {
         WhenFile::Searching => {
             stage.ask.iter().any(|q| matches!(q.kind, QuestionKind::ToothWith { .. } | QuestionKind::QuadrantOf { .. }))
         }
-        WhenFile::Stage(id) => stage.id == *id,
+        // Each trial is a stage of its own.
+        WhenFile::Stage(id) => {
+            let is_trial_of = |draw: &Draw| draw.trials > 1 && stage.id == format!("{id}-{}", draw.trial);
+            stage.id == *id || stage.draw.as_ref().is_some_and(is_trial_of)
+        }
     }
 }
 

@@ -1,9 +1,10 @@
 //! Palpation of teeth by pressing and sliding, and answers derived from the measured stiffness.
 
-use crate::scenario::{QuestionKind, Stage};
+use crate::scenario::{Lesion, QuestionKind, Stage, ToothBounds};
 use crate::session::operator::file::{ActionFile, AnswerActionFile, FollowFile, PressFile, ProbeFile};
-use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT, TOUCH_SPEED};
+use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT, TOUCH_SPEED, rule_applies};
 use crate::session::{AnswerValue, Input};
+use std::collections::BTreeSet;
 use typodont_core::device::{Move, MoveResult};
 use typodont_core::frame::Vec3;
 
@@ -38,7 +39,7 @@ impl Operator {
         for tooth in self.workpiece.clone().teeth.iter() {
             for line in 0..follow.lines {
                 let across = spread(line, follow.lines);
-                let path = self.line_over(tooth.crown.low, tooth.crown.high, across, radius);
+                let path = self.line_over(tooth, across, radius);
                 let Some(&start) = path.first() else { continue };
                 self.travel_to(start + Vec3::Z * TOUCH_HEIGHT);
                 let path = path.into_iter().map(|p| self.in_world(p)).collect();
@@ -56,29 +57,27 @@ impl Operator {
 
     /// Returns the path of the instrument's centre along a mesiodistal line over a crown; tooth space, mm. `across`
     /// is the buccolingual position, -1 to 1.
-    fn line_over(&self, low: Vec3, high: Vec3, across: f32, radius: f32) -> Vec<Vec3> {
+    fn line_over(&self, tooth: &ToothBounds, across: f32, radius: f32) -> Vec<Vec3> {
         /// Share of the crown's width that belongs to the occlusal surface.
         const OCCLUSAL: f32 = 0.7;
-        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * OCCLUSAL);
         (0..=24)
             .filter_map(|i| {
-                let (x, y) = (middle.x + half.x * across, middle.y + half.y * (i as f32 / 12.0 - 1.0));
-                self.surface_at(x, y, high.z).map(|(p, n)| p + n * radius)
+                let Vec3 { x, y, .. } = over_crown(tooth, OCCLUSAL, [across, i as f32 / 12.0 - 1.0]);
+                self.surface_at(x, y, tooth.crown.high.z).map(|(p, n)| p + n * radius)
             })
             .collect()
     }
 
     pub(super) fn probe(&mut self, probe: &ProbeFile, radius: f32) {
-        /// Share of the crown's width that is probed; beyond it the surface is too steep to press on.
-        const PROBED: f32 = 0.62;
-        for (index, tooth) in self.workpiece.clone().teeth.iter().enumerate() {
-            let (middle, half) = (tooth.crown.centre(), tooth.crown.half_size());
+        let searched = self.searched_teeth();
+        for (index, tooth) in self.workpiece.clone().teeth.iter().enumerate().filter(|(i, _)| searched.contains(i)) {
             for i in 0..probe.side {
                 for j in 0..probe.side {
                     // Alternating direction keeps the hand's paths short.
                     let j = if i % 2 == 0 { j } else { probe.side - 1 - j };
-                    let (u, v) = (spread(i, probe.side) * PROBED, spread(j, probe.side) * PROBED);
-                    let at = self.surface_at(middle.x + half.x * u, middle.y + half.y * v, tooth.crown.high.z);
+                    let (u, v) = (spread(i, probe.side) * probe.width, spread(j, probe.side) * probe.width);
+                    let Vec3 { x, y, .. } = over_crown(tooth, 1.0, [u, v]);
+                    let at = self.surface_at(x, y, tooth.crown.high.z);
                     if let Some((surface, normal)) = at {
                         self.tap(index, surface, normal, radius, probe);
                     }
@@ -86,6 +85,17 @@ impl Operator {
             }
         }
         self.lift_off();
+    }
+
+    /// Returns the indices of the teeth on which caries may be, as the stage's instruction tells: those with a possible site
+    /// of its draw; without a draw all.
+    fn searched_teeth(&self) -> BTreeSet<usize> {
+        let draw = self.stage.and_then(|stage| self.scenario.stages[stage].draw.as_ref());
+        let is_site = |lesion: &&Lesion| draw.is_some_and(|draw| draw.sites.contains(&lesion.id));
+        match draw {
+            Some(_) => self.workpiece.lesions.iter().filter(is_site).map(|lesion| lesion.tooth).collect(),
+            None => (0..self.workpiece.teeth.len()).collect(),
+        }
     }
 
     /// Plans a short press on a surface point and back, without rising to travelling height.
@@ -124,7 +134,8 @@ impl Operator {
 
     /// Returns answers to a stage's questions about decay, derived from the palpated points.
     pub(super) fn answers(&self, kind: &AnswerActionFile, stage: &Stage) -> Vec<Input> {
-        let noticed_below = self.file.rules.iter().flat_map(|r| &r.actions).find_map(|a| match a {
+        let rule = self.file.rules.iter().find(|rule| rule_applies(&rule.when, stage));
+        let noticed_below = rule.into_iter().flat_map(|rule| &rule.actions).find_map(|a| match a {
             ActionFile::Probe(probe) => Some(probe.notices_below),
             _ => None,
         });
@@ -143,6 +154,13 @@ impl Operator {
             |q: &crate::scenario::Question| Some(Input::Answer { question: q.id.clone(), value: answer(&q.kind)? });
         stage.ask.iter().filter_map(input).collect()
     }
+}
+
+/// Returns a point over a share of a crown's width, tooth space, mm: from lingual to buccal and along the tooth's own
+/// mesiodistal axis, each -1 to 1.
+pub(super) fn over_crown(tooth: &ToothBounds, share: f32, [across, along]: [f32; 2]) -> Vec3 {
+    let (middle, half) = (tooth.own_crown.centre(), tooth.own_crown.half_size() * share);
+    tooth.tooth_from_own * (middle + Vec3::new(half.x * across, half.y * along, 0.0))
 }
 
 /// Returns the i-th of n values spaced evenly from -1 to 1, ends included; 0 for n = 1.

@@ -62,13 +62,15 @@ impl Operator {
         let bowl = (radii - radius + margin).max(Vec3::splat(0.02));
         let floor = -0.5 * core::f32::consts::PI;
         let rings = ((TOP - floor) * bowl.max_element() / cut.pitch_mm).ceil().max(2.0) as u32;
+        let tooth_from_own = self.workpiece.teeth[lesion.tooth].tooth_from_own;
         let on_bowl = |i: u32| {
             let rise = floor + (TOP - floor) * i as f32 / (rings * POINTS) as f32;
             // Every second pass goes in the opposite sense.
             let sense = if pass.is_multiple_of(2) { 1.0 } else { -1.0 };
             let azimuth = sense * core::f32::consts::TAU * i as f32 / POINTS as f32;
             let (level, up) = (libm::cosf(rise), libm::sinf(rise));
-            lesion.centre + Vec3::new(level * libm::cosf(azimuth), level * libm::sinf(azimuth), up) * bowl
+            let own = Vec3::new(level * libm::cosf(azimuth), level * libm::sinf(azimuth), up) * bowl;
+            lesion.centre + tooth_from_own.rotate(own)
         };
         let surface =
             self.surface_at(lesion.centre.x, lesion.centre.y, self.top()).map_or(lesion.centre.z, |(p, _)| p.z);

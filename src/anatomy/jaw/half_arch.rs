@@ -1,11 +1,10 @@
 //! Positions of the teeth in one jaw.
 //!
-//! *Arch space*: x to the patient's left in the lower jaw and to the right in the upper one, y back from the edges of the
-//! central incisors, z occlusal, 0 on the plane through the incisors' edges; right-handed, mm. Both jaws have such a space of
-//! their own.
+//! In arch space, mm; each half is laid out at x > 0.
 
-use super::teeth::ToothModel;
-use typodont_anatomy::crown_contour::CrownContour;
+use super::tooth_model::ToothModel;
+use crate::crown_contour::CrownContour;
+use crate::form::ToothForm;
 use typodont_core::frame::{Pose, Quat, Vec3};
 
 /// A jaw's shape.
@@ -88,10 +87,8 @@ impl HalfArch {
         let depth = shape.depth.unwrap_or(0.5 * (low + high));
         let line = with_arc_length(&beta_curve(shape.width, depth));
         let mut half = HalfArch { seats: Vec::new(), line };
-        let girths: Vec<CrownContour> = teeth
-            .iter()
-            .map(|(model, _)| CrownContour::of(&typodont_anatomy::ToothForm { sizes: model.sizes, ..model.form }))
-            .collect();
+        let girths: Vec<CrownContour> =
+            teeth.iter().map(|(model, _)| CrownContour::of(&ToothForm { sizes: model.sizes, ..model.form })).collect();
         let mut middles: Vec<f32> = Vec::new();
         for (i, (model, width)) in teeth.iter().enumerate() {
             // Each tooth goes back until it just touches the one before it, the first until it touches its twin.
@@ -243,7 +240,7 @@ fn with_arc_length(curve: &[[f32; 2]]) -> Vec<[f32; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{crown, teeth};
+    use super::super::{crown, tooth_model};
     use super::*;
     use typodont_core::mesh::Mesh;
     use typodont_core::touch::ClosedMesh;
@@ -263,7 +260,7 @@ mod tests {
     fn neighbours_touch_and_none_overlaps_another_by_more_than_a_tenth() {
         // Aim: no gap and no overlap worth seeing, on what is drawn. Method: every corner of each crown against the next one's
         // closed surface; the first against its mirror image. Below the neck teeth are out of sight and out of touch.
-        for (form, models) in [(UPPER, teeth::UPPER), (LOWER, teeth::LOWER)] {
+        for (form, models) in [(UPPER, tooth_model::UPPER), (LOWER, tooth_model::LOWER)] {
             let half = half(form, &models);
             let crowns = crowns(&half, &models);
             for (i, pair) in crowns.windows(2).enumerate() {
@@ -286,7 +283,7 @@ mod tests {
 
     #[test]
     fn teeth_stand_upright_along_the_arch() {
-        for (form, models) in [(UPPER, teeth::UPPER), (LOWER, teeth::LOWER)] {
+        for (form, models) in [(UPPER, tooth_model::UPPER), (LOWER, tooth_model::LOWER)] {
             let half = half(form, &models);
             assert!((half.seats[6].top.x - 0.5 * form.width).abs() < 1.5);
             for seat in &half.seats {

@@ -3,19 +3,13 @@
 //! The teeth pass through the sheet, so the gingival margin is the line in which the sheet meets them: low in the
 //! middle of each tooth, high between two teeth.
 
-use super::arch::{HalfArch, ToothSeat};
-use super::crown::{ColouredMesh, compute_normals, smooth_normals};
-use super::teeth::ToothModel;
-use typodont_anatomy::periodontium::{ProbingSite, SiteLengths};
+use super::Jaw;
+use super::half_arch::{HalfArch, ToothSeat};
+use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
+use super::tooth_model::ToothModel;
+use crate::periodontium::{ProbingSite, SiteLengths};
 use typodont_core::frame::{Vec3, smooth_step};
-use typodont_render::Rgb;
-
-/// Upper or lower jaw.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Jaw {
-    Upper,
-    Lower,
-}
+use typodont_core::mesh::Mesh;
 
 /// Distance between columns along the arch, mm: a papilla is some 3 mm wide.
 const COLUMN: f32 = 0.9;
@@ -50,30 +44,120 @@ pub struct HalfJaw<'a> {
     pub sign: f32,
 }
 
+/// Region of the mucosa over a jaw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MucosaRegion {
+    /// Gingiva and alveolar mucosa on the ridge.
+    Gingiva,
+    Palate,
+    FloorOfMouth,
+}
+
+/// Depth of a solid below the jaw's base, mm.
+const SOLID_BASE: f32 = BASE - 1.0;
+
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.
-pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], fit: impl Fn(Vec3) -> Vec3) -> ColouredMesh {
-    let mut columns: Vec<Vec<(Vec3, Rgb)>> = Vec::new();
-    // Both sides end equally far back, also where one tooth is larger than its twin.
-    let ends = sides.each_ref().map(|side| side.half.frame_at(side.half.length() + PAD).0.y);
-    for (number, side) in sides.iter().enumerate() {
-        let end = side.half.length() + PAD + ends[0].max(ends[1]) - ends[number];
-        let count = (end / COLUMN).ceil() as usize;
-        let column = |i: usize| side.column(jaw, end * i as f32 / count as f32);
-        match number {
-            // From behind to the midline, then from there back; the midline once.
-            0 => columns.extend((1..=count).rev().map(column)),
-            _ => columns.extend((0..=count).map(column)),
-        }
-    }
+pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
+    let [left, right] = halves(jaw, &sides);
+    // From behind to the midline, then from there back; the midline once.
+    let mut columns: Vec<Vec<(Vec3, Tint)>> = left.into_iter().skip(1).rev().chain(right).collect();
     for (place, _) in columns.iter_mut().flatten() {
         *place = fit(*place);
     }
     closed_sheet(&columns)
 }
 
+/// The same surface as closed solids that meet without overlap, arch space, mm: of each half its ridge, and its palate or
+/// its floor.
+pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
+    let inner = match jaw {
+        Jaw::Upper => MucosaRegion::Palate,
+        Jaw::Lower => MucosaRegion::FloorOfMouth,
+    };
+    let mut solids = Vec::new();
+    for (columns, side) in halves(jaw, &sides).iter().zip(&sides) {
+        let rows = columns.first().map_or(0, Vec::len);
+        // Palate and floor begin at the last place but one of the ridge's section; between two places there is another.
+        let border = rows - INNER - 3;
+        for (region, rows) in [(MucosaRegion::Gingiva, 0..border + 1), (inner, border..rows)] {
+            let part: Vec<Vec<Vec3>> =
+                columns.iter().map(|column| column[rows.clone()].iter().map(|(place, _)| *place).collect()).collect();
+            solids.push((region, solid_under(&part, side.sign < 0.0)));
+        }
+    }
+    solids
+}
+
+/// Columns of places from the midline back, for each half.
+fn halves(jaw: Jaw, sides: &[HalfJaw; 2]) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
+    // Both sides end equally far back, also where one tooth is larger than its twin.
+    let ends = sides.each_ref().map(|side| side.half.frame_at(side.half.length() + PAD).0.y);
+    std::array::from_fn(|number| {
+        let side = &sides[number];
+        let end = side.half.length() + PAD + ends[0].max(ends[1]) - ends[number];
+        let count = (end / COLUMN).ceil() as usize;
+        (0..=count).map(|i| side.column(jaw, end * i as f32 / count as f32)).collect()
+    })
+}
+
+/// The solid between a sheet of places and a level below it, closed. Counter-clockwise seen from outside; `is_mirrored` for
+/// a sheet at x < 0, whose columns run the other way.
+fn solid_under(columns: &[Vec<Vec3>], is_mirrored: bool) -> Mesh {
+    let mut mesh = Mesh::default();
+    // Places of a column that coincide, as where it begins at the midline, are one corner.
+    let corners: Vec<Vec<u32>> = columns
+        .iter()
+        .map(|column| {
+            let mut own: Vec<u32> = Vec::with_capacity(column.len());
+            for (row, place) in column.iter().enumerate() {
+                match own.last() {
+                    Some(&before) if column[row - 1] == *place => own.push(before),
+                    _ => {
+                        own.push(mesh.positions.len() as u32);
+                        mesh.positions.push(*place);
+                    }
+                }
+            }
+            own
+        })
+        .collect();
+    let count = mesh.positions.len() as u32;
+    let below: Vec<Vec3> = mesh.positions.iter().map(|p| p.with_z(SOLID_BASE)).collect();
+    mesh.positions.extend(below);
+    let mut quad = |[a, b, c, d]: [u32; 4]| {
+        for [a, b, c] in [[a, b, c], [a, c, d]] {
+            if a != b && b != c && c != a {
+                mesh.triangles.push(if is_mirrored { [a, c, b] } else { [a, b, c] });
+            }
+        }
+    };
+    let (last_column, last_row) = (columns.len() - 1, columns[0].len() - 1);
+    for c in 0..last_column {
+        for r in 0..last_row {
+            let [a, b, d, e] = [corners[c][r], corners[c + 1][r], corners[c][r + 1], corners[c + 1][r + 1]];
+            quad([a, b, e, d]);
+            quad([d, e, b, a].map(|corner| corner + count));
+        }
+        for (r, is_first) in [(0, true), (last_row, false)] {
+            let [a, b] = [corners[c][r], corners[c + 1][r]];
+            let [a, b] = if is_first { [b, a] } else { [a, b] };
+            quad([a, b, b + count, a + count]);
+        }
+    }
+    for r in 0..last_row {
+        for (c, is_first) in [(0, true), (last_column, false)] {
+            let [a, d] = [corners[c][r], corners[c][r + 1]];
+            let [a, d] = if is_first { [a, d] } else { [d, a] };
+            quad([a, d, d + count, a + count]);
+        }
+    }
+    mesh.compute_normals();
+    mesh
+}
+
 impl HalfJaw<'_> {
     /// Places from the base's outer edge over the ridge to the midline, so far along the arch.
-    fn column(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Rgb)> {
+    fn column(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Tint)> {
         let mut rows = subdivide(&self.ridge(jaw, arc_length));
         let (foot, tint) = rows[rows.len() - 1];
         let front = self.ridge(jaw, 0.0).pop().map_or(foot, |row| row.0);
@@ -86,13 +170,13 @@ impl HalfJaw<'_> {
                 Jaw::Upper => PALATE,
                 Jaw::Lower => FLOOR,
             };
-            rows.push((Vec3::new(x, y, z + relief(jaw, front, x, y)), lerp_tint(tint, inner, 2.5 * share)));
+            rows.push((Vec3::new(x, y, z + relief(jaw, front, x, y)), mixed_tint(tint, inner, 2.5 * share)));
         }
         rows.iter().map(|&(p, tint)| (Vec3::new(p.x * self.sign, p.y, p.z), tint)).collect()
     }
 
     /// The ridge's section, from cheek to tongue.
-    fn ridge(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Rgb)> {
+    fn ridge(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Tint)> {
         let (place, distal) = self.half.frame_at(arc_length);
         let out = distal.cross(Vec3::Z);
         let RidgeSection { neck, offset, half, margin, inner_margin, between_teeth: between, root, pad } =
@@ -198,16 +282,12 @@ struct RidgeSection {
 }
 
 /// Tints of the gingiva's colour: pale where it is attached to bone, redder where it is loose.
-const ATTACHED: Rgb = [1.0, 1.0, 1.0];
-const FREE: Rgb = [1.0, 0.94, 0.93];
-const LINE: Rgb = [0.97, 0.87, 0.86];
-const MUCOSA: Rgb = [0.90, 0.70, 0.69];
-const PALATE: Rgb = [0.98, 0.96, 0.94];
-const FLOOR: Rgb = [0.88, 0.68, 0.67];
-
-fn lerp_tint(a: Rgb, b: Rgb, share: f32) -> Rgb {
-    std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share.min(1.0))
-}
+const ATTACHED: Tint = [1.0, 1.0, 1.0];
+const FREE: Tint = [1.0, 0.94, 0.93];
+const LINE: Tint = [0.97, 0.87, 0.86];
+const MUCOSA: Tint = [0.90, 0.70, 0.69];
+const PALATE: Tint = [0.98, 0.96, 0.94];
+const FLOOR: Tint = [0.88, 0.68, 0.67];
 
 /// Height on the midline.
 fn midline_height(jaw: Jaw, front: Vec3, y: f32) -> f32 {
@@ -236,25 +316,25 @@ fn relief(jaw: Jaw, front: Vec3, x: f32, y: f32) -> f32 {
 }
 
 /// Twice as many places on a smooth line through them (Catmull–Rom).
-fn subdivide(rows: &[(Vec3, Rgb)]) -> Vec<(Vec3, Rgb)> {
+fn subdivide(rows: &[(Vec3, Tint)]) -> Vec<(Vec3, Tint)> {
     let mut finer = Vec::with_capacity(2 * rows.len());
     for (i, &(place, tint)) in rows.iter().enumerate() {
         finer.push((place, tint));
         let Some(&(next, next_tint)) = rows.get(i + 1) else { break };
         let before = rows[i.saturating_sub(1)].0;
         let after = rows[(i + 2).min(rows.len() - 1)].0;
-        finer.push(((place + next) * 0.5625 - (before + after) * 0.0625, lerp_tint(tint, next_tint, 0.5)));
+        finer.push(((place + next) * 0.5625 - (before + after) * 0.0625, mixed_tint(tint, next_tint, 0.5)));
     }
     finer
 }
 
 /// Columns of places as one closed surface: the sheet, a flat base under it and a wall behind.
-fn closed_sheet(columns: &[Vec<(Vec3, Rgb)>]) -> ColouredMesh {
-    let mut made = ColouredMesh::default();
+fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
+    let mut made = TintedMesh::default();
     let rows = columns[0].len();
     for (place, tint) in columns.iter().flatten() {
         made.mesh.positions.push(*place);
-        made.vertex_colours.push(*tint);
+        made.tints.push(*tint);
     }
     let mut strip = |corner: &dyn Fn(usize, usize) -> u32, columns: usize, rows: usize| {
         for c in 0..columns - 1 {
@@ -265,8 +345,8 @@ fn closed_sheet(columns: &[Vec<(Vec3, Rgb)>]) -> ColouredMesh {
         }
     };
     strip(&|c, r| (c * rows + r) as u32, columns.len(), rows);
-    compute_normals(&mut made.mesh);
-    smooth_normals(&mut made.mesh, SMOOTHING);
+    made.mesh.compute_normals();
+    made.mesh.smooth_normals(SMOOTHING);
     // On the midline both halves end alike.
     for c in 0..columns.len() {
         let normal = &mut made.mesh.normals[c * rows + rows - 1];
@@ -277,7 +357,7 @@ fn closed_sheet(columns: &[Vec<(Vec3, Rgb)>]) -> ColouredMesh {
         for i in 0..count {
             made.mesh.positions.extend(places(i));
             made.mesh.normals.extend([normal; 2]);
-            made.vertex_colours.extend([MUCOSA; 2]);
+            made.tints.extend([MUCOSA; 2]);
         }
         for i in 0..count as u32 - 1 {
             let [a, b, c, d] = [0, 1, 2, 3].map(|n| first + 2 * i + n);
@@ -295,4 +375,37 @@ fn closed_sheet(columns: &[Vec<(Vec3, Rgb)>]) -> ColouredMesh {
         flat(&pair, rows, Vec3::Y);
     }
     made
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ArchPlan, DentalArch};
+    use super::*;
+    use typodont_core::touch::ClosedMesh;
+
+    #[test]
+    fn the_solids_of_the_mucosa_are_closed_and_lie_under_what_is_drawn() {
+        // Aim: gum, palate and floor are felt where they are seen. Method: every solid is closed and faces outward, and each corner
+        // of the drawn surface above the base lies on one of them, for straight and for turned teeth.
+        let turned = ArchPlan { rotated: vec![(35, 30.0), (12, -20.0)], ..ArchPlan::default() };
+        for (jaw, plan) in [(Jaw::Upper, ArchPlan::default()), (Jaw::Lower, ArchPlan::default()), (Jaw::Lower, turned)]
+        {
+            let arch = DentalArch::new(jaw, 7, None, &plan);
+            let solids = arch.gum_solids();
+            assert_eq!(solids.len(), 4);
+            let mut closed = Vec::new();
+            for (region, mesh) in &solids {
+                assert!(mesh.volume_mm3() > 500.0, "{jaw:?} {region:?}: {} mm³", mesh.volume_mm3());
+                closed.push(ClosedMesh::new(mesh).unwrap_or_else(|| panic!("{jaw:?} {region:?} is open")));
+            }
+            let drawn = arch.gum(&|p| p).mesh;
+            let top = drawn.positions.iter().filter(|p| p.z > BASE + 0.1);
+            let worst = top
+                .clone()
+                .step_by(7)
+                .map(|p| closed.iter().map(|solid| solid.distance(*p).abs()).fold(f32::INFINITY, f32::min));
+            let worst = worst.fold(0.0, f32::max);
+            assert!(worst < 0.01, "{jaw:?}: {worst} mm off");
+        }
+    }
 }

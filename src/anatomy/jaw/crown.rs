@@ -1,11 +1,10 @@
 //! One crown as triangles, made as a carved tooth is, but coarser and cut off below the gingival margin.
 
-use super::teeth::{ToothKind, ToothModel};
-use typodont_anatomy::{TissueLabels, grid_of_spacing, grow};
+use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
+use super::tooth_model::{ToothKind, ToothModel};
+use crate::{TissueLabels, grid_of_spacing, grow};
 use typodont_core::frame::Vec3;
-use typodont_core::mesh::Mesh;
 use typodont_core::volume::{Grid, Label, Volume, surface};
-use typodont_render::Rgb;
 
 /// Distance between samples, mm: cusps and ridges show, the finest grooves as shallow valleys. From 0.45 on edges fray, below 0.3
 /// a mouth takes longer to draw than it gains.
@@ -25,64 +24,13 @@ const DEEPER: f32 = 0.17;
 /// Labels used while a crown is made. They are independent of the exercise's tissues, since a crown is only drawn.
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
-/// A surface with a colour at each corner.
-#[derive(Clone, Debug, Default)]
-pub struct ColouredMesh {
-    pub mesh: Mesh,
-    pub vertex_colours: Vec<Rgb>,
-}
-
-impl ColouredMesh {
-    /// Adds another surface, its corners and normals carried over by a map.
-    pub fn append(
-        &mut self,
-        other: &ColouredMesh,
-        point: impl Fn(Vec3) -> Vec3,
-        direction: impl Fn(Vec3) -> Vec3,
-        is_mirrored: bool,
-    ) {
-        let first = self.mesh.positions.len() as u32;
-        self.mesh.positions.extend(other.mesh.positions.iter().map(|p| point(*p)));
-        self.mesh.normals.extend(other.mesh.normals.iter().map(|n| direction(*n)));
-        let corners = |[a, b, c]: [u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
-        self.mesh.triangles.extend(other.mesh.triangles.iter().map(|t| corners(t.map(|i| first + i))));
-        self.vertex_colours.extend(&other.vertex_colours);
-    }
-}
-
-/// Outward normals of the corners, weighted by the area of their triangles.
-pub fn compute_normals(mesh: &mut Mesh) {
-    mesh.normals = vec![Vec3::ZERO; mesh.positions.len()];
-    for &triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
-        triangle.iter().for_each(|&i| mesh.normals[i as usize] += (b - a).cross(c - a));
-    }
-    mesh.normals.iter_mut().for_each(|n| *n = n.normalize_or(Vec3::Z));
-}
-
-/// Normals as a mean over the corners around each, so often: a surface whose triangles are larger than a pixel shows no
-/// facets and no creases.
-pub fn smooth_normals(mesh: &mut Mesh, passes: usize) {
-    for _ in 0..passes {
-        let mut sums = mesh.normals.clone();
-        for triangle in &mesh.triangles {
-            let [a, b, c] = triangle.map(|i| mesh.normals[i as usize]);
-            for (&i, others) in triangle.iter().zip([b + c, c + a, a + b]) {
-                // Each edge belongs to two triangles.
-                sums[i as usize] += 0.5 * others;
-            }
-        }
-        mesh.normals = sums.into_iter().map(|sum| sum.normalize_or(Vec3::Z)).collect();
-    }
-}
-
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm.
-pub fn crown(model: &ToothModel) -> ColouredMesh {
+pub fn crown(model: &ToothModel) -> TintedMesh {
     let volume = grow(&model.form, cropped_above(grid_of_spacing(&model.form, SPACING), -ROOT_LENGTH), &TISSUES);
     let mut mesh = surface::extract(&volume);
-    smooth_normals(&mut mesh, 1);
-    let vertex_colours = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
-    ColouredMesh { mesh, vertex_colours }
+    mesh.smooth_normals(1);
+    let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
+    TintedMesh { mesh, tints }
 }
 
 /// The part of a grid above a height.
@@ -94,36 +42,31 @@ fn cropped_above(grid: Grid, height: f32) -> Grid {
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
-const NECK: Rgb = [0.98, 0.93, 0.84];
-const ROOT: Rgb = [0.93, 0.83, 0.66];
-const EDGE: Rgb = [0.93, 0.95, 0.99];
-const DEEP: Rgb = [0.84, 0.75, 0.62];
-const CANINE: Rgb = [0.99, 0.975, 0.94];
-const PLAIN: Rgb = [1.0; 3];
+const NECK: Tint = [0.98, 0.93, 0.84];
+const ROOT: Tint = [0.93, 0.83, 0.66];
+const EDGE: Tint = [0.93, 0.95, 0.99];
+const DEEP: Tint = [0.84, 0.75, 0.62];
+const CANINE: Tint = [0.99, 0.975, 0.94];
+const PLAIN: Tint = [1.0; 3];
 
-fn lerp_colour(a: Rgb, b: Rgb, share: f32) -> Rgb {
-    let share = share.clamp(0.0, 1.0);
-    std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share)
-}
-
-fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Rgb {
+fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
     let sizes = &model.form.sizes;
     let [mesial, distal] = sizes.neckline_rise;
     let rise = if place.y < 0.0 { mesial } else { distal };
     let neckline = rise * place.y * place.y / (place.x * place.x + place.y * place.y + 0.01);
     let body = if model.kind == ToothKind::Canine { CANINE } else { PLAIN };
     let height = (place.z - neckline) / sizes.crown;
-    let on_enamel = lerp_colour(NECK, body, height / 0.45);
+    let on_enamel = mixed_tint(NECK, body, height / 0.45);
     let enamel = match model.kind {
-        ToothKind::Incisor => lerp_colour(on_enamel, EDGE, (height - 0.65) / 0.3),
+        ToothKind::Incisor => mixed_tint(on_enamel, EDGE, (height - 0.65) / 0.3),
         ToothKind::Canine => on_enamel,
         ToothKind::Premolar | ToothKind::Molar if height > 0.3 => {
-            lerp_colour(on_enamel, DEEP, groove_depth(volume, place))
+            mixed_tint(on_enamel, DEEP, groove_depth(volume, place))
         }
         ToothKind::Premolar | ToothKind::Molar => on_enamel,
     };
     // Over a sample's width, so that the neckline is a line and not a stair.
-    lerp_colour(ROOT, enamel, 0.5 + (place.z - neckline) / SPACING)
+    mixed_tint(ROOT, enamel, 0.5 + (place.z - neckline) / SPACING)
 }
 
 /// 0 on flat or bulging places, 1 deep in a groove.
@@ -140,7 +83,7 @@ fn groove_depth(volume: &Volume, place: Vec3) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::teeth::{LOWER, UPPER};
+    use super::super::tooth_model::{LOWER, UPPER};
     use super::*;
     use typodont_core::touch::ClosedMesh;
 
@@ -148,7 +91,7 @@ mod tests {
     fn every_crown_is_closed_and_as_large_as_the_table_says() {
         // Aim: a closed surface facing outward, of the table's widths and length to a sample's distance.
         for model in UPPER.iter().chain(&LOWER) {
-            let ColouredMesh { mesh, vertex_colours: tints } = crown(model);
+            let TintedMesh { mesh, tints } = crown(model);
             let sizes = &model.sizes;
             assert!(ClosedMesh::new(&mesh).is_some(), "{sizes:?} is closed");
             assert!(mesh.volume_mm3() > 50.0, "{sizes:?}");

@@ -3,8 +3,8 @@
 //! Axes as in tooth space of the upper right and the lower left: x lingual (−) to buccal (+), y mesial (−) to distal (+),
 //! z apical (−) to occlusal (+), 0 at the neck.
 
-use typodont_anatomy::form::{Sizes, ToothForm};
-use typodont_anatomy::teeth;
+use crate::form::{Sizes, ToothForm};
+use crate::teeth;
 
 /// One tooth: its shape, the size of its place, and how it stands.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,232 @@
+//! The dental arch of one jaw: how its teeth stand, their crowns, and the gingiva over the ridge.
+//!
+//! *Arch space*: x to the patient's left in the lower jaw and to the right in the upper one, y back from the edges of the
+//! central incisors, z occlusal, 0 on the plane through the incisors' edges; right-handed, mm. There stand, at x > 0, the
+//! quadrants whose forms are grown as they are written (1 and 3), the mirrored ones (2 and 4) at x < 0.
+
+mod crown;
+mod gum;
+mod half_arch;
+mod tinted_mesh;
+mod tooth_model;
+
+use self::gum::HalfJaw;
+use self::half_arch::{ArchShape, HalfArch};
+use self::tooth_model::{ToothKind, ToothModel};
+use crate::age;
+use crate::age::AgeEffects;
+use crate::form::Sizes;
+use crate::teeth::distal_sign;
+use glam::Mat3;
+use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::mesh::Mesh;
+use typodont_core::parallel;
+
+pub use self::gum::MucosaRegion;
+pub use self::half_arch::ToothSeat;
+pub use self::tinted_mesh::{Tint, TintedMesh};
+
+/// Upper or lower jaw.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Jaw {
+    Upper,
+    Lower,
+}
+
+impl Jaw {
+    /// The jaw of a tooth.
+    pub fn of(fdi: u8) -> Jaw {
+        if fdi / 10 <= 2 { Jaw::Upper } else { Jaw::Lower }
+    }
+
+    pub fn other(self) -> Jaw {
+        match self {
+            Jaw::Upper => Jaw::Lower,
+            Jaw::Lower => Jaw::Upper,
+        }
+    }
+
+    /// FDI number of the tooth at a place from the midline, 0 to 7, on a side of x, 1 or −1.
+    pub fn fdi(self, side: f32, index: usize) -> u8 {
+        let quadrant = match (self, side > 0.0) {
+            (Jaw::Upper, true) => 1,
+            (Jaw::Upper, false) => 2,
+            (Jaw::Lower, true) => 3,
+            (Jaw::Lower, false) => 4,
+        };
+        10 * quadrant + index as u8 + 1
+    }
+
+    fn models(self) -> [ToothModel; 8] {
+        match self {
+            Jaw::Upper => tooth_model::UPPER,
+            Jaw::Lower => tooth_model::LOWER,
+        }
+    }
+
+    fn average_shape(self) -> ArchShape {
+        match self {
+            Jaw::Upper => half_arch::UPPER,
+            Jaw::Lower => half_arch::LOWER,
+        }
+    }
+}
+
+/// Differences from the average arch of an adult.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ArchPlan {
+    /// Width between the second molars' centres and depth to them, mm; `None` for the average.
+    pub width: Option<f32>,
+    pub depth: Option<f32>,
+    /// FDI numbers of rotated teeth, each with its rotation, degrees: mesial toward lip or cheek.
+    pub rotated: Vec<(u8, f32)>,
+    /// Age that teeth and gingiva show, years.
+    pub age: Option<f32>,
+}
+
+/// A tooth for which the arch leaves room of that tooth's own size.
+#[derive(Clone, Copy, Debug)]
+pub struct FittedTooth {
+    pub fdi: u8,
+    /// Size of its crown, mm: buccolingual, mesiodistal, height.
+    pub crown: Vec3,
+}
+
+/// Teeth and gingiva of one jaw.
+pub struct DentalArch {
+    jaw: Jaw,
+    age: Option<f32>,
+    /// On which side of x the fitted tooth stands: 1 or −1.
+    sign: f32,
+    /// The side with the fitted tooth and the other; each is laid out at x > 0.
+    fitted: ArchSide,
+    plain: ArchSide,
+}
+
+/// Half a jaw's teeth.
+#[derive(Clone)]
+struct ArchSide {
+    half: HalfArch,
+    models: Vec<ToothModel>,
+}
+
+impl DentalArch {
+    /// An arch with this many teeth on each side: 7, or 8 with third molars. A fitted third molar brings both.
+    pub fn new(jaw: Jaw, count: usize, fitted: Option<FittedTooth>, plan: &ArchPlan) -> DentalArch {
+        let fitted = fitted.map(|tooth| (tooth, usize::from(tooth.fdi % 10)));
+        let count = if fitted.is_some_and(|(_, number)| number == 8) { 8 } else { count.clamp(7, 8) };
+        let plain = jaw.models()[..count].to_vec();
+        let mut models = plain.clone();
+        if let Some((tooth, number)) = fitted {
+            models[number - 1] = fitted_model(&models[number - 1], tooth.crown);
+        }
+        let sign = fitted.map_or(1.0, |(tooth, _)| distal_sign(tooth.fdi));
+        let average = jaw.average_shape();
+        let shape = ArchShape { width: plan.width.unwrap_or(average.width), depth: plan.depth, ..average };
+        let row = |mut models: Vec<ToothModel>, side: f32| {
+            for (index, model) in models.iter_mut().enumerate() {
+                let fdi = jaw.fdi(side, index);
+                let is_fitted = side == sign && fitted.is_some_and(|(_, number)| number == index + 1);
+                // The fitted one's own crown was measured as it is.
+                model.form.age_effects = plan.age.filter(|_| !is_fitted).and_then(|years| AgeEffects::of(fdi, years));
+                model.rotation = plan.rotated.iter().find(|(turned, _)| *turned == fdi).map_or(0.0, |(_, deg)| *deg);
+            }
+            let teeth: Vec<(ToothModel, f32)> = models.iter().map(|m| (*m, m.sizes.mesiodistal[0])).collect();
+            ArchSide { half: HalfArch::new(shape, &teeth), models }
+        };
+        if fitted.is_none() && plan.rotated.is_empty() {
+            let both = row(plain, -sign);
+            return DentalArch { jaw, age: plan.age, sign, fitted: both.clone(), plain: both };
+        }
+        DentalArch { jaw, age: plan.age, sign, fitted: row(models, sign), plain: row(plain, -sign) }
+    }
+
+    pub fn jaw(&self) -> Jaw {
+        self.jaw
+    }
+
+    /// The side of x on which the fitted tooth stands, 1 or −1; 1 without one.
+    pub fn fitted_side(&self) -> f32 {
+        self.sign
+    }
+
+    /// Seat of a tooth by its side of x and its place from the midline, 0 to 7, as at x > 0.
+    pub fn seat(&self, side: f32, index: usize) -> Option<&ToothSeat> {
+        let row = if side == self.sign { &self.fitted } else { &self.plain };
+        row.half.seats.get(index)
+    }
+
+    /// Pose of each tooth in its own axes (`arch_from_tooth`), with its FDI number, from the midline back: quadrants 1 and 2
+    /// or 3 and 4.
+    pub fn teeth(&self) -> Vec<(u8, Pose)> {
+        let side = |sign: f32| {
+            let seats =
+                (0..self.plain.half.seats.len()).filter_map(move |index| Some((index, self.seat(sign, index)?)));
+            seats.map(move |(index, seat)| (self.jaw.fdi(sign, index), mirrored_pose(seat.arch_from_tooth(), sign)))
+        };
+        side(1.0).chain(side(-1.0)).collect()
+    }
+
+    /// All crowns but those that are left out, by side of x and place from the midline.
+    pub fn crowns(&self, is_left_out: &dyn Fn(f32, usize, &ToothSeat) -> bool) -> TintedMesh {
+        let crowns = parallel::par_map(self.plain.models.len(), |index| crown::crown(&self.plain.models[index]));
+        let mut all = TintedMesh::default();
+        for (index, crown) in crowns.iter().enumerate() {
+            for (row, sign) in [(&self.fitted, self.sign), (&self.plain, -self.sign)] {
+                let seat = &row.half.seats[index];
+                if is_left_out(sign, index, seat) {
+                    continue;
+                }
+                let pose = seat.arch_from_tooth();
+                let side = Vec3::new(sign, 1.0, 1.0);
+                all.append(crown, |p| pose * p * side, |n| pose.rotate(n) * side, sign < 0.0);
+            }
+        }
+        all
+    }
+
+    /// The gingiva with the palate or the floor of the mouth. `fit` may move each point.
+    pub fn gum(&self, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
+        gum::gum(self.jaw, self.sides(), fit)
+    }
+
+    /// The same surface as closed solids that do not overlap, each of one region of the mucosa.
+    pub fn gum_solids(&self) -> Vec<(MucosaRegion, Mesh)> {
+        gum::gum_solids(self.jaw, self.sides())
+    }
+
+    fn sides(&self) -> [HalfJaw<'_>; 2] {
+        let rows = if self.sign > 0.0 { [&self.plain, &self.fitted] } else { [&self.fitted, &self.plain] };
+        let recession = self.age.map_or([0.0; 6], age::recession);
+        [(rows[0], -1.0), (rows[1], 1.0)].map(|(row, sign)| HalfJaw {
+            half: &row.half,
+            models: &row.models,
+            recession,
+            sign,
+        })
+    }
+}
+
+/// A pose at x > 0, or its mirror image at x < 0 for a tooth that is a mirror image (in y) too.
+pub fn mirrored_pose(pose: Pose, sign: f32) -> Pose {
+    let across = Mat3::from_diagonal(Vec3::new(sign, 1.0, 1.0));
+    let along = Mat3::from_diagonal(Vec3::new(1.0, sign, 1.0));
+    let orientation = Quat::from_mat3(&(across * Mat3::from_quat(pose.orientation) * along)).normalize();
+    Pose { position: across * pose.position, orientation }
+}
+
+/// A table's tooth with a crown of another size.
+fn fitted_model(model: &ToothModel, crown: Vec3) -> ToothModel {
+    /// Room between the fitted crown and its neighbours on each side, mm.
+    const CONTACT: f32 = 0.05;
+    let share = |of: [f32; 2], now: f32| [now, now * of[1] / of[0]];
+    let sizes = Sizes {
+        crown: crown.z,
+        mesiodistal: share(model.sizes.mesiodistal, crown.y + 2.0 * CONTACT),
+        buccolingual: share(model.sizes.buccolingual, crown.x),
+        ..model.sizes
+    };
+    // Front teeth lean as in any jaw; the others stand as upright as their space.
+    let lean = if matches!(model.kind, ToothKind::Incisor | ToothKind::Canine) { model.lean } else { 0.0 };
+    ToothModel { sizes, lean, ..*model }
+}
