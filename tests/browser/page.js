@@ -2,9 +2,9 @@
 //
 //     node page.js PLAYWRIGHT-CORE CHROMIUM PAGE PICTURES BUNDLE.zip webgl|webgpu EXERCISE
 //
-// Serves the folder PAGE itself. Exercise 5-grinding is worked until caries is removed: `seed N` is printed once it has begun, and the
-// place of the caries, `x y z` in mm, is read from the input. In others the instrument is moved and pressed in every stage. Prints what
-// was measured as JSON. Exits with 1 and a line per claim that does not hold.
+// Serves the folder PAGE itself. `seed N` is printed once the exercise has begun, and what is to be done is read from the input as JSON:
+// `goal`, a place in mm, is worked at until caries is removed; of each of `trials` the `place` is touched, and its `answers` are given
+// as `QUESTION:ANSWER`; with neither the instrument is moved and pressed in every stage. Prints what was measured as JSON. Exits with 1 and a line per claim that does not hold.
 
 const path = require('path');
 const readline = require('readline');
@@ -69,11 +69,11 @@ main(async () => {
   };
   const now = () => [Date.now(), Number(state.ticks), Number(state.frames)];
 
-  const grind = async () => {
-    console.log(`seed ${state.seed}`);
-    const goal = numbers(await new Promise(done => readline.createInterface({ input: process.stdin }).once('line', done)));
-    // An open input would keep this process after its last line.
-    process.stdin.destroy();
+  console.log(`seed ${state.seed}`);
+  const work = JSON.parse(await new Promise(done => readline.createInterface({ input: process.stdin }).once('line', done)));
+  // An open input would keep this process after its last line.
+  process.stdin.destroy();
+  const grind = async goal => {
     await pointAt(goal);
     const cutting = now();
     for (let round = 0; round < 40 && Number(state.cleared) < 10; round += 1) {
@@ -97,10 +97,37 @@ main(async () => {
     }
     return paceSince(touching);
   };
-  const pace = exercise === '5-grinding' ? await grind() : await touch();
+  const search = async trials => {
+    const searching = now();
+    for (const [number, { place, answers }] of trials.entries()) {
+      if (number > 0) {
+        await page.keyboard.press('o');
+        await until('pointer', pointer => pointer === 'held');
+      }
+      await pointAt(place);
+      await page.mouse.down();
+      await page.waitForTimeout(1500);
+      await page.mouse.up();
+      if (number === 0) await picture('4-touching');
+      await page.keyboard.press('Escape');
+      await until('pointer', pointer => pointer === 'free');
+      const { stage } = state;
+      for (const answer of answers) {
+        await opened.click(`answer:${answer}`);
+        await page.waitForTimeout(700);
+      }
+      if (number + 1 < trials.length) await until('stage', now => now !== stage);
+      else await until('screen', screen => screen !== 'practice');
+    }
+    return paceSince(searching);
+  };
+  const pace = await (work.goal ? grind(work.goal) : work.trials.length > 0 ? search(work.trials) : touch());
   const late = state.late;
   await picture('5-worked');
-  const ended = await finishLesson(opened);
+  // After the last trial the lesson ends by itself, but for a questionnaire.
+  if (work.trials?.length > 0) await page.waitForTimeout(1500);
+  const isOver = state.screen !== 'practice' && state.screen !== 'questionnaire';
+  const ended = (isOver ? undefined : await finishLesson(opened)) ?? Date.now();
   await until('screen', screen => screen === 'results');
   const scored_ms = Date.now() - ended;
   await until('bundle', () => true);

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use typodont_core::frame::{Quat, Vec3};
 use typodont_exercise::scenario;
-use typodont_exercise::scenario::{ResolveMode, Workpiece};
+use typodont_exercise::scenario::{Question, QuestionKind, ResolveMode, Scenario, Stage, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::SourceText;
 use typodont_render::Orbit;
@@ -95,9 +95,37 @@ impl<Driver: WindowDriver> Trainee for Driver {}
 
 /// Centre of the decay of an exercise for a seed, world space, mm.
 pub fn lesion_in_world(exercise: &str, seed: u64) -> Vec3 {
+    let (_, workpiece) = made(exercise, seed);
+    workpiece.world_from_tooth * workpiece.lesions[0].centre
+}
+
+/// The caries that a trial draws, world space, mm, and the correct answers to its questions as `QUESTION:ANSWER`.
+pub struct DrawnTrial {
+    pub place: Vec3,
+    pub answers: Vec<String>,
+}
+
+/// All trials of an exercise for a seed; none in an exercise without a draw.
+pub fn drawn_trials(exercise: &str, seed: u64) -> Vec<DrawnTrial> {
+    let (scenario, workpiece) = made(exercise, seed);
+    let drawn = scenario.stages.iter().zip(&workpiece.drawn);
+    let trial = |(stage, drawn): (&Stage, &Option<usize>)| {
+        let lesion = &workpiece.lesions[(*drawn)?];
+        let answer = |question: &Question| match question.kind {
+            QuestionKind::ToothWith { .. } => Some(format!("{}:{}", question.id, workpiece.teeth[lesion.tooth].id)),
+            QuestionKind::QuadrantOf { .. } => Some(format!("{}:{}", question.id, lesion.quadrant)),
+            _ => None,
+        };
+        let place = workpiece.world_from_tooth * lesion.centre;
+        Some(DrawnTrial { place, answers: stage.ask.iter().filter_map(answer).collect() })
+    };
+    drawn.filter_map(trial).collect()
+}
+
+fn made(exercise: &str, seed: u64) -> (Scenario, Workpiece) {
     let text = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(exercise)).unwrap();
     let scenario =
         scenario::resolve(SourceText::new(exercise, text), &Library::shipped(), ResolveMode::MakeWorkpiece).unwrap();
     let workpiece = Workpiece::make(&scenario, seed).unwrap();
-    workpiece.world_from_tooth * workpiece.lesions[0].centre
+    (scenario, workpiece)
 }
