@@ -47,7 +47,7 @@ fn page_script(name: &str, adapter: &str) -> Option<(Command, Option<Display>)> 
     Some((node, Some(display)))
 }
 
-/// What `page.js` is to do in an exercise: remove caries, or touch what each trial draws and name it.
+/// Work for `page.js` in an exercise: caries to be removed, or the places that the trials draw, with their answers.
 fn work_in_page(exercise: &str, seed: u64) -> Value {
     let path = format!("scenarios/{exercise}.json");
     if exercise == DRILLED {
