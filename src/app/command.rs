@@ -49,6 +49,8 @@ pub enum AppCommand {
     TryAgain,
     /// Scores the interrupted session that the list offers, and makes its bundle.
     FinishInterrupted,
+    /// Goes on with the interrupted session that the list offers.
+    ResumeInterrupted,
     /// Moves the interrupted session that the list offers aside.
     SetAsideInterrupted,
     ShowShortcuts(bool),

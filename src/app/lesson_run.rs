@@ -3,22 +3,18 @@
 //! Takes the window's commands. Gives events, edits and the newest tick; messages that do not fit into a full queue wait
 //! here. Never waits: a step does what is due and returns.
 
-use crate::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent};
+use crate::lesson_backend::{InputDevice, LessonClient, LessonCommand, LessonConfig, LessonEvent, LessonQueues};
 use crate::lesson_sound::LessonSound;
 use crate::platform;
-use crate::snapshot::{LessonSnapshot, LimitWarning, SNAPSHOT_WORDS};
-use std::collections::VecDeque;
+use crate::snapshot::{LessonSnapshot, LimitWarning};
 use std::sync::Arc;
 use typodont_audio::SoundSender;
 use typodont_core::device::Device;
-use typodont_core::mailbox;
-use typodont_core::mailbox::{Receiver, Sender, SeqLock};
-use typodont_core::volume::Edit;
 use typodont_devices::Driver;
 use typodont_devices::mouse::Mouse;
 use typodont_exercise::session::Input;
 use typodont_lesson::live::LiveEvent;
-use typodont_lesson::{Lesson, LessonError, PendingSecondHand, PreparedSession, RecordedSession, SessionConfig};
+use typodont_lesson::{Lesson, LessonError, PendingSecondHand, RecordedSession, SessionConfig};
 use typodont_report::bundle::{CompletionStep, RecordingGrowth};
 use web_time::{Duration, Instant};
 
@@ -30,12 +26,6 @@ const RECONNECT_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Interval at which the growth of a recording in memory is kept.
 const KEEP_INTERVAL: Duration = Duration::from_millis(500);
-
-/// Capacity of the command queue and of the event queue, messages.
-const EVENT_CAPACITY: usize = 256;
-
-/// Capacity of the queue of changed voxels: some seconds of the hardest cutting. Further ones wait here.
-const EDIT_CAPACITY: usize = 1 << 16;
 
 /// A lesson that a backend runs.
 pub struct LessonRun {
@@ -88,6 +78,12 @@ impl KeptRecording {
         }
     }
 
+    /// Keeps everything so far in place of the recording with which the session goes on.
+    fn replace(&mut self, former: &str) {
+        self.keep();
+        platform::replace_recording(former, &self.session);
+    }
+
     fn keep(&mut self) {
         self.last_change = Instant::now();
         if let Some(change) = self.growth.take_change() {
@@ -107,20 +103,6 @@ impl Drop for KeptRecording {
 impl LessonRun {
     /// Creates a lesson that has not begun, and the window's ends of its queues.
     pub fn new(config: LessonConfig, sounds: SoundSender) -> (LessonClient, LessonRun) {
-        let (commands, inbox) = mailbox::channel(EVENT_CAPACITY);
-        let (event_sender, events) = mailbox::channel(EVENT_CAPACITY);
-        let (edit_sender, edits) = mailbox::channel(EDIT_CAPACITY);
-        let snapshot = Arc::new(SeqLock::new());
-        let port = LessonPort {
-            inbox,
-            events: BufferedSender::new(event_sender),
-            edits: BufferedSender::new(edit_sender),
-            snapshot: snapshot.clone(),
-            sound: LessonSound::new(&config.scenario, sounds),
-            is_paused: false,
-            shown: None,
-            wake: config.wake.clone(),
-        };
         let (mouse, device): (_, PointerDevice) = match &config.input_device {
             InputDevice::Mouse => {
                 let (mouse, device) = Mouse::new();
@@ -128,7 +110,14 @@ impl LessonRun {
             }
             InputDevice::Device(_) => (None, None),
         };
-        let client = LessonClient { commands, events, edits, snapshot, mouse };
+        let (client, queues) = LessonClient::with_queues(mouse);
+        let port = LessonPort {
+            queues,
+            sound: LessonSound::new(&config.scenario, sounds),
+            is_paused: false,
+            shown: None,
+            wake: config.wake.clone(),
+        };
         (client, LessonRun { port, phase: LessonPhase::Opening(Box::new(config), device) })
     }
 
@@ -136,7 +125,7 @@ impl LessonRun {
     pub fn advance(&mut self) -> bool {
         self.phase = match std::mem::replace(&mut self.phase, LessonPhase::Over) {
             LessonPhase::Over => {
-                self.port.events.flush();
+                self.port.queues.events.flush();
                 LessonPhase::Over
             }
             phase => self.port.advance(phase).unwrap_or_else(|failed| {
@@ -145,21 +134,13 @@ impl LessonRun {
             }),
         };
         let is_over = matches!(self.phase, LessonPhase::Over);
-        !is_over || !(self.port.events.queue.is_empty() || self.port.inbox.is_abandoned())
-    }
-
-    /// True if the next step takes so long that the window should say so before.
-    pub fn is_next_step_long(&self) -> bool {
-        matches!(self.phase, LessonPhase::Opening(..) | LessonPhase::Recorded(_))
+        !is_over || !(self.port.queues.events.is_flushed() || self.port.queues.inbox.is_abandoned())
     }
 }
 
 /// The lesson's ends of its queues.
 struct LessonPort {
-    inbox: Receiver<LessonCommand>,
-    events: BufferedSender<LessonEvent>,
-    edits: BufferedSender<Edit>,
-    snapshot: Arc<SeqLock<SNAPSHOT_WORDS>>,
+    queues: LessonQueues,
     sound: LessonSound,
     is_paused: bool,
     /// The newest tick for which a frame was requested, and the time of the request.
@@ -196,6 +177,7 @@ impl LessonPort {
             input_device,
             second,
             digests,
+            resumed,
             is_kept,
             ..
         } = config;
@@ -215,22 +197,39 @@ impl LessonPort {
         if let Some(address) = second.as_ref().and_then(PendingSecondHand::address) {
             self.send_event(LessonEvent::AwaitingSecondHand(address));
         }
-        let opening = SessionConfig {
-            scenario,
-            seed,
-            participant: &participant,
-            out: out.as_deref(),
-            digests,
-            templates,
-            started,
+        let former = resumed.as_ref().and_then(|reopened| reopened.session().kept_recording());
+        let former = former.map(|(name, _)| name.to_string());
+        let prepared = match resumed {
+            Some(reopened) => {
+                let workpiece = reopened.make_workpiece()?;
+                self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
+                reopened.prepare(workpiece, device.spec().clone(), templates)?
+            }
+            None => {
+                let opening = SessionConfig {
+                    scenario,
+                    seed,
+                    participant: &participant,
+                    out: out.as_deref(),
+                    digests,
+                    templates,
+                    started,
+                };
+                let workpiece = opening.make_workpiece()?;
+                // It is drawn while its recording is opened.
+                self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
+                opening.prepare(workpiece, device.spec().clone(), None)?
+            }
         };
-        let workpiece = opening.make_workpiece()?;
-        // It is drawn while its recording is opened.
-        self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
-        let prepared: PreparedSession = opening.prepare(workpiece, device.spec().clone(), None)?;
-        let kept = prepared.growth().filter(|_| is_kept).map(|growth| KeptRecording::new(prepared.name(), growth));
+        let mut kept = prepared.growth().filter(|_| is_kept).map(|growth| KeptRecording::new(prepared.name(), growth));
         let (mut lesson, events) = prepared.begin(device, second)?;
+        if let Some((former, kept)) = former.zip(kept.as_mut()) {
+            kept.replace(&former);
+        }
         self.send_events(events);
+        for edit in lesson.edits() {
+            self.queues.edits.send(*edit);
+        }
         lesson.await_movement();
         if reconnect.is_some() {
             // The buttons of a mouse have other functions.
@@ -286,11 +285,12 @@ impl LessonPort {
         while let Some(event) = lesson.next_assist_event() {
             self.send_event(LessonEvent::SecondHand(event));
         }
+        let queues = &mut self.queues;
         for edit in lesson.edits() {
-            self.edits.queue.push_back(*edit);
+            queues.edits.send(*edit);
         }
-        self.edits.flush();
-        self.events.flush();
+        queues.edits.flush();
+        queues.events.flush();
         let (session, live) = (lesson.session(), lesson.live());
         if let Some(step) = live.latest_step() {
             let snapshot = LessonSnapshot::new(
@@ -302,7 +302,7 @@ impl LessonPort {
             );
             let limits = lesson.limits();
             let snapshot = LessonSnapshot { warning: limits.warning(step.tick).map(LimitWarning::from), ..snapshot };
-            self.snapshot.write(snapshot.encode());
+            self.queues.snapshot.write(snapshot.encode());
             match session.stage() {
                 Some((_, stage)) if !self.is_paused && !live.is_suspended() => {
                     self.sound.update(step, stage.cutting, limits);
@@ -331,8 +331,8 @@ impl LessonPort {
     /// Carries out the window's commands; returns true when the lesson is to end.
     fn handle_commands(&mut self, lesson: &mut Lesson) -> Result<bool, LessonError> {
         // Checked first, so that commands sent before the window was closed are still carried out.
-        let is_abandoned = self.inbox.is_abandoned();
-        while let Some(command) = self.inbox.try_recv() {
+        let is_abandoned = self.queues.inbox.is_abandoned();
+        while let Some(command) = self.queues.inbox.try_recv() {
             match command {
                 LessonCommand::StageInput(stage, _)
                     if lesson.session().stage().map(|(running, _)| running) != Some(stage) => {}
@@ -368,34 +368,7 @@ impl LessonPort {
 
     /// Sends an event, and requests a frame that shows it.
     fn send_event(&mut self, event: LessonEvent) {
-        self.events.send(event);
+        self.queues.events.send(event);
         (self.wake)();
-    }
-}
-
-/// A bounded queue with a buffer before it: messages that do not fit wait in order.
-struct BufferedSender<T> {
-    sender: Sender<T>,
-    queue: VecDeque<T>,
-}
-
-impl<T> BufferedSender<T> {
-    fn new(sender: Sender<T>) -> BufferedSender<T> {
-        BufferedSender { sender, queue: VecDeque::new() }
-    }
-
-    fn send(&mut self, item: T) {
-        self.queue.push_back(item);
-        self.flush();
-    }
-
-    /// Moves as many buffered messages into the queue as fit.
-    fn flush(&mut self) {
-        for _ in 0..self.sender.free_slots().min(self.queue.len()) {
-            if let Some(item) = self.queue.pop_front() {
-                // There is room: only this side fills it.
-                let _ = self.sender.try_send(item);
-            }
-        }
     }
 }

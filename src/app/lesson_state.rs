@@ -4,10 +4,11 @@ use crate::answer_draft::parse_draft;
 use crate::completion::CompletionState;
 use crate::controls_progress::{ControlsProgress, LessonProgress};
 use crate::hand_placement::HandPlacement;
-use crate::inline_lesson::InlineLesson;
 use crate::lesson_backend::{LessonBackend, LessonClient, LessonCommand, LessonConfig, LessonEvent};
+#[cfg(not(target_family = "wasm"))]
 use crate::lesson_run::LessonRun;
 use crate::lesson_scene::{DisplayMode, LessonScene};
+#[cfg(not(target_family = "wasm"))]
 use crate::lesson_thread::LessonThread;
 use crate::messages::{self, PauseReason, SecondHandStatus};
 use crate::pointer_hand::{PointedPlace, PointerHand};
@@ -121,8 +122,7 @@ impl LessonState {
         let materials = scenario.tissues.materials();
         let hand_placement = config.is_hand_placeable().then(HandPlacement::default);
         let (sound_sender, sound_receiver) = audio::sound_channel();
-        let (client, backend) =
-            start_lesson(config, sound_sender).map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
+        let (client, backend) = start_lesson(config, &library, sound_sender)?;
         Ok(LessonState {
             scenario,
             client,
@@ -174,7 +174,12 @@ impl LessonState {
         self.stage.and_then(|stage| self.scenario.stages.get(stage))
     }
 
-    /// True if the lesson runs only within frames.
+    /// Passes on the commands of a frame to the lesson.
+    pub fn pass_on(&mut self) {
+        self.backend.pass_on();
+    }
+
+    /// True if every frame must be followed by another for the lesson to begin.
     pub fn needs_frames(&self) -> bool {
         self.backend.needs_frames()
     }
@@ -610,15 +615,30 @@ impl LessonState {
     }
 }
 
-/// Begins a lesson where this platform can run it. A lesson that cannot begin reports [`LessonEvent::Failed`].
+/// Begins a lesson on a thread of its own. A lesson that cannot begin reports [`LessonEvent::Failed`].
 ///
 /// # Errors
-/// The system's error if the lesson needs a thread that cannot be started.
-fn start_lesson(config: LessonConfig, sounds: SoundSender) -> std::io::Result<(LessonClient, Box<dyn LessonBackend>)> {
+/// A message if the system starts no thread.
+#[cfg(not(target_family = "wasm"))]
+fn start_lesson(
+    config: LessonConfig,
+    _: &Library,
+    sounds: SoundSender,
+) -> Result<(LessonClient, Box<dyn LessonBackend>), String> {
     let (client, run) = LessonRun::new(config, sounds);
-    let backend: Box<dyn LessonBackend> = match cfg!(target_family = "wasm") {
-        true => Box::new(InlineLesson::new(run)),
-        false => Box::new(LessonThread::start(run)?),
-    };
-    Ok((client, backend))
+    let thread = LessonThread::start(run).map_err(|e| format!("no-thread: the lesson cannot begin: {e}"))?;
+    Ok((client, Box::new(thread)))
+}
+
+/// Begins a lesson in a worker beside the page.
+///
+/// # Errors
+/// A message if the browser starts no worker.
+#[cfg(target_family = "wasm")]
+fn start_lesson(
+    config: LessonConfig,
+    library: &Library,
+    sounds: SoundSender,
+) -> Result<(LessonClient, Box<dyn LessonBackend>), String> {
+    crate::page_worker::start_lesson(config, library, sounds)
 }

@@ -29,6 +29,8 @@ impl LessonThread {
 impl LessonBackend for LessonThread {
     fn advance(&mut self) {}
 
+    fn pass_on(&mut self) {}
+
     fn needs_frames(&self) -> bool {
         false
     }

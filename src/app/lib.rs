@@ -16,8 +16,16 @@
 mod editor;
 mod lesson_backend;
 mod lesson_run;
+#[cfg(not(target_family = "wasm"))]
 mod lesson_thread;
-mod inline_lesson;
+#[cfg(any(target_family = "wasm", test))]
+mod lesson_message;
+#[cfg(any(target_family = "wasm", test))]
+mod lesson_host;
+#[cfg(any(target_family = "wasm", test))]
+mod remote_lesson;
+#[cfg(target_family = "wasm")]
+mod page_worker;
 mod command;
 mod screen;
 mod ui;
@@ -52,6 +60,8 @@ pub mod readiness;
 pub use app::App;
 pub use editor::OpenMode;
 pub use kiosk::{KioskOptions, StationOptions};
+#[cfg(target_family = "wasm")]
+pub use page_worker::serve_lesson;
 pub use platform::LogSink;
 pub use supervisor_code::SupervisorCode;
 pub use user_folder::UserFolder;

@@ -39,7 +39,7 @@ mod native;
 
 pub use clip::{Clip, Replacements};
 pub use cries::CRIES;
-pub use load::{DrillLoad, Tool};
+pub use load::{DrillLoad, LOAD_WORDS, Tool};
 pub use playback::{AudioError, PlaybackOptions};
 pub use player::{PlayerEvent, RETRY_INTERVAL, SoundPlayer, output_name};
 pub use sound_channel::{SoundReceiver, SoundSender, sound_channel};

@@ -40,7 +40,7 @@ pub struct DrillLoad {
 }
 
 /// Number of words of a load in a mailbox.
-pub(super) const LOAD_WORDS: usize = 5;
+pub const LOAD_WORDS: usize = 5;
 
 /// Bits of the flags in the first word; its lowest two bits are the tool.
 const IS_RUNNING: u32 = 1 << 2;
@@ -68,7 +68,8 @@ impl DrillLoad {
         }
     }
 
-    pub(super) fn encode(self) -> [u32; LOAD_WORDS] {
+    /// The load as words, of which [`DrillLoad::decode`] makes the same load.
+    pub fn encode(self) -> [u32; LOAD_WORDS] {
         let flags = [
             (self.is_running, IS_RUNNING),
             (self.is_touching, IS_TOUCHING),
@@ -81,7 +82,7 @@ impl DrillLoad {
         [first, numbers[0], numbers[1], numbers[2], numbers[3]]
     }
 
-    pub(super) fn decode(words: [u32; LOAD_WORDS]) -> DrillLoad {
+    pub fn decode(words: [u32; LOAD_WORDS]) -> DrillLoad {
         let [first, numbers @ ..] = words;
         let [speed, force, surface_speed, hardness] = numbers.map(f32::from_bits);
         let tool = [Tool::AirTurbine, Tool::Electric, Tool::LowSpeed, Tool::Hand][(first & 0b11) as usize];

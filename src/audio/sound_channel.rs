@@ -89,6 +89,16 @@ impl SoundReceiver {
         }
     }
 
+    /// The load that was set last; `None` before the first, and while one is being written.
+    pub fn load(&self) -> Option<DrillLoad> {
+        self.load.read().map(|(_, words)| DrillLoad::decode(words))
+    }
+
+    /// Strength of the next cry that waits, 0 to 1, where another player is to play it.
+    pub fn next_cry(&mut self) -> Option<f32> {
+        self.cries.try_recv()
+    }
+
     /// Drops the cries that were sent while nothing could be heard.
     pub(super) fn drop_pending_cries(&mut self) {
         while self.cries.try_recv().is_some() {}

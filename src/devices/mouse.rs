@@ -56,6 +56,14 @@ pub struct HandTarget {
     pub yaw: f32,
 }
 
+/// Everything that a window sets of a mouse.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MouseTarget {
+    pub hand: HandTarget,
+    /// Bit mask of the pressed buttons.
+    pub buttons: u32,
+}
+
 /// A mouse as seen by a window. Clones refer to the same mouse.
 #[derive(Clone, Debug)]
 pub struct Mouse(Arc<MouseState>);
@@ -113,6 +121,17 @@ impl Mouse {
             true => self.0.buttons.fetch_or(mask, Ordering::Relaxed),
             false => self.0.buttons.fetch_and(!mask, Ordering::Relaxed),
         };
+    }
+
+    /// The target and the buttons as they are now.
+    pub fn state(&self) -> MouseTarget {
+        MouseTarget { hand: self.0.target(), buttons: self.0.buttons.load(Ordering::Relaxed) }
+    }
+
+    /// Sets the target and all buttons, as [`Mouse::state`] of another mouse gave them.
+    pub fn follow(&self, other: MouseTarget) {
+        self.aim(other.hand);
+        self.0.buttons.store(other.buttons, Ordering::Relaxed);
     }
 
     /// Releases all buttons and aims at `place` (world space, mm) without force. At the position of the working end

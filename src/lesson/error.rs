@@ -23,6 +23,8 @@ pub enum LessonError {
     ShortCode { least: usize },
     /// The random choices of the exercise cannot be sealed.
     NotSealable { scenario: String },
+    /// An interrupted session cannot go on.
+    NotResumable { why: String },
     /// The bundle's folder cannot be made or filled.
     Bundle(BundleError),
     /// The session stopped; `folder` holds its recording up to then, unless it was made in memory.
@@ -71,6 +73,9 @@ impl fmt::Display for LessonError {
                 "{scenario}: not-sealable: a sealed seed requires an exercise with \"draw\" and without other random \
                  positions or depths, which the recording contains from the beginning"
             ),
+            LessonError::NotResumable { why } => {
+                write!(f, "not-resumable: the session cannot be continued: {why}; score the work done so far instead")
+            }
             LessonError::Bundle(unmade) => unmade.fmt(f),
             LessonError::Stopped { why, folder: None } => f.write_str(why),
             LessonError::Stopped { why, folder: Some(folder) } => {

@@ -40,6 +40,8 @@ mod seed;
 mod session_folder;
 mod tooth_scan;
 #[cfg(feature = "devices")]
+mod continuation;
+#[cfg(feature = "devices")]
 mod device_selection;
 #[cfg(feature = "devices")]
 pub mod live;
@@ -56,6 +58,8 @@ pub use seed::{SessionSeed, is_long_enough, is_sealable, new_examiner_code};
 pub use session_folder::{Attempt, InterruptedSession, SessionFolder};
 pub use tooth_scan::ToothScan;
 
+#[cfg(feature = "devices")]
+pub use continuation::ReopenedSession;
 #[cfg(feature = "devices")]
 pub use device_selection::{OpenDevice, open_device};
 #[cfg(feature = "devices")]

@@ -7,7 +7,7 @@
 use core::time::Duration;
 use std::collections::VecDeque;
 use std::fmt;
-use typodont_core::device::{Device, DeviceError, DeviceSpec, DeviceState};
+use typodont_core::device::{Device, DeviceError, DeviceSpec, DeviceState, Reading};
 use typodont_core::sim::{Command, Simulation, Step};
 use typodont_core::tick::Tick;
 use typodont_core::touch::Gate;
@@ -156,23 +156,7 @@ impl LiveSession {
         second: Option<SecondHandLink>,
         observer: &mut O,
     ) -> Result<(LiveSession, Vec<LiveEvent>), LiveError<O::Error>> {
-        let mut live = LiveSession {
-            state: LiveState::Ended,
-            tick: Tick::ZERO,
-            pending_commands: VecDeque::new(),
-            edits: Vec::new(),
-            gate: Gate::default(),
-            latest_step: None,
-            buttons: 0,
-            interruptions: 0,
-            pauses: 0,
-            spec: device.spec().clone(),
-            is_paused: false,
-            awaits_movement: false,
-            is_awaiting: false,
-            was_ready: false,
-            final_timing: None,
-        };
+        let mut live = LiveSession::before_start(device.spec().clone());
         let mut events = Vec::new();
         for effect in session.begin() {
             if let Effect::Command(command) = &effect {
@@ -185,6 +169,62 @@ impl LiveSession {
         }
         live.start(simulation, device, second, TimingStats::default())?;
         Ok((live, events))
+    }
+
+    /// Goes on with a session that was interrupted `interruptions` times: one tick releases the hand, and then the servo starts
+    /// with the commands that were not carried out. Returns the events of that tick.
+    ///
+    /// # Errors
+    ///
+    /// [`LiveError::Observer`] if the observer failed, [`LiveError::Servo`] if the servo cannot be started.
+    pub fn resume<O: Observer>(
+        session: &mut Session,
+        mut simulation: Simulation,
+        pending_commands: VecDeque<Command>,
+        interruptions: u64,
+        device: Box<dyn Device + Send>,
+        observer: &mut O,
+    ) -> Result<(LiveSession, Vec<LiveEvent>), LiveError<O::Error>> {
+        let mut live = LiveSession {
+            tick: simulation.tick(),
+            pending_commands,
+            gate: *simulation.gate(),
+            interruptions,
+            ..LiveSession::before_start(device.spec().clone())
+        };
+        let mut events = Vec::new();
+        if !session.are_stages_over() {
+            let step = simulation.step(&Reading::ABSENT);
+            observer.tick_completed(&Reading::ABSENT, &step, simulation.edits())?;
+            (live.tick, live.gate, live.latest_step) = (step.tick.next(), *simulation.gate(), Some(step));
+            let effects = session.advance(SessionEvent::Tick { step: &step, edits: simulation.edits() });
+            live.apply_effects(effects, session, observer, &mut events)?;
+        }
+        if !session.are_stages_over() {
+            live.start(simulation, device, None, TimingStats::default())?;
+        }
+        Ok((live, events))
+    }
+
+    /// A session whose servo does not run yet.
+    fn before_start(spec: DeviceSpec) -> LiveSession {
+        LiveSession {
+            state: LiveState::Ended,
+            tick: Tick::ZERO,
+            pending_commands: VecDeque::new(),
+            edits: Vec::new(),
+            gate: Gate::default(),
+            latest_step: None,
+            buttons: 0,
+            interruptions: 0,
+            pauses: 0,
+            spec,
+            is_paused: false,
+            awaits_movement: false,
+            is_awaiting: false,
+            was_ready: false,
+            final_timing: None,
+        }
     }
 
     fn start<E>(

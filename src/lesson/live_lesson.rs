@@ -1,5 +1,6 @@
 //! A session with a person at a device, recorded while it runs.
 
+use super::continuation::Resumption;
 use super::disk_sync::DiskSync;
 use super::live::{LiveError, LiveEvent, LiveSession};
 use super::preparation::{PreparedSession, RecordedSession};
@@ -10,7 +11,7 @@ use typodont_core::sim::{Command, Simulation, Step};
 use typodont_core::tick::Tick;
 use typodont_core::volume::Edit;
 use typodont_devices::servo::{SecondHandEvent, SecondHandServo};
-use typodont_exercise::record::{Recorder, RecorderError, RecordingEndFile};
+use typodont_exercise::record::{Continuation, Recorder, RecorderError, RecordingEndFile};
 use typodont_exercise::score::LimitMonitor;
 use typodont_exercise::session::{Effect, Input, Observer, Session};
 use typodont_report::Templates;
@@ -62,6 +63,41 @@ impl Lesson {
         let clutch = ClutchControls::default();
         let lesson =
             Lesson { session, live, assist, observer, disk_sync, partial_bundle, templates, has_second_hand, clutch };
+        Ok((lesson, events))
+    }
+
+    /// Goes on with an interrupted session. Returns its effects so far; [`Lesson::edits`] holds all changed voxels so far.
+    pub(super) fn go_on(
+        prepared: PreparedSession,
+        device: Box<dyn Device + Send>,
+    ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
+        let PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, resumption, .. } =
+            prepared;
+        let Some(Resumption { continuation, interruptions, former }) = resumption else {
+            return Err(LessonError::NotResumable { why: "nothing was recorded".into() });
+        };
+        let Continuation { simulation, mut session, pending_commands, is_clutch_pressed, effects, edits } =
+            continuation;
+        let limits = LimitMonitor::new(&scenario, &workpiece);
+        let mut observer = RecordingObserver { recorder, edits, handle_orientation: UPRIGHT, limits };
+        let mut events: Vec<LiveEvent> = effects.into_iter().map(LiveEvent::Effect).collect();
+        let resumed =
+            LiveSession::resume(&mut session, simulation, pending_commands, interruptions, device, &mut observer);
+        let (live, first_events) = resumed.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
+        events.extend(first_events);
+        Resumption::replace_former(former, &partial_bundle);
+        let lesson = Lesson {
+            session,
+            live,
+            assist: None,
+            observer,
+            disk_sync,
+            partial_bundle,
+            templates,
+            has_second_hand: false,
+            // Released with the first ticks, unless it is pressed again.
+            clutch: ClutchControls { is_pressed: is_clutch_pressed, ..ClutchControls::default() },
+        };
         Ok((lesson, events))
     }
 

@@ -4,7 +4,7 @@ use super::LessonError;
 use super::disk_sync::DiskSync;
 use super::seed::{SessionSeed, started_text};
 #[cfg(feature = "devices")]
-use super::{Lesson, PendingSecondHand, live::LiveEvent};
+use super::{Lesson, PendingSecondHand, continuation::Resumption, live::LiveEvent};
 use jiff::Timestamp;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -48,6 +48,9 @@ pub struct PreparedSession {
     pub(super) templates: Templates,
     spec: DeviceSpec,
     seed: u64,
+    /// State of a session that goes on; `None` for a new one.
+    #[cfg(feature = "devices")]
+    pub(super) resumption: Option<Resumption>,
 }
 
 impl SessionConfig<'_> {
@@ -83,21 +86,41 @@ impl SessionConfig<'_> {
             digests,
             ..RecordingHeadFile::of(&scenario, &spec, seed.value)
         };
-        let name = bundle_name(&head, started);
+        SessionConfig::open(&head, scenario, workpiece, spec, out, templates)
+    }
+
+    /// Creates the folder and the recording that a head describes.
+    pub(super) fn open(
+        head: &RecordingHeadFile,
+        scenario: Arc<Scenario>,
+        workpiece: Arc<Workpiece>,
+        spec: DeviceSpec,
+        out: Option<&Path>,
+        templates: Templates,
+    ) -> Result<PreparedSession, LessonError> {
+        let name = bundle_name(head);
         let partial_bundle = match out {
             Some(out) => PartialBundle::create(out, &name)?,
             None => PartialBundle::in_memory(&name),
         };
-        let recorder = partial_bundle.start_recording(&head, &scenario, &workpiece);
+        let recorder = partial_bundle.start_recording(head, &scenario, &workpiece);
         let opened = recorder.map_err(LessonError::RecordingNotStarted).and_then(|recorder| {
             let start = |path: PathBuf| DiskSync::start(&path).map_err(|why| LessonError::NoDiskSync { path, why });
             Ok((recorder, partial_bundle.recording_path().map(start).transpose()?))
         });
         match opened {
-            Ok((recorder, disk_sync)) => {
-                let seed = seed.value;
-                Ok(PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, spec, seed })
-            }
+            Ok((recorder, disk_sync)) => Ok(PreparedSession {
+                scenario,
+                workpiece,
+                recorder,
+                disk_sync,
+                partial_bundle,
+                templates,
+                spec,
+                seed: head.seed,
+                #[cfg(feature = "devices")]
+                resumption: None,
+            }),
             Err(error) => {
                 partial_bundle.abandon();
                 Err(error)
@@ -108,13 +131,18 @@ impl SessionConfig<'_> {
 
 /// Name `exercise_time_digest`: it sorts by exercise and time, differs for two sessions of the same second, and
 /// contains no participant code.
-fn bundle_name(head: &RecordingHeadFile, started: Timestamp) -> String {
+fn bundle_name(head: &RecordingHeadFile) -> String {
     // The name of a folder must not help to find a sealed seed.
     let seed = if head.seed_origin == Some(SeedOriginFile::Sealed) { 0 } else { head.seed };
     // A browser has no processes.
     let process = if cfg!(target_family = "wasm") { 0 } else { std::process::id() };
-    let digest = Sha256::digest(format!("{}/{seed}/{process}/{started}", head.participant));
-    format!("{}_{}_{}", head.scenario_id, started.strftime("%Y%m%dT%H%M%SZ"), hex(&digest[..4]))
+    let RecordingHeadFile { participant, started, resumed, .. } = head;
+    let parts = resumed
+        .iter()
+        .fold(format!("{participant}/{seed}/{process}/{started}"), |parts, tick| format!("{parts}/{tick}"));
+    let digest = Sha256::digest(parts);
+    let moment = started.replace(['-', ':'], "");
+    format!("{}_{moment}_{}", head.scenario_id, hex(&digest[..4]))
 }
 
 impl PreparedSession {
@@ -128,7 +156,8 @@ impl PreparedSession {
         self.partial_bundle.growth()
     }
 
-    /// Begins a session with a device that a person operates, in real time. Returns the first events.
+    /// Begins a session with a device that a person operates, in real time, or goes on with one that was interrupted, without
+    /// a second hand. Returns the first events.
     ///
     /// # Errors
     ///
@@ -140,7 +169,10 @@ impl PreparedSession {
         second: Option<PendingSecondHand>,
     ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
         let simulation = self.simulation();
-        Lesson::begin(self, simulation, device, second)
+        match self.resumption {
+            Some(_) => Lesson::go_on(self, device),
+            None => Lesson::begin(self, simulation, device, second),
+        }
     }
 
     /// Performs the whole session with a scripted operator, as fast as the machine can.
@@ -150,8 +182,9 @@ impl PreparedSession {
     /// When the recording cannot be written.
     pub fn run_script(self, operator: OperatorFile) -> Result<RecordedSession, LessonError> {
         let mut simulation = self.simulation();
-        let PreparedSession { scenario, workpiece, mut recorder, disk_sync, partial_bundle, templates, spec, seed } =
-            self;
+        let PreparedSession {
+            scenario, workpiece, mut recorder, disk_sync, partial_bundle, templates, spec, seed, ..
+        } = self;
         let mut session = Session::new(scenario.clone(), &workpiece);
         let mut trainee = Operator::new(operator, scenario, workpiece, spec, seed);
         let progress = typodont_exercise::session::run(&mut session, &mut simulation, &mut trainee, &mut recorder);

@@ -40,7 +40,7 @@ pub struct Attempt {
 /// A session that was interrupted before its bundle was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InterruptedSession {
-    place: RecordingPlace,
+    pub(super) place: RecordingPlace,
     pub scenario_id: String,
     pub participant: String,
     /// Start of the session, RFC 3339.
@@ -51,7 +51,7 @@ pub struct InterruptedSession {
 
 /// The place of an interrupted session's recording.
 #[derive(Clone, Debug, PartialEq)]
-enum RecordingPlace {
+pub(super) enum RecordingPlace {
     Folder(PathBuf),
     /// A recording that was kept elsewhere than in a folder, as far as it goes.
     Memory {

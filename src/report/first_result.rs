@@ -7,6 +7,7 @@ use super::session_file::SessionFile;
 use super::templates::Templates;
 use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::record::Recording;
+use typodont_exercise::scenario::Scenario;
 use typodont_exercise::score::{Scored, Verdict};
 
 /// Result of a session before its files are made.
@@ -24,6 +25,7 @@ pub struct FirstResult {
 /// A colour of the map.
 #[derive(Clone, Debug)]
 pub struct LegendEntry {
+    pub verdict: Verdict,
     pub title: Message,
     /// Red, green and blue, sRGB.
     pub color: [u8; 3],
@@ -37,29 +39,51 @@ pub struct LegendEntry {
 
 impl FirstResult {
     pub fn of(recording: &Recording, scored: &Scored, templates: &Templates) -> FirstResult {
-        let session = SessionFile::of(recording, scored);
-        let feedback = feedback::build(&session, &recording.scenario, templates.rules());
-        FirstResult { session, feedback, legend: legend(scored), texts: recording.scenario.texts.clone() }
+        FirstResult {
+            legend: legend(scored),
+            ..FirstResult::of_session(SessionFile::of(recording, scored), &[], &recording.scenario, templates)
+        }
+    }
+
+    /// The result of a session that was scored elsewhere. `volumes`: the volume of the tissue of each verdict, mm³, in the
+    /// order of the legend.
+    pub fn of_session(
+        session: SessionFile,
+        volumes: &[(Verdict, f64)],
+        scenario: &Scenario,
+        templates: &Templates,
+    ) -> FirstResult {
+        let feedback = feedback::build(&session, scenario, templates.rules());
+        let legend = volumes.iter().map(|(verdict, volume)| LegendEntry::new(*verdict, *volume)).collect();
+        FirstResult { session, feedback, legend, texts: scenario.texts.clone() }
+    }
+}
+
+impl LegendEntry {
+    fn new(verdict: Verdict, volume: f64) -> LegendEntry {
+        let [r, g, b] = verdict.color();
+        // Black is read better from this luminance on (WCAG 2): (0.179 + 0.05)² ≈ 1.05·0.05.
+        let [red, green, blue] = srgb_to_linear([r, g, b]);
+        LegendEntry {
+            verdict,
+            title: Message::text_or(format!("verdict.{}", verdict.id()), verdict.title()),
+            color: [r, g, b].map(|c| (c * 255.0).round() as u8),
+            sign: verdict.sign(),
+            volume,
+            is_dark: 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.179,
+        }
     }
 }
 
 /// Colours of the map of a session, as far as they occur.
 pub fn legend(scored: &Scored) -> Vec<LegendEntry> {
     let voxel = scored.replay.workpiece.volume.grid().voxel_mm3();
-    let entry = |verdict: &Verdict| {
-        let count = scored.verdicts.iter().filter(|v| *v == verdict).count();
-        let [r, g, b] = verdict.color();
-        // Black is read better from this luminance on (WCAG 2): (0.179 + 0.05)² ≈ 1.05·0.05.
-        let [red, green, blue] = srgb_to_linear([r, g, b]);
-        LegendEntry {
-            title: Message::text_or(format!("verdict.{}", verdict.id()), verdict.title()),
-            color: [r, g, b].map(|c| (c * 255.0).round() as u8),
-            sign: verdict.sign(),
-            volume: count as f64 * voxel,
-            is_dark: 0.2126 * red + 0.7152 * green + 0.0722 * blue < 0.179,
-        }
-    };
-    shown_verdicts(scored).filter(|v| scored.verdicts.contains(v)).map(entry).collect()
+    let count = |verdict: &Verdict| scored.verdicts.iter().filter(|v| *v == verdict).count();
+    let counts = shown_verdicts(scored).map(|verdict| (verdict, count(verdict)));
+    counts
+        .filter(|(_, count)| *count > 0)
+        .map(|(verdict, count)| LegendEntry::new(*verdict, count as f64 * voxel))
+        .collect()
 }
 
 /// The verdicts that a session's maps may show.

@@ -109,6 +109,9 @@ pub struct SessionFile {
     pub questionnaire: Option<QuestionnaireFile>,
     #[serde(default)]
     pub servo: ServoStatsFile,
+    /// Times of the session at which it went on after it had been interrupted, s; left out if it never was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resumed_s: Vec<f64>,
     /// SHA-256 of the templates that the page was made from.
     #[serde(default)]
     pub template_sha256: String,
@@ -382,6 +385,7 @@ impl SessionFile {
             grade: scored.grade.as_ref().map(grade),
             questionnaire: scenario.questionnaire.as_ref().map(|q| questionnaire(q, &scored.replay.outcome.ratings)),
             servo: recording.end.as_ref().map_or(ticks, |end| end.servo.clone()),
+            resumed_s: head.resumed.iter().map(|tick| Tick(*tick).seconds()).collect(),
             template_sha256: String::new(),
             digests: BTreeMap::new(),
         }

@@ -8,8 +8,11 @@ mod launch;
 #[cfg(target_family = "wasm")]
 mod page;
 
-/// Opens the page. Elsewhere than in a browser there is none, and the program ends at once.
+/// Opens the page or, in a worker of it, runs a lesson. Elsewhere than in a browser there is neither, and the program ends at
+/// once.
 fn main() {
     #[cfg(target_family = "wasm")]
-    page::open();
+    if !typodont_app::serve_lesson() {
+        page::open();
+    }
 }

@@ -1,4 +1,4 @@
-// Closes the page in the middle of a lesson, and finishes the session in the next page.
+// Closes the page in the middle of a lesson; the next page finishes the session as it is, or goes on with it, in turns.
 //
 //     node closed_page.js PLAYWRIGHT-CORE CHROMIUM PAGE BUNDLES MOMENTS
 //
@@ -6,7 +6,8 @@
 // does not hold.
 
 const path = require('path');
-const { LOST_MAX, claim, main, moveAbout, open, openExercise, saveBundle, sessionOf, tell } = require('./served_page.js');
+const { LOST_MAX, claim, finishLesson, main, moveAbout, open, openExercise, saveBundle, sessionOf, takeInstrument, tell } =
+  require('./served_page.js');
 
 const [playwright, executablePath, folder, bundles, moments] = process.argv.slice(2);
 
@@ -26,13 +27,22 @@ main(async () => {
     // As the system ends a tab: without a question, and without a last word to the program.
     await reopen('?state-log');
     await until('unfinished', count => count === '1');
-    await click('shelf.finish');
+    const goesOn = moment % 2 === 1;
+    await click(goesOn ? 'shelf.resume' : 'shelf.finish');
+    if (goesOn) {
+      await takeInstrument(opened);
+      await moveAbout(opened.page, 1500);
+      await finishLesson(opened);
+    }
     const file = path.join(bundles, `${moment}.zip`);
     await saveBundle(opened, file);
-    const kept = sessionOf(file).servo.ticks;
+    const { servo, resumed_s: resumed } = sessionOf(file);
+    claim((resumed ?? []).length === Number(goesOn), `continued at ${resumed} s`);
+    const kept = goesOn ? Math.round(1000 * resumed[0]) : servo.ticks;
+    claim(!goesOn || servo.ticks > kept + 500, `only ${servo.ticks - kept} ticks have run after the interruption`);
     lost.push(seen - kept);
     claim(seen - kept <= LOST_MAX, `${seen - kept} of ${seen} ticks are lost`);
-    tell(`closed after ${seen} ticks, ${seen - kept} lost`);
+    tell(`closed after ${seen} ticks, ${seen - kept} lost; ended after ${servo.ticks}`);
     await opened.page.waitForTimeout(500);
   }
   await close();

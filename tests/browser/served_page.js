@@ -140,8 +140,13 @@ const openExercise = async ({ page, state, until, click }, exercise, atBriefing 
 };
 
 /** Begins the lesson of a briefing, up to the moment in which the instrument follows the mouse. */
-const beginLesson = async ({ page, until, click }) => {
-  await click('briefing.begin');
+const beginLesson = async opened => {
+  await opened.click('briefing.begin');
+  await takeInstrument(opened);
+};
+
+/** Waits for a lesson to begin, and lets the instrument follow the mouse. */
+const takeInstrument = async ({ page, until }) => {
   await until('screen', screen => screen === 'practice');
   await until('hand', () => true);
   await until('clock', clock => clock === 'stopped');
@@ -200,5 +205,6 @@ const main = work => work().then(() => { if (wrong.length) throw new Error(wrong
 const sessionOf = zip => JSON.parse(execFileSync('unzip', ['-p', zip, '*/session.json'], { maxBuffer: 1 << 26 }));
 
 module.exports = {
-  LOST_MAX, PATIENCE, beginLesson, claim, complain, finishLesson, main, moveAbout, open, openExercise, saveBundle, sessionOf, tell,
+  LOST_MAX, PATIENCE, beginLesson, claim, complain, finishLesson, main, moveAbout, open, openExercise, saveBundle, sessionOf,
+  takeInstrument, tell,
 };

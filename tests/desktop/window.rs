@@ -26,8 +26,10 @@ use typodont_core::frame::Vec3;
 use typodont_core::volume::Label;
 use typodont_devices::HandLink;
 use typodont_devices::servo::{SecondHandEvent, SecondHandServo};
+use typodont_exercise::record::{FILE_NAME, Recording};
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples};
+use typodont_report::bundle::is_partial;
 
 /// Settings with the language and the text size that pictures are requested in, and others.
 fn large(others: &str) -> String {
@@ -255,10 +257,16 @@ fn each_eye_has_a_window_of_its_own_where_two_projectors_are_asked_for() {
     assert_eq!(desk.latest("screen").unwrap(), "practice");
 }
 
+/// Ticks of each recording in a folder whose bundle is not made yet.
+fn ticks_of_partial_bundles(folder: &Path) -> Vec<u64> {
+    let folders = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).filter(|path| is_partial(path));
+    folders.map(|path| Recording::read(&path.join(FILE_NAME)).unwrap().len() as u64).collect()
+}
+
 #[test]
 fn the_introduction_comes_first_and_an_interrupted_session_is_offered_again() {
     // Aim: the list leads. Method: a new trainee cannot open exercise 2; the introduction is begun and the program is
-    // killed in it; the next start offers that session, which is scored, and counts as an attempt that did not pass.
+    // killed in it; the next start offers that session, which goes on and is killed again; then it is scored, and counts as an attempt that did not pass.
     let Some(display) = Display::open() else { return };
     let place = folder("interrupted_window");
     keep_settings(&place, &large(r#""volume": 0.0"#));
@@ -284,15 +292,34 @@ fn the_introduction_comes_first_and_an_interrupted_session_is_offered_again() {
     desk.program.wait().unwrap();
     drop(desk);
 
-    let display = Display::open().unwrap();
-    let mut desk = Desk::sit_down(display, &place, &[]);
+    let before = ticks_of_partial_bundles(&place.join("home/Typodont/sessions"));
+    let mut desk = Desk::sit_down(Display::open().unwrap(), &place, &[]);
     desk.until("unfinished", |unfinished| unfinished == "1");
     desk.picture("21-unfinished");
+    desk.click("shelf.resume");
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("clock", |clock| clock == "stopped");
+    let after = ticks_of_partial_bundles(&place.join("home/Typodont/sessions"));
+    assert!(before.len() == 1 && after.len() == 1, "the former recording is replaced: {before:?}, {after:?}");
+    assert!(after[0] + 1 >= before[0], "{after:?} of {before:?} ticks are left");
+    desk.press("o", "pointer", "held");
+    desk.display.xdotool(&["mousemove_relative", "--", "-60", "-30"]);
+    desk.until("clock", |clock| clock == "running");
+    desk.until("ticks", |now| now.parse::<u64>().unwrap() > 1000);
+    desk.program.kill().unwrap();
+    desk.program.wait().unwrap();
+    drop(desk);
+
+    let mut desk = Desk::sit_down(Display::open().unwrap(), &place, &[]);
+    desk.until("unfinished", |unfinished| unfinished == "1");
     desk.click("shelf.finish");
     desk.until("screen", |screen| screen == "results");
     let bundle = place.join(desk.until("bundle", |_| true));
     desk.picture("22-finished");
-    assert_ne!(session(&bundle)["ended_because"], "complete");
+    let scored = session(&bundle);
+    assert_ne!(scored["ended_because"], "complete");
+    assert_eq!(scored["resumed_s"].as_array().unwrap().len(), 1);
+    assert!(scored["servo"]["ticks"].as_u64().unwrap() > before[0] + 500, "{} of {before:?}", scored["servo"]);
     let output = typodont(&["verify", bundle.to_str().unwrap()]);
     assert!(output.status.success(), "{}", complained(&output));
     desk.press("Escape", "screen", "shelf");

@@ -74,6 +74,40 @@ impl App {
         };
     }
 
+    /// Goes on with the interrupted session that the list offers; if it cannot go on, the list says why and still offers it.
+    pub(super) fn resume_interrupted(&mut self, ctx: &egui::Context) {
+        if !self.completions.is_empty() {
+            return;
+        }
+        let Some(session) = self.history.interrupted().cloned() else { return };
+        let reopened = match session.reopen() {
+            Ok(reopened) => reopened,
+            Err(why) => return self.complaints.push(why.to_string()),
+        };
+        let Some(input_device) = self.open_input_device() else { return };
+        self.history.take_interrupted();
+        let mut library = Library::shipped();
+        for (name, bytes) in &reopened.scenario().files {
+            library.insert(name.clone(), bytes.clone());
+        }
+        self.participant = reopened.session().participant.clone();
+        let config = LessonConfig {
+            scenario: reopened.scenario().clone(),
+            seed: reopened.seed(),
+            participant: self.participant.clone(),
+            out: None,
+            templates: self.options.templates.clone(),
+            started: jiff::Timestamp::now(),
+            input_device,
+            second: None,
+            digests: BTreeMap::new(),
+            resumed: Some(reopened),
+            is_kept: true,
+            wake: Arc::from(repaint_waker(ctx)),
+        };
+        self.show_lesson(config, library);
+    }
+
     pub(super) fn set_interrupted_aside(&mut self) {
         let Some(session) = self.history.take_interrupted() else { return };
         self.complaints.extend(session.set_aside().err());
@@ -119,6 +153,7 @@ impl App {
                 self.screen = Screen::Briefing;
             }
             AppCommand::FinishInterrupted => self.finish_interrupted(ctx),
+            AppCommand::ResumeInterrupted => self.resume_interrupted(ctx),
             AppCommand::SetAsideInterrupted => self.set_interrupted_aside(),
             AppCommand::ShowShortcuts(is_open) => {
                 self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false })
@@ -134,6 +169,7 @@ impl App {
             AppCommand::Practice(command) => {
                 if let Screen::Lesson(lesson) = &mut self.screen {
                     execute_in_lesson(lesson, command);
+                    lesson.pass_on();
                 }
             }
             AppCommand::Camera(command) => self.move_camera(command),
@@ -352,16 +388,7 @@ impl App {
         out: PathBuf,
         ctx: &egui::Context,
     ) {
-        let input_device = match self.options.device.as_deref().unwrap_or(&self.settings.device) {
-            "mouse" => InputDevice::Mouse,
-            device => match lesson::open_device(device) {
-                Ok(held) => InputDevice::Device(held),
-                Err(failed) => {
-                    self.screen = Screen::Failed(failed.to_string());
-                    return;
-                }
-            },
-        };
+        let Some(input_device) = self.open_input_device() else { return };
         let started = jiff::Timestamp::now();
         let typed = Some(std::mem::take(&mut self.examiner_code)).filter(|code| !code.is_empty());
         let seed = match (typed.as_ref().or(self.options.seed_code.as_ref()), self.options.seed) {
@@ -387,11 +414,30 @@ impl App {
             input_device,
             second: self.options.second.clone(),
             digests,
+            resumed: None,
             is_kept: self.test_run_origin.is_none(),
             wake: Arc::from(repaint_waker(ctx)),
         };
+        self.show_lesson(config, library);
+    }
+
+    /// Opens the device of a lesson; if that fails, the screen says why.
+    fn open_input_device(&mut self) -> Option<InputDevice> {
+        match self.options.device.as_deref().unwrap_or(&self.settings.device) {
+            "mouse" => Some(InputDevice::Mouse),
+            device => match lesson::open_device(device) {
+                Ok(held) => Some(InputDevice::Device(held)),
+                Err(failed) => {
+                    self.screen = Screen::Failed(failed.to_string());
+                    None
+                }
+            },
+        }
+    }
+
+    fn show_lesson(&mut self, config: LessonConfig, library: Library) {
         // A sealed seed is shown nowhere; the sound does not need it.
-        let shown_seed = if seed.is_sealed() { 0 } else { seed.value };
+        let shown_seed = if config.seed.is_sealed() { 0 } else { config.seed.value };
         self.state_log.record("seed", shown_seed);
         let output =
             PlaybackOptions { seed: shown_seed, replacements: self.replacements.clone(), ..PlaybackOptions::default() };

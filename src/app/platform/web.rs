@@ -157,7 +157,7 @@ pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: Fi
 }
 
 /// The message of an error, without its stack.
-fn reason(error: &JsValue) -> String {
+pub fn reason(error: &JsValue) -> String {
     let message = js_sys::Reflect::get(error, &"message".into()).ok().and_then(|message| message.as_string());
     message.or_else(|| error.as_string()).unwrap_or_else(|| format!("{error:?}"))
 }
@@ -176,6 +176,11 @@ pub fn keep_change(session: &str, number: u32, change: &RecordingChange) {
 /// Deletes the kept recording of a session whose bundle is saved, or which is set aside.
 pub fn forget_recording(session: &str) {
     call_keeper("forget", [session.into()]);
+}
+
+/// Deletes the kept recording of a session that goes on as another one, once that is kept.
+pub fn replace_recording(former: &str, session: &str) {
+    call_keeper("replace", [former.into(), session.into()]);
 }
 
 /// The reason why a change could not be kept; it is told once.
@@ -209,11 +214,24 @@ pub fn download_recording(session: &str, recording: &[u8]) -> Option<String> {
     saved.err().map(|error| format!("{name}: unwritable-file: {}", reason(&error)))
 }
 
+/// Carries out a call of `page/kept.js` that a worker asks for: an object with the function's name and what it is given.
+pub fn keep_for_worker(asked: &JsValue) {
+    let name = js_sys::Reflect::get(asked, &"keep".into()).ok().and_then(|name| name.as_string());
+    let given = js_sys::Reflect::get(asked, &"given".into()).ok().and_then(|given| given.dyn_into().ok());
+    if let (Some(name), Some(given)) = (name, given) {
+        call_keeper_with(&name, &given);
+    }
+}
+
 /// Calls a function of `page/kept.js` in the crate `web`; `None` in a page without it.
 fn call_keeper<const N: usize>(function: &str, arguments: [JsValue; N]) -> Option<JsValue> {
+    call_keeper_with(function, &arguments.into_iter().collect())
+}
+
+fn call_keeper_with(function: &str, arguments: &js_sys::Array) -> Option<JsValue> {
     let keeper = js_sys::Reflect::get(&js_sys::global(), &"typodontKept".into()).ok()?;
     let function = js_sys::Reflect::get(&keeper, &function.into()).ok()?.dyn_into::<js_sys::Function>().ok()?;
-    function.apply(&keeper, &arguments.into_iter().collect()).ok()
+    function.apply(&keeper, arguments).ok()
 }
 
 /// Name of the place where settings are kept, for messages.

@@ -35,7 +35,9 @@ pub fn exercise_list_ui(
         ui.heading(words.get("shelf.title"));
         participant_ui(ui, participant, words, commands);
         if let Some(session) = context.history.interrupted() {
-            interrupted_ui(ui, list, session, words, commands);
+            // In a kiosk, nobody takes over the work of somebody else.
+            let is_own = !context.is_kiosk || session.participant == participant;
+            interrupted_ui(ui, list, session, is_own, words, commands);
         }
         ui.add_space(8.0);
         let room = (ui.available_height() - 150.0).max(160.0);
@@ -114,11 +116,12 @@ fn participant_ui(ui: &mut egui::Ui, participant: &str, words: &Translations, co
     }
 }
 
-/// Offers to finish a session that was interrupted.
+/// Offers to go on with a session that was interrupted, or to finish it.
 fn interrupted_ui(
     ui: &mut egui::Ui,
     list: &ExerciseList,
     session: &InterruptedSession,
+    is_own: bool,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -134,9 +137,12 @@ fn interrupted_ui(
         ui.strong(words.format("shelf.interrupted", whose.join(" · ")));
         ui.label(words.get(if session.is_sealed { "shelf.interrupted_sealed" } else { "shelf.interrupted_about" }));
         ui.horizontal_wrapped(|ui| {
-            let asked =
-                [("shelf.finish", AppCommand::FinishInterrupted), ("shelf.aside", AppCommand::SetAsideInterrupted)];
-            for (key, command) in asked.into_iter().filter(|(key, _)| *key == "shelf.aside" || !session.is_sealed) {
+            let asked = [
+                ("shelf.resume", AppCommand::ResumeInterrupted, is_own && !session.is_sealed),
+                ("shelf.finish", AppCommand::FinishInterrupted, !session.is_sealed),
+                ("shelf.aside", AppCommand::SetAsideInterrupted, true),
+            ];
+            for (key, command, _) in asked.into_iter().filter(|(_, _, is_offered)| *is_offered) {
                 let button = ui.button(words.get(key));
                 ui_anchors::anchor(ui, key, button.rect);
                 if button.clicked() {

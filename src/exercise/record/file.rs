@@ -49,6 +49,9 @@ pub struct RecordingHeadFile {
     /// carried out some ticks after it was issued.
     #[serde(default)]
     pub live: bool,
+    /// Ticks before which the session went on after it had been interrupted; left out if it never was.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub resumed: Vec<u64>,
     /// FDI number of the tooth that replaced the exercise's own; left out if the number is the exercise's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tooth_fdi: Option<u8>,
@@ -73,6 +76,7 @@ impl RecordingHeadFile {
             started: String::new(),
             operator: None,
             live: false,
+            resumed: Vec::new(),
             tooth_fdi: scenario.substituted_fdi,
             device: DeviceSpecFile::from(device),
             digests: BTreeMap::new(),

@@ -19,10 +19,11 @@ mod volume;
 mod writer;
 
 pub use file::{
-    DeviceSpecFile, RecordingEndFile, RecordingHeadFile, SeedOriginFile, ServoStatsFile, VERSION, ended_by_name,
+    CommandFile, DeviceSpecFile, InputFile, RecordingEndFile, RecordingHeadFile, SeedOriginFile, ServoStatsFile,
+    VERSION, ended_by_name,
 };
 pub use reader::{Recording, RecordingError, RecordingLoss};
-pub use replay::{Difference, Replay, ReplayCheck, replay};
+pub use replay::{Continuation, ContinuationError, Difference, Replay, ReplayCheck, go_on, replay};
 pub use seal::{CODE_MIN, reveal, sealed_seed};
 pub use tick_record::TickRecord;
 pub use writer::{Recorder, RecorderError, RecordingSink};

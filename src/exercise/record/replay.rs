@@ -1,15 +1,17 @@
-//! The replay of a recording, and its comparison with what was recorded.
+//! The replay of a recording, its comparison with what was recorded, and the state in which an interrupted session goes on.
 
 use super::file::{DeviceSpecFile, END, ServoStatsFile};
 use super::reader::Recording;
 use super::tick_record::{TickLayout, TickRecord};
-use super::writer::DIGEST_TICKS;
+use super::writer::{DIGEST_TICKS, Recorder, RecorderError};
 use crate::scenario::Workpiece;
-use crate::session::{COMMAND_LAG_TICKS, Effect, Session, SessionEvent, SessionOutcome};
+use crate::session::{COMMAND_LAG_TICKS, Effect, Input, Observer, Session, SessionEvent, SessionOutcome};
 use sha2::{Digest, Sha256};
 use std::collections::VecDeque;
 use std::fmt;
-use typodont_core::device::{Device, DeviceSpec, PlaybackDevice, Wrench};
+use std::iter::Peekable;
+use std::slice::Iter;
+use typodont_core::device::DeviceSpec;
 use typodont_core::sim::{Command, Simulation, Step};
 use typodont_core::tick::Tick;
 use typodont_core::volume::{Edit, Volume};
@@ -109,54 +111,192 @@ pub fn replay(
     check: ReplayCheck,
     mut visit: impl FnMut(&TickRecord, &Step, &[Edit], &Session),
 ) -> Replay {
-    let spec = DeviceSpec::from(&recording.head.device as &DeviceSpecFile);
-    let mut setup = crate::session::setup(&recording.scenario, &workpiece, spec.clone());
-    if recording.head.version < 2 {
-        setup.ramp = 0;
-    }
-    let mut simulation = Simulation::new(setup);
-    let mut session = Session::new(recording.scenario.clone(), &workpiece);
-    let lag = if recording.head.live { COMMAND_LAG_TICKS } else { 0 };
-    let mut expected_commands = ExpectedCommands { expected: VecDeque::new(), lag };
-    expected_commands.push_effects(Tick::ZERO, &session.begin());
-    let mut verifier = ReplayVerifier::new(recording, check);
-    let mut hand = PlaybackDevice::new(spec, recording.ticks.iter().map(|t| t.reading));
-    let mut output = Wrench::default();
-    let mut inputs = recording.inputs.iter().peekable();
-    let mut commands = recording.commands.iter().peekable();
+    let mut replayer = Replayer::new(recording, &workpiece, check);
     for haptic in &recording.ticks {
-        let tick = haptic.tick;
-        while let Some((_, input)) = inputs.next_if(|(at, _)| *at <= tick) {
-            expected_commands.push_effects(tick, &session.advance(SessionEvent::Input(input)));
+        replayer.apply_events(haptic.tick);
+        let step = replayer.step(haptic);
+        visit(haptic, &step, replayer.simulation.edits(), &replayer.session);
+        replayer.advance(&step);
+    }
+    let (simulation, session, difference) = replayer.finish();
+    Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference }
+}
+
+/// State in which an interrupted session goes on.
+pub struct Continuation {
+    pub simulation: Simulation,
+    pub session: Session,
+    /// Commands that the session has issued and that were not carried out yet.
+    pub pending_commands: VecDeque<Command>,
+    /// True if the clutch was pressed.
+    pub is_clutch_pressed: bool,
+    /// All effects so far, in order.
+    pub effects: Vec<Effect>,
+    /// All changed voxels so far, in order.
+    pub edits: Vec<Edit>,
+}
+
+/// Repeats the session of a recording without an end and writes it again with a recorder, up to its last tick, which is left
+/// out: what belongs to the tick after it may be missing. `recorder` has been started with the recording's workpiece.
+///
+/// # Errors
+/// The first difference between the repetition and the recording, or the failure of the recorder.
+pub fn go_on(
+    recording: &Recording,
+    workpiece: &Workpiece,
+    recorder: &mut Recorder,
+) -> Result<Continuation, ContinuationError> {
+    let mut replayer = Replayer::new(recording, workpiece, ReplayCheck::Full);
+    let mut effects = replayer.first_effects();
+    let mut edits = Vec::new();
+    let mut events = recording.events.iter().peekable();
+    let Some((last, ticks)) = recording.ticks.split_last() else { return Err(ContinuationError::TooShort) };
+    for haptic in ticks {
+        effects.extend(replayer.apply_events(haptic.tick));
+        while let Some((tick, bytes)) = events.next_if(|(at, _)| *at <= haptic.tick) {
+            recorder.repeat_event(*tick, bytes)?;
         }
-        while let Some((at, command)) = commands.next_if(|(at, _)| *at <= tick) {
-            let (issued, matches) = expected_commands.take_matching(*at, command.as_ref());
-            verifier.command(tick, matches);
+        let step = replayer.step(haptic);
+        recorder.tick_completed(&haptic.reading, &step, replayer.simulation.edits())?;
+        edits.extend_from_slice(replayer.simulation.edits());
+        effects.extend(replayer.advance(&step));
+    }
+    effects.extend(replayer.apply_events(last.tick));
+    while let Some((tick, bytes)) = events.next_if(|(at, _)| *at <= last.tick) {
+        recorder.repeat_event(*tick, bytes)?;
+    }
+    let Replayer { simulation, session, expected_commands, verifier, .. } = replayer;
+    match verifier.difference {
+        Some(difference) => Err(ContinuationError::Different(difference)),
+        None => {
+            let pending_commands = expected_commands.expected.into_iter().map(|(_, command)| command).collect();
+            let clutch = |(_, input): &(Tick, Input)| match input {
+                Input::PressClutch(is_pressed) => Some(*is_pressed),
+                _ => None,
+            };
+            let is_clutch_pressed = recording.inputs.iter().rev().find_map(clutch).unwrap_or(false);
+            Ok(Continuation { simulation, session, pending_commands, is_clutch_pressed, effects, edits })
+        }
+    }
+}
+
+/// Reason why a session cannot go on.
+#[derive(Debug)]
+pub enum ContinuationError {
+    /// The recording has no ticks.
+    TooShort,
+    /// This program does not repeat the recording bit by bit.
+    Different(Difference),
+    Recorder(RecorderError),
+}
+
+impl From<RecorderError> for ContinuationError {
+    fn from(error: RecorderError) -> ContinuationError {
+        ContinuationError::Recorder(error)
+    }
+}
+
+impl fmt::Display for ContinuationError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            ContinuationError::TooShort => f.write_str("nothing was recorded yet"),
+            ContinuationError::Different(difference) => difference.fmt(f),
+            ContinuationError::Recorder(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for ContinuationError {}
+
+/// A simulation and a session that repeat a recording tick by tick.
+struct Replayer<'a> {
+    simulation: Simulation,
+    session: Session,
+    expected_commands: ExpectedCommands,
+    verifier: ReplayVerifier<'a>,
+    inputs: Peekable<Iter<'a, (Tick, Input)>>,
+    commands: Peekable<Iter<'a, (Tick, Option<Command>)>>,
+    /// Effects of the beginning, until they are taken.
+    first_effects: Vec<Effect>,
+}
+
+impl<'a> Replayer<'a> {
+    fn new(recording: &'a Recording, workpiece: &Workpiece, check: ReplayCheck) -> Replayer<'a> {
+        let spec = DeviceSpec::from(&recording.head.device as &DeviceSpecFile);
+        let mut setup = crate::session::setup(&recording.scenario, workpiece, spec);
+        if recording.head.version < 2 {
+            setup.ramp = 0;
+        }
+        let mut session = Session::new(recording.scenario.clone(), workpiece);
+        let lag = if recording.head.live { COMMAND_LAG_TICKS } else { 0 };
+        let mut expected_commands = ExpectedCommands { expected: VecDeque::new(), lag };
+        let first_effects = session.begin();
+        expected_commands.push_effects(Tick::ZERO, &first_effects);
+        Replayer {
+            simulation: Simulation::new(setup),
+            session,
+            expected_commands,
+            verifier: ReplayVerifier::new(recording, check),
+            inputs: recording.inputs.iter().peekable(),
+            commands: recording.commands.iter().peekable(),
+            first_effects,
+        }
+    }
+
+    /// Effects of the session's beginning.
+    fn first_effects(&mut self) -> Vec<Effect> {
+        std::mem::take(&mut self.first_effects)
+    }
+
+    /// Repeats the inputs and commands before the step of a tick; returns the effects of the inputs.
+    fn apply_events(&mut self, tick: Tick) -> Vec<Effect> {
+        let mut effects = Vec::new();
+        while let Some((_, input)) = self.inputs.next_if(|(at, _)| *at <= tick) {
+            let caused = self.session.advance(SessionEvent::Input(input));
+            self.expected_commands.push_effects(tick, &caused);
+            effects.extend(caused);
+        }
+        while let Some((at, command)) = self.commands.next_if(|(at, _)| *at <= tick) {
+            let (issued, matches) = self.expected_commands.take_matching(*at, command.as_ref());
+            self.verifier.command(tick, matches);
             // A sealed command is not in the recording: the session issues it again.
             if let Some(command) = command.as_ref().or(issued.as_ref()) {
-                simulation.apply(command);
+                self.simulation.apply(command);
             }
         }
-        let Ok(reading) = hand.exchange(&output) else { break };
-        simulation.set_coupling_force(haptic.lead);
-        let step = simulation.step(&reading);
-        output = step.wrench();
-        verifier.tick(haptic, &step, simulation.edits());
-        visit(haptic, &step, simulation.edits(), &session);
-        expected_commands
-            .push_effects(tick.next(), &session.advance(SessionEvent::Tick { step: &step, edits: simulation.edits() }));
+        effects
     }
-    let last = Tick(recording.ticks.len() as u64);
-    for (_, input) in inputs {
-        expected_commands.push_effects(last, &session.advance(SessionEvent::Input(input)));
+
+    /// Repeats the step of a tick.
+    fn step(&mut self, haptic: &TickRecord) -> Step {
+        self.simulation.set_coupling_force(haptic.lead);
+        let step = self.simulation.step(&haptic.reading);
+        self.verifier.tick(haptic, &step, self.simulation.edits());
+        step
     }
-    for (at, command) in commands {
-        verifier.command(last, expected_commands.take_matching(*at, command.as_ref()).1);
+
+    /// Passes the step to the session; returns its effects.
+    fn advance(&mut self, step: &Step) -> Vec<Effect> {
+        let effects = self.session.advance(SessionEvent::Tick { step, edits: self.simulation.edits() });
+        self.expected_commands.push_effects(step.tick.next(), &effects);
+        effects
     }
-    let counted = ServoStatsFile::of(&simulation);
-    let is_counted = recording.end.as_ref().is_none_or(|end| end.servo.has_same_counts(&counted));
-    let difference = verifier.finish(last, expected_commands.is_empty(), is_counted);
-    Replay { volume: simulation.into_volume(), outcome: session.outcome(), workpiece, difference }
+
+    /// Repeats what follows the last tick; returns the first difference from the recording.
+    fn finish(mut self) -> (Simulation, Session, Option<Difference>) {
+        let recording = self.verifier.recording;
+        let last = Tick(recording.ticks.len() as u64);
+        for (_, input) in self.inputs {
+            self.expected_commands.push_effects(last, &self.session.advance(SessionEvent::Input(input)));
+        }
+        for (at, command) in self.commands {
+            self.verifier.command(last, self.expected_commands.take_matching(*at, command.as_ref()).1);
+        }
+        let counted = ServoStatsFile::of(&self.simulation);
+        let is_counted = recording.end.as_ref().is_none_or(|end| end.servo.has_same_counts(&counted));
+        let difference = self.verifier.finish(last, self.expected_commands.is_empty(), is_counted);
+        (self.simulation, self.session, difference)
+    }
 }
 
 /// Commands issued by the replayed session that must still be found in the recording, in the same order.

@@ -157,6 +157,20 @@ impl Recorder {
         self.write(self.event_channel, tick, &bytes)
     }
 
+    /// Writes an event again as another recording of the same session has it.
+    pub(super) fn repeat_event(&mut self, tick: Tick, bytes: &[u8]) -> Result<(), RecorderError> {
+        self.running_digest.event(bytes);
+        self.write(self.event_channel, tick, bytes)
+    }
+
+    /// Passes everything on that was written so far; a tick does so only now and then.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn flush(&mut self) -> Result<(), RecorderError> {
+        self.writer.flush().map_err(|e| self.failed(&e))
+    }
+
     /// Writes the last digest and the end metadata, and closes the file.
     ///
     /// # Errors
@@ -248,7 +262,7 @@ impl Observer for Recorder {
             self.write(self.digest_channel, step.tick, &json(&digest))?;
         }
         if ticks_done.is_multiple_of(FLUSH_TICKS) {
-            self.writer.flush().map_err(|e| self.failed(&e))?;
+            self.flush()?;
         }
         Ok(())
     }

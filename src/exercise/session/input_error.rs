@@ -1,9 +1,11 @@
 //! The reasons for which a session refuses an input.
 
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Reason for refusing an input. Recordings contain the English text; the application shows it in its own language.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum InputError {
     TooEarly,
     NoStage,

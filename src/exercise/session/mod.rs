@@ -18,6 +18,7 @@ use crate::catalog::{TissueRole, WorkingEndEntry};
 use crate::scenario::{
     Periodontium, ProbingSite, QuestionKind, Scenario, Stage, StiffnessSteps, Workpiece, anatomy_tissues,
 };
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use typodont_core::device::DeviceSpec;
 use typodont_core::frame::Pose;
@@ -137,7 +138,8 @@ pub enum Effect {
 }
 
 /// Reason for which a stage ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum EndedBy {
     Time,
     Answer,

@@ -50,13 +50,11 @@ const transact = async (mode, work) => {
 
 /** Changes that are not kept yet, in order; those that could not be are tried again with the next. */
 let waiting = [];
-let isWriting = false;
+let writing;
 let failure;
 let isTold = false;
 
-const write = async () => {
-  if (isWriting) return;
-  isWriting = true;
+const writeAll = async () => {
   while (waiting.length > 0) {
     const changes = waiting;
     waiting = [];
@@ -68,8 +66,10 @@ const write = async () => {
       break;
     }
   }
-  isWriting = false;
 };
+
+/** Keeps what is waiting; resolves when it is kept, or could not be. */
+const write = () => writing ??= writeAll().finally(() => { writing = undefined; });
 
 const releases = new Map();
 
@@ -98,6 +98,11 @@ globalThis.typodontKept = {
       releases.get(session)?.();
       releases.delete(session);
     });
+  },
+
+  /** Deletes the recording of a session that goes on as another one, once that is kept. */
+  replace(former, session) {
+    write().then(() => waiting.some((change) => change.session === session) ? undefined : remove(former)).catch(() => {});
   },
 
   /** The reason why a change could not be kept, once for each session. */

@@ -1,0 +1,10 @@
+// Runs a lesson beside the page, so that its ticks do not wait for pictures (`page_worker.rs` in the crate `app`).
+//
+// The page's first message is the program as it has compiled it; the program answers when it is ready, and takes all further
+// messages. The page keeps the recording, so that it can delete it when the bundle is saved.
+import init from "./typodont-web.js";
+
+const keep = (name) => (...given) => postMessage({ keep: name, given });
+globalThis.typodontKept = { begin: keep("begin"), keep: keep("keep"), replace: keep("replace") };
+
+onmessage = ({ data }) => init({ module_or_path: data });
