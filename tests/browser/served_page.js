@@ -126,7 +126,7 @@ const open = async ({ playwright, executablePath, folder, adapter, exercises, is
 };
 
 /** Opens an exercise of the list, up to the moment in which the instrument follows the mouse. */
-const openExercise = async ({ page, state, until, click }, exercise, atBriefing = async () => {}) => {
+const openExercise = async ({ page, state, until, click }, exercise, atBriefing = async () => {}, atTask = async () => {}) => {
   await page.mouse.move(640, 400);
   while (state.chosen !== exercise) {
     const before = state.chosen;
@@ -136,20 +136,21 @@ const openExercise = async ({ page, state, until, click }, exercise, atBriefing 
   await click('shelf.open');
   await until('screen', screen => screen === 'briefing');
   await atBriefing();
-  await beginLesson({ page, until, click });
+  await beginLesson({ page, until, click }, atTask);
 };
 
 /** Begins the lesson of a briefing, up to the moment in which the instrument follows the mouse. */
-const beginLesson = async opened => {
+const beginLesson = async (opened, atTask) => {
   await opened.click('briefing.begin');
-  await takeInstrument(opened);
+  await takeInstrument(opened, atTask);
 };
 
 /** Waits for a lesson to begin, and lets the instrument follow the mouse. */
-const takeInstrument = async ({ page, until }) => {
+const takeInstrument = async ({ page, until }, atTask = async () => {}) => {
   await until('screen', screen => screen === 'practice');
   await until('hand', () => true);
   await until('clock', clock => clock === 'stopped');
+  await atTask();
   await page.keyboard.press('o');
   await until('pointer', pointer => pointer === 'held');
 };

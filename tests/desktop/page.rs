@@ -3,16 +3,18 @@
 //! Needs the page that `scripts/web` builds into `target/web`, and `TYPODONT_PLAYWRIGHT` and `TYPODONT_CHROMIUM`, as
 //! `scripts/test --long` sets them.
 
+use crate::harness::keep_settings;
 use crate::support::browser::browser;
 use crate::support::bundle::{complained, metric, run, session, typodont};
 use crate::support::folder::folder;
-use crate::support::screen::Display;
+use crate::support::screen::{Desk, Display, WindowDriver};
 use crate::support::tools::{named_by, skip};
 use crate::trainee::{DrawnTrial, drawn_trials, lesion_in_world};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 use typodont_report::bundle::{BundleFolder, SESSION_FILE};
 
 /// Exercise in which the test removes caries.
@@ -313,4 +315,128 @@ fn hostile_exercises_do_no_harm_in_the_page() {
         node.arg(format!("refused={refused}"));
     }
     assert!(node.status().unwrap().success(), "the page is harmed; see above");
+}
+
+/// Moves the mouse of a window in circles for a time, as `beside_page.js` does; returns ticks and frames per second.
+fn circle(desk: &mut Desk, seconds: f64) -> [f64; 2] {
+    let counts = |desk: &Desk| ["ticks", "frames"].map(|topic| desk.latest(topic).unwrap().parse::<f64>().unwrap());
+    let (begun, before) = (Instant::now(), counts(desk));
+    for at in 0.. {
+        if begun.elapsed().as_secs_f64() > seconds {
+            break;
+        }
+        let angle = 0.3 * f64::from(at);
+        desk.move_to([640 + (60.0 * angle.cos()) as i32, 400 + (60.0 * angle.sin()) as i32]);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let (took, after) = (begun.elapsed().as_secs_f64(), counts(desk));
+    [0, 1].map(|i| (after[i] - before[i]) / took)
+}
+
+/// Picture of the window in RGB, as far as the page's is wide and high.
+fn window_picture(desk: &Desk, file: &Path) -> image::RgbImage {
+    let name = &desk.display.name;
+    let taken = Command::new("import").args(["-window", "root"]).arg(file).env("DISPLAY", name).status().unwrap();
+    assert!(taken.success());
+    image::open(file).unwrap().to_rgb8()
+}
+
+#[test]
+#[ignore = "long: needs the page that scripts/web builds"]
+fn the_page_is_beside_the_window_in_picture_and_pace() {
+    // Aim: the same program in both places. Method: the same exercise and seed in the page and in the window, one after the other at
+    // the same size. The picture of the teeth differs no more than those of two adapters; ticks and frames are printed.
+    const SECONDS: &str = "8";
+    const PICTURE: [u32; 4] = [330, 90, 960, 720];
+    let out = folder("page_beside");
+    for exercise in ["10-class-one", "5-grinding"] {
+        let Some((mut node, _display)) = page_script("beside_page.js", WEBGL) else { return };
+        let page_file = out.join(format!("{exercise}-page.png"));
+        let output = node.arg(&page_file).args([WEBGL, exercise, SECONDS]).stderr(Stdio::inherit()).output().unwrap();
+        assert!(output.status.success(), "the exercise in the page failed; see above");
+        let in_page: Value = serde_json::from_slice(&output.stdout).unwrap();
+
+        let place = folder(&format!("window_beside_{exercise}"));
+        keep_settings(&place, r#"{ "volume": 0.0, "introduction_first": false }"#);
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{exercise}.json"));
+        let seed = in_page["seed"].as_str().unwrap();
+        let begun = ["run", file.to_str().unwrap(), "--seed", seed, "--begin", "--out", "bundles"];
+        let Some(display) = Display::open() else { return };
+        let mut desk = Desk::sit_down(display, &place, &begun);
+        desk.until("clock", |clock| clock == "stopped");
+        desk.move_to([2, 2]);
+        std::thread::sleep(Duration::from_secs(4));
+        let window = window_picture(&desk, &out.join(format!("{exercise}-window.png")));
+        desk.move_to([640, 400]);
+        desk.press("o", "pointer", "held");
+        let [ticks, frames] = circle(&mut desk, SECONDS.parse().unwrap());
+        println!("{exercise}: page {in_page}; window ticks_per_s {ticks:.0}, frames_per_s {frames:.1}");
+
+        let page = image::open(&page_file).unwrap().to_rgb8();
+        let [left, top, right, bottom] = PICTURE;
+        let places = (top..bottom).flat_map(|y| (left..right).map(move |x| (x, y)));
+        let differences = places.flat_map(|(x, y)| {
+            let pair = page.get_pixel(x, y).0.into_iter().zip(window.get_pixel(x, y).0);
+            pair.map(|(a, b)| f64::from(a.abs_diff(b)))
+        });
+        let differences: Vec<f64> = differences.collect();
+        let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+        let within = differences.iter().filter(|d| **d <= 8.0).count() as f64 / differences.len() as f64;
+        println!("{exercise}: mean difference {mean:.3} of 255, {:.3} % within 8", 100.0 * within);
+        assert!(mean < 1.0 && within >= 0.999, "{exercise}: the page draws another picture; see {}", out.display());
+    }
+}
+
+/// Writes a ZIP file of what a Python expression gives for `entries`: pairs of a name and a content.
+fn zip_of(out: &Path, name: &str, entries: &str) -> PathBuf {
+    let file = out.join(name);
+    let script = format!(
+        "import sys, zipfile, random\nwith zipfile.ZipFile(sys.argv[1], 'w', zipfile.ZIP_DEFLATED) as z:\n    for name, content in {entries}: z.writestr(name, content)"
+    );
+    let output = Command::new("python3").args(["-W", "ignore", "-c", &script]).arg(&file).output().unwrap();
+    assert!(output.status.success(), "{}", complained(&output));
+    file
+}
+
+#[test]
+#[ignore = "long: needs the page that scripts/web builds"]
+fn hostile_bundles_do_no_harm_in_the_page() {
+    // Aim: an examiner may drop anything onto the page. Method: archives that grow a thousand times, that lead out of their folder, with
+    // too many files, too much nesting, markup in every place that is shown, a recording of noise, and the same file twice; each has an
+    // answer, no dialog opens, nothing is asked for, and a genuine result is verified after them.
+    if built_page().is_none() {
+        return;
+    }
+    let out = folder("page_hostile_bundles");
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/example");
+    let markup = "<img src=x onerror=alert(1)><script>alert(2)</script>";
+    let shown = json!(markup).to_string();
+    let marked = zipped(&example, &out, "marked.zip", |text| {
+        let text = text.replacen("\"participant\": \"example\"", &format!("\"participant\": {shown}"), 1);
+        text.replacen("\"title\": \"Caries removal\"", &format!("\"title\": {shown}"), 1)
+    });
+    let session = std::fs::read_to_string(example.join(SESSION_FILE)).unwrap();
+    let session = json!(session).to_string();
+    let files = [
+        ("unreadable", zip_of(&out, "grows.zip", "[('b/session.json', b' ' * (1100 << 20))]")),
+        ("unreadable", zip_of(&out, "outside.zip", "[('../../b/session.json', b'{}'), ('/b/recording.mcap', b'')]")),
+        ("unreadable", zip_of(&out, "many.zip", "[('b/%d' % n, b'') for n in range(70000)]")),
+        ("unreadable", zip_of(&out, "nested.zip", "[('b/session.json', b'[' * 200000)]")),
+        ("unreadable", zip_of(&out, "large.zip", "[('b/session.json', b' ' * (300 << 20))]")),
+        ("unreadable", zip_of(&out, "nothing.zip", "[]")),
+        (
+            "unreadable",
+            zip_of(
+                &out,
+                "noise.zip",
+                &format!(
+                    "[('b/session.json', {session}), ('b/recording.mcap', b'\\x89MCAP0\\r\\n' + random.Random(1).randbytes(1 << 20))]"
+                ),
+            ),
+        ),
+        ("unreadable", zip_of(&out, "twice.zip", &format!("[('b/session.json', {session})] * 2"))),
+        ("differs", marked),
+        ("verified", zipped(&example, &out, "genuine.zip", str::to_string)),
+    ];
+    verifies_in_the_page(WEBGL, &out, &files);
 }
