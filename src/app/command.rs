@@ -119,6 +119,15 @@ pub enum PracticeCommand {
     ChangeStrength(f32),
     /// Sets the share of the strength with which a pen presses, 0 to 1.
     SetPressure(f32),
+    /// Leans the handle further to the right and toward the eye, as shares of its length.
+    Lean {
+        right: f32,
+        near: f32,
+    },
+    /// Holds the handle upright again.
+    HoldUpright,
+    /// Sets the direction of a pen, as in [`crate::pointer_hand::PointerHand::pen`].
+    PointPen(Option<[f32; 2]>),
     SetDeviceButton {
         bit: u32,
         is_down: bool,

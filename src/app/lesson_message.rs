@@ -173,20 +173,21 @@ pub struct MouseMessage {
     place_mm: [f32; 3],
     max_force_n: f32,
     yaw_rad: f32,
+    lean: [f32; 2],
     buttons: u32,
 }
 
 impl From<MouseTarget> for MouseMessage {
     fn from(target: MouseTarget) -> MouseMessage {
-        let MouseTarget { hand: HandTarget { place, max_force, yaw }, buttons } = target;
-        MouseMessage { place_mm: place.to_array(), max_force_n: max_force, yaw_rad: yaw, buttons }
+        let MouseTarget { hand: HandTarget { place, max_force, yaw, lean }, buttons } = target;
+        MouseMessage { place_mm: place.to_array(), max_force_n: max_force, yaw_rad: yaw, lean, buttons }
     }
 }
 
 impl From<MouseMessage> for MouseTarget {
     fn from(message: MouseMessage) -> MouseTarget {
-        let MouseMessage { place_mm, max_force_n, yaw_rad, buttons } = message;
-        let hand = HandTarget { place: Vec3::from_array(place_mm), max_force: max_force_n, yaw: yaw_rad };
+        let MouseMessage { place_mm, max_force_n, yaw_rad, lean, buttons } = message;
+        let hand = HandTarget { place: Vec3::from_array(place_mm), max_force: max_force_n, yaw: yaw_rad, lean };
         MouseTarget { hand, buttons }
     }
 }

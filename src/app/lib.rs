@@ -38,6 +38,7 @@ mod answer_draft;
 mod results;
 mod completion;
 mod given_file;
+mod gamepad;
 mod zip_verification;
 mod session_history;
 mod snapshot;
@@ -202,6 +203,7 @@ pub async fn open_page(canvas: web_sys::HtmlCanvasElement, options: AppOptions) 
     let made = Box::new(|context: &eframe::CreationContext| -> Result<Box<dyn eframe::App>, _> {
         Ok(Box::new(App::new(context, options)))
     });
+    platform::listen_to_pens(&canvas);
     // As in a window: rendering in software is common, and dithering would take a large part of it.
     let web = eframe::WebOptions { dithering: false, ..Default::default() };
     let began = eframe::WebRunner::new().start(canvas, web, made).await;

@@ -21,7 +21,7 @@ use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageEvent, Worker, WorkerOptions, WorkerType};
 
 /// The worker's script, beside the page.
-const SCRIPT: &str = "worker.js";
+const SCRIPT: &str = "./worker.js";
 
 /// Interval between two steps of the lesson, ms: the shortest that browsers grant.
 const INTERVAL_MS: i32 = 4;

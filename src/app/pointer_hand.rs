@@ -2,9 +2,8 @@
 
 use crate::lesson_scene::LessonScene;
 use crate::snapshot::LessonSnapshot;
-use typodont_core::device::UPRIGHT;
-use typodont_core::frame::{Quat, Vec3};
-use typodont_devices::mouse::{HandTarget, Mouse};
+use typodont_core::frame::{Quat, Vec2, Vec3};
+use typodont_devices::mouse::{HandTarget, LEAN_MAX, Mouse};
 use typodont_exercise::catalog::{InstrumentEntry, WorkingEndEntry};
 use typodont_render::{Eye, Orbit};
 use typodont_scene::particles::CollisionWorld;
@@ -40,6 +39,12 @@ pub struct PointerHand {
     pub is_pressing: bool,
     /// Share of the strength with which it presses, 0 to 1; less than 1 for a pen that is pressed lightly.
     pub pressure: f32,
+    /// Lean of the handle: components of the unit vector from the tip toward the hand, to the right and toward the eye, along
+    /// the ground.
+    lean: [f32; 2],
+    /// Direction of a pen whose tilt is known, which the handle follows: its components to the right and up, as one sees the
+    /// view, of the unit vector from its tip; the third is toward the eye.
+    pub pen: Option<[f32; 2]>,
     /// Surface under the pointer.
     pub spot: Option<SurfaceSpot>,
     /// Maximum force of a press, N, by instrument, where the trainee has changed it.
@@ -48,7 +53,7 @@ pub struct PointerHand {
 
 impl Default for PointerHand {
     fn default() -> PointerHand {
-        PointerHand { is_pressing: false, pressure: 1.0, spot: None, strengths: Vec::new() }
+        PointerHand { is_pressing: false, pressure: 1.0, lean: [0.0; 2], pen: None, spot: None, strengths: Vec::new() }
     }
 }
 
@@ -67,6 +72,36 @@ impl PointerHand {
         }
         // Not rounded: a touchpad sends small parts of a step.
         self.strengths[index] = Some(strength.clamp(least, most));
+    }
+
+    /// Leans the handle further to the right and toward the eye, as shares of its length.
+    pub fn lean(&mut self, right: f32, near: f32) {
+        let lean = Vec2::from_array(self.lean) + Vec2::new(right, near);
+        self.lean = lean.clamp_length_max(LEAN_MAX).to_array();
+    }
+
+    /// Holds the handle upright again.
+    pub fn hold_upright(&mut self) {
+        self.lean = [0.0; 2];
+    }
+
+    /// Lean of the handle in world space, as in [`HandTarget::lean`].
+    fn world_lean(&self, eye: &Eye, azimuth: f32) -> [f32; 2] {
+        let handle = match self.pen {
+            Some([right, up]) => {
+                let near = (1.0 - right * right - up * up).max(0.0).sqrt();
+                let handle = eye.right * right + eye.up * up - eye.forward * near;
+                // A pen that points upward in the mouth is held as flat as a handle may be.
+                if handle.y < 0.0 { handle.with_y(0.0).normalize_or_zero() } else { handle }
+            }
+            None => Quat::from_rotation_y(azimuth) * Vec3::new(self.lean[0], 0.0, self.lean[1]),
+        };
+        Vec2::new(handle.x, handle.z).clamp_length_max(LEAN_MAX).to_array()
+    }
+
+    /// Angle between the handle and the vertical, rad, unless a pen gives it.
+    pub fn tilt(&self) -> f32 {
+        Vec2::from_array(self.lean).length().asin()
     }
 
     fn exact_strength(&self, index: usize, instrument: &InstrumentEntry) -> f32 {
@@ -98,6 +133,8 @@ impl PointerHand {
         self.spot = spot_under_ray(&world, eye.position, along);
         // The handle turns with the view, so that a handpiece leads to the operator's side.
         let yaw = orbit.azimuth;
+        let lean = self.world_lean(&eye, yaw);
+        let held = HandTarget { place: Vec3::ZERO, max_force: REST_FORCE, yaw, lean };
         let (place, max_force) = match self.spot {
             Some(spot) => {
                 let action = match self.is_pressing {
@@ -106,13 +143,12 @@ impl PointerHand {
                     },
                     false => HandAction::Rest,
                 };
-                let world_from_handle = Quat::from_rotation_y(yaw) * UPRIGHT;
-                let hand = hand_at_spot(&spot, snapshot.tip, instrument, world_from_handle, action);
+                let hand = hand_at_spot(&spot, snapshot.tip, instrument, held.orientation(), action);
                 (hand.place, hand.max_force)
             }
             None => (beside_the_tooth(&eye, along, snapshot.tip), REST_FORCE),
         };
-        mouse.aim(HandTarget { place, max_force, yaw });
+        mouse.aim(HandTarget { place, max_force, ..held });
     }
 }
 

@@ -306,7 +306,7 @@ mod tests {
             let Some(seen) = lesson.client.snapshot() else { continue };
             has_been_above |= seen.tip.y > ABOVE - 1.0;
             let place = Vec3::Y * if has_been_above { -ABOVE } else { ABOVE };
-            lesson.client.mouse.as_ref().unwrap().aim(HandTarget { place, max_force: PRESS, yaw: 0.0 });
+            lesson.client.mouse.as_ref().unwrap().aim(HandTarget { place, max_force: PRESS, yaw: 0.0, lean: [0.0; 2] });
             if changes > removed && !is_over {
                 is_over = lesson.client.send(LessonCommand::Input(Input::Abort));
             }

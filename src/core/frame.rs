@@ -4,7 +4,7 @@
 //! tooth.
 
 use glam::Mat3;
-pub use glam::{Quat, Vec3};
+pub use glam::{Quat, Vec2, Vec3};
 
 /// Rigid transform, also used as a position with an orientation.
 ///

@@ -18,7 +18,7 @@
 //!
 //! // The hand is aimed 10 mm to the right; it is there within a second.
 //! let (mouse, mut device) = Mouse::new();
-//! mouse.aim(HandTarget { place: Vec3::X * 10.0, max_force: 1.0, yaw: 0.0 });
+//! mouse.aim(HandTarget { place: Vec3::X * 10.0, max_force: 1.0, yaw: 0.0, lean: [0.0; 2] });
 //! for _ in 0..1000 {
 //!     device.exchange(&Wrench::ZERO).unwrap();
 //! }

@@ -8,7 +8,7 @@ use crate::{Driver, FoundDevice, OpenError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, Pacing, Reading, UPRIGHT, Wrench};
-use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::frame::{Pose, Quat, Vec2, Vec3};
 use typodont_core::tick::TICK_S;
 
 /// Half the box that the hand can reach, mm: the teeth of a quadrant with room around them.
@@ -42,8 +42,11 @@ const TURN_TIME: f32 = 0.15;
 const UM_PER_MM: f32 = 1000.0;
 const MN_PER_N: f32 = 1000.0;
 
-/// Angles are stored in units of 10⁻⁴ rad.
+/// Angles are stored in units of 10⁻⁴ rad, and the handle's lean in units of 10⁻⁴.
 const ANGLE_UNITS: f32 = 1e4;
+
+/// Maximum lean of the handle: the sine of about 65° from upright, beyond which a handpiece would lie on the teeth.
+pub const LEAN_MAX: f32 = 0.9;
 
 /// Target of the hand: set by the window, approached by the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +57,22 @@ pub struct HandTarget {
     pub max_force: f32,
     /// Rotation of the upright handle around the vertical axis, rad.
     pub yaw: f32,
+    /// Lean of the handle: components along x and z of the unit vector from the tip toward the hand, world space. The vector
+    /// points upward; its horizontal part is at most [`LEAN_MAX`] long.
+    pub lean: [f32; 2],
+}
+
+impl HandTarget {
+    /// Orientation of the handle, `world_from_handle`.
+    pub fn orientation(&self) -> Quat {
+        let upright = Quat::from_rotation_y(self.yaw) * UPRIGHT;
+        let [x, z] = Vec2::from_array(self.lean).clamp_length_max(LEAN_MAX).to_array();
+        if x == 0.0 && z == 0.0 {
+            return upright;
+        }
+        let handle = Vec3::new(x, (1.0 - x * x - z * z).sqrt(), z);
+        Quat::from_rotation_arc(Vec3::Y, handle) * upright
+    }
 }
 
 /// Everything that a window sets of a mouse.
@@ -75,6 +94,7 @@ struct MouseState {
     /// mN
     max_force: AtomicU32,
     yaw: AtomicI32,
+    lean: [AtomicI32; 2],
     buttons: AtomicU32,
     /// Maximum force of a target, N: that of the device.
     force_limit: f32,
@@ -88,6 +108,7 @@ impl Mouse {
             place: Default::default(),
             max_force: AtomicU32::new(0),
             yaw: AtomicI32::new(0),
+            lean: Default::default(),
             buttons: AtomicU32::new(0),
             force_limit: spec.max_force,
         });
@@ -103,8 +124,9 @@ impl Mouse {
 
     /// Sets the target of the hand, within the workspace. A value that is not finite leaves the target unchanged.
     pub fn aim(&self, target: HandTarget) {
-        let HandTarget { place, max_force, yaw } = target;
-        if !(place.is_finite() && max_force.is_finite() && yaw.is_finite()) {
+        let HandTarget { place, max_force, yaw, lean } = target;
+        let lean = Vec2::from_array(lean);
+        if !(place.is_finite() && max_force.is_finite() && yaw.is_finite() && lean.is_finite()) {
             return;
         }
         for ((at, mm), half) in self.0.place.iter().zip(place.to_array()).zip(WORKSPACE_HALF.to_array()) {
@@ -112,6 +134,9 @@ impl Mouse {
         }
         self.0.max_force.store((max_force.clamp(0.0, self.0.force_limit) * MN_PER_N).round() as u32, Ordering::Relaxed);
         self.0.yaw.store((yaw * ANGLE_UNITS).round() as i32, Ordering::Relaxed);
+        for (part, value) in self.0.lean.iter().zip(lean.clamp_length_max(LEAN_MAX).to_array()) {
+            part.store((value * ANGLE_UNITS).round() as i32, Ordering::Relaxed);
+        }
     }
 
     /// Presses or releases a button; bit 0 is the main one. There are 32.
@@ -149,6 +174,7 @@ impl MouseState {
             place: Vec3::from_array(place),
             max_force: self.max_force.load(Ordering::Relaxed) as f32 / MN_PER_N,
             yaw: self.yaw.load(Ordering::Relaxed) as f32 / ANGLE_UNITS,
+            lean: [0, 1].map(|i| self.lean[i].load(Ordering::Relaxed) as f32 / ANGLE_UNITS),
         }
     }
 }
@@ -208,8 +234,7 @@ impl Device for MouseDevice {
         let target = self.shared.target();
         self.felt_force += (output.force - self.felt_force) * (TICK / FORCE_TIME);
         self.hand += self.displacement(&target);
-        let upright = Quat::from_rotation_y(target.yaw) * UPRIGHT;
-        self.orientation = self.orientation.slerp(upright, TICK / TURN_TIME).normalize();
+        self.orientation = self.orientation.slerp(target.orientation(), TICK / TURN_TIME).normalize();
         let pose = Pose { position: self.hand, orientation: self.orientation };
         Ok(Reading { pose, buttons: self.shared.buttons.load(Ordering::Relaxed) })
     }

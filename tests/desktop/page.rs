@@ -317,6 +317,19 @@ fn hostile_exercises_do_no_harm_in_the_page() {
     assert!(node.status().unwrap().success(), "the page is harmed; see above");
 }
 
+#[test]
+#[ignore = "long: needs the page that scripts/web builds"]
+fn a_pen_and_a_gamepad_work_in_the_page() {
+    // Aim: a tablet's pen presses as hard as it is pressed and holds the instrument as it is held, and a gamepad does what a mouse
+    // does. Method: the browser's input with pressure and tilt; a gamepad as the browser shows one; the bundle holds.
+    let Some((mut node, _)) = page_script("hands_page.js", WEBGL) else { return };
+    let out = folder("page_hands");
+    let zip = out.join("bundle.zip");
+    assert!(node.arg(&out).arg(&zip).status().unwrap().success(), "see above");
+    let output = typodont(&["verify", zip.to_str().unwrap()]);
+    assert!(output.status.success(), "{}", complained(&output));
+}
+
 /// Moves the mouse of a window in circles for a time, as `beside_page.js` does; returns ticks and frames per second.
 fn circle(desk: &mut Desk, seconds: f64) -> [f64; 2] {
     let counts = |desk: &Desk| ["ticks", "frames"].map(|topic| desk.latest(topic).unwrap().parse::<f64>().unwrap());

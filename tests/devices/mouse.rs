@@ -11,7 +11,7 @@ fn settle(device: &mut impl Device) -> Vec3 {
 }
 
 fn target(place: Vec3, max_force: f32) -> HandTarget {
-    HandTarget { place, max_force, yaw: 0.0 }
+    HandTarget { place, max_force, yaw: 0.0, lean: [0.0; 2] }
 }
 
 /// Stiffness of the wall, N/mm: that of a tooth at a PHANTOM Omni.
@@ -115,7 +115,7 @@ fn a_target_that_jumps_is_approached_as_a_hand_moves() {
 #[test]
 fn the_handle_turns_with_the_view() {
     let (mouse, mut device) = Mouse::new();
-    mouse.aim(HandTarget { place: Vec3::ZERO, max_force: 1.0, yaw: 1.5 });
+    mouse.aim(HandTarget { place: Vec3::ZERO, max_force: 1.0, yaw: 1.5, lean: [0.0; 2] });
     let mut before = UPRIGHT;
     for _ in 0..3000 {
         let now = device.exchange(&Wrench::ZERO).unwrap().pose.orientation;
@@ -123,6 +123,26 @@ fn the_handle_turns_with_the_view() {
         before = now;
     }
     assert!(before.angle_between(Quat::from_rotation_y(1.5) * UPRIGHT) < 0.01);
+}
+
+#[test]
+fn the_handle_leans_where_it_is_told_and_no_further_than_a_hand_can_hold_it() {
+    // Aim: the shaft points to where the window says. Method: leans within and beyond the limit, with the view turned; the shaft's
+    // direction has the components that were given, and points upward.
+    for (lean, expected) in [([0.3, -0.4], [0.3, -0.4]), ([3.0, 4.0], [0.54, 0.72])] {
+        let (mouse, mut device) = Mouse::new();
+        mouse.aim(HandTarget { place: Vec3::ZERO, max_force: 1.0, yaw: 0.7, lean });
+        let mut pose = device.exchange(&Wrench::ZERO).unwrap().pose;
+        for _ in 0..3000 {
+            pose = device.exchange(&Wrench::ZERO).unwrap().pose;
+        }
+        let shaft = pose.orientation * Vec3::Z;
+        assert!((shaft.x - expected[0]).abs() < 0.01 && (shaft.z - expected[1]).abs() < 0.01, "{shaft}");
+        assert!(shaft.y > 0.4);
+    }
+    let (mouse, _) = Mouse::new();
+    mouse.aim(HandTarget { place: Vec3::X, max_force: 1.0, yaw: 0.0, lean: [f32::NAN, 0.0] });
+    assert_eq!(mouse.state().hand.place, Vec3::ZERO, "an invalid lean is no target");
 }
 
 #[test]

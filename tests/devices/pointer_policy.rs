@@ -170,7 +170,7 @@ impl PointerPolicy {
         };
         let orientation = Quat::from_rotation_y(yaw) * UPRIGHT;
         let hand = hand_at_spot(&spot, tip, &self.scenario.instruments[instrument], orientation, action);
-        self.mouse.aim(HandTarget { place: hand.place, max_force: hand.max_force, yaw });
+        self.mouse.aim(HandTarget { place: hand.place, max_force: hand.max_force, yaw, lean: [0.0; 2] });
     }
 }
 

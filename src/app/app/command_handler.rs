@@ -484,6 +484,9 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::ChangeStrength(steps) => lesson.change_strength(steps),
         // A key of the same frame may have put the instrument down.
         PracticeCommand::SetPressure(_) | PracticeCommand::SetDeviceButton { .. } if !lesson.is_pointer_captured => {}
+        PracticeCommand::Lean { right, near } => lesson.pointer_hand.lean(right, near),
+        PracticeCommand::HoldUpright => lesson.pointer_hand.hold_upright(),
+        PracticeCommand::PointPen(pen) => lesson.pointer_hand.pen = pen,
         PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
         PracticeCommand::PressClutch(is_pressed) => lesson.press_clutch(is_pressed),

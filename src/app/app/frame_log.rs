@@ -8,6 +8,7 @@ use crate::results::BundleState;
 use crate::screen::Screen;
 use crate::state_log::StateLog;
 use crate::ui::lesson_view::LessonView;
+use typodont_core::frame::Vec3;
 
 impl App {
     /// Writes the state of the screen to the state log, a line per change.
@@ -110,6 +111,9 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState, view: &LessonView) {
         log.record("hand", format!("{x:.2} {y:.2} {z:.2}"));
         let [x, y, z] = snapshot.tip.to_array();
         log.record("tip", format!("{x:.2} {y:.2} {z:.2}"));
+        let [x, y, z] = (snapshot.orientation * Vec3::Z).to_array();
+        log.record("handle", format!("{x:.2} {y:.2} {z:.2}"));
+        log.record("force", format!("{:.2}", snapshot.spring));
         log.record("cleared", format!("{:.0}", snapshot.cleared_pct.unwrap_or_default()));
         log.record("instrument", snapshot.instrument);
         log.record("ticks", snapshot.timing.ticks);

@@ -9,9 +9,11 @@ mod frame;
 mod frame_log;
 
 use crate::AppOptions;
+use crate::command::{AppCommand, CameraCommand};
 use crate::completion::Completion;
 use crate::editor::EditorState;
 use crate::exercise_list::ExerciseList;
+use crate::gamepad::GamepadPointer;
 use crate::given_file::FileInbox;
 use crate::i18n::{self, Translations};
 use crate::kiosk::KioskExit;
@@ -74,6 +76,9 @@ pub struct App {
     frame_count: u64,
     /// Time of the last input, s.
     last_input: f64,
+    gamepad: GamepadPointer,
+    /// Movement of the camera by the gamepad in this frame.
+    gamepad_camera: Option<CameraCommand>,
 }
 
 /// State of a request to close the window.
@@ -88,6 +93,9 @@ enum CloseState {
 
 /// Interval at which events are taken over while the window is hidden: a bundle is completed and a lesson's time is kept.
 const HIDDEN_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Interval at which a gamepad is read.
+const GAMEPAD_INTERVAL: Duration = Duration::from_millis(16);
 
 impl App {
     pub fn new(context: &eframe::CreationContext, mut options: AppOptions) -> App {
@@ -138,6 +146,8 @@ impl App {
             fills_screen: false,
             frame_count: 0,
             last_input: 0.0,
+            gamepad: GamepadPointer::default(),
+            gamepad_camera: None,
         };
         if let (Some(mode), Some(path)) = (app.options.editor_mode, app.options.exercise.clone()) {
             app.open_editor(&path, mode, ctx);
@@ -215,6 +225,15 @@ impl eframe::App for App {
         visuals.panel_fill.to_normalized_gamma_f32()
     }
 
+    fn raw_input_hook(&mut self, ctx: &egui::Context, input: &mut egui::RawInput) {
+        let Some(pad) = platform::gamepad() else { return };
+        let (pointer, screen) = (ctx.pointer_latest_pos(), ctx.content_rect());
+        let seconds = input.time.map_or(input.predicted_dt, |now| (now - ctx.input(|before| before.time)) as f32);
+        let (events, camera) = self.gamepad.update(pad, pointer, screen, seconds);
+        input.events.extend(events);
+        self.gamepad_camera = camera;
+    }
+
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.poll(ctx);
         self.handle_close_request(ctx);
@@ -232,6 +251,7 @@ impl eframe::App for App {
         let mut commands = Vec::new();
         shortcuts::collect_commands(&ctx, &self.screen, self.overlay, self.had_focus, &mut commands);
         self.frame_ui(ui, frame, &mut commands);
+        commands.extend(self.gamepad_camera.take().map(AppCommand::Camera));
         // What was seen and typed in this frame counts before what a key asked for in it.
         commands.sort_by_key(|command| !command.is_of_this_frame());
         for command in commands {
@@ -246,6 +266,12 @@ impl eframe::App for App {
         self.state_log.record("frames", self.frame_count);
         self.log_state();
         ui_anchors::log_anchors(&ctx, &mut self.state_log);
-        ctx.request_repaint_after(self.frame_interval(&ctx));
+        let interval = self.frame_interval(&ctx);
+        // A gamepad causes no events by itself.
+        ctx.request_repaint_after(if platform::gamepad().is_some() {
+            interval.min(GAMEPAD_INTERVAL)
+        } else {
+            interval
+        });
     }
 }

@@ -1,6 +1,6 @@
 //! A computer: settings in a file of the user's configuration folder, bundles in a folder.
 
-use super::LogSink;
+use super::{GamepadState, LogSink, Pen};
 use crate::given_file::{FileInbox, GivenContent, GivenFile};
 use crate::user_folder::UserFolder;
 use directories::{ProjectDirs, UserDirs};
@@ -42,6 +42,16 @@ pub fn set_unsaved_work(_: bool) {}
 
 /// Bundles are in folders here: there is nothing to download.
 pub fn download(_: &BundleFolder) -> Option<String> {
+    None
+}
+
+/// Pens are reported by the window system, without their tilt.
+pub fn pen() -> Option<Pen> {
+    None
+}
+
+/// Gamepads are read in pages only: each system has its own way to them.
+pub fn gamepad() -> Option<GamepadState> {
     None
 }
 

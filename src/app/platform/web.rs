@@ -1,9 +1,10 @@
 //! A page in a browser: settings in the page's own storage, bundles in memory and as downloads.
 
-use super::LogSink;
+use super::{GamepadState, LogSink, Pen};
 use crate::given_file::{FileInbox, GivenContent, GivenFile};
 use crate::user_folder::UserFolder;
 use eframe::egui;
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use typodont_lesson::InterruptedSession;
@@ -295,6 +296,50 @@ fn write(key: &str, text: &str) -> Option<String> {
 
 fn storage() -> Option<web_sys::Storage> {
     web_sys::window()?.local_storage().ok().flatten()
+}
+
+thread_local! {
+    /// The pen that touched the page last, until another pointer does.
+    static PEN: Cell<Option<Pen>> = const { Cell::new(None) };
+}
+
+/// Listens to the pens over an element: browsers report them as pointers, of which the window system takes the position only.
+pub fn listen_to_pens(canvas: &web_sys::HtmlCanvasElement) {
+    let listener = Closure::<dyn FnMut(web_sys::PointerEvent)>::new(|event: web_sys::PointerEvent| {
+        let pen = (event.pointer_type() == "pen")
+            .then(|| Pen { pressure: event.pressure(), tilt: [event.tilt_x() as f32, event.tilt_y() as f32] });
+        PEN.set(pen);
+    });
+    for event in ["pointerdown", "pointermove", "pointerup"] {
+        // An element takes any listener; without it a pen presses with its full strength.
+        let _ = canvas.add_event_listener_with_callback(event, listener.as_ref().unchecked_ref());
+    }
+    // It lives as long as the page.
+    listener.forget();
+}
+
+/// The pen in use; `None` if another pointer is.
+pub fn pen() -> Option<Pen> {
+    PEN.get()
+}
+
+/// State of the first gamepad that is connected and has a standard layout.
+pub fn gamepad() -> Option<GamepadState> {
+    let pads = web_sys::window()?.navigator().get_gamepads().ok()?;
+    let pad = pads
+        .iter()
+        .filter_map(|pad| pad.dyn_into::<web_sys::Gamepad>().ok())
+        .find(|pad| pad.connected() && pad.mapping() == web_sys::GamepadMappingType::Standard)?;
+    let (axes, buttons) = (pad.axes(), pad.buttons());
+    let axis = |index: u32| axes.get(index).as_f64().unwrap_or_default() as f32;
+    let button = |index: u32| buttons.get(index).dyn_into::<web_sys::GamepadButton>().ok();
+    let pull = |index: u32| button(index).map_or(0.0, |trigger| trigger.value() as f32);
+    let is_pressed = |index: &u32| button(*index).is_some_and(|button| button.pressed());
+    Some(GamepadState {
+        sticks: [[axis(0), axis(1)], [axis(2), axis(3)]],
+        triggers: [pull(6), pull(7)],
+        buttons: (0..buttons.length().min(32)).filter(is_pressed).fold(0, |mask, index| mask | 1 << index),
+    })
 }
 
 /// Locale of the user, from the browser's preferred language.

@@ -198,7 +198,12 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
                 ui.add(egui::Label::new(text).wrap());
             }
             (None, Some(strength)) => {
-                let text = egui::RichText::new(words.format("practice.strength", format!("{strength:.1}"))).weak();
+                let mut text = words.format("practice.strength", format!("{strength:.1}"));
+                let tilt = lesson.pointer_hand.tilt().to_degrees().round();
+                if tilt > 0.0 {
+                    text = format!("{text} · {}", words.format("practice.tilt", tilt));
+                }
+                let text = egui::RichText::new(text).weak();
                 ui.add(egui::Label::new(text).wrap());
             }
             (None, None) => {}

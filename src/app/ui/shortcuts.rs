@@ -10,7 +10,7 @@ use typodont_exercise::session::ChartInput;
 
 /// Keys with the text keys of their functions, in the order of the page. A key whose name differs between languages is
 /// itself a text key.
-const SHORTCUTS: [(&str, &str); 31] = [
+const SHORTCUTS: [(&str, &str); 32] = [
     ("F1", "keys.help"),
     ("F2", "keys.settings"),
     ("Tab", "keys.tab"),
@@ -20,6 +20,7 @@ const SHORTCUTS: [(&str, &str); 31] = [
     ("O", "keys.hold"),
     ("O", "keys.clutch"),
     ("Ctrl Enter", "keys.done"),
+    ("A", "keys.tilt"),
     ("T", "keys.tool"),
     ("D", "keys.depth"),
     ("C", "keys.calculus"),

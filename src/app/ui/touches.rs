@@ -9,6 +9,11 @@ const LEAST_PRESSURE: f32 = 0.05;
 #[derive(Clone, Debug, Default)]
 pub struct Touches(Vec<(TouchId, Option<f32>)>);
 
+/// Share of the strength with which a pen presses that is pressed this hard, 0 to 1.
+pub fn pen_pressure(pressure: f32) -> f32 {
+    if pressure >= LEAST_PRESSURE { pressure.min(1.0) } else { 0.0 }
+}
+
 impl Touches {
     /// Takes over the events of a frame.
     pub fn update(&mut self, events: &[Event]) {
@@ -34,7 +39,7 @@ impl Touches {
         let fingers = self.0.iter().filter(|(_, pressure)| pressure.is_none()).count();
         match pens.reduce(f32::max) {
             // The palm beside a pen is no finger.
-            Some(pressure) => Some(if pressure >= LEAST_PRESSURE { pressure.min(1.0) } else { 0.0 }),
+            Some(pressure) => Some(pen_pressure(pressure)),
             None if fingers == 0 => None,
             None => Some(if fingers > 1 { 1.0 } else { 0.0 }),
         }

@@ -3,12 +3,15 @@
 //! While it is free, its buttons move the camera as in the thesis: left rotates, right zooms, middle shifts. While it
 //! acts as the device, the hand follows the surface under the pointer, the left button presses, the wheel sets the
 //! strength, and the right button rotates the view; with the Ctrl key the buttons and the wheel move the camera as
-//! before. A pen presses as hard as it is pressed; one finger points, and a second one presses.
+//! before. While the key A is held, the pointer tilts the instrument, and a press of the key alone holds it upright again. A
+//! pen presses as hard as it is pressed, and the instrument is tilted as the pen is; one finger points, and a second one
+//! presses.
 
 use crate::command::{AppCommand, CameraCommand, PracticeCommand};
+use crate::platform;
 use crate::pointer_hand::PointedPlace;
-use crate::ui::touches::Touches;
-use eframe::egui::{self, Event, MouseWheelUnit, PointerButton};
+use crate::ui::touches::{Touches, pen_pressure};
+use eframe::egui::{self, Event, Key, MouseWheelUnit, PointerButton};
 
 /// Rotation by a drag across one point of the screen, rad: half a turn in 300 points.
 const RADIANS_PER_POINT: f32 = 0.0105;
@@ -142,8 +145,11 @@ fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &PointerConta
         });
     }
     let is_working = is_on_view && drag.is_none();
+    let pen = platform::pen();
+    commands.push(AppCommand::Practice(PracticeCommand::PointPen(pen.and_then(|pen| pen.direction()))));
     // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
-    let pressure = contact.touches.pressure().unwrap_or(1.0);
+    let pressure = pen.map(|pen| pen_pressure(pen.pressure)).or(contact.touches.pressure()).unwrap_or(1.0);
+    let at = tilting(ui, view.id, at, commands);
     let is_down = is_working && contact.began_on_view && pressure > 0.0;
     commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
     commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
@@ -152,6 +158,45 @@ fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &PointerConta
         PointedPlace { share: [share.x, share.y], aspect: rect.width() / rect.height().max(1.0) }
     });
     commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
+}
+
+/// Lean of the handle by a movement of one point.
+const LEAN_PER_POINT: f32 = 0.004;
+
+/// Movement of the pointer up to which a press of the tilting key holds the handle upright, points.
+const STILL_POINTS: f32 = 4.0;
+
+/// Tilts the instrument while its key is held. Returns the position at which the hand points: meanwhile that at which the key
+/// was pressed.
+fn tilting(
+    ui: &egui::Ui,
+    view: egui::Id,
+    at: Option<egui::Pos2>,
+    commands: &mut Vec<AppCommand>,
+) -> Option<egui::Pos2> {
+    let id = view.with("tilting");
+    let (is_held, by) = ui.input(|input| (input.key_down(Key::A), input.pointer.delta()));
+    // The position at which the key was pressed, and the movement since then.
+    let begun = ui.data(|data| data.get_temp::<(egui::Pos2, f32)>(id));
+    match (is_held, begun, at) {
+        (true, begun, Some(at)) => {
+            let (place, moved) = begun.unwrap_or((at, 0.0));
+            ui.data_mut(|data| data.insert_temp(id, (place, moved + by.length())));
+            if by != egui::Vec2::ZERO {
+                let (right, near) = (by.x * LEAN_PER_POINT, by.y * LEAN_PER_POINT);
+                commands.push(AppCommand::Practice(PracticeCommand::Lean { right, near }));
+            }
+            Some(place)
+        }
+        (false, Some((_, moved)), at) => {
+            ui.data_mut(|data| data.remove_temp::<(egui::Pos2, f32)>(id));
+            if moved < STILL_POINTS {
+                commands.push(AppCommand::Practice(PracticeCommand::HoldUpright));
+            }
+            at
+        }
+        (_, _, at) => at,
+    }
 }
 
 /// Position at which the hand points: that of the pointer, or, while Shift is held, one that follows it more finely
@@ -196,6 +241,20 @@ mod tests {
 
         /// The same at a time, s.
         fn frame_at(&self, time: Option<f64>, events: Vec<Event>) -> (f32, Option<[f32; 2]>) {
+            let commands = self.commands(time, events);
+            let (mut pressure, mut is_pressed) = (1.0, false);
+            for command in &commands {
+                match command {
+                    AppCommand::Practice(PracticeCommand::SetPressure(share)) => pressure = *share,
+                    AppCommand::Practice(PracticeCommand::SetDeviceButton { is_down, .. }) => is_pressed = *is_down,
+                    _ => {}
+                }
+            }
+            (if is_pressed { pressure } else { 0.0 }, pointed(&commands))
+        }
+
+        /// Shows a frame in which these events come in; returns its commands.
+        fn commands(&self, time: Option<f64>, events: Vec<Event>) -> Vec<AppCommand> {
             let mut commands = Vec::new();
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 600.0)));
             let input = RawInput { screen_rect, time, events, ..RawInput::default() };
@@ -205,17 +264,17 @@ mod tests {
                 collect_commands(ui, &view, true, &mut commands);
             });
             output.textures_delta.clear();
-            let (mut pressure, mut is_pressed, mut place) = (1.0, false, None);
-            for command in commands {
-                match command {
-                    AppCommand::Practice(PracticeCommand::SetPressure(share)) => pressure = share,
-                    AppCommand::Practice(PracticeCommand::SetDeviceButton { is_down, .. }) => is_pressed = is_down,
-                    AppCommand::Practice(PracticeCommand::PointAt(pointed)) => place = pointed.map(|p| p.share),
-                    _ => {}
-                }
-            }
-            (if is_pressed { pressure } else { 0.0 }, place)
+            commands
         }
+    }
+
+    /// The place at which the hand points by these commands.
+    fn pointed(commands: &[AppCommand]) -> Option<[f32; 2]> {
+        let place = |command: &AppCommand| match command {
+            AppCommand::Practice(PracticeCommand::PointAt(place)) => Some(place.map(|place| place.share)),
+            _ => None,
+        };
+        commands.iter().rev().find_map(place).flatten()
     }
 
     /// Events of a touch as winit's egui integration sends them: the first touch moves the pointer, too.
@@ -270,6 +329,38 @@ mod tests {
             assert_eq!(screen.frame_at(Some(0.1 * f64::from(tenth)), Vec::new()).0, 1.0);
         }
         assert_eq!(screen.frame_at(Some(6.0), touch(1, TouchPhase::End, second, None)).0, 0.0);
+    }
+
+    #[test]
+    fn the_pointer_tilts_while_its_key_is_held_and_the_hand_stays() {
+        let screen = Screen::default();
+        screen.frame(Vec::new());
+        let key = |pressed| Event::Key {
+            key: Key::A,
+            physical_key: None,
+            pressed,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let at = |x: f32, y: f32| Event::PointerMoved(Pos2::new(x, y));
+        let tilts = |commands: &[AppCommand]| {
+            let tilt = |command: &AppCommand| match command {
+                AppCommand::Practice(PracticeCommand::Lean { right, near }) => Some([*right, *near]),
+                AppCommand::Practice(PracticeCommand::HoldUpright) => Some([0.0; 2]),
+                _ => None,
+            };
+            commands.iter().filter_map(tilt).collect::<Vec<_>>()
+        };
+        screen.frame(vec![at(400.0, 300.0)]);
+        assert_eq!(tilts(&screen.commands(None, vec![key(true)])), Vec::<[f32; 2]>::new());
+        let commands = screen.commands(None, vec![at(450.0, 275.0)]);
+        assert_eq!(tilts(&commands), [[50.0 * LEAN_PER_POINT, -25.0 * LEAN_PER_POINT]]);
+        assert_eq!(pointed(&commands), Some([0.5, 0.5]), "the hand moves while it is tilted");
+        let commands = screen.commands(None, vec![key(false)]);
+        assert_eq!((tilts(&commands), pointed(&commands)), (vec![], Some([0.5625, 275.0 / 600.0])));
+        // The key alone.
+        screen.commands(None, vec![key(true)]);
+        assert_eq!(tilts(&screen.commands(None, vec![key(false)])), [[0.0; 2]]);
     }
 
     #[test]
