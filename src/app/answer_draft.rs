@@ -9,7 +9,10 @@ pub fn parse_draft(question: &Question, draft: &str) -> Option<Option<AnswerValu
     let line = draft.trim();
     match &question.kind {
         _ if line.is_empty() => None,
-        QuestionKind::Number { .. } => Some(line.replace(',', ".").parse().ok().map(AnswerValue::Number)),
+        QuestionKind::Number { .. } => {
+            let number = line.replace(',', ".").parse().ok().filter(|number: &f64| number.is_finite());
+            Some(number.map(AnswerValue::Number))
+        }
         QuestionKind::Text => Some(Some(AnswerValue::Word(line.to_string()))),
         _ => None,
     }

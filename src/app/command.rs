@@ -127,7 +127,7 @@ pub enum PracticeCommand {
     /// Holds the handle upright again.
     HoldUpright,
     /// Sets the direction of a pen, as in [`crate::pointer_hand::PointerHand::pen`].
-    PointPen(Option<[f32; 2]>),
+    SetPenDirection(Option<[f32; 2]>),
     SetDeviceButton {
         bit: u32,
         is_down: bool,

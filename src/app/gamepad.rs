@@ -1,7 +1,7 @@
 //! A gamepad as a pointer with some keys.
 //!
 //! Takes the state of a gamepad in each frame. Gives the events that a mouse, a pen and a keyboard would have caused, so that
-//! every screen can be used with it, and movements of the camera: the left stick moves the pointer, the right trigger presses as
+//! every screen can be used with it but for typing, and movements of the camera: the left stick moves the pointer, the right trigger presses as
 //! hard as it is pulled, and the right stick rotates the view. Buttons are those of the W3C's standard gamepad.
 
 use crate::command::CameraCommand;
@@ -68,6 +68,11 @@ fn deflection([x, y]: [f32; 2]) -> Vec2 {
 }
 
 impl GamepadPointer {
+    /// True if nothing is pressed or deflected.
+    pub fn is_at_rest(&self) -> bool {
+        self.before == GamepadState::default()
+    }
+
     /// Events of a frame that took `seconds`, and movements of the camera. `pointer`: position of the pointer as it is.
     pub fn update(
         &mut self,

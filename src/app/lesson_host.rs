@@ -6,9 +6,11 @@
 use crate::lesson_backend::{InputDevice, LessonClient, LessonConfig};
 use crate::lesson_message::{EventMessage, LessonMessage, LessonNews, StartMessage, WindowMessage, edit_bytes};
 use crate::lesson_run::LessonRun;
+use crate::snapshot::SNAPSHOT_WORDS;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use typodont_audio::{DrillLoad, SoundReceiver};
 use typodont_report::Templates;
+use web_time::{Duration, Instant};
 
 /// Sends a message to the window.
 pub type NewsSender = Box<dyn FnMut(LessonMessage) + Send>;
@@ -24,13 +26,18 @@ struct Outlet {
     client: LessonClient,
     sounds: SoundReceiver,
     load: Option<DrillLoad>,
+    snapshot: Option<[u32; SNAPSHOT_WORDS]>,
+    sent: Instant,
     send: NewsSender,
 }
+
+/// Interval at which the window learns of ticks in which nothing happened: its clock goes on.
+const QUIET_INTERVAL: Duration = Duration::from_millis(100);
 
 impl Outlet {
     /// Tells the window what has happened since the last time, if anything has.
     fn send_news(&mut self, is_worth_a_frame: bool, is_over: bool) {
-        let Outlet { client, sounds, load, send } = self;
+        let Outlet { client, sounds, load, snapshot, sent, send } = self;
         let mut news = LessonNews { is_worth_a_frame, is_over, ..LessonNews::default() };
         let edits = edit_bytes(std::iter::from_fn(|| client.next_edit()));
         let mut bytes = vec![edits];
@@ -46,10 +53,13 @@ impl Outlet {
             *load = heard;
             news.load = heard.map(DrillLoad::encode);
         }
-        if news == LessonNews::default() && bytes[0].is_empty() {
+        let newest = client.snapshot_words();
+        let is_quiet = news == LessonNews::default() && bytes[0].is_empty();
+        if is_quiet && (newest == *snapshot || sent.elapsed() < QUIET_INTERVAL) {
             return;
         }
-        news.snapshot = client.snapshot_words();
+        (*snapshot, *sent) = (newest, Instant::now());
+        news.snapshot = newest;
         if let Ok(message) = LessonMessage::new(&news, bytes) {
             send(message);
         }
@@ -91,7 +101,7 @@ impl LessonHost {
         };
         let (sender, sounds) = typodont_audio::sound_channel();
         let (client, run) = LessonRun::new(config, sender);
-        *lock(&outlet) = Some(Outlet { client, sounds, load: None, send });
+        *lock(&outlet) = Some(Outlet { client, sounds, load: None, snapshot: None, sent: Instant::now(), send });
         Ok(LessonHost { run: Some(run), outlet })
     }
 

@@ -81,7 +81,7 @@ impl KeptRecording {
     /// Keeps everything so far in place of the recording with which the session goes on.
     fn replace(&mut self, former: &str) {
         self.keep();
-        platform::replace_recording(former, &self.session);
+        platform::replace_recording(former);
     }
 
     fn keep(&mut self) {
@@ -203,7 +203,7 @@ impl LessonPort {
             Some(reopened) => {
                 let workpiece = reopened.make_workpiece()?;
                 self.send_event(LessonEvent::WorkpieceReady(workpiece.clone()));
-                reopened.prepare(workpiece, device.spec().clone(), templates)?
+                reopened.prepare(workpiece, device.spec().clone(), templates, started)?
             }
             None => {
                 let opening = SessionConfig {

@@ -25,6 +25,7 @@ use typodont_exercise::session::{
     AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input, InputError, TraineeView,
 };
 use typodont_formats::Library;
+use typodont_lesson::InterruptedSession;
 use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
 use typodont_scene::particles::CollisionWorld;
@@ -62,7 +63,11 @@ pub struct LessonState {
     pub pause_reason: Option<PauseReason>,
     /// Last status of a second hand.
     pub second_hand: Option<SecondHandStatus>,
+    /// The interrupted session that goes on, until its first tick: if that fails, it is still offered.
+    pub former: Option<InterruptedSession>,
     pub is_paused: bool,
+    /// True while the window cannot be seen, and the lesson is paused for it.
+    is_hidden: bool,
     /// True while the pointer acts as the device.
     pub is_pointer_captured: bool,
     pub pointer_hand: PointerHand,
@@ -142,6 +147,8 @@ impl LessonState {
             pause_reason: None,
             second_hand: None,
             is_paused: false,
+            is_hidden: false,
+            former: None,
             is_pointer_captured: false,
             pointer_hand: PointerHand::default(),
             hand_placement,
@@ -260,6 +267,9 @@ impl LessonState {
             scene.collect_undrawn();
         }
         self.snapshot = self.client.snapshot().or(self.snapshot);
+        if self.snapshot.is_some() {
+            self.former = None;
+        }
         if let Some(seen) = &self.snapshot {
             self.controls.update(&LessonProgress {
                 hand: seen.hand,
@@ -592,6 +602,19 @@ impl LessonState {
             self.release_pointer();
         }
         self.client.send(LessonCommand::Pause(is_paused));
+    }
+
+    /// Pauses a lesson that nobody sees, and resumes it when it is seen again.
+    pub fn set_hidden(&mut self, is_hidden: bool) {
+        if is_hidden == self.is_hidden || self.are_stages_over {
+            return;
+        }
+        self.is_hidden = is_hidden;
+        if is_hidden {
+            self.release_pointer();
+        }
+        self.client.send(LessonCommand::Pause(is_hidden || self.is_paused));
+        self.pass_on();
     }
 
     /// Submits the questionnaire with the present ratings.

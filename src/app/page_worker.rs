@@ -65,6 +65,8 @@ impl Mailbox {
 
 impl Drop for WorkerLesson {
     fn drop(&mut self) {
+        self.worker.worker.set_onmessage(None);
+        self.worker.worker.set_onerror(None);
         self.worker.worker.terminate();
     }
 }
@@ -190,8 +192,9 @@ pub fn serve_lesson() -> bool {
     scope.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
     let on_time = Closure::<dyn FnMut()>::new(|| {
         LESSON.with_borrow_mut(|lesson| {
-            if lesson.as_mut().is_some_and(|lesson| !lesson.advance()) {
-                *lesson = None;
+            // One that is over stays, for the page's messages that were on their way.
+            if let Some(lesson) = lesson {
+                lesson.advance();
             }
         })
     });

@@ -36,6 +36,8 @@ pub struct RemoteLesson {
     sounds: SoundSender,
     mouse: Mouse,
     passed_on: Option<MouseTarget>,
+    /// True once the lesson has sent its last message.
+    is_over: bool,
     scenario: Arc<Scenario>,
     templates: Templates,
     /// Origin of the workpiece until it is made, and the frames that were drawn since.
@@ -75,6 +77,7 @@ impl RemoteLesson {
             sounds,
             mouse,
             passed_on: None,
+            is_over: false,
             scenario: config.scenario,
             templates: config.templates,
             opening: Some((origin, 0)),
@@ -107,7 +110,7 @@ impl RemoteLesson {
             Arrival::News(news, bytes) => (news, bytes),
             Arrival::Failed(why) => {
                 queues.events.send(LessonEvent::Failed(why));
-                self.queues = None;
+                self.is_over = true;
                 return;
             }
         };
@@ -128,9 +131,7 @@ impl RemoteLesson {
             let file_bytes = event.take_bytes(&mut bytes);
             queues.events.send(event.event(file_bytes, &self.scenario, &self.templates));
         }
-        if news.is_over {
-            self.queues = None;
-        }
+        self.is_over |= news.is_over;
     }
 }
 
@@ -145,6 +146,10 @@ impl LessonBackend for RemoteLesson {
         if let Some(queues) = &mut self.queues {
             queues.edits.flush();
             queues.events.flush();
+            if self.is_over && queues.events.is_flushed() {
+                // The window learns from the abandoned queues that nothing follows.
+                self.queues = None;
+            }
         }
         self.pass_on();
     }
@@ -193,9 +198,6 @@ mod tests {
     use typodont_report::FirstResult;
     use typodont_report::bundle::{BundleFolder, CompletionStep, VerificationOutcome, verify};
 
-    /// Bytes at the end of a recording without which it has no end.
-    const END_BYTES: usize = 300;
-
     /// Force with which the test presses the bur into the tooth, N.
     const PRESS: f32 = 1.5;
 
@@ -207,7 +209,7 @@ mod tests {
 
     fn coarse_lesson() -> LessonConfig {
         let text =
-            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.2");
+            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.3");
         let source = SourceText::new("coarse.json", text);
         let scenario = scenario::resolve(source, &Library::shipped(), ResolveMode::MakeWorkpiece).unwrap();
         LessonConfig {
@@ -344,6 +346,14 @@ mod tests {
         cut.expect("a moment of the cutting").to_vec()
     }
 
+    /// A recording up to its end, which is missing: nothing else is.
+    fn without_end(recording: &[u8]) -> Vec<u8> {
+        const STEP: usize = 50;
+        let has_end = |bytes: &[u8]| Recording::parse(FILE_NAME, bytes).unwrap().end.is_some();
+        let cut = (1..).map(|steps| &recording[..recording.len() - steps * STEP]).find(|bytes| !has_end(bytes));
+        cut.expect("a recording without an end").to_vec()
+    }
+
     #[test]
     fn a_lesson_of_messages_makes_a_bundle_that_holds_and_the_window_sees_what_it_cuts() {
         // Aim: a page, whose lesson runs in a worker, gives the same evidence, and draws the tooth as it was cut. Method: a lesson
@@ -353,8 +363,7 @@ mod tests {
         let (name, whole) = checked(&seen);
 
         // A page that was closed before the recording's end has kept the rest of it.
-        let kept =
-            InterruptedSession::kept(&name, whole[..whole.len() - END_BYTES].to_vec()).expect("a person's session");
+        let kept = InterruptedSession::kept(&name, without_end(&whole)).expect("a person's session");
         assert_eq!((kept.scenario_id.as_str(), kept.participant.as_str()), ("5-grinding", "P01"));
         let finished = kept.finish(&Templates::shipped(), &mut |_| ()).unwrap();
         assert!(!finished.remarks.is_empty(), "the end of the recording is not missed");
@@ -397,17 +406,57 @@ mod tests {
             assert_ne!(new_name, name, "the new recording would replace the former before it is kept");
             let after = Recording::parse(FILE_NAME, &whole).unwrap();
             assert_eq!(after.head.resumed.len(), times);
-            let kept = before.ticks.len() - 1;
+            let kept = before.ticks.len();
             // Absent readings are not numbers, and so not equal to themselves.
             let text = |recording: &Recording| format!("{:?}", &recording.ticks[..kept]);
             assert!(text(&after) == text(&before), "what was done before the interruption has changed");
             assert!(!after.ticks[kept].reading.pose.is_valid(), "the hand is not released where it was interrupted");
             assert!(after.ticks.len() > kept + 10, "nothing was done after it");
             assert_eq!(seen.stages[0], 0, "the window does not learn of the stage");
-            assert_eq!(after.end.as_ref().unwrap().servo.interruptions, times as u64);
-            assert_eq!(seen.first.session.resumed_s.len(), times);
+            assert_eq!(seen.first.session.resumed.len(), times);
             former = (new_name, interrupted(&whole));
         }
+    }
+
+    #[test]
+    fn the_clock_goes_on_while_the_hand_rests() {
+        let mut lesson = Crossing::begin(coarse_lesson());
+        let begun = Instant::now();
+        let seconds = |lesson: &mut Crossing| {
+            lesson.frame();
+            assert!(begun.elapsed() < Duration::from_secs(100), "the clock does not go on");
+            std::thread::sleep(Duration::from_millis(5));
+            lesson.client.snapshot().map_or(0.0, |seen| seen.stage_seconds)
+        };
+        // The first movement starts the clock.
+        let place = Vec3::Y * ABOVE;
+        lesson.client.mouse.as_ref().unwrap().aim(HandTarget { place, max_force: 0.0, yaw: 0.0, lean: [0.0; 2] });
+        while seconds(&mut lesson) < 2.0 {}
+    }
+
+    #[test]
+    fn a_session_whose_stages_are_over_does_not_go_on() {
+        // Aim: nobody cuts on after having finished. Method: the recording without its end, after the trainee has ended the lesson;
+        // what followed its last tick is not forgotten.
+        let (name, whole) = checked(&grind(Crossing::begin(coarse_lesson()), 1));
+        let session = InterruptedSession::kept(&name, without_end(&whole)).unwrap();
+        let reopened = session.reopen().unwrap();
+        let config = LessonConfig {
+            scenario: reopened.scenario().clone(),
+            seed: reopened.seed(),
+            resumed: Some(reopened),
+            ..coarse_lesson()
+        };
+        let mut lesson = Crossing::begin(config);
+        let why = loop {
+            lesson.frame();
+            match lesson.client.next_event() {
+                Some(LessonEvent::Failed(why)) => break why,
+                Some(LessonEvent::Live(event)) => panic!("it goes on: {event:?}"),
+                _ => assert!(!lesson.client.is_finished()),
+            }
+        };
+        assert!(why.starts_with("not-resumable: ") && why.contains("all its stages were performed"), "{why}");
     }
 
     #[test]

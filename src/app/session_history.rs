@@ -114,6 +114,11 @@ impl SessionHistory {
         self.sessions.interrupted.first()
     }
 
+    /// Puts an interrupted session back that could not go on.
+    pub fn put_back(&mut self, session: InterruptedSession) {
+        self.sessions.interrupted.insert(0, session);
+    }
+
     /// Takes the oldest interrupted session off the list.
     pub fn take_interrupted(&mut self) -> Option<InterruptedSession> {
         let is_any = !self.sessions.interrupted.is_empty();

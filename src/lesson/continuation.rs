@@ -4,13 +4,19 @@
 //! until the new one contains all of it.
 
 use super::preparation::{PreparedSession, SessionConfig};
+use super::seed::started_text;
 use super::session_folder::{InterruptedSession, RecordingPlace};
 use super::{LessonError, SessionSeed};
+use jiff::Timestamp;
 use std::fs;
+use std::path::PathBuf;
 use std::sync::Arc;
 use typodont_core::device::DeviceSpec;
-use typodont_exercise::record::{self, Continuation, DeviceSpecFile, Recording, SeedOriginFile, VERSION};
+use typodont_exercise::record::{
+    self, Continuation, ContinuationError, DeviceSpecFile, Recording, ResumptionFile, SeedOriginFile, VERSION,
+};
 use typodont_exercise::scenario::{Scenario, Workpiece};
+use typodont_formats::sync_folder;
 use typodont_report::Templates;
 use typodont_report::bundle::PartialBundle;
 
@@ -25,8 +31,6 @@ pub struct ReopenedSession {
 /// State of a session that goes on.
 pub(super) struct Resumption {
     pub continuation: Continuation,
-    /// Number of times that the session was interrupted so far.
-    pub interruptions: u64,
     pub former: Option<PartialBundle>,
 }
 
@@ -49,6 +53,17 @@ impl InterruptedSession {
         let head = &recording.head;
         if recording.end.is_some() {
             return Err(not("all of it was recorded".into()));
+        }
+        if recording.is_empty() {
+            return Err(not("nothing of it was recorded".into()));
+        }
+        let damage =
+            recording.loss.as_ref().filter(|loss| loss.seen_until.is_some_and(|tick| tick.0 >= recording.len() as u64));
+        if let Some(damage) = damage {
+            return Err(not(format!("its recording is damaged ({})", damage.what)));
+        }
+        if !head.live || head.operator.is_some() {
+            return Err(not("no person performed it".into()));
         }
         if head.seed_origin == Some(SeedOriginFile::Sealed) {
             return Err(not("its random choices are sealed".into()));
@@ -87,13 +102,14 @@ impl ReopenedSession {
     ///
     /// # Errors
     ///
-    /// [`LessonError::NotResumable`] if the device is another one or this machine repeats the recording with other results;
-    /// when the folder or the recording cannot be created.
+    /// [`LessonError::NotResumable`] if the device is another one, all stages were performed, or this machine repeats the
+    /// recording with other results; other errors if the folder or the recording cannot be written.
     pub fn prepare(
         self,
         workpiece: Arc<Workpiece>,
         spec: DeviceSpec,
         templates: Templates,
+        now: Timestamp,
     ) -> Result<PreparedSession, LessonError> {
         let ReopenedSession { session, recording, former } = self;
         let not = |why: String| LessonError::NotResumable { why };
@@ -101,8 +117,7 @@ impl ReopenedSession {
         if DeviceSpecFile::from(&spec) != head.device {
             return Err(not(format!("it began with another device ({})", head.device.name)));
         }
-        // The last recorded tick is left out; see `record::go_on`.
-        head.resumed.push(recording.len().saturating_sub(1) as u64);
+        head.resumed.push(ResumptionFile { tick: recording.len() as u64, at: started_text(now) });
         let out = match &session.place {
             RecordingPlace::Folder(folder) => folder.parent(),
             RecordingPlace::Memory { .. } => None,
@@ -112,13 +127,15 @@ impl ReopenedSession {
         let gone_on = record::go_on(&recording, &workpiece, &mut prepared.recorder);
         match gone_on.and_then(|continuation| Ok((continuation, prepared.recorder.flush()?))) {
             Ok((continuation, ())) => {
-                let interruptions = head.resumed.len() as u64;
-                prepared.resumption = Some(Resumption { continuation, interruptions, former });
+                prepared.resumption = Some(Resumption { continuation, former });
                 Ok(prepared)
             }
             Err(error) => {
                 prepared.partial_bundle.abandon();
-                Err(not(error.to_string()))
+                Err(match error {
+                    ContinuationError::Recorder(error) => LessonError::RecordingNotStarted(error),
+                    ContinuationError::StagesOver | ContinuationError::Different(_) => not(error.to_string()),
+                })
             }
         }
     }
@@ -127,7 +144,12 @@ impl ReopenedSession {
 impl Resumption {
     /// Removes the former recording from the disk, once the new one is there.
     pub fn replace_former(former: Option<PartialBundle>, new: &PartialBundle) {
-        let is_written = |path| fs::File::open(path).and_then(|file| file.sync_all()).is_ok();
+        // Some systems sync no file that was opened only for reading.
+        let is_written = |path: PathBuf| {
+            let synced = fs::File::options().write(true).open(&path).and_then(|file| file.sync_all());
+            path.ancestors().skip(1).take(2).for_each(sync_folder);
+            synced.is_ok()
+        };
         // A former recording that cannot be removed is offered again; nothing is lost by it.
         if let Some(former) = former.filter(|_| new.recording_path().is_none_or(is_written)) {
             former.abandon();

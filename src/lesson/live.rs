@@ -171,7 +171,7 @@ impl LiveSession {
         Ok((live, events))
     }
 
-    /// Goes on with a session that was interrupted `interruptions` times: one tick releases the hand, and then the servo starts
+    /// Goes on with a session that was interrupted before its stages were over: one tick releases the hand, and then the servo starts
     /// with the commands that were not carried out. Returns the events of that tick.
     ///
     /// # Errors
@@ -181,7 +181,6 @@ impl LiveSession {
         session: &mut Session,
         mut simulation: Simulation,
         pending_commands: VecDeque<Command>,
-        interruptions: u64,
         device: Box<dyn Device + Send>,
         observer: &mut O,
     ) -> Result<(LiveSession, Vec<LiveEvent>), LiveError<O::Error>> {
@@ -189,17 +188,15 @@ impl LiveSession {
             tick: simulation.tick(),
             pending_commands,
             gate: *simulation.gate(),
-            interruptions,
             ..LiveSession::before_start(device.spec().clone())
         };
         let mut events = Vec::new();
-        if !session.are_stages_over() {
-            let step = simulation.step(&Reading::ABSENT);
-            observer.tick_completed(&Reading::ABSENT, &step, simulation.edits())?;
-            (live.tick, live.gate, live.latest_step) = (step.tick.next(), *simulation.gate(), Some(step));
-            let effects = session.advance(SessionEvent::Tick { step: &step, edits: simulation.edits() });
-            live.apply_effects(effects, session, observer, &mut events)?;
-        }
+        let step = simulation.step(&Reading::ABSENT);
+        observer.tick_completed(&Reading::ABSENT, &step, simulation.edits())?;
+        (live.tick, live.gate, live.latest_step) = (step.tick.next(), *simulation.gate(), Some(step));
+        let effects = session.advance(SessionEvent::Tick { step: &step, edits: simulation.edits() });
+        live.apply_effects(effects, session, observer, &mut events)?;
+        // The tick may have been the last of the last stage.
         if !session.are_stages_over() {
             live.start(simulation, device, None, TimingStats::default())?;
         }

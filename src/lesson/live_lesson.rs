@@ -73,7 +73,7 @@ impl Lesson {
     ) -> Result<(Lesson, Vec<LiveEvent>), LessonError> {
         let PreparedSession { scenario, workpiece, recorder, disk_sync, partial_bundle, templates, resumption, .. } =
             prepared;
-        let Some(Resumption { continuation, interruptions, former }) = resumption else {
+        let Some(Resumption { continuation, former }) = resumption else {
             return Err(LessonError::NotResumable { why: "nothing was recorded".into() });
         };
         let Continuation { simulation, mut session, pending_commands, is_clutch_pressed, effects, edits } =
@@ -81,8 +81,7 @@ impl Lesson {
         let limits = LimitMonitor::new(&scenario, &workpiece);
         let mut observer = RecordingObserver { recorder, edits, handle_orientation: UPRIGHT, limits };
         let mut events: Vec<LiveEvent> = effects.into_iter().map(LiveEvent::Effect).collect();
-        let resumed =
-            LiveSession::resume(&mut session, simulation, pending_commands, interruptions, device, &mut observer);
+        let resumed = LiveSession::resume(&mut session, simulation, pending_commands, device, &mut observer);
         let (live, first_events) = resumed.map_err(|broken| stopped_error(&partial_bundle, &broken))?;
         events.extend(first_events);
         Resumption::replace_former(former, &partial_bundle);
@@ -240,7 +239,12 @@ impl Observer for RecordingObserver {
     type Error = RecorderError;
 
     fn input(&mut self, tick: Tick, input: &Input) -> Result<(), RecorderError> {
-        self.recorder.input(tick, input)
+        self.recorder.input(tick, input)?;
+        // After the last stage, no tick passes on what was written.
+        match input {
+            Input::Look(_) | Input::PlaceHand(_) | Input::PressClutch(_) => Ok(()),
+            _ => self.recorder.flush(),
+        }
     }
 
     fn command(&mut self, tick: Tick, command: &Command) -> Result<(), RecorderError> {
@@ -248,7 +252,12 @@ impl Observer for RecordingObserver {
     }
 
     fn effect(&mut self, tick: Tick, effect: &Effect, session: &Session) -> Result<(), RecorderError> {
-        self.recorder.effect(tick, effect, session)
+        self.recorder.effect(tick, effect, session)?;
+        // An interruption must not undo the end of a stage.
+        match effect {
+            Effect::StageEnded { .. } | Effect::StagesOver => self.recorder.flush(),
+            _ => Ok(()),
+        }
     }
 
     fn tick_completed(&mut self, reading: &Reading, step: &Step, edits: &[Edit]) -> Result<(), RecorderError> {

@@ -139,7 +139,7 @@ fn bundle_name(head: &RecordingHeadFile) -> String {
     let RecordingHeadFile { participant, started, resumed, .. } = head;
     let parts = resumed
         .iter()
-        .fold(format!("{participant}/{seed}/{process}/{started}"), |parts, tick| format!("{parts}/{tick}"));
+        .fold(format!("{participant}/{seed}/{process}/{started}"), |parts, one| format!("{parts}/{}", one.tick));
     let digest = Sha256::digest(parts);
     let moment = started.replace(['-', ':'], "");
     format!("{}_{moment}_{}", head.scenario_id, hex(&digest[..4]))

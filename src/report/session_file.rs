@@ -8,7 +8,9 @@ use typodont_core::device::DeviceSpec;
 use typodont_core::tick::Tick;
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{CoefficientName, TissueRole, TissueTable};
-use typodont_exercise::record::{DeviceSpecFile, Recording, SeedOriginFile, ServoStatsFile, ended_by_name};
+use typodont_exercise::record::{
+    DeviceSpecFile, Recording, ResumptionFile, SeedOriginFile, ServoStatsFile, ended_by_name,
+};
 use typodont_exercise::scenario::{Jaw, Limit, QuestionKind, Questionnaire, Scenario, Workpiece, hex};
 use typodont_exercise::score;
 use typodont_exercise::score::{EpisodeKind, ErrorEpisode, Evidence, Grade, SCORER_VERSION, Scored, SiteResult};
@@ -109,15 +111,30 @@ pub struct SessionFile {
     pub questionnaire: Option<QuestionnaireFile>,
     #[serde(default)]
     pub servo: ServoStatsFile,
-    /// Times of the session at which it went on after it had been interrupted, s; left out if it never was.
+    /// Moments at which the session went on after it had been interrupted; left out if it never was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub resumed_s: Vec<f64>,
+    pub resumed: Vec<SessionResumption>,
     /// SHA-256 of the templates that the page was made from.
     #[serde(default)]
     pub template_sha256: String,
     /// SHA-256 of the bundle's other files, by name.
     #[serde(default)]
     pub digests: BTreeMap<String, String>,
+}
+
+/// Moment at which an interrupted session went on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SessionResumption {
+    /// Time of the session, s.
+    pub session_s: f64,
+    /// Date and time, RFC 3339.
+    pub at: String,
+}
+
+impl SessionResumption {
+    fn of(file: &ResumptionFile) -> SessionResumption {
+        SessionResumption { session_s: Tick(file.tick).seconds(), at: file.at.clone() }
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -385,7 +402,7 @@ impl SessionFile {
             grade: scored.grade.as_ref().map(grade),
             questionnaire: scenario.questionnaire.as_ref().map(|q| questionnaire(q, &scored.replay.outcome.ratings)),
             servo: recording.end.as_ref().map_or(ticks, |end| end.servo.clone()),
-            resumed_s: head.resumed.iter().map(|tick| Tick(*tick).seconds()).collect(),
+            resumed: head.resumed.iter().map(SessionResumption::of).collect(),
             template_sha256: String::new(),
             digests: BTreeMap::new(),
         }

@@ -36,9 +36,9 @@ main(async () => {
     }
     const file = path.join(bundles, `${moment}.zip`);
     await saveBundle(opened, file);
-    const { servo, resumed_s: resumed } = sessionOf(file);
-    claim((resumed ?? []).length === Number(goesOn), `continued at ${resumed} s`);
-    const kept = goesOn ? Math.round(1000 * resumed[0]) : servo.ticks;
+    const { servo, resumed } = sessionOf(file);
+    claim((resumed ?? []).length === Number(goesOn), `continued ${JSON.stringify(resumed)}`);
+    const kept = goesOn ? Math.round(1000 * resumed[0].session_s) : servo.ticks;
     claim(!goesOn || servo.ticks > kept + 500, `only ${servo.ticks - kept} ticks have run after the interruption`);
     lost.push(seen - kept);
     claim(seen - kept <= LOST_MAX, `${seen - kept} of ${seen} ticks are lost`);

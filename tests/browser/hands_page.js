@@ -86,6 +86,25 @@ main(async () => {
   await until('handle', handle => numbers(handle)[1] < 0.9);
   await hold({});
   await picture('gamepad');
+  // A page that is not seen stands still.
+  const hide = isHidden => page.evaluate(isHidden => {
+    for (const [name, value] of [['hidden', isHidden], ['visibilityState', isHidden ? 'hidden' : 'visible']]) {
+      Object.defineProperty(document, name, { configurable: true, get: () => value });
+    }
+    document.dispatchEvent(new Event('visibilitychange'));
+  }, isHidden);
+  await hide(true);
+  await page.waitForTimeout(1000);
+  const atHiding = Number(state.ticks);
+  await page.waitForTimeout(4000);
+  await hide(false);
+  await page.mouse.move(x + 20, y);
+  await page.waitForTimeout(500);
+  await page.mouse.move(x, y);
+  await until('ticks', ticks => Number(ticks) > atHiding + 200);
+  const whileHidden = Number(state.ticks) - atHiding;
+  claim(whileHidden < 3500, `${whileHidden} ticks have run while the page was hidden for five seconds`);
+
   // B puts the instrument down.
   await hold({ pressed: [1] });
   await until('pointer', pointer => pointer === 'free');
@@ -93,5 +112,5 @@ main(async () => {
   await finishLesson(opened);
   await saveBundle(opened, zip);
   await close();
-  console.log(JSON.stringify({ tilted, light, hard, pulled }));
+  console.log(JSON.stringify({ tilted, light, hard, pulled, whileHidden }));
 });

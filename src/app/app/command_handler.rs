@@ -74,18 +74,22 @@ impl App {
         };
     }
 
-    /// Goes on with the interrupted session that the list offers; if it cannot go on, the list says why and still offers it.
+    /// Goes on with the interrupted session that the list offers. If it cannot go on, the user learns why, and the list still
+    /// offers it.
     pub(super) fn resume_interrupted(&mut self, ctx: &egui::Context) {
         if !self.completions.is_empty() {
             return;
         }
         let Some(session) = self.history.interrupted().cloned() else { return };
+        if self.options.kiosk().is_some() && session.participant != self.participant {
+            return;
+        }
         let reopened = match session.reopen() {
             Ok(reopened) => reopened,
             Err(why) => return self.complaints.push(why.to_string()),
         };
         let Some(input_device) = self.open_input_device() else { return };
-        self.history.take_interrupted();
+        let former = self.history.take_interrupted();
         let mut library = Library::shipped();
         for (name, bytes) in &reopened.scenario().files {
             library.insert(name.clone(), bytes.clone());
@@ -106,6 +110,9 @@ impl App {
             wake: Arc::from(repaint_waker(ctx)),
         };
         self.show_lesson(config, library);
+        if let Screen::Lesson(lesson) = &mut self.screen {
+            lesson.former = former;
+        }
     }
 
     pub(super) fn set_interrupted_aside(&mut self) {
@@ -486,7 +493,7 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SetPressure(_) | PracticeCommand::SetDeviceButton { .. } if !lesson.is_pointer_captured => {}
         PracticeCommand::Lean { right, near } => lesson.pointer_hand.lean(right, near),
         PracticeCommand::HoldUpright => lesson.pointer_hand.hold_upright(),
-        PracticeCommand::PointPen(pen) => lesson.pointer_hand.pen = pen,
+        PracticeCommand::SetPenDirection(pen) => lesson.pointer_hand.pen = pen,
         PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
         PracticeCommand::PressClutch(is_pressed) => lesson.press_clutch(is_pressed),

@@ -60,9 +60,9 @@ impl App {
             lesson.release_pointer();
         }
         match &mut self.screen {
-            // A page that nobody sees stands still, and goes on where it stopped.
-            Screen::Lesson(lesson) if platform::IS_PAGE && is_hidden(ctx) && !lesson.are_stages_over => {}
             Screen::Lesson(lesson) => {
+                // A page that nobody sees stands still, and goes on where it stopped.
+                lesson.set_hidden(platform::IS_PAGE && is_hidden(ctx));
                 let (elapsed, is_dragging, now) =
                     ctx.input(|input| (input.unstable_dt, input.pointer.any_down(), input.time));
                 lesson.poll(self.settings.volume, elapsed);
@@ -165,6 +165,9 @@ impl App {
                 self.show_results(*first, Completion::of_lesson(lesson), !is_test_run);
             }
         } else if let Some(Err(why)) = lesson.completion.outcome.take() {
+            if let Some(former) = lesson.former.take() {
+                self.history.put_back(former);
+            }
             self.screen = Screen::Failed(why);
         }
     }

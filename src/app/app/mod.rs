@@ -77,6 +77,7 @@ pub struct App {
     /// Time of the last input, s.
     last_input: f64,
     gamepad: GamepadPointer,
+    has_gamepad: bool,
     /// Movement of the camera by the gamepad in this frame.
     gamepad_camera: Option<CameraCommand>,
 }
@@ -147,6 +148,7 @@ impl App {
             frame_count: 0,
             last_input: 0.0,
             gamepad: GamepadPointer::default(),
+            has_gamepad: false,
             gamepad_camera: None,
         };
         if let (Some(mode), Some(path)) = (app.options.editor_mode, app.options.exercise.clone()) {
@@ -226,7 +228,13 @@ impl eframe::App for App {
     }
 
     fn raw_input_hook(&mut self, ctx: &egui::Context, input: &mut egui::RawInput) {
-        let Some(pad) = platform::gamepad() else { return };
+        let pad = platform::gamepad();
+        self.has_gamepad = pad.is_some();
+        // One that was disconnected lets go of everything.
+        let pad = pad.unwrap_or_default();
+        if !self.has_gamepad && self.gamepad.is_at_rest() {
+            return;
+        }
         let (pointer, screen) = (ctx.pointer_latest_pos(), ctx.content_rect());
         let seconds = input.time.map_or(input.predicted_dt, |now| (now - ctx.input(|before| before.time)) as f32);
         let (events, camera) = self.gamepad.update(pad, pointer, screen, seconds);
@@ -268,10 +276,6 @@ impl eframe::App for App {
         ui_anchors::log_anchors(&ctx, &mut self.state_log);
         let interval = self.frame_interval(&ctx);
         // A gamepad causes no events by itself.
-        ctx.request_repaint_after(if platform::gamepad().is_some() {
-            interval.min(GAMEPAD_INTERVAL)
-        } else {
-            interval
-        });
+        ctx.request_repaint_after(if self.has_gamepad { interval.min(GAMEPAD_INTERVAL) } else { interval });
     }
 }

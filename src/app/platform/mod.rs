@@ -20,19 +20,20 @@ pub const FRAMES_BEFORE_LONG_STEP: u32 = 2;
 /// A pen as the platform reports it beside the window system's own events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pen {
-    /// Share of its full pressure, 0 to 1.
-    pub pressure: f32,
-    /// Tilt to the right and toward the user, from the perpendicular to the screen, degrees.
-    pub tilt: [f32; 2],
+    /// Share of its full pressure, 0 to 1, while it touches the screen.
+    pub pressure: Option<f32>,
+    /// Tilt to the right and toward the user, from the perpendicular to the screen, degrees; `None` for a pen that does not
+    /// know it.
+    pub tilt: Option<[f32; 2]>,
 }
 
 impl Pen {
     /// Direction from the tip to the other end as one sees the screen: components to the right and up of a unit vector, whose
-    /// third component is toward the eye. `None` for a pen that does not know its tilt.
+    /// third component is toward the eye.
     pub fn direction(self) -> Option<[f32; 2]> {
-        let [right, near] = self.tilt.map(|degrees| degrees.to_radians().tan());
+        let [right, near] = self.tilt?.map(|degrees| degrees.to_radians().tan());
         let length = (1.0 + right * right + near * near).sqrt();
-        (self.tilt != [0.0; 2] && length.is_finite()).then(|| [right / length, -near / length])
+        length.is_finite().then(|| [right / length, -near / length])
     }
 }
 
@@ -56,8 +57,8 @@ mod tests {
 
     #[test]
     fn a_pens_tilt_is_the_direction_of_its_other_end() {
-        let direction = |tilt| Pen { pressure: 1.0, tilt }.direction();
-        assert_eq!(direction([0.0, 0.0]), None, "a pen that knows no tilt says 0");
+        let direction = |tilt| Pen { pressure: None, tilt: Some(tilt) }.direction();
+        assert_eq!(direction([0.0, 0.0]), Some([0.0, 0.0]));
         let [right, up] = direction([45.0, 0.0]).unwrap();
         assert!((right - 0.5f32.sqrt()).abs() < 1e-6 && up == 0.0);
         let [right, up] = direction([0.0, 60.0]).unwrap();

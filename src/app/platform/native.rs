@@ -112,7 +112,7 @@ pub fn keep_change(_: &str, _: u32, _: &RecordingChange) {}
 pub fn forget_recording(_: &str) {}
 
 /// Deletes nothing: see [`begin_keeping`].
-pub fn replace_recording(_: &str, _: &str) {}
+pub fn replace_recording(_: &str) {}
 
 /// Never fails: see [`begin_keeping`].
 pub fn keeping_failure() -> Option<String> {

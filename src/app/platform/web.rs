@@ -180,8 +180,8 @@ pub fn forget_recording(session: &str) {
 }
 
 /// Deletes the kept recording of a session that goes on as another one, once that is kept.
-pub fn replace_recording(former: &str, session: &str) {
-    call_keeper("replace", [former.into(), session.into()]);
+pub fn replace_recording(former: &str) {
+    call_keeper("replace", [former.into()]);
 }
 
 /// The reason why a change could not be kept; it is told once.
@@ -301,16 +301,23 @@ fn storage() -> Option<web_sys::Storage> {
 thread_local! {
     /// The pen that touched the page last, until another pointer does.
     static PEN: Cell<Option<Pen>> = const { Cell::new(None) };
+    /// True once a pen has told of a tilt.
+    static KNOWS_TILT: Cell<bool> = const { Cell::new(false) };
 }
 
 /// Listens to the pens over an element: browsers report them as pointers, of which the window system takes the position only.
 pub fn listen_to_pens(canvas: &web_sys::HtmlCanvasElement) {
     let listener = Closure::<dyn FnMut(web_sys::PointerEvent)>::new(|event: web_sys::PointerEvent| {
-        let pen = (event.pointer_type() == "pen")
-            .then(|| Pen { pressure: event.pressure(), tilt: [event.tilt_x() as f32, event.tilt_y() as f32] });
-        PEN.set(pen);
+        let tilt = [event.tilt_x() as f32, event.tilt_y() as f32];
+        // A pen that does not measure its tilt always says 0.
+        KNOWS_TILT.set(KNOWS_TILT.get() || tilt != [0.0; 2]);
+        let is_pen = event.pointer_type() == "pen" && !matches!(&*event.type_(), "pointercancel" | "pointerleave");
+        PEN.set(is_pen.then(|| Pen {
+            pressure: (event.buttons() != 0).then(|| event.pressure()),
+            tilt: KNOWS_TILT.get().then_some(tilt),
+        }));
     });
-    for event in ["pointerdown", "pointermove", "pointerup"] {
+    for event in ["pointerdown", "pointermove", "pointerup", "pointercancel", "pointerleave"] {
         // An element takes any listener; without it a pen presses with its full strength.
         let _ = canvas.add_event_listener_with_callback(event, listener.as_ref().unchecked_ref());
     }

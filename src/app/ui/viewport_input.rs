@@ -27,10 +27,13 @@ const POINTS_PER_STEP: f32 = 40.0;
 
 /// Collects the commands of the pointer over a view, captured or free.
 pub fn collect_commands(ui: &egui::Ui, view: &egui::Response, is_captured: bool, commands: &mut Vec<AppCommand>) {
-    let contact = contact(ui, view);
+    let mut contact = contact(ui, view);
     match is_captured {
-        true => captured_pointer(ui, view, &contact, commands),
-        false => free_pointer(ui, view, commands),
+        true => captured_pointer(ui, view, &mut contact, commands),
+        false => {
+            end_tilting(ui, view.id);
+            free_pointer(ui, view, commands)
+        }
     }
 }
 
@@ -120,7 +123,17 @@ fn contact(ui: &egui::Ui, view: &egui::Response) -> PointerContact {
     })
 }
 
-fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &PointerContact, commands: &mut Vec<AppCommand>) {
+/// Ends a press, although the button is still held.
+fn let_go(ui: &egui::Ui, view: egui::Id) {
+    ui.data_mut(|data| data.get_temp_mut_or_default::<PointerContact>(view.with("contact")).began_on_view = false);
+}
+
+fn captured_pointer(
+    ui: &egui::Ui,
+    view: &egui::Response,
+    contact: &mut PointerContact,
+    commands: &mut Vec<AppCommand>,
+) {
     view.clone().on_hover_cursor(egui::CursorIcon::Crosshair);
     let rect = view.rect;
     let (modifiers, at) = ui.input(|input| (input.modifiers, input.pointer.latest_pos()));
@@ -144,12 +157,20 @@ fn captured_pointer(ui: &egui::Ui, view: &egui::Response, contact: &PointerConta
             false => AppCommand::Practice(PracticeCommand::ChangeStrength(steps)),
         });
     }
-    let is_working = is_on_view && drag.is_none();
+    let was_tilting = is_tilting(ui, view.id);
+    let tilting = tilting(ui, view.id, at, commands);
+    if was_tilting && tilting.is_none() {
+        // The hand goes to the pointer, wherever that is by now, without pressing.
+        let_go(ui, view.id);
+        contact.began_on_view = false;
+    }
+    let at = tilting.map(|tilting| tilting.place).or(at);
+    let is_working = (is_on_view || tilting.is_some()) && drag.is_none();
     let pen = platform::pen();
-    commands.push(AppCommand::Practice(PracticeCommand::PointPen(pen.and_then(|pen| pen.direction()))));
+    commands.push(AppCommand::Practice(PracticeCommand::SetPenDirection(pen.and_then(|pen| pen.direction()))));
     // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
-    let pressure = pen.map(|pen| pen_pressure(pen.pressure)).or(contact.touches.pressure()).unwrap_or(1.0);
-    let at = tilting(ui, view.id, at, commands);
+    let of_pen = pen.and_then(|pen| pen.pressure).map(pen_pressure);
+    let pressure = of_pen.or(contact.touches.pressure()).unwrap_or(1.0);
     let is_down = is_working && contact.began_on_view && pressure > 0.0;
     commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
     commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
@@ -166,37 +187,46 @@ const LEAN_PER_POINT: f32 = 0.004;
 /// Movement of the pointer up to which a press of the tilting key holds the handle upright, points.
 const STILL_POINTS: f32 = 4.0;
 
-/// Tilts the instrument while its key is held. Returns the position at which the hand points: meanwhile that at which the key
-/// was pressed.
-fn tilting(
-    ui: &egui::Ui,
-    view: egui::Id,
-    at: Option<egui::Pos2>,
-    commands: &mut Vec<AppCommand>,
-) -> Option<egui::Pos2> {
+/// State of the tilting key while it is held.
+#[derive(Clone, Copy, Default)]
+struct Tilting {
+    /// Position at which the key was pressed.
+    place: egui::Pos2,
+    /// Movement of the pointer since then, points.
+    moved: f32,
+}
+
+/// Tilts the instrument while its key is held; returns the state of the key. Not while somebody types.
+fn tilting(ui: &egui::Ui, view: egui::Id, at: Option<egui::Pos2>, commands: &mut Vec<AppCommand>) -> Option<Tilting> {
     let id = view.with("tilting");
-    let (is_held, by) = ui.input(|input| (input.key_down(Key::A), input.pointer.delta()));
-    // The position at which the key was pressed, and the movement since then.
-    let begun = ui.data(|data| data.get_temp::<(egui::Pos2, f32)>(id));
-    match (is_held, begun, at) {
-        (true, begun, Some(at)) => {
-            let (place, moved) = begun.unwrap_or((at, 0.0));
-            ui.data_mut(|data| data.insert_temp(id, (place, moved + by.length())));
-            if by != egui::Vec2::ZERO {
-                let (right, near) = (by.x * LEAN_PER_POINT, by.y * LEAN_PER_POINT);
-                commands.push(AppCommand::Practice(PracticeCommand::Lean { right, near }));
-            }
-            Some(place)
+    let is_typing = ui.ctx().egui_wants_keyboard_input();
+    let (is_down, is_plain, by) =
+        ui.input(|input| (input.key_down(Key::A), input.modifiers.is_none(), input.pointer.delta()));
+    let begun = ui.data(|data| data.get_temp::<Tilting>(id));
+    let is_held = is_down && !is_typing && (begun.is_some() || is_plain);
+    let Some(place) = at.filter(|_| is_held) else {
+        if begun.is_some_and(|begun| begun.moved < STILL_POINTS) && !is_typing {
+            commands.push(AppCommand::Practice(PracticeCommand::HoldUpright));
         }
-        (false, Some((_, moved)), at) => {
-            ui.data_mut(|data| data.remove_temp::<(egui::Pos2, f32)>(id));
-            if moved < STILL_POINTS {
-                commands.push(AppCommand::Practice(PracticeCommand::HoldUpright));
-            }
-            at
-        }
-        (_, _, at) => at,
+        end_tilting(ui, view);
+        return None;
+    };
+    let Tilting { place, moved } = begun.unwrap_or(Tilting { place, moved: 0.0 });
+    let now = Tilting { place, moved: moved + by.length() };
+    ui.data_mut(|data| data.insert_temp(id, now));
+    if by != egui::Vec2::ZERO {
+        let (right, near) = (by.x * LEAN_PER_POINT, by.y * LEAN_PER_POINT);
+        commands.push(AppCommand::Practice(PracticeCommand::Lean { right, near }));
     }
+    Some(now)
+}
+
+fn is_tilting(ui: &egui::Ui, view: egui::Id) -> bool {
+    ui.data(|data| data.get_temp::<Tilting>(view.with("tilting")).is_some())
+}
+
+fn end_tilting(ui: &egui::Ui, view: egui::Id) {
+    ui.data_mut(|data| data.remove_temp::<Tilting>(view.with("tilting")));
 }
 
 /// Position at which the hand points: that of the pointer, or, while Shift is held, one that follows it more finely

@@ -49,9 +49,9 @@ pub struct RecordingHeadFile {
     /// carried out some ticks after it was issued.
     #[serde(default)]
     pub live: bool,
-    /// Ticks before which the session went on after it had been interrupted; left out if it never was.
+    /// Moments at which the session went on after it had been interrupted; left out if it never was.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub resumed: Vec<u64>,
+    pub resumed: Vec<ResumptionFile>,
     /// FDI number of the tooth that replaced the exercise's own; left out if the number is the exercise's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tooth_fdi: Option<u8>,
@@ -82,6 +82,15 @@ impl RecordingHeadFile {
             digests: BTreeMap::new(),
         }
     }
+}
+
+/// Moment at which an interrupted session went on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResumptionFile {
+    /// The first tick after the interruption.
+    pub tick: u64,
+    /// Date and time, RFC 3339; for information, not used by the score.
+    pub at: String,
 }
 
 /// Source of a session's seed.

@@ -19,8 +19,8 @@ mod volume;
 mod writer;
 
 pub use file::{
-    CommandFile, DeviceSpecFile, InputFile, RecordingEndFile, RecordingHeadFile, SeedOriginFile, ServoStatsFile,
-    VERSION, ended_by_name,
+    CommandFile, DeviceSpecFile, InputFile, RecordingEndFile, RecordingHeadFile, ResumptionFile, SeedOriginFile,
+    ServoStatsFile, VERSION, ended_by_name,
 };
 pub use reader::{Recording, RecordingError, RecordingLoss};
 pub use replay::{Continuation, ContinuationError, Difference, Replay, ReplayCheck, go_on, replay};

@@ -136,11 +136,12 @@ pub struct Continuation {
     pub edits: Vec<Edit>,
 }
 
-/// Repeats the session of a recording without an end and writes it again with a recorder, up to its last tick, which is left
-/// out: what belongs to the tick after it may be missing. `recorder` has been started with the recording's workpiece.
+/// Repeats the session of a recording without an end and writes it again with a recorder, which has been started with the
+/// recording's workpiece. What follows the last tick may be incomplete: its inputs are made again, and what they cause is
+/// recorded anew; commands that were carried out after it are pending again.
 ///
 /// # Errors
-/// The first difference between the repetition and the recording, or the failure of the recorder.
+/// The first difference between the repetition and the recording, the end of the stages, or the failure of the recorder.
 pub fn go_on(
     recording: &Recording,
     workpiece: &Workpiece,
@@ -150,8 +151,9 @@ pub fn go_on(
     let mut effects = replayer.first_effects();
     let mut edits = Vec::new();
     let mut events = recording.events.iter().peekable();
-    let Some((last, ticks)) = recording.ticks.split_last() else { return Err(ContinuationError::TooShort) };
-    for haptic in ticks {
+    let mut newest = Vec::new();
+    for haptic in &recording.ticks {
+        effects.extend(std::mem::take(&mut newest));
         effects.extend(replayer.apply_events(haptic.tick));
         while let Some((tick, bytes)) = events.next_if(|(at, _)| *at <= haptic.tick) {
             recorder.repeat_event(*tick, bytes)?;
@@ -159,32 +161,44 @@ pub fn go_on(
         let step = replayer.step(haptic);
         recorder.tick_completed(&haptic.reading, &step, replayer.simulation.edits())?;
         edits.extend_from_slice(replayer.simulation.edits());
-        effects.extend(replayer.advance(&step));
+        newest = replayer.advance(&step);
     }
-    effects.extend(replayer.apply_events(last.tick));
-    while let Some((tick, bytes)) = events.next_if(|(at, _)| *at <= last.tick) {
-        recorder.repeat_event(*tick, bytes)?;
+    let next = Tick(recording.ticks.len() as u64);
+    let Replayer { simulation, mut session, mut expected_commands, verifier, inputs, .. } = replayer;
+    if let Some(difference) = verifier.difference {
+        return Err(ContinuationError::Different(difference));
     }
-    let Replayer { simulation, session, expected_commands, verifier, .. } = replayer;
-    match verifier.difference {
-        Some(difference) => Err(ContinuationError::Different(difference)),
-        None => {
-            let pending_commands = expected_commands.expected.into_iter().map(|(_, command)| command).collect();
-            let clutch = |(_, input): &(Tick, Input)| match input {
-                Input::PressClutch(is_pressed) => Some(*is_pressed),
-                _ => None,
-            };
-            let is_clutch_pressed = recording.inputs.iter().rev().find_map(clutch).unwrap_or(false);
-            Ok(Continuation { simulation, session, pending_commands, is_clutch_pressed, effects, edits })
+    for effect in &newest {
+        recorder.effect(next, effect, &session)?;
+    }
+    effects.extend(newest);
+    let mut is_clutch_pressed = false;
+    for (_, input) in &recording.inputs {
+        if let Input::PressClutch(is_pressed) = input {
+            is_clutch_pressed = *is_pressed;
         }
     }
+    for (_, input) in inputs {
+        recorder.input(next, input)?;
+        let caused = session.advance(SessionEvent::Input(input));
+        expected_commands.push_effects(next, &caused);
+        for effect in &caused {
+            recorder.effect(next, effect, &session)?;
+        }
+        effects.extend(caused);
+    }
+    if session.are_stages_over() {
+        return Err(ContinuationError::StagesOver);
+    }
+    let pending_commands = expected_commands.expected.into_iter().map(|(_, command)| command).collect();
+    Ok(Continuation { simulation, session, pending_commands, is_clutch_pressed, effects, edits })
 }
 
 /// Reason why a session cannot go on.
 #[derive(Debug)]
 pub enum ContinuationError {
-    /// The recording has no ticks.
-    TooShort,
+    /// All stages were performed; only the questionnaire may be missing.
+    StagesOver,
     /// This program does not repeat the recording bit by bit.
     Different(Difference),
     Recorder(RecorderError),
@@ -199,7 +213,7 @@ impl From<RecorderError> for ContinuationError {
 impl fmt::Display for ContinuationError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            ContinuationError::TooShort => f.write_str("nothing was recorded yet"),
+            ContinuationError::StagesOver => f.write_str("all its stages were performed"),
             ContinuationError::Different(difference) => difference.fmt(f),
             ContinuationError::Recorder(error) => error.fmt(f),
         }

@@ -3,7 +3,7 @@
 //
 // A recording is kept as its changes, in order; each replaces everything from its offset on. A lock of the session's name tells
 // other pages that it is still running; where a browser has no locks, as by HTTP, the time of its last change does. A session is
-// offered only at the address at which it was begun, so that nobody finishes another learner's work within a learning platform.
+// offered by one page at a time, and only at the address at which it was begun, so that nobody finishes another learner's work within a learning platform.
 
 const STORE = "changes";
 
@@ -54,6 +54,9 @@ let writing;
 let failure;
 let isTold = false;
 
+/** Recordings whose sessions went on as others, to be deleted when those are kept. */
+let replaced = [];
+
 const writeAll = async () => {
   while (waiting.length > 0) {
     const changes = waiting;
@@ -63,15 +66,36 @@ const writeAll = async () => {
     } catch (error) {
       waiting = [...changes, ...waiting];
       failure ??= String(error);
-      break;
+      return;
     }
+  }
+  const former = replaced;
+  replaced = [];
+  for (const session of former) {
+    await remove(session).catch(() => {});
+    release(session);
   }
 };
 
 /** Keeps what is waiting; resolves when it is kept, or could not be. */
 const write = () => writing ??= writeAll().finally(() => { writing = undefined; });
 
+/** Ends of the locks that this page holds, by session. */
 const releases = new Map();
+
+const release = (session) => {
+  releases.get(session)?.();
+  releases.delete(session);
+};
+
+/** Takes the lock of a session that runs in no page; resolves with false if another page has taken it. */
+const take = (session) => new Promise((resolve) => {
+  const hold = (lock) => {
+    resolve(lock !== null);
+    return lock && new Promise((end) => releases.set(session, end));
+  };
+  navigator.locks.request(lockOf(session), { ifAvailable: true }, hold).catch(() => resolve(false));
+});
 
 const remove = (session) => transact("readwrite", (store) => store.delete(keysOf(session)));
 
@@ -80,7 +104,7 @@ globalThis.typodontKept = {
   begin(session) {
     failure = undefined;
     isTold = false;
-    waiting = [];
+    waiting = waiting.filter((change) => change.session !== session);
     const held = new Promise((release) => releases.set(session, release));
     navigator.locks?.request(lockOf(session), () => held).catch(() => {});
   },
@@ -94,15 +118,13 @@ globalThis.typodontKept = {
   /** Deletes a session's recording. */
   forget(session) {
     waiting = waiting.filter((change) => change.session !== session);
-    remove(session).catch(() => {}).then(() => {
-      releases.get(session)?.();
-      releases.delete(session);
-    });
+    remove(session).catch(() => {}).then(() => release(session));
   },
 
   /** Deletes the recording of a session that goes on as another one, once that is kept. */
-  replace(former, session) {
-    write().then(() => waiting.some((change) => change.session === session) ? undefined : remove(former)).catch(() => {});
+  replace(former) {
+    replaced.push(former);
+    write();
   },
 
   /** The reason why a change could not be kept, once for each session. */
@@ -128,6 +150,8 @@ globalThis.typodontKept = {
         continue;
       }
       if (changes[0].place !== place || (!locks && age < RUNNING)) continue;
+      // Only one page offers it, so that nobody goes on with it twice.
+      if (locks && !await take(session)) continue;
       const gap = changes.findIndex((change, index) => change.number !== index);
       const whole = gap < 0 ? changes : changes.slice(0, gap);
       const recording = new Uint8Array(Math.max(...whole.map(({ offset, bytes }) => offset + bytes.length)));

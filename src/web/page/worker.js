@@ -7,4 +7,5 @@ import init from "./typodont-web.js";
 const keep = (name) => (...given) => postMessage({ keep: name, given });
 globalThis.typodontKept = { begin: keep("begin"), keep: keep("keep"), replace: keep("replace") };
 
-onmessage = ({ data }) => init({ module_or_path: data });
+// A failure of the program is to reach the page as one of the worker.
+onmessage = ({ data }) => init({ module_or_path: data }).catch((error) => setTimeout(() => { throw error; }));
