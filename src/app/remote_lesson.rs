@@ -184,7 +184,7 @@ mod tests {
     use crate::lesson_backend::{InputDevice, LessonCommand};
     use crate::lesson_host::LessonHost;
     use std::collections::BTreeMap;
-    use std::sync::mpsc;
+    use std::sync::{LazyLock, mpsc};
     use std::time::{Duration, Instant};
     use typodont_core::frame::Vec3;
     use typodont_core::volume::Volume;
@@ -354,13 +354,15 @@ mod tests {
         cut.expect("a recording without an end").to_vec()
     }
 
+    /// A whole lesson with its window, for all tests that need no more of it.
+    static WHOLE: LazyLock<SeenLesson> = LazyLock::new(|| grind(Crossing::begin(coarse_lesson()), CUT));
+
     #[test]
     fn a_lesson_of_messages_makes_a_bundle_that_holds_and_the_window_sees_what_it_cuts() {
         // Aim: a page, whose lesson runs in a worker, gives the same evidence, and draws the tooth as it was cut. Method: a lesson
         // with coarse voxels; the pointer presses the bur into the tooth; the changes that the window receives are applied to the
         // workpiece that it has made by itself, and compared with the recording's last volume.
-        let seen = grind(Crossing::begin(coarse_lesson()), 20);
-        let (name, whole) = checked(&seen);
+        let (name, whole) = checked(&WHOLE);
 
         // A page that was closed before the recording's end has kept the rest of it.
         let kept = InterruptedSession::kept(&name, without_end(&whole)).expect("a person's session");
@@ -388,7 +390,7 @@ mod tests {
     fn an_interrupted_lesson_goes_on_as_if_nothing_had_happened_to_the_tooth() {
         // Aim: who was interrupted loses no work, and the evidence of both parts holds as one. Method: a lesson is cut off while the
         // bur cuts; it goes on in a new lesson, in which the bur cuts on; twice.
-        let (first_name, first) = checked(&grind(Crossing::begin(coarse_lesson()), CUT));
+        let (first_name, first) = checked(&WHOLE);
         let mut former = (first_name, interrupted(&first));
         for times in 1..=2 {
             let (name, cut) = former;
@@ -438,7 +440,7 @@ mod tests {
     fn a_session_whose_stages_are_over_does_not_go_on() {
         // Aim: nobody cuts on after having finished. Method: the recording without its end, after the trainee has ended the lesson;
         // what followed its last tick is not forgotten.
-        let (name, whole) = checked(&grind(Crossing::begin(coarse_lesson()), 1));
+        let (name, whole) = checked(&WHOLE);
         let session = InterruptedSession::kept(&name, without_end(&whole)).unwrap();
         let reopened = session.reopen().unwrap();
         let config = LessonConfig {
@@ -461,7 +463,7 @@ mod tests {
 
     #[test]
     fn a_session_that_was_recorded_to_its_end_does_not_go_on() {
-        let (name, whole) = checked(&grind(Crossing::begin(coarse_lesson()), 1));
+        let (name, whole) = checked(&WHOLE);
         let why = |recording: &[u8]| {
             let session = InterruptedSession::kept(&name, recording.to_vec()).unwrap();
             session.reopen().err().expect("the session goes on").to_string()

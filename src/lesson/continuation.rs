@@ -131,7 +131,10 @@ impl ReopenedSession {
                 Ok(prepared)
             }
             Err(error) => {
-                prepared.partial_bundle.abandon();
+                let PreparedSession { recorder, disk_sync, partial_bundle, .. } = prepared;
+                // Some systems remove no file that is open.
+                drop((recorder, disk_sync));
+                partial_bundle.abandon();
                 Err(match error {
                     ContinuationError::Recorder(error) => LessonError::RecordingNotStarted(error),
                     ContinuationError::StagesOver | ContinuationError::Different(_) => not(error.to_string()),

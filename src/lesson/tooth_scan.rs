@@ -5,7 +5,7 @@ use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use typodont_exercise::scenario;
-use typodont_exercise::scenario::{Scenario, SceneLayout, ToothSource, hex};
+use typodont_exercise::scenario::{Scenario, ToothSource, hex};
 use typodont_exercise::tooth_import;
 use typodont_formats::nrrd;
 
@@ -49,7 +49,7 @@ impl ToothScan {
         let spacing = self.spacing.map(|mm| [mm; 3]);
         let volume = tooth_import::tooth_volume(&self.image, spacing, &scenario.tissues, &tissues);
         let volume = Arc::new(volume.map_err(|why| wrong_volume(&self.path, why))?);
-        if matches!(scenario.scene.layout, SceneLayout::Arch { .. }) {
+        if scenario.scene.is_arch() {
             let why = "the exercise has all teeth of a jaw; --fdi with the number of one of them says which the volume replaces";
             let mut teeth = scenario.scene.teeth.iter_mut();
             let tooth = teeth.find(|tooth| self.fdi == Some(tooth.fdi));

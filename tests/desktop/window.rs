@@ -302,8 +302,10 @@ fn the_introduction_comes_first_and_an_interrupted_session_is_offered_again() {
     let after = ticks_of_partial_bundles(&place.join("home/Typodont/sessions"));
     assert!(before.len() == 1 && after.len() == 1, "the former recording is replaced: {before:?}, {after:?}");
     assert!(after[0] >= before[0], "{after:?} of {before:?} ticks are left");
+    // From the button of the list into the view.
+    desk.move_to([640, 400]);
     desk.press("o", "pointer", "held");
-    desk.display.xdotool(&["mousemove_relative", "--", "-60", "-30"]);
+    desk.move_to([700, 430]);
     desk.until("clock", |clock| clock == "running");
     desk.until("ticks", |now| now.parse::<u64>().unwrap() > 1000);
     desk.program.kill().unwrap();

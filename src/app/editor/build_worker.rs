@@ -223,7 +223,7 @@ impl Build {
 
 /// The same scenario with coarse voxels; `None` where the teeth are scanned or a map is drawn on their voxels.
 fn quick_variant(scenario: &Scenario) -> Option<Scenario> {
-    let is_arch = matches!(scenario.scene.layout, SceneLayout::Arch { .. });
+    let is_arch = scenario.scene.is_arch();
     let quick_spacing = if is_arch { QUICK_ARCH_SPACING } else { QUICK_SPACING };
     let is_grown =
         |form: &ToothSource| matches!(form, ToothSource::Procedural { spacing, .. } if *spacing < quick_spacing);

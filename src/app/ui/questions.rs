@@ -8,7 +8,7 @@ use crate::ui::theme;
 use crate::ui::ui_anchors::anchor;
 use eframe::egui;
 use typodont_exercise::local_text::LocalTexts;
-use typodont_exercise::scenario::{Question, QuestionKind, SceneLayout, Stage, distal};
+use typodont_exercise::scenario::{Question, QuestionKind, Stage, distal};
 use typodont_exercise::session::AnswerValue;
 
 /// Every question of a stage.
@@ -29,7 +29,7 @@ pub fn questions_ui(
             _ => i16::from(*fdi) + 100,
         });
     }
-    let is_in_arch = matches!(scenario.scene.layout, SceneLayout::Arch { .. });
+    let is_in_arch = scenario.scene.is_arch();
     for (place, question) in stage.ask.iter().enumerate() {
         let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
         ui.add_space(10.0);

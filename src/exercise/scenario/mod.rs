@@ -139,9 +139,14 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Returns true if all teeth of one jaw can be worked on.
+    pub fn is_arch(&self) -> bool {
+        matches!(self.layout, SceneLayout::Arch { .. })
+    }
+
     /// Returns true if the teeth stand in a jaw that is drawn around them.
     pub fn is_in_mouth(&self) -> bool {
-        matches!(self.layout, SceneLayout::Jaw | SceneLayout::Arch { .. })
+        self.is_arch() || matches!(self.layout, SceneLayout::Jaw)
     }
 }
 
@@ -537,7 +542,7 @@ impl Scenario {
     /// # Errors
     /// Returns a message if there is no tooth with this number, or if the exercise has all teeth of a jaw.
     pub fn renumber_teeth(&mut self, fdi: u8) -> Result<(), String> {
-        if matches!(self.scene.layout, SceneLayout::Arch { .. }) {
+        if self.scene.is_arch() {
             return Err("the exercise has all teeth of a jaw, none of which can take another's number".into());
         }
         let Some(former) = self.scene.teeth.first().map(|tooth| tooth.fdi) else { return Ok(()) };

@@ -197,7 +197,7 @@ impl Workpiece {
         seed: u64,
     ) -> Result<Workpiece, WorkpieceError> {
         let whole = original.as_ref().unwrap_or(&volume);
-        let seats = matches!(scenario.scene.layout, SceneLayout::Arch { .. }).then(|| ArchSeats::of(&scenario.scene));
+        let seats = scenario.scene.is_arch().then(|| ArchSeats::of(&scenario.scene));
         let mut teeth = Vec::new();
         let mut lesions = Vec::new();
         for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
