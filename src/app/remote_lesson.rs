@@ -228,6 +228,16 @@ mod tests {
         }
     }
 
+    /// The lesson in which an interrupted session goes on.
+    fn resumed(reopened: ReopenedSession) -> LessonConfig {
+        LessonConfig {
+            scenario: reopened.scenario().clone(),
+            seed: reopened.seed(),
+            resumed: Some(reopened),
+            ..coarse_lesson()
+        }
+    }
+
     /// A lesson of which only messages cross between the two sides, as between a page and its worker.
     struct Crossing {
         client: LessonClient,
@@ -397,13 +407,7 @@ mod tests {
             let before = Recording::parse(FILE_NAME, &cut).unwrap();
             let session = InterruptedSession::kept(&name, cut.clone()).unwrap();
             let reopened = session.reopen().unwrap();
-            let config = LessonConfig {
-                scenario: reopened.scenario().clone(),
-                seed: reopened.seed(),
-                resumed: Some(reopened),
-                ..coarse_lesson()
-            };
-            let seen = grind(Crossing::begin(config), CUT * (times + 1));
+            let seen = grind(Crossing::begin(resumed(reopened)), CUT * (times + 1));
             let (new_name, whole) = checked(&seen);
             assert_ne!(new_name, name, "the new recording would replace the former before it is kept");
             let after = Recording::parse(FILE_NAME, &whole).unwrap();
@@ -443,13 +447,7 @@ mod tests {
         let (name, whole) = checked(&WHOLE);
         let session = InterruptedSession::kept(&name, without_end(&whole)).unwrap();
         let reopened = session.reopen().unwrap();
-        let config = LessonConfig {
-            scenario: reopened.scenario().clone(),
-            seed: reopened.seed(),
-            resumed: Some(reopened),
-            ..coarse_lesson()
-        };
-        let mut lesson = Crossing::begin(config);
+        let mut lesson = Crossing::begin(resumed(reopened));
         let why = loop {
             lesson.frame();
             match lesson.client.next_event() {
