@@ -43,6 +43,8 @@ pub enum AppCommand {
     DownloadBundle,
     /// Lets the browser ask for a ZIP file that is to be verified; only in a page.
     ChooseZip,
+    /// Lets the browser ask for a device of the chosen kind; only in a page.
+    AllowDevice,
     /// Lets the browser ask for the file of an exercise that is to be opened; only in a page.
     ChooseExercise,
     /// Shows the instructions of the exercise whose results are shown again.

@@ -75,7 +75,7 @@ impl LessonConfig {
     /// True if the hand can be placed anew for the view: it is an arm's, and not coupled to a second hand, because the
     /// coupling holds in the space of both devices.
     pub fn is_hand_placeable(&self) -> bool {
-        matches!(self.input_device, InputDevice::Device(_)) && self.second.is_none()
+        !matches!(self.input_device, InputDevice::Mouse) && self.second.is_none()
     }
 }
 
@@ -84,6 +84,8 @@ pub enum InputDevice {
     /// The pointer of this window.
     Mouse,
     Device(OpenDevice),
+    /// The device of this name, which is opened in the lesson's worker.
+    InWorker(String),
 }
 
 /// Runner of a lesson. When a lesson on a thread is dropped after its [`LessonClient`], it is aborted, the device's force is

@@ -9,6 +9,7 @@ use crate::lesson_run::LessonRun;
 use crate::snapshot::SNAPSHOT_WORDS;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use typodont_audio::{DrillLoad, SoundReceiver};
+use typodont_lesson::OpenDevice;
 use typodont_report::Templates;
 use web_time::{Duration, Instant};
 
@@ -67,11 +68,16 @@ impl Outlet {
 }
 
 impl LessonHost {
-    /// Begins the lesson that the window's first message describes.
+    /// Begins the lesson that the window's first message describes, with an open device if the message names one.
     ///
     /// # Errors
     /// A message if it does not describe a lesson.
-    pub fn start(first: LessonMessage, templates: Templates, send: NewsSender) -> Result<LessonHost, String> {
+    pub fn start(
+        first: LessonMessage,
+        device: Option<OpenDevice>,
+        templates: Templates,
+        send: NewsSender,
+    ) -> Result<LessonHost, String> {
         let start: StartMessage = first.content()?;
         let mut bytes = first.bytes;
         let resumed = start.reopen(&mut bytes)?;
@@ -88,7 +94,7 @@ impl LessonHost {
             out: None,
             templates,
             started: start.started.parse().map_err(|error| format!("unreadable-message: {error}"))?,
-            input_device: InputDevice::Mouse,
+            input_device: device.map_or(InputDevice::Mouse, InputDevice::Device),
             second: None,
             digests: start.digests,
             resumed,
@@ -123,17 +129,27 @@ impl LessonHost {
         Ok(())
     }
 
-    /// Does what is due. Returns false when the lesson is over.
-    pub fn advance(&mut self) -> bool {
-        let Some(run) = &mut self.run else { return false };
-        let is_running = run.advance();
-        if !is_running {
+    /// Does what is due without telling the window, unless the lesson is over.
+    pub fn run_ticks(&mut self) {
+        if self.run.as_mut().is_some_and(|run| !run.advance()) {
             self.run = None;
+            self.send_news(true);
         }
+    }
+
+    /// Does what is due, and tells the window what has happened. Returns false when the lesson is over.
+    pub fn advance(&mut self) -> bool {
+        self.run_ticks();
+        if self.run.is_some() {
+            self.send_news(false);
+        }
+        self.run.is_some()
+    }
+
+    fn send_news(&self, is_over: bool) {
         if let Some(outlet) = lock(&self.outlet).as_mut() {
-            outlet.send_news(false, !is_running);
+            outlet.send_news(false, is_over);
         }
-        is_running
     }
 }
 

@@ -1,15 +1,16 @@
 //! The messages between a window and a lesson that runs in a worker, as texts and bytes.
 //!
-//! Takes and gives what crosses between [`crate::remote_lesson`] and [`crate::lesson_host`]. Events that only a haptic device
-//! or a second hand causes have no message: a page has one device, the pointer.
+//! Takes and gives what crosses between [`crate::remote_lesson`] and [`crate::lesson_host`]. The events of a second hand have no
+//! message: a page has one hand.
 
-use crate::lesson_backend::{LessonCommand, LessonConfig, LessonEvent};
+use crate::lesson_backend::{InputDevice, LessonCommand, LessonConfig, LessonEvent};
 use crate::snapshot::SNAPSHOT_WORDS;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Mutex, PoisonError};
 use typodont_audio::LOAD_WORDS;
-use typodont_core::device::DeviceState;
+use typodont_core::device::{DeviceError, DeviceState};
 use typodont_core::frame::Vec3;
 use typodont_core::sim::Command;
 use typodont_core::tick::Tick;
@@ -60,6 +61,8 @@ pub struct StartMessage {
     pub started: String,
     pub digests: BTreeMap<String, String>,
     pub is_kept: bool,
+    /// Device that the lesson opens; `None` for the pointer.
+    pub device: Option<String>,
     /// Name of the interrupted session that goes on; its recording is the last of the bytes.
     resumed: Option<String>,
     /// Names of the files that the exercise names, as far as they are not shipped.
@@ -85,6 +88,10 @@ impl StartMessage {
             started: config.started.to_string(),
             digests: config.digests.clone(),
             is_kept: config.is_kept,
+            device: match &config.input_device {
+                InputDevice::InWorker(name) => Some(name.clone()),
+                InputDevice::Mouse | InputDevice::Device(_) => None,
+            },
             resumed: former.map(|(name, _)| name.to_string()),
             files,
         };
@@ -213,7 +220,12 @@ pub struct LessonNews {
 pub enum EventMessage {
     ServoStarted,
     Effect(EffectMessage),
-    DeviceReady,
+    DeviceState(DeviceStateMessage),
+    DeviceLost {
+        why: String,
+        code: i32,
+    },
+    DifferentDevice,
     AwaitingMovement(bool),
     Completing(StepMessage),
     /// The bundle; the bytes of its files follow those of the changed voxels.
@@ -222,6 +234,50 @@ pub enum EventMessage {
         files: Vec<String>,
     },
     Failed(String),
+}
+
+/// Message form of [`DeviceState`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DeviceStateMessage {
+    Ready,
+    Calibrate(String),
+    Homing(String),
+    ForceOff(String),
+}
+
+impl From<DeviceState> for DeviceStateMessage {
+    fn from(state: DeviceState) -> DeviceStateMessage {
+        match state {
+            DeviceState::Ready => DeviceStateMessage::Ready,
+            DeviceState::Calibrate { how } => DeviceStateMessage::Calibrate(how.into()),
+            DeviceState::Homing { what } => DeviceStateMessage::Homing(what.into()),
+            DeviceState::ForceOff { why } => DeviceStateMessage::ForceOff(why.into()),
+        }
+    }
+}
+
+impl From<DeviceStateMessage> for DeviceState {
+    fn from(message: DeviceStateMessage) -> DeviceState {
+        match message {
+            DeviceStateMessage::Ready => DeviceState::Ready,
+            DeviceStateMessage::Calibrate(how) => DeviceState::Calibrate { how: driver_text(how) },
+            DeviceStateMessage::Homing(what) => DeviceState::Homing { what: driver_text(what) },
+            DeviceStateMessage::ForceOff(why) => DeviceState::ForceOff { why: driver_text(why) },
+        }
+    }
+}
+
+/// A driver's text that has crossed. Drivers have some dozens of constant texts; each is kept once.
+fn driver_text(text: String) -> &'static str {
+    static TEXTS: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
+    let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = texts.get(&*text) {
+        return known;
+    }
+    let kept = text.leak();
+    texts.insert(kept);
+    kept
 }
 
 /// Message form of [`Effect`].
@@ -269,13 +325,17 @@ pub enum StepMessage {
 }
 
 impl EventMessage {
-    /// The message of an event, and the bytes that belong to it; `None` for an event of a device that a page does not have,
-    /// and for the workpiece, which the window makes by itself.
+    /// The message of an event, and the bytes that belong to it; `None` for an event of a second hand, which a page does not
+    /// have, and for the workpiece, which the window makes by itself.
     pub fn of(event: LessonEvent) -> Option<(EventMessage, Vec<Vec<u8>>)> {
         let message = match event {
             LessonEvent::Live(LiveEvent::ServoStarted(_)) => EventMessage::ServoStarted,
             LessonEvent::Live(LiveEvent::Effect(effect)) => EventMessage::Effect(EffectMessage::from(&effect)),
-            LessonEvent::Live(LiveEvent::DeviceState(DeviceState::Ready)) => EventMessage::DeviceReady,
+            LessonEvent::Live(LiveEvent::DeviceState(state)) => EventMessage::DeviceState(state.into()),
+            LessonEvent::Live(LiveEvent::DeviceLost(DeviceError::Lost { why, code })) => {
+                EventMessage::DeviceLost { why: why.into(), code }
+            }
+            LessonEvent::DifferentDevice => EventMessage::DifferentDevice,
             LessonEvent::Live(LiveEvent::AwaitingMovement(is_awaiting)) => EventMessage::AwaitingMovement(is_awaiting),
             LessonEvent::Completing(step) => EventMessage::Completing(StepMessage::from(step)),
             LessonEvent::Failed(why) => EventMessage::Failed(why),
@@ -287,8 +347,8 @@ impl EventMessage {
             | LessonEvent::WorkpieceReady(_)
             | LessonEvent::AwaitingSecondHand(_)
             | LessonEvent::SecondHand(_)
-            | LessonEvent::DifferentDevice
-            | LessonEvent::Live(LiveEvent::DeviceState(_) | LiveEvent::DeviceLost(_)) => return None,
+            // Only a script or a recording ends.
+            | LessonEvent::Live(LiveEvent::DeviceLost(DeviceError::Ended)) => return None,
         };
         Some((message, Vec::new()))
     }
@@ -304,7 +364,11 @@ impl EventMessage {
         match self {
             EventMessage::ServoStarted => LessonEvent::Live(LiveEvent::ServoStarted(Priority::Ordinary)),
             EventMessage::Effect(effect) => LessonEvent::Live(LiveEvent::Effect(Effect::from(effect))),
-            EventMessage::DeviceReady => LessonEvent::Live(LiveEvent::DeviceState(DeviceState::Ready)),
+            EventMessage::DeviceState(state) => LessonEvent::Live(LiveEvent::DeviceState(state.into())),
+            EventMessage::DeviceLost { why, code } => {
+                LessonEvent::Live(LiveEvent::DeviceLost(DeviceError::Lost { why: driver_text(why), code }))
+            }
+            EventMessage::DifferentDevice => LessonEvent::DifferentDevice,
             EventMessage::AwaitingMovement(is_awaiting) => LessonEvent::Live(LiveEvent::AwaitingMovement(is_awaiting)),
             EventMessage::Completing(step) => LessonEvent::Completing(step.step(scenario, templates)),
             EventMessage::Finished { name, files } => {
@@ -475,6 +539,21 @@ mod tests {
         for effect in effects {
             assert_eq!(Effect::from(crossed(&EffectMessage::from(&effect))), effect);
         }
+    }
+
+    #[test]
+    fn states_of_a_device_come_out_as_they_went_in() {
+        let force_off = DeviceState::ForceOff { why: "its motors are too warm" };
+        let states = [
+            DeviceState::Ready,
+            DeviceState::Calibrate { how: "press its button" },
+            DeviceState::Homing { what: "it is starting" },
+            force_off,
+        ];
+        for state in states {
+            assert_eq!(DeviceState::from(crossed(&DeviceStateMessage::from(state))), state);
+        }
+        assert_eq!(driver_text("a".into()).as_ptr(), driver_text("a".into()).as_ptr(), "kept once");
     }
 
     #[test]

@@ -108,7 +108,7 @@ impl LessonRun {
                 let (mouse, device) = Mouse::new();
                 (Some(mouse), Some(Box::new(device)))
             }
-            InputDevice::Device(_) => (None, None),
+            InputDevice::Device(_) | InputDevice::InWorker(_) => (None, None),
         };
         let (client, queues) = LessonClient::with_queues(mouse);
         let port = LessonPort {
@@ -184,6 +184,7 @@ impl LessonPort {
         let open_device = match input_device {
             InputDevice::Mouse => None,
             InputDevice::Device(held) => Some(held),
+            InputDevice::InWorker(name) => Some(typodont_lesson::open_device(&name)?),
         };
         let (name, device, reconnect) = match (open_device, mouse) {
             (Some(held), _) => (held.name, held.device, Some((held.driver, held.argument))),

@@ -26,6 +26,8 @@ mod lesson_host;
 mod remote_lesson;
 #[cfg(target_family = "wasm")]
 mod page_worker;
+#[cfg(target_family = "wasm")]
+mod page_hid;
 mod command;
 mod screen;
 mod ui;
@@ -38,6 +40,7 @@ mod answer_draft;
 mod results;
 mod completion;
 mod given_file;
+mod inbox;
 mod gamepad;
 mod zip_verification;
 mod session_history;

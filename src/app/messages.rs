@@ -68,6 +68,11 @@ pub struct PauseReason {
 }
 
 impl PauseReason {
+    /// Its key in the language files.
+    pub fn key(&self) -> &'static str {
+        self.key
+    }
+
     /// `None` while the device is ready.
     pub fn from_state(state: DeviceState) -> Option<PauseReason> {
         let (key, detail) = match state {

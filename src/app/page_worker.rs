@@ -5,7 +5,8 @@
 
 use crate::lesson_backend::{LessonBackend, LessonClient, LessonConfig};
 use crate::lesson_host::LessonHost;
-use crate::lesson_message::{LessonMessage, LessonNews};
+use crate::lesson_message::{EventMessage, LessonMessage, LessonNews, StartMessage};
+use crate::page_hid;
 use crate::platform;
 use crate::remote_lesson::{Arrival, RemoteLesson};
 use js_sys::{Array, Uint8Array};
@@ -15,10 +16,12 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Sender};
 use typodont_audio::SoundSender;
 use typodont_formats::Library;
+use typodont_lesson::OpenDevice;
 use typodont_report::Templates;
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use web_sys::{DedicatedWorkerGlobalScope, ErrorEvent, MessageEvent, Worker, WorkerOptions, WorkerType};
+use web_time::{Duration, Instant};
 
 /// The worker's script, beside the page.
 const SCRIPT: &str = "./worker.js";
@@ -176,26 +179,99 @@ fn of_js(data: &JsValue) -> Option<LessonMessage> {
     Some(LessonMessage { text, bytes: bytes.collect::<Result<_, _>>().ok()? })
 }
 
+/// State of this worker.
+enum WorkerState {
+    Empty,
+    AwaitingDevice(AwaitedDevice),
+    Running(LessonHost),
+    /// The lesson's device cannot be opened.
+    Failed,
+}
+
 thread_local! {
-    /// The lesson of this worker.
-    static LESSON: RefCell<Option<LessonHost>> = const { RefCell::new(None) };
+    static WORKER: RefCell<WorkerState> = const { RefCell::new(WorkerState::Empty) };
+}
+
+/// A lesson that begins when its device is open.
+struct AwaitedDevice {
+    /// Name of the device.
+    name: String,
+    start: LessonMessage,
+    /// Later messages of the page.
+    messages: Vec<LessonMessage>,
+    begun: Instant,
+    last_attempt: Instant,
+}
+
+/// Interval between two attempts to open the device; it answers in a few milliseconds.
+const ATTEMPT_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Time within which the device must be open.
+const DEVICE_TIMEOUT: Duration = Duration::from_secs(4);
+
+impl AwaitedDevice {
+    fn new(name: String, start: LessonMessage) -> AwaitedDevice {
+        let now = Instant::now();
+        AwaitedDevice { name, start, messages: Vec::new(), begun: now, last_attempt: now }
+    }
+
+    /// Begins the lesson if the device can be opened now.
+    fn advance(mut self) -> Result<WorkerState, String> {
+        if self.last_attempt.elapsed() < ATTEMPT_INTERVAL {
+            return Ok(WorkerState::AwaitingDevice(self));
+        }
+        self.last_attempt = Instant::now();
+        match typodont_lesson::open_device(&self.name) {
+            Ok(device) => {
+                let mut lesson = begin_lesson(self.start, Some(device))?;
+                self.messages.iter().try_for_each(|message| lesson.receive(message))?;
+                Ok(WorkerState::Running(lesson))
+            }
+            Err(_) if self.begun.elapsed() < DEVICE_TIMEOUT => Ok(WorkerState::AwaitingDevice(self)),
+            Err(why) => {
+                let failed = vec![EventMessage::Failed(why.to_string())];
+                let news = LessonNews { events: failed, is_over: true, ..LessonNews::default() };
+                send_to_page(LessonMessage::new(&news, vec![Vec::new()])?);
+                Ok(WorkerState::Failed)
+            }
+        }
+    }
+}
+
+fn begin_lesson(start: LessonMessage, device: Option<OpenDevice>) -> Result<LessonHost, String> {
+    LessonHost::start(start, device, Templates::shipped(), Box::new(send_to_page))
+}
+
+/// Changes the worker's state; a failure reaches the page as one of the worker.
+fn update_worker(change: impl FnOnce(WorkerState) -> Result<WorkerState, String>) {
+    let state = WORKER.replace(WorkerState::Empty);
+    match change(state) {
+        Ok(state) => WORKER.set(state),
+        Err(why) => wasm_bindgen::throw_str(&why),
+    }
+    page_hid::send_outgoing();
 }
 
 /// Runs a lesson in this worker, once the page describes it. Returns false anywhere else than in a worker.
 pub fn serve_lesson() -> bool {
     let Ok(scope) = js_sys::global().dyn_into::<DedicatedWorkerGlobalScope>() else { return false };
     let on_message = Closure::<dyn FnMut(MessageEvent)>::new(|event: MessageEvent| {
-        if let Some(Err(why)) = of_js(&event.data()).map(receive) {
-            wasm_bindgen::throw_str(&why);
+        if let Some(message) = of_js(&event.data()) {
+            update_worker(|state| receive(state, message));
         }
     });
     scope.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
     let on_time = Closure::<dyn FnMut()>::new(|| {
-        LESSON.with_borrow_mut(|lesson| {
-            // One that is over stays, for the page's messages that were on their way.
-            if let Some(lesson) = lesson {
-                lesson.advance();
-            }
+        update_worker(|state| {
+            Ok(match state {
+                WorkerState::Empty | WorkerState::Failed => state,
+                WorkerState::AwaitingDevice(awaited) => awaited.advance()?,
+                WorkerState::Running(mut lesson) => {
+                    // One that is over stays, for the page's messages that were on their way.
+                    lesson.advance();
+                    WorkerState::Running(lesson)
+                }
+            })
         })
     });
     let timer = on_time.as_ref().unchecked_ref();
@@ -208,14 +284,35 @@ pub fn serve_lesson() -> bool {
 }
 
 /// Takes a message of the page.
-fn receive(message: LessonMessage) -> Result<(), String> {
-    LESSON.with_borrow_mut(|lesson| match lesson {
-        Some(lesson) => lesson.receive(&message),
-        None => {
-            *lesson = Some(LessonHost::start(message, Templates::shipped(), Box::new(send_to_page))?);
-            Ok(())
+fn receive(state: WorkerState, message: LessonMessage) -> Result<WorkerState, String> {
+    match state {
+        WorkerState::Running(mut lesson) => {
+            lesson.receive(&message)?;
+            Ok(WorkerState::Running(lesson))
         }
-    })
+        WorkerState::AwaitingDevice(mut awaited) => {
+            awaited.messages.push(message);
+            Ok(WorkerState::AwaitingDevice(awaited))
+        }
+        WorkerState::Failed => Ok(WorkerState::Failed),
+        WorkerState::Empty => match message.content::<StartMessage>()?.device {
+            None => begin_lesson(message, None).map(WorkerState::Running),
+            Some(name) => {
+                page_hid::serve(&name, run_ticks);
+                Ok(WorkerState::AwaitingDevice(AwaitedDevice::new(name, message)))
+            }
+        },
+    }
+}
+
+/// Runs the ticks that are due when a report of the device has come.
+fn run_ticks() {
+    update_worker(|mut state| {
+        if let WorkerState::Running(lesson) = &mut state {
+            lesson.run_ticks();
+        }
+        Ok(state)
+    });
 }
 
 fn send_to_page(message: LessonMessage) {

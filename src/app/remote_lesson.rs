@@ -4,7 +4,7 @@
 //! window's commands and its pointer. Makes the workpiece a second time, for the picture: the same exercise and seed give the
 //! same one, and meanwhile the worker prepares the session.
 
-use crate::lesson_backend::{LessonBackend, LessonClient, LessonConfig, LessonEvent, LessonQueues};
+use crate::lesson_backend::{InputDevice, LessonBackend, LessonClient, LessonConfig, LessonEvent, LessonQueues};
 use crate::lesson_message::{
     CommandMessage, LessonMessage, LessonNews, MouseMessage, StartMessage, WindowMessage, edits,
 };
@@ -34,7 +34,8 @@ pub struct RemoteLesson {
     /// The ends of the window's queues; `None` when the lesson is over.
     queues: Option<LessonQueues>,
     sounds: SoundSender,
-    mouse: Mouse,
+    /// The pointer, if it is the device.
+    mouse: Option<Mouse>,
     passed_on: Option<MouseTarget>,
     /// True once the lesson has sent its last message.
     is_over: bool,
@@ -68,8 +69,8 @@ impl RemoteLesson {
             Some(reopened) => WorkpieceOrigin::Recording(Box::new(reopened)),
             None => WorkpieceOrigin::Seed(config.seed.value),
         };
-        let (mouse, _) = Mouse::new();
-        let (client, queues) = LessonClient::with_queues(Some(mouse.clone()));
+        let mouse = matches!(config.input_device, InputDevice::Mouse).then(|| Mouse::new().0);
+        let (client, queues) = LessonClient::with_queues(mouse.clone());
         let lesson = RemoteLesson {
             send,
             arrivals,
@@ -160,10 +161,10 @@ impl LessonBackend for RemoteLesson {
         while let Some(command) = queues.inbox.try_recv() {
             message.commands.push(CommandMessage::from(&command));
         }
-        let target = self.mouse.state();
-        if self.passed_on != Some(target) {
-            message.mouse = Some(MouseMessage::from(target));
-            self.passed_on = Some(target);
+        let target = self.mouse.as_ref().map(Mouse::state);
+        if self.passed_on != target {
+            message.mouse = target.map(MouseMessage::from);
+            self.passed_on = target;
         }
         if message != WindowMessage::default() {
             // Texts and finite numbers can always be written.
@@ -181,7 +182,7 @@ impl LessonBackend for RemoteLesson {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lesson_backend::{InputDevice, LessonCommand};
+    use crate::lesson_backend::LessonCommand;
     use crate::lesson_host::LessonHost;
     use std::collections::BTreeMap;
     use std::sync::{LazyLock, mpsc};
@@ -257,7 +258,7 @@ mod tests {
             let sounds = typodont_audio::sound_channel().0;
             let (client, remote) = RemoteLesson::start(config, &Library::shipped(), sounds, send, arrivals).unwrap();
             let send = Box::new(move |message| _ = host_sends.send(message));
-            let host = LessonHost::start(to_host.recv().unwrap(), Templates::shipped(), send).unwrap();
+            let host = LessonHost::start(to_host.recv().unwrap(), None, Templates::shipped(), send).unwrap();
             Crossing { client, remote, host, to_host, from_host, to_window }
         }
 

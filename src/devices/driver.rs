@@ -4,6 +4,7 @@
 //! what to do about it. Never prints and never waits for a person: an open device that needs one says so in its
 //! [`DeviceState`](typodont_core::device::DeviceState).
 
+use crate::hid::HidMatch;
 use std::fmt;
 use typodont_core::device::Device;
 
@@ -14,6 +15,11 @@ pub trait Driver: Sync {
 
     /// Returns one line of text: which devices the driver opens, and the meaning of the argument after the colon.
     fn description(&self) -> &'static str;
+
+    /// Kinds of HID devices that the driver opens. In a browser the user allows each device, and only these can be opened.
+    fn hid_kinds(&self) -> &'static [HidMatch] {
+        &[]
+    }
 
     /// Lists the devices that are connected now. Opens nothing that can move.
     ///

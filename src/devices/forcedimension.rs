@@ -11,8 +11,7 @@
 // This file calls C; the comment at each block states what it relies on.
 #![allow(unsafe_code)]
 
-use crate::report_filter;
-use crate::report_filter::PoseRejects;
+use crate::pose_rejects::{PoseRejects, plausible};
 use crate::{DeviceReport, Driver, FoundDevice, OpenError, Protocol, Relay, shared_library};
 use libloading::Library;
 use std::ffi::{CStr, OsStr, c_char, c_int, c_uint};
@@ -557,7 +556,7 @@ impl ForceDimensionProtocol {
             }
             false => UPRIGHT,
         };
-        report_filter::plausible(Pose { position, orientation }, &self.spec)
+        plausible(Pose { position, orientation }, &self.spec)
     }
 
     /// Returns the buttons; a closed gripper counts as the main button.
@@ -686,5 +685,6 @@ fn spec(sdk: &Sdk, id: DeviceId, kind: c_int, renders_torque: bool) -> DeviceSpe
         resolution,
         workspace_half: Vec3::splat(radius),
         apparent_mass: 0.2,
+        page_force: None,
     }
 }

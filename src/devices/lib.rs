@@ -29,22 +29,21 @@
 #[cfg(not(target_family = "wasm"))]
 pub mod access;
 mod coupling;
+mod direct;
 mod driver;
 #[cfg(not(target_family = "wasm"))]
 mod forcedimension;
 #[cfg(not(target_family = "wasm"))]
 mod haply;
-#[cfg(not(target_family = "wasm"))]
 pub mod hid;
 mod link_key;
 mod link;
 pub mod mouse;
-#[cfg(not(target_family = "wasm"))]
 pub mod open_handle;
 #[cfg(not(target_family = "wasm"))]
 mod openhaptics;
-#[cfg(not(target_family = "wasm"))]
 pub mod polhem;
+mod protocol;
 pub mod realtime;
 mod registry;
 #[cfg(not(target_family = "wasm"))]
@@ -52,21 +51,23 @@ mod relay;
 pub mod servo;
 #[cfg(not(target_family = "wasm"))]
 mod shared_library;
-#[cfg(not(target_family = "wasm"))]
 pub mod spacemouse;
 #[cfg(not(target_family = "wasm"))]
 mod stream;
 // Without a relay, only the life time of a force is needed.
 #[cfg_attr(target_family = "wasm", allow(dead_code))]
 mod force_slot;
-#[cfg(not(target_family = "wasm"))]
 mod report_filter;
+#[cfg(not(target_family = "wasm"))]
+mod pose_rejects;
 
 pub use coupling::{Coupling, CouplingParams, DelayedPosition};
+pub use direct::DirectDevice;
 pub use driver::{Driver, FoundDevice, OpenError};
 pub use force_slot::FORCE_LIFE;
 pub use link::{HandLink, LinkedHand};
 pub use link_key::generate_key;
+pub use protocol::{DeviceReport, Protocol};
 pub use registry::{DRIVERS, NamedDevice, UnknownDriverError, driver_by_name};
 #[cfg(not(target_family = "wasm"))]
-pub use relay::{DeviceReport, Protocol, Relay};
+pub use relay::Relay;

@@ -6,11 +6,12 @@
 
 use crate::hid;
 use crate::hid::{HidDeviceInfo, HidMatch, REPORT_MAX, Transport};
+use crate::protocol::open_device;
 use crate::report_filter::ReportFilter;
-use crate::{DeviceReport, Driver, FoundDevice, OpenError, Protocol, Relay};
-use std::time::{Duration, Instant};
+use crate::{DeviceReport, Driver, FoundDevice, OpenError, Protocol};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, DeviceState, Pacing, Reading, UPRIGHT, Wrench};
 use typodont_core::frame::{Pose, Quat, Vec3};
+use web_time::{Duration, Instant};
 
 /// Product string of the firmware, which distinguishes it from every other Teensy.
 pub const PRODUCT: &str = "Typodont Handle";
@@ -60,7 +61,7 @@ pub struct OpenHandleProtocol<T> {
 }
 
 impl<T: Transport> OpenHandleProtocol<T> {
-    /// Asks the handle for its description.
+    /// Asks the handle for its description. On a transport that cannot wait, the answer is there at a later call.
     ///
     /// # Errors
     ///
@@ -81,6 +82,9 @@ impl<T: Transport> OpenHandleProtocol<T> {
             while Instant::now() < ask_again {
                 let mut report = [0; REPORT_MAX];
                 let length = transport.read(&mut report, REPORT_TIMEOUT).map_err(broken)?;
+                if length == 0 && !transport.can_wait() {
+                    return Err(silent());
+                }
                 if let Some(body) = decode(&report[..length]).filter(|r| r[3] == SPEC) {
                     let (spec, has_orientation) = parse_description(body)?;
                     return Ok(OpenHandleProtocol::new(transport, spec, has_orientation));
@@ -180,6 +184,10 @@ impl<T: Transport> Protocol for OpenHandleProtocol<T> {
         self.is_ready = parsed.state.is_ready();
         let state = if self.is_ready { self.filter.state(now) } else { parsed.state };
         Ok(Some(DeviceReport { reading, state }))
+    }
+
+    fn release_time(&self) -> Option<Duration> {
+        Some(Duration::from_millis(FORCE_LIFE_MS.into()))
     }
 
     fn close(&mut self) {
@@ -284,6 +292,7 @@ fn parse_description(report: &[u8; REPORT_LENGTH]) -> Result<(DeviceSpec, bool),
         resolution: per(10_000.0, 16),
         workspace_half: Vec3::new(per(10.0, 18), per(10.0, 20), per(10.0, 22)),
         apparent_mass: per(1000.0, 24),
+        page_force: None,
     };
     let is_whole = has_force && spec.max_force > 0.0 && spec.max_stiffness > 0.0;
     if !is_whole || spec.resolution <= 0.0 || spec.workspace_half.min_element() <= 0.0 {
@@ -315,6 +324,10 @@ impl Driver for OpenHandleDriver {
         "a home-built handle on a Teensy (content/devices/open-handle.md); the argument is its serial number"
     }
 
+    fn hid_kinds(&self) -> &'static [HidMatch] {
+        &[HID_MATCH]
+    }
+
     fn discover(&self) -> Result<Vec<FoundDevice>, OpenError> {
         Ok(hid::found_devices(handles()?))
     }
@@ -322,7 +335,7 @@ impl Driver for OpenHandleDriver {
     fn open(&self, argument: Option<&str>) -> Result<Box<dyn Device + Send>, OpenError> {
         let help = format!("plug it in; its firmware must have the product string \"{PRODUCT}\"");
         let plugged = hid::select(handles()?, argument, "open handle", &help)?;
-        Ok(Box::new(Relay::start(OpenHandleProtocol::handshake(hid::open(&plugged)?)?)))
+        Ok(open_device(OpenHandleProtocol::handshake(hid::open(&plugged)?)?))
     }
 }
 

@@ -12,8 +12,7 @@
 #![allow(unsafe_code)]
 
 use crate::force_slot::ForceSlot;
-use crate::report_filter;
-use crate::report_filter::PoseRejects;
+use crate::pose_rejects::{PoseRejects, plausible};
 use crate::{DeviceReport, Driver, FoundDevice, OpenError, Protocol, Relay, shared_library};
 use libloading::Library;
 use std::ffi::{CStr, OsStr, c_char, c_ulong, c_void};
@@ -648,7 +647,7 @@ impl OpenHapticsProtocol {
             std::array::from_fn(|i| Vec3::from_array(std::array::from_fn(|j| f32::from_bits(words[3 * i + j]))));
         let position = origin - self.middle;
         let orientation = if self.senses_orientation { nearest_rotation(x, y, z)? } else { UPRIGHT };
-        report_filter::plausible(Pose { position, orientation }, &self.spec)
+        plausible(Pose { position, orientation }, &self.spec)
     }
 }
 
@@ -858,5 +857,6 @@ fn spec(hd: &Hd, workspace_half: Option<Vec3>) -> DeviceSpec {
         workspace_half: workspace_half.unwrap_or(Vec3::splat(model.radius)),
         apparent_mass: model.apparent_mass,
         name,
+        page_force: None,
     }
 }

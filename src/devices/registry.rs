@@ -16,9 +16,14 @@ pub static DRIVERS: &[&dyn Driver] = &[
     &crate::stream::StreamDriver,
 ];
 
-/// All drivers of a browser.
+/// All drivers of a browser, which passes HID reports to a page.
 #[cfg(target_family = "wasm")]
-pub static DRIVERS: &[&dyn Driver] = &[&crate::mouse::MouseDriver];
+pub static DRIVERS: &[&dyn Driver] = &[
+    &crate::mouse::MouseDriver,
+    &crate::spacemouse::SpaceMouseDriver,
+    &crate::polhem::PolhemDriver,
+    &crate::open_handle::OpenHandleDriver,
+];
 
 /// Returns the driver with this name.
 pub fn driver_by_name(name: &str) -> Option<&'static dyn Driver> {

@@ -6,6 +6,7 @@
 //! than [`FORCE_LIFE`](crate::FORCE_LIFE), so a servo that is late releases the hand.
 
 use crate::force_slot::ForceSlot;
+use crate::protocol::{DeviceReport, LastReport, Protocol, SILENCE_TIMEOUT};
 use crate::realtime;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -17,44 +18,9 @@ use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mailbox;
 use typodont_core::mailbox::{Receiver, Sender, SeqLock};
 
-/// Time for which the last report stands in for a missing one: USB and radio links pause for some milliseconds.
-const REPORT_LIFE: Duration = Duration::from_millis(20);
-
-/// Time without a report after which a device counts as lost.
-const SILENCE_TIMEOUT: Duration = Duration::from_millis(500);
-
 /// Time for which the servo waits for the next report of a device that sets the pace: one and a half ticks, so that a
 /// late report costs one missed tick and not two.
 const REPORT_TIMEOUT: Duration = Duration::from_micros(1500);
-
-/// Protocol of one device, run on a thread of its own.
-pub trait Protocol: Send + 'static {
-    /// Returns the device's limits.
-    fn spec(&self) -> &DeviceSpec;
-
-    /// Returns whether [`Protocol::exchange`] waits for the device's own report rate, or returns at once.
-    fn pacing(&self) -> Pacing;
-
-    /// Sends a force to the device and waits for its report. World space, mm, N.
-    ///
-    /// Returns within about [`REPORT_LIFE`] even if the device sends nothing; `Ok(None)` means that it sent nothing
-    /// new.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error if the device has failed or was unplugged; the relay then calls [`Protocol::close`].
-    fn exchange(&mut self, output: &Wrench) -> Result<Option<DeviceReport>, DeviceError>;
-
-    /// Releases the hand and closes the device.
-    fn close(&mut self);
-}
-
-/// One report of a device.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DeviceReport {
-    pub reading: Reading,
-    pub state: DeviceState,
-}
 
 /// The servo's end of a relay.
 pub struct Relay {
@@ -64,15 +30,10 @@ pub struct Relay {
     thread: Option<JoinHandle<()>>,
     /// Count of the last report that was read.
     last_count: u64,
-    /// The last trusted report, and the time at which it was read.
-    last: Reading,
-    last_at: Option<Instant>,
-    opened: Instant,
+    last: LastReport,
     events: Receiver<RelayEvent>,
     caller_sender: Sender<Thread>,
     caller: Option<ThreadId>,
-    /// State as of the last report that was read.
-    state: DeviceState,
     /// State that the device thread announced last.
     protocol_state: DeviceState,
     failure: Option<DeviceError>,
@@ -116,13 +77,10 @@ impl Relay {
             pacing,
             shared,
             last_count: 0,
-            last: Reading::ABSENT,
-            last_at: None,
-            opened: Instant::now(),
+            last: LastReport::awaited(),
             events,
             caller_sender,
             caller: None,
-            state: DeviceState::Homing { what: "waiting for the device's first report" },
             protocol_state: DeviceState::Ready,
             failure: thread.is_none().then_some(no_thread),
             thread,
@@ -180,7 +138,7 @@ impl Device for Relay {
     }
 
     fn state(&self) -> DeviceState {
-        self.state
+        self.last.state()
     }
 
     fn exchange(&mut self, output: &Wrench) -> Result<Reading, DeviceError> {
@@ -196,29 +154,11 @@ impl Device for Relay {
         }
         if let Some((count, words)) = report {
             self.last_count = count;
-            self.last = decode_reading(words);
-            self.last_at = Some(Instant::now());
-            self.state = self.protocol_state;
+            self.last.receive(DeviceReport { reading: decode_reading(words), state: self.protocol_state });
         }
-        let silent = self.last_at.map_or(self.opened.elapsed(), |at| at.elapsed());
-        match self.last_at {
-            Some(_) if silent < REPORT_LIFE => Ok(self.last),
-            _ if silent < SILENCE_TIMEOUT => {
-                if self.last_at.is_some() {
-                    self.state = DeviceState::ForceOff { why: "the device does not respond; is it plugged in?" };
-                }
-                Ok(Reading::ABSENT)
-            }
-            _ if !self.state.is_ready() && self.last_at.is_none() && silent < FIRST_REPORT_TIMEOUT => {
-                Ok(Reading::ABSENT)
-            }
-            _ => Err(DeviceError::Lost { why: "it has been silent for too long; is it plugged in?", code: 0 }),
-        }
+        self.last.reading()
     }
 }
-
-/// Time from opening to the first report that a device may take: controllers boot and services start.
-const FIRST_REPORT_TIMEOUT: Duration = Duration::from_secs(5);
 
 impl Drop for Relay {
     fn drop(&mut self) {

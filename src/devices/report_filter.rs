@@ -1,13 +1,12 @@
 //! Validity and timeliness checks on a device's reports, which decide whether it may be given a force.
 //!
 //! Takes the position in each report and its time of arrival. Gives whether the report is valid, and the reason if
-//! forces are off for now. [`ReportFilter`] serves protocols whose firmware checks nothing itself, [`PoseRejects`]
-//! those behind a vendor's library. Never reads a clock: the caller passes the time.
+//! forces are off for now, for protocols whose firmware checks nothing itself. Never reads a clock: the caller passes the
+//! time.
 
-use crate::DeviceReport;
-use std::time::{Duration, Instant};
-use typodont_core::device::{DeviceError, DeviceSpec, DeviceState, Reading};
-use typodont_core::frame::{Pose, Vec3};
+use typodont_core::device::{DeviceError, DeviceState};
+use typodont_core::frame::Vec3;
+use web_time::{Duration, Instant};
 
 /// Interval between two reports above which the later one is late: covers the longest delays of full-speed USB, and
 /// equals the time for which the relay repeats the last report.
@@ -115,48 +114,6 @@ impl ReportFilter {
     pub fn is_fresh(&self, now: Instant) -> bool {
         let is_young = self.last.is_some_and(|(at, _)| now.saturating_duration_since(at) <= LATE_AFTER);
         is_young && self.invalid_count == 0 && self.state(now).is_ready()
-    }
-}
-
-/// Consecutive implausible poses after which a device counts as faulty: about 0.5 s.
-const IMPLAUSIBLE_POSES_MAX: u32 = 500;
-
-/// Multiple of the half workspace that an arm may still reach: the usable workspace is a box within a larger shape.
-const WORKSPACE_FACTOR: f32 = 10.0;
-
-/// Returns the pose if a device with this specification can be there.
-pub fn plausible(pose: Pose, spec: &DeviceSpec) -> Option<Pose> {
-    let is_reachable = pose.position.abs().cmple(spec.workspace_half * WORKSPACE_FACTOR).all();
-    (is_reachable && pose.is_valid()).then_some(pose)
-}
-
-/// Count of consecutive implausible poses from a vendor's library that checks everything else.
-#[derive(Clone, Debug, Default)]
-pub struct PoseRejects {
-    consecutive: u32,
-}
-
-impl PoseRejects {
-    /// Returns the report that stands in for an implausible pose.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`DeviceError::Lost`] after too many in a row.
-    pub fn reject(&mut self) -> Result<DeviceReport, DeviceError> {
-        self.consecutive += 1;
-        if self.consecutive > IMPLAUSIBLE_POSES_MAX {
-            return Err(DeviceError::Lost {
-                why: "its positions are implausible; switch it off and on again",
-                code: 0,
-            });
-        }
-        let state = DeviceState::ForceOff { why: "its positions are implausible" };
-        Ok(DeviceReport { reading: Reading::ABSENT, state })
-    }
-
-    /// Resets the count after a plausible pose.
-    pub fn reset(&mut self) {
-        self.consecutive = 0;
     }
 }
 

@@ -7,10 +7,11 @@
 
 use crate::hid;
 use crate::hid::{HidMatch, Transport};
-use crate::{DeviceReport, Driver, FoundDevice, OpenError, Protocol, Relay};
-use std::time::{Duration, Instant};
+use crate::protocol::open_device;
+use crate::{DeviceReport, Driver, FoundDevice, OpenError, Protocol};
 use typodont_core::device::{Device, DeviceError, DeviceSpec, DeviceState, Pacing, Reading, UPRIGHT, Wrench};
 use typodont_core::frame::{Pose, Quat, Vec3};
+use web_time::{Duration, Instant};
 
 /// Usage page "generic desktop", usage "multi-axis controller".
 const MULTI_AXIS: Option<(u16, u16)> = Some((1, 8));
@@ -231,6 +232,10 @@ impl Driver for SpaceMouseDriver {
         "3Dconnexion SpaceMouse, no force; the argument is its serial number"
     }
 
+    fn hid_kinds(&self) -> &'static [HidMatch] {
+        HID_MATCHES
+    }
+
     fn discover(&self) -> Result<Vec<FoundDevice>, OpenError> {
         Ok(hid::found_devices(hid::find(HID_MATCHES)?))
     }
@@ -239,7 +244,7 @@ impl Driver for SpaceMouseDriver {
         let help =
             "plug it in, or switch it on and wait for a steady light; `typodont devices` lists what is connected";
         let plugged = hid::select(hid::find(HID_MATCHES)?, argument, "SpaceMouse", help)?;
-        Ok(Box::new(Relay::start(SpaceMouseProtocol::new(hid::open(&plugged)?, plugged.product))))
+        Ok(open_device(SpaceMouseProtocol::new(hid::open(&plugged)?, plugged.product)))
     }
 }
 

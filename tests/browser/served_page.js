@@ -125,8 +125,9 @@ const open = async ({ playwright, executablePath, folder, adapter, exercises, is
   return opened;
 };
 
-/** Opens an exercise of the list, up to the moment in which the instrument follows the mouse. */
-const openExercise = async ({ page, state, until, click }, exercise, atBriefing = async () => {}, atTask = async () => {}) => {
+/** Opens an exercise of the list, up to the moment in which the instrument follows the mouse, or up to the end of `opened.begin`. */
+const openExercise = async (opened, exercise, atBriefing = async () => {}, atTask = async () => {}) => {
+  const { page, state, until, click, begin = atTask => takeInstrument(opened, atTask) } = opened;
   await page.mouse.move(640, 400);
   while (state.chosen !== exercise) {
     const before = state.chosen;
@@ -136,7 +137,8 @@ const openExercise = async ({ page, state, until, click }, exercise, atBriefing 
   await click('shelf.open');
   await until('screen', screen => screen === 'briefing');
   await atBriefing();
-  await beginLesson({ page, until, click }, atTask);
+  await click('briefing.begin');
+  await begin(atTask);
 };
 
 /** Begins the lesson of a briefing, up to the moment in which the instrument follows the mouse. */

@@ -330,6 +330,37 @@ fn a_pen_and_a_gamepad_work_in_the_page() {
     assert!(output.status.success(), "{}", complained(&output));
 }
 
+#[test]
+#[ignore = "long: needs the page that scripts/web builds"]
+fn hid_devices_work_in_the_page() {
+    // Aim: an open handle is felt, without a buzz and with the force that the report states; a SpaceMouse and a Polhem move the
+    // instrument, and the motors of a Polhem stay off. Method: devices that speak the real protocols in place of the browser's; the
+    // handle is pressed onto the tooth, unplugged and plugged in again.
+    for (kind, force) in [("open-handle", Some("reduced")), ("spacemouse", None), ("polhem", Some("off"))] {
+        let Some((mut node, _)) = page_script("device_page.js", WEBGL) else { return };
+        let out = folder(&format!("page_{kind}"));
+        let zip = out.join("bundle.zip");
+        let output = node.arg(&out).arg(&zip).arg(kind).stderr(Stdio::inherit()).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stdout);
+        println!("{told}");
+        assert!(output.status.success(), "{kind}: see above");
+        let verified = typodont(&["verify", zip.to_str().unwrap()]);
+        assert!(verified.status.success(), "{}", complained(&verified));
+        let bundle = BundleFolder::from_zip(&std::fs::read(&zip).unwrap(), kind).unwrap();
+        let session: Value = serde_json::from_slice(&bundle.read(SESSION_FILE).unwrap()).unwrap();
+        assert_eq!(session["device"]["page_force"].as_str(), force, "{kind}");
+        let report = String::from_utf8_lossy(&bundle.read("report.html").unwrap()).into_owned();
+        assert_eq!(report.contains("an eighth of the force"), force == Some("reduced"), "{kind}");
+        assert_eq!(report.contains("No force was felt"), force == Some("off"), "{kind}");
+        if kind == "open-handle" {
+            let told: Value = serde_json::from_str(&told).unwrap();
+            let rms = told["rms"].as_f64().unwrap();
+            // The bur cuts and slides meanwhile; a buzz is some hundred mm/s.
+            assert!(rms < 20.0, "the contact buzzes: {told}");
+        }
+    }
+}
+
 /// Moves the mouse of a window in circles for a time, as `beside_page.js` does; returns ticks and frames per second.
 fn circle(desk: &mut Desk, seconds: f64) -> [f64; 2] {
     let counts = |desk: &Desk| ["ticks", "frames"].map(|topic| desk.latest(topic).unwrap().parse::<f64>().unwrap());

@@ -13,6 +13,7 @@ mod live;
 mod mouse;
 mod native;
 mod open_handle;
+mod page;
 mod pipe;
 mod pointer_policy;
 mod polhem;

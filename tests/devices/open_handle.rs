@@ -16,11 +16,11 @@ const PATIENCE: Duration = Duration::from_secs(20);
 
 pub struct Rigged {
     hand: SharedHand,
-    faults: Arc<Faults>,
+    pub faults: Arc<Faults>,
 }
 
 #[derive(Default)]
-struct Faults {
+pub struct Faults {
     wrong: AtomicU32,
     /// A state that the handle starts in instead of 3.
     state: AtomicU8,
@@ -106,7 +106,8 @@ fn description() -> Vec<u8> {
     sealed(2, 0, &body)
 }
 
-fn firmware(device: DeviceEnd, hand: &SharedHand, faults: &Faults) {
+/// Runs a handle until its cable is pulled.
+pub fn firmware(device: DeviceEnd, hand: &SharedHand, faults: &Faults) {
     let (mut number, mut obeyed) = (0u16, 0u16);
     let mut order = Wrench::ZERO;
     let mut lives_until = Instant::now();

@@ -113,7 +113,7 @@ fn a_servo_without_a_thread_makes_up_for_a_tenth_of_a_second_and_counts_the_rest
     let hand = SharedHand::at_rest(0.0);
     let before = Instant::now();
     let simulation = Simulation::new(world());
-    let mut servo = Servo::start_inline(simulation, Box::new(InHand::new(&hand)), None, TimingStats::default());
+    let mut servo = Servo::start_inline(simulation, Box::new(Unfelt::new(&hand)), None, TimingStats::default());
     let mut ticks: Vec<TickReport> = Vec::new();
     let mut edits = Vec::new();
     let mut run_after = |servo: &mut Servo, wait: u64, to: Vec3| {
@@ -146,6 +146,43 @@ fn a_servo_without_a_thread_makes_up_for_a_tenth_of_a_second_and_counts_the_rest
     }
     assert!(ticks.iter().any(|tick| tick.step.touch.is_some()), "the bur touched nothing");
     assert_eq!(edits.len(), ticks.iter().map(|tick| tick.edits).sum::<usize>());
+}
+
+#[test]
+fn a_servo_without_a_thread_releases_a_hand_that_feels_its_force_when_it_is_late() {
+    // Aim: where a page was held up, no old force is rendered, and the hand is not led through what it has passed meanwhile.
+    // Method: a hand that leans on the wall; nobody asks the servo for a while.
+    let hand = SharedHand::at_rest(0.0);
+    let device = Box::new(InHand::new(&hand));
+    let mut servo = Servo::start_inline(Simulation::new(world()), device, None, TimingStats::default());
+    let mut edits = Vec::new();
+    let mut advance = |servo: &mut Servo, wait: Duration| {
+        std::thread::sleep(wait);
+        servo.advance();
+        let mut steps = Vec::new();
+        while let Some(event) = servo.next_event() {
+            if let ServoEvent::Ticked(tick) = event {
+                servo.take_edits(&tick, &mut edits);
+                steps.push(tick);
+            }
+        }
+        steps
+    };
+    let mut is_felt = false;
+    for ms in 0..2000 {
+        hand.reach(Vec3::new(-3.0, if ms < 200 { 2.0 } else { -0.9 }, 0.0));
+        let steps = advance(&mut servo, Duration::from_millis(1));
+        is_felt = steps.last().map_or(is_felt, |tick| tick.step.wrench().force.y > 0.1);
+    }
+    assert!(is_felt, "nothing is felt: {}", hand.position());
+    let steps = advance(&mut servo, Duration::from_millis(60));
+    assert_eq!(steps.len(), 10, "what was missed longer ago is not made up for");
+    assert!(!steps[0].reading.pose.is_valid(), "{:?}", steps[0].reading);
+    let most = steps.iter().map(|tick| tick.step.wrench().force.length()).fold(0.0, f32::max);
+    assert!(most < 0.05, "{most} N");
+    let ended = servo.stop().unwrap();
+    assert!(ended.timing.late_releases >= 1 && ended.timing.missed >= 40, "{:?}", ended.timing.summary());
+    assert_eq!(hand.felt(), Wrench::ZERO);
 }
 
 /// A hand like [`InHand`] that feels nothing, as that of a mouse; it is lost after a number of exchanges.

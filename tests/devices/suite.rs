@@ -77,13 +77,15 @@ fn forces_arrive(rig: &mut dyn Rig) {
     for force in [Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z].map(|axis| axis * 0.6) {
         let told = Wrench { force, ..Wrench::ZERO };
         // Servos warm up and services check a first command: what counts is what is felt after a while.
-        let arrived = || (hand.felt().force - force).length() < 0.03;
+        let felt = force * rig.force_share();
+        let arrived = || (hand.felt().force - felt).length() < 0.05 * felt.length();
         hold_until(&mut device, told, arrived, || format!("{}: told {force}, felt {}", rig.name(), hand.felt().force));
     }
     if rig.abilities().torque {
         for torque in [Vec3::X, Vec3::Y, -Vec3::Z].map(|axis| axis * 0.5 * device.spec().max_torque) {
             let told = Wrench { torque, ..Wrench::ZERO };
-            let arrived = || (hand.felt().torque - torque).length() < 0.05 * torque.length();
+            let felt = torque * rig.force_share();
+            let arrived = || (hand.felt().torque - felt).length() < 0.05 * felt.length();
             let what = || format!("{}: told {torque}, felt {}", rig.name(), hand.felt().torque);
             hold_until(&mut device, told, arrived, what);
         }
@@ -101,7 +103,7 @@ fn forces_arrive(rig: &mut dyn Rig) {
 fn a_stalled_program_lets_go(rig: &mut dyn Rig) {
     let (mut device, hand) = (ready(rig), rig.hand());
     let told = Wrench { force: Vec3::Y * 0.6, ..Wrench::ZERO };
-    let pushed = || hand.felt().force.length() > 0.5;
+    let pushed = || hand.felt().force.length() > 0.5 * rig.force_share();
     hold_until(&mut device, told, pushed, || format!("{}: no force arrives", rig.name()));
     eventually(|| hand.felt().force.length() < 1e-3, || format!("{}: the force stays on", rig.name()));
 }
@@ -194,7 +196,7 @@ fn trouble_lets_go_and_passes(rig: &mut dyn Rig, how: Misbehaviour) {
     let above = |heard: &Heard| heard.ticks > 50;
     listen_for(&mut servo, PATIENCE, above, || format!("{}: {how:?}: does not go on", rig.name()));
     if has_force {
-        let pushed = |_: &Heard| hand.felt().force.length() > 0.05;
+        let pushed = |_: &Heard| hand.felt().force.length() > 0.05 * rig.force_share();
         press(&mut servo, &hand, -1.5, pushed, || format!("{}: {how:?}: no force after it", rig.name()));
     }
     lean(&hand, 3.0);

@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use typodont_audio::PlaybackOptions;
 use typodont_author::new_exercise;
+use typodont_devices::driver_by_name;
 use typodont_exercise::scenario::Scenario;
 use typodont_exercise::session::Input;
 use typodont_formats::Library;
@@ -154,6 +155,7 @@ impl App {
             AppCommand::OpenReport => self.open_report(ctx),
             AppCommand::DownloadBundle => self.download_bundle(),
             AppCommand::ChooseZip => platform::ask_for_file(".zip", self.inbox.clone(), ctx),
+            AppCommand::AllowDevice => self.ask_for_device(ctx),
             AppCommand::ChooseExercise => platform::ask_for_file(".json", self.inbox.clone(), ctx),
             AppCommand::TryAgain => {
                 self.leave_results();
@@ -428,10 +430,19 @@ impl App {
         self.show_lesson(config, library);
     }
 
+    /// Lets the browser ask for a device of the chosen kind.
+    fn ask_for_device(&mut self, ctx: &egui::Context) {
+        self.device_answer = None;
+        if let Some(driver) = driver_by_name(&self.settings.device) {
+            platform::ask_for_device(driver.hid_kinds(), self.device_inbox.clone(), ctx);
+        }
+    }
+
     /// Opens the device of a lesson; if that fails, the screen says why.
     fn open_input_device(&mut self) -> Option<InputDevice> {
         match self.options.device.as_deref().unwrap_or(&self.settings.device) {
             "mouse" => Some(InputDevice::Mouse),
+            device if platform::IS_PAGE => Some(InputDevice::InWorker(device.into())),
             device => match lesson::open_device(device) {
                 Ok(held) => Some(InputDevice::Device(held)),
                 Err(failed) => {

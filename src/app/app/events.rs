@@ -97,6 +97,7 @@ impl App {
         // In a page, a bundle that is still being made would wait for the answer.
         let is_busy = platform::IS_PAGE && !self.completions.is_empty();
         let file = self.inbox.take();
+        self.device_answer = self.device_inbox.take().or(self.device_answer.take());
         if !is_taking || is_covered || is_busy || self.options.kiosk().is_some() {
             return;
         }

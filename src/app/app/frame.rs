@@ -9,7 +9,7 @@ use crate::ui::briefing::BriefingFields;
 use crate::ui::case_pictures::picture_window;
 use crate::ui::exercise_list::{ListContext, exercise_list_ui};
 use crate::ui::results::{ResultTexts, results_ui};
-use crate::ui::settings_screen::{kiosk_settings_ui, settings_ui};
+use crate::ui::settings_screen::{SettingsContext, kiosk_settings_ui, settings_ui};
 use crate::ui::zip_verification::zip_verification_ui;
 use crate::ui::{briefing, kiosk_exit, practice, questionnaire, shortcuts, theme, ui_anchors};
 use eframe::egui;
@@ -121,8 +121,11 @@ impl App {
                 None => settings_ui(
                     ui,
                     &self.settings,
-                    self.user_folder.settings_file().as_deref(),
-                    self.has_graphics,
+                    &SettingsContext {
+                        file: self.user_folder.settings_file().as_deref(),
+                        has_graphics: self.has_graphics,
+                        device_answer: self.device_answer.as_ref(),
+                    },
                     &self.languages,
                     words,
                     commands,

@@ -3,7 +3,7 @@
 use super::{App, CloseState};
 use crate::editor::EditorState;
 use crate::lesson_state::LessonState;
-use crate::messages::SecondHandStatus;
+use crate::messages::{PauseReason, SecondHandStatus};
 use crate::results::BundleState;
 use crate::screen::Screen;
 use crate::state_log::StateLog;
@@ -91,6 +91,7 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState, view: &LessonView) {
     }
     log.record("pointer", if lesson.is_pointer_captured { "held" } else { "free" });
     log.record("paused", lesson.is_paused);
+    log.record("standstill", lesson.pause_reason.as_ref().map_or("", PauseReason::key));
     log.record("clock", if lesson.is_awaiting_movement { "stopped" } else { "running" });
     log.record("asked", if lesson.is_confirming_finish { "finish" } else { "nothing" });
     if let Some(SecondHandStatus::AwaitingConnection(address)) = lesson.second_hand {

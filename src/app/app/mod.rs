@@ -14,10 +14,12 @@ use crate::completion::Completion;
 use crate::editor::EditorState;
 use crate::exercise_list::ExerciseList;
 use crate::gamepad::GamepadPointer;
-use crate::given_file::FileInbox;
+use crate::given_file::GivenFile;
 use crate::i18n::{self, Translations};
+use crate::inbox::Inbox;
 use crate::kiosk::KioskExit;
 use crate::platform;
+use crate::platform::DeviceAnswer;
 use crate::screen::Screen;
 use crate::session_history::SessionHistory;
 use crate::settings::{self, Settings};
@@ -43,7 +45,10 @@ pub struct App {
     /// Bundles that are still being made after their results were left.
     completions: Vec<Completion>,
     /// Files that the user gives to the window.
-    inbox: FileInbox,
+    inbox: Inbox<GivenFile>,
+    device_inbox: Inbox<DeviceAnswer>,
+    /// The browser's last answer to the question for a device.
+    device_answer: Option<DeviceAnswer>,
     participant: String,
     /// Examiner's code for the next session, as typed in the briefing. Forgotten when that session begins.
     examiner_code: String,
@@ -121,7 +126,9 @@ impl App {
         let mut app = App {
             history,
             completions: Vec::new(),
-            inbox: FileInbox::default(),
+            inbox: Inbox::default(),
+            device_inbox: Inbox::default(),
+            device_answer: None,
             words: i18n::select_language(&languages, &settings.language),
             participant: options.participant.clone(),
             examiner_code: String::new(),

@@ -48,6 +48,9 @@ pub struct GamepadState {
     pub buttons: u32,
 }
 
+/// The browser's answer to the question for a device: the name of the one that the user allowed, if any, or why it cannot ask.
+pub type DeviceAnswer = Result<Option<String>, String>;
+
 /// Writer of a line of the state log.
 pub type LogSink = Box<dyn FnMut(&str)>;
 

@@ -1,7 +1,8 @@
 //! A computer: settings in a file of the user's configuration folder, bundles in a folder.
 
-use super::{GamepadState, LogSink, Pen};
-use crate::given_file::{FileInbox, GivenContent, GivenFile};
+use super::{DeviceAnswer, GamepadState, LogSink, Pen};
+use crate::given_file::{GivenContent, GivenFile};
+use crate::inbox::Inbox;
 use crate::user_folder::UserFolder;
 use directories::{ProjectDirs, UserDirs};
 use eframe::egui;
@@ -11,10 +12,11 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use typodont_author::autosave;
+use typodont_devices::hid::HidMatch;
 use typodont_lesson::InterruptedSession;
 use typodont_report::bundle::{BundleFolder, REPORT_FILE, RecordingChange};
 
-/// True for a page in a browser: it has no folders, and one device, the pointer.
+/// True for a page in a browser: it has no folders, and only devices that the browser passes on.
 pub const IS_PAGE: bool = false;
 
 /// Environment variable that names the file of the state log; without it nothing is written.
@@ -66,7 +68,10 @@ pub fn download_text(_: &str, _: &str) -> Option<String> {
 }
 
 /// This window has no dialog for files: they are dropped into it, or named to the command line.
-pub fn ask_for_file(_: &str, _: FileInbox, _: &egui::Context) {}
+pub fn ask_for_file(_: &str, _: Inbox<GivenFile>, _: &egui::Context) {}
+
+/// A program opens devices without a question.
+pub fn ask_for_device(_: &[HidMatch], _: Inbox<DeviceAnswer>, _: &egui::Context) {}
 
 /// Keeps the unsaved text of an exercise in the folder for drafts; without one, nowhere. `path` identifies the exercise.
 ///
@@ -89,7 +94,7 @@ pub fn remove_draft(folder: Option<&Path>, path: Option<&Path>) {
 }
 
 /// Takes a file that was dropped into the window, with `left_out` others.
-pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: FileInbox, ctx: &egui::Context) {
+pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: Inbox<GivenFile>, ctx: &egui::Context) {
     let path = file.path();
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let content = match path.is_dir() {

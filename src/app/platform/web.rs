@@ -1,19 +1,21 @@
 //! A page in a browser: settings in the page's own storage, bundles in memory and as downloads.
 
-use super::{GamepadState, LogSink, Pen};
-use crate::given_file::{FileInbox, GivenContent, GivenFile};
+use super::{DeviceAnswer, GamepadState, LogSink, Pen};
+use crate::given_file::{GivenContent, GivenFile};
+use crate::inbox::Inbox;
 use crate::user_folder::UserFolder;
 use eframe::egui;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
+use typodont_devices::hid::HidMatch;
 use typodont_lesson::InterruptedSession;
 use typodont_report::bundle::{BundleFolder, REPORT_FILE, RecordingChange};
 use wasm_bindgen::prelude::Closure;
 use wasm_bindgen::{JsCast, JsValue};
 use wasm_bindgen_futures::{JsFuture, spawn_local};
 
-/// True for a page in a browser: it has no folders, and one device, the pointer.
+/// True for a page in a browser: it has no folders, and only devices that the browser passes on.
 pub const IS_PAGE: bool = true;
 
 /// Key of the settings in the page's own storage.
@@ -101,14 +103,14 @@ const FILE_MAX: f64 = (400 << 20) as f64;
 const FILE_INPUT: &str = "typodont-file";
 
 /// Lets the browser ask the user for a file whose name ends as told, such as `.zip`.
-pub fn ask_for_file(ending: &str, inbox: FileInbox, ctx: &egui::Context) {
+pub fn ask_for_file(ending: &str, inbox: Inbox<GivenFile>, ctx: &egui::Context) {
     if let Err(error) = offer_files(ending, inbox.clone(), ctx.clone()) {
         let why = format!("unreadable-file: the browser offers no files ({}); drop the file here", reason(&error));
         inbox.put(GivenFile { name: String::new(), content: GivenContent::Read(Err(why)), left_out: 0 }, ctx);
     }
 }
 
-fn offer_files(ending: &str, inbox: FileInbox, ctx: egui::Context) -> Result<(), JsValue> {
+fn offer_files(ending: &str, inbox: Inbox<GivenFile>, ctx: egui::Context) -> Result<(), JsValue> {
     let document = web_sys::window().and_then(|window| window.document()).ok_or("no document")?;
     // The element of a question that was not answered is still there.
     if let Some(earlier) = document.get_element_by_id(FILE_INPUT) {
@@ -146,8 +148,36 @@ async fn read(file: &web_sys::File) -> Result<Vec<u8>, String> {
         .map_err(|error| format!("unreadable-file: {}; choose the file again", reason(&error)))
 }
 
+/// Lets the browser ask the user for a device of one of these kinds. It does so only for a moment after a click.
+pub fn ask_for_device(kinds: &[HidMatch], inbox: Inbox<DeviceAnswer>, ctx: &egui::Context) {
+    let asked = call_hid("ask", &js_sys::Array::of1(&hid_kinds_js(kinds)));
+    let Some(promise) = asked.and_then(|asked| asked.dyn_into::<js_sys::Promise>().ok()) else {
+        return inbox.put(Err("page/hid.js is missing".into()), ctx);
+    };
+    let ctx = ctx.clone();
+    spawn_local(async move {
+        let answer = JsFuture::from(promise).await;
+        inbox.put(answer.map(|name| name.as_string()).map_err(|error| reason(&error)), &ctx);
+    });
+}
+
+/// Kinds of devices, as `page/hid.js` takes them.
+pub fn hid_kinds_js(kinds: &[HidMatch]) -> JsValue {
+    let kind = |kind: &HidMatch| {
+        let HidMatch { vendor, products, usage } = kind;
+        serde_json::json!({ "vendor": vendor, "products": products, "usage": usage.map(|(page, usage)| [page, usage]) })
+    };
+    let text = kinds.iter().map(kind).collect::<serde_json::Value>().to_string();
+    js_sys::JSON::parse(&text).unwrap_or_default()
+}
+
+/// Calls a function of `page/hid.js` in the crate `web`; `None` in a page without it.
+pub fn call_hid(function: &str, arguments: &js_sys::Array) -> Option<JsValue> {
+    call_script("typodontHid", function, arguments)
+}
+
 /// Reads a file that was dropped into the page, with `left_out` others.
-pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: FileInbox, ctx: &egui::Context) {
+pub fn receive_dropped(file: egui::DroppedFileHandle, left_out: usize, inbox: Inbox<GivenFile>, ctx: &egui::Context) {
     let ctx = ctx.clone();
     spawn_local(async move {
         let name = file.path().to_string_lossy().into_owned();
@@ -230,9 +260,14 @@ fn call_keeper<const N: usize>(function: &str, arguments: [JsValue; N]) -> Optio
 }
 
 fn call_keeper_with(function: &str, arguments: &js_sys::Array) -> Option<JsValue> {
-    let keeper = js_sys::Reflect::get(&js_sys::global(), &"typodontKept".into()).ok()?;
-    let function = js_sys::Reflect::get(&keeper, &function.into()).ok()?.dyn_into::<js_sys::Function>().ok()?;
-    function.apply(&keeper, arguments).ok()
+    call_script("typodontKept", function, arguments)
+}
+
+/// Calls a function of one of the page's scripts, which are global objects.
+fn call_script(script: &str, function: &str, arguments: &js_sys::Array) -> Option<JsValue> {
+    let script = js_sys::Reflect::get(&js_sys::global(), &script.into()).ok()?;
+    let function = js_sys::Reflect::get(&script, &function.into()).ok()?.dyn_into::<js_sys::Function>().ok()?;
+    function.apply(&script, arguments).ok()
 }
 
 /// Name of the place where settings are kept, for messages.

@@ -3,8 +3,9 @@
 use crate::command::AppCommand;
 use crate::i18n::Translations;
 use crate::platform;
+use crate::platform::DeviceAnswer;
 use crate::settings::{FONT_SIZES, Settings, StereoMode};
-use crate::ui::ui_anchors;
+use crate::ui::{theme, ui_anchors};
 use eframe::egui;
 use std::path::Path;
 use typodont_core::sim::HandFrame;
@@ -20,12 +21,21 @@ const STEREO_MODES: [(StereoMode, &str); 7] = [
     (StereoMode::FrameSequential, "settings.stereo_shutter"),
 ];
 
+/// Everything beside the settings that their screen shows.
+pub struct SettingsContext<'a> {
+    /// File in which the settings are kept.
+    pub file: Option<&'a Path>,
+    /// True if a graphics processor draws.
+    pub has_graphics: bool,
+    /// The browser's last answer to the question for a device.
+    pub device_answer: Option<&'a DeviceAnswer>,
+}
+
 /// Draws all settings. Pushes commands for changes, and changes nothing itself.
 pub fn settings_ui(
     ui: &mut egui::Ui,
     settings: &Settings,
-    settings_file: Option<&Path>,
-    has_graphics: bool,
+    context: &SettingsContext,
     languages: &[Translations],
     words: &Translations,
     commands: &mut Vec<AppCommand>,
@@ -34,6 +44,9 @@ pub fn settings_ui(
     egui::Grid::new("settings").num_columns(2).spacing([24.0, 12.0]).show(ui, |ui| {
         language_row(ui, &mut new, languages, words);
         device_row(ui, &mut new, words);
+        if platform::IS_PAGE && settings.device != "mouse" {
+            permission_row(ui, context.device_answer, words, commands);
+        }
         left_handed_row(ui, &mut new, words);
         hand_rows(ui, &mut new, words);
         stereo_row(ui, &mut new, words);
@@ -47,7 +60,7 @@ pub fn settings_ui(
         });
         font_row(ui, &mut new, words);
         ui.label("");
-        let mut is_smooth = settings.is_smooth(has_graphics);
+        let mut is_smooth = settings.is_smooth(context.has_graphics);
         if ui.checkbox(&mut is_smooth, words.get("settings.smooth")).changed() {
             new.smooth_edges = Some(is_smooth);
         }
@@ -60,7 +73,7 @@ pub fn settings_ui(
         commands.push(AppCommand::ApplySettings(Box::new(new)));
     }
     ui.add_space(12.0);
-    if let Some(path) = settings_file {
+    if let Some(path) = context.file {
         ui.weak(words.format("settings.kept", path.display()));
     }
     ui.add_space(8.0);
@@ -129,11 +142,39 @@ fn device_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) 
         let choice = egui::ComboBox::from_id_salt("device").selected_text(settings.device.clone()).show_ui(ui, |ui| {
             for driver in DRIVERS {
                 let name = driver.name().to_string();
-                ui.selectable_value(&mut settings.device, name.clone(), name).on_hover_text(driver.description());
+                let choice = ui.selectable_value(&mut settings.device, name.clone(), name.clone());
+                ui_anchors::anchor(ui, format!("settings.device.{name}"), choice.rect);
+                choice.on_hover_text(driver.description());
             }
         });
+        ui_anchors::anchor(ui, "settings.device", choice.response.rect);
         choice.response
     });
+}
+
+/// Draws the button by which the browser asks for the device, and its answer.
+fn permission_row(
+    ui: &mut egui::Ui,
+    answer: Option<&DeviceAnswer>,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
+    ui.label("");
+    ui.vertical(|ui| {
+        let allow =
+            ui.button(words.get("settings.allow_device")).on_hover_text(words.get("settings.allow_device_hint"));
+        ui_anchors::anchor(ui, "settings.allow_device", allow.rect);
+        if allow.clicked() {
+            commands.push(AppCommand::AllowDevice);
+        }
+        match answer {
+            None => {}
+            Some(Ok(Some(name))) => _ = ui.label(words.format("settings.device_allowed", name)),
+            Some(Ok(None)) => _ = ui.label(words.get("settings.no_device_chosen")),
+            Some(Err(why)) => _ = ui.colored_label(theme::ERROR, words.format("settings.no_devices", why)),
+        }
+    });
+    ui.end_row();
 }
 
 /// Draws which hand holds the handpiece of a mouse; an arm holds its own.

@@ -36,6 +36,17 @@ pub struct DeviceSpec {
     pub workspace_half: Vec3,
     /// Apparent mass at the tip, kg.
     pub apparent_mass: f32,
+    /// Force that is left in a browser's page; `None` outside of a page, and for a device that renders none anyway.
+    pub page_force: Option<PageForce>,
+}
+
+/// Force that a browser's page renders on a device: a page cannot promise a servo at 1 kHz.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PageForce {
+    /// A part of it is rendered, on a device that releases the hand by itself when the page is late.
+    Reduced,
+    /// Not rendered.
+    Off,
 }
 
 impl DeviceSpec {
@@ -53,6 +64,7 @@ impl DeviceSpec {
             resolution: 0.055,
             workspace_half: Vec3::new(80.0, 60.0, 35.0),
             apparent_mass: 0.045,
+            page_force: None,
         }
     }
 }

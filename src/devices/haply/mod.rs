@@ -99,5 +99,6 @@ fn spec(model: Option<HaplyModel>) -> DeviceSpec {
         workspace_half: Vec3::splat(radius),
         // Not published; the order of magnitude of the Omni, doubled for the longer arms.
         apparent_mass: 0.1,
+        page_force: None,
     }
 }

@@ -9,9 +9,9 @@ use crate::polhem::geometry::ArmConfig;
 use crate::polhem::{orientation_to_world, to_arm, to_world};
 use crate::report_filter::ReportFilter;
 use crate::{DeviceReport, Protocol};
-use std::time::{Duration, Instant};
 use typodont_core::device::{DeviceError, DeviceSpec, DeviceState, Pacing, Reading, UPRIGHT, Wrench};
 use typodont_core::frame::{Pose, Quat, Vec3};
+use web_time::{Duration, Instant};
 
 /// Maximum current that the firmware accepts, mA; its own limit is 3 A.
 const CURRENT_MAX: f64 = 1999.0;
@@ -22,6 +22,9 @@ const ANSWER_TIMEOUT: Duration = Duration::from_millis(10);
 /// Time without an answer after which a report counts as lost and another one is sent. Sending more often would let a
 /// slow arm answer in time, but to an old report.
 const LOST_AFTER: Duration = Duration::from_millis(100);
+
+/// Time after the last report at which the arm stops its motors.
+const MOTOR_STOP_TIME: Duration = Duration::from_millis(500);
 
 /// Length of encoders and `info`, the used bytes of a report of any length.
 const ENCODER_BYTES: usize = 14;
@@ -185,6 +188,10 @@ impl<T: Transport> Protocol for HidArm<T> {
         Ok(Some(DeviceReport { reading, state }))
     }
 
+    fn release_time(&self) -> Option<Duration> {
+        Some(MOTOR_STOP_TIME)
+    }
+
     fn close(&mut self) {
         // If the arm does not receive this, its motors are off already.
         let _ = self.send_words([0; 7]);
@@ -220,6 +227,7 @@ fn spec(config: &ArmConfig) -> DeviceSpec {
         workspace_half: Vec3::splat(57.0),
         // Not published either; an estimate for plywood links and capstans without gears.
         apparent_mass: 0.1,
+        page_force: None,
     }
 }
 

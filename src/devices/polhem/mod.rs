@@ -7,13 +7,16 @@
 
 pub mod hid_arm;
 pub mod geometry;
+#[cfg(not(target_family = "wasm"))]
+mod ports;
+#[cfg(not(target_family = "wasm"))]
 pub mod serial_arm;
 
 use crate::hid;
 use crate::hid::{HidDeviceInfo, HidMatch};
-use crate::{Driver, FoundDevice, OpenError, Relay};
+use crate::protocol::open_device;
+use crate::{Driver, FoundDevice, OpenError};
 use geometry::{ARM_CONFIGS, ArmConfig};
-use std::time::Duration;
 use typodont_core::device::Device;
 use typodont_core::frame::{Quat, Vec3};
 
@@ -45,11 +48,27 @@ fn orientation_to_world(arm_from_handle: Quat) -> Quat {
 /// Driver of Polhem and WoodenHaptics arms.
 pub struct PolhemDriver;
 
+/// A page has no serial ports.
+#[cfg(target_family = "wasm")]
+mod ports {
+    use crate::{FoundDevice, OpenError};
+    use typodont_core::device::Device;
+
+    pub fn find() -> Vec<FoundDevice> {
+        Vec::new()
+    }
+
+    pub fn open(_port: &str) -> Result<Box<dyn Device + Send>, OpenError> {
+        Err(OpenError::new("a page has no serial ports", "use the program that is installed"))
+    }
+
+    pub fn open_first() -> Option<Box<dyn Device + Send>> {
+        None
+    }
+}
+
 /// Geometry used if the argument names none.
 const DEFAULT_CONFIG: &str = "polhem_v1";
-
-/// Time for which a serial port is checked for an arm. An arm sends many lines in this time.
-const LISTEN_TIME: Duration = Duration::from_millis(500);
 
 impl Driver for PolhemDriver {
     fn name(&self) -> &'static str {
@@ -60,15 +79,16 @@ impl Driver for PolhemDriver {
         "Polhem or WoodenHaptics arm; the argument is `hid`, `hid:GEOMETRY` (polhem_v1 by default) or `serial:PORT`"
     }
 
+    fn hid_kinds(&self) -> &'static [HidMatch] {
+        HID_MATCHES
+    }
+
     fn discover(&self) -> Result<Vec<FoundDevice>, OpenError> {
         let mut found: Vec<FoundDevice> = hid_candidates()?
             .into_iter()
             .map(|p| FoundDevice { title: format!("{} (may be a Polhem)", p.title), argument: "hid".into() })
             .collect();
-        found.extend(serial_arm::ports().into_iter().map(|port| FoundDevice {
-            title: format!("serial port {port} (may be a Polhem)"),
-            argument: format!("serial:{port}"),
-        }));
+        found.extend(ports::find());
         Ok(found)
     }
 
@@ -77,7 +97,7 @@ impl Driver for PolhemDriver {
             None => open_any(),
             Some(("hid", "")) => open_hid_arm(DEFAULT_CONFIG),
             Some(("hid", name)) => open_hid_arm(name),
-            Some(("serial", port)) if !port.is_empty() => Ok(Box::new(Relay::start(serial_arm::open(port)?))),
+            Some(("serial", port)) if !port.is_empty() => ports::open(port),
             Some((other, _)) => Err(OpenError::new(
                 format!("unknown connection polhem:{other}"),
                 "use polhem:hid, polhem:hid:polhem_v1 or polhem:serial:/dev/ttyACM0",
@@ -103,7 +123,7 @@ fn open_hid_arm(name: &str) -> Result<Box<dyn Device + Send>, OpenError> {
         )
     })?;
     let report_length = hid_arm::report_length(plugged.vendor);
-    Ok(Box::new(Relay::start(hid_arm::HidArm::new(hid::open(&plugged)?, config, report_length))))
+    Ok(open_device(hid_arm::HidArm::new(hid::open(&plugged)?, config, report_length)))
 }
 
 fn config_by_name(name: &str) -> Result<&'static ArmConfig, OpenError> {
@@ -113,23 +133,17 @@ fn config_by_name(name: &str) -> Result<&'static ArmConfig, OpenError> {
     })
 }
 
-/// Opens a HID arm if there is one, else the first serial port on which an arm is detected. Detection writes nothing,
-/// so that it disturbs no other device on such a port.
+/// Opens a HID arm if there is one, else the first serial port on which an arm is detected.
 fn open_any() -> Result<Box<dyn Device + Send>, OpenError> {
     if !hid_candidates()?.is_empty() {
         return open_hid_arm(DEFAULT_CONFIG);
     }
-    for port in serial_arm::ports() {
-        if let Ok(mut arm) = serial_arm::open(&port)
-            && arm.detects_arm(LISTEN_TIME)
-        {
-            return Ok(Box::new(Relay::start(arm)));
-        }
-    }
-    Err(OpenError::new(
-        "no Polhem is connected",
-        "plug it in and switch its motors on; on Linux you must be in the group dialout to open a serial port",
-    ))
+    ports::open_first().ok_or_else(|| {
+        OpenError::new(
+            "no Polhem is connected",
+            "plug it in and switch its motors on; on Linux you must be in the group dialout to open a serial port",
+        )
+    })
 }
 
 #[cfg(test)]

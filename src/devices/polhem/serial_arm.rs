@@ -301,6 +301,7 @@ fn spec() -> DeviceSpec {
         workspace_half: Vec3::splat(57.0),
         // Not published.
         apparent_mass: 0.1,
+        page_force: None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! A servo that runs several ticks at once, for a device whose force nobody feels.
+//! A servo that runs several ticks at once: for a device whose force nobody feels, and in a browser's page.
 //!
 //! Takes the servo's state. Runs the ticks that have become due since the last call, all with the same clock time: on a
 //! thread that sleeps a few milliseconds between two calls, or, in a browser's page, which has no threads, when its owner
@@ -17,6 +17,9 @@ use web_time::Duration;
 /// Ticks that a page makes up for in one call. A frame of a slow computer takes a tenth of a second; whoever waits longer has
 /// lost sight of the instrument.
 const PAGE_LIMIT: u32 = 100;
+
+/// Ticks that a page makes up for in one call with a device whose force is felt: the hand has moved on meanwhile.
+const FELT_LIMIT: u32 = 10;
 
 /// Ticks that the thread makes up for in one call: a frame of a display and some of the next.
 const THREAD_LIMIT: u32 = 25;
@@ -60,15 +63,17 @@ impl BatchedServo {
     /// Runs the ticks of a page that have become due.
     pub fn advance(&mut self) {
         if !self.has_ended() {
-            self.run_due(PAGE_LIMIT);
+            self.run_due(if self.servo.device.renders_force() { FELT_LIMIT } else { PAGE_LIMIT });
         }
     }
 
     fn run_due(&mut self, limit: u32) {
-        for _ in 0..self.timer.ticks_due(limit, &mut self.servo.sink.timing) {
+        let (count, mut late) = self.timer.ticks_due(limit, &mut self.servo.sink.timing);
+        for _ in 0..count {
             let exchanged = self.servo.device.exchange(&self.servo.output);
-            // The hand moves with the ticks and feels no force, so a late tick need not release it.
-            if let Err(gone) = self.servo.process(exchanged, Duration::ZERO) {
+            // A hand that feels no force moves with the ticks, so that a late one need not release it.
+            let late = if self.servo.device.renders_force() { std::mem::take(&mut late) } else { Duration::ZERO };
+            if let Err(gone) = self.servo.process(exchanged, late) {
                 self.device_error = Some(gone);
                 return;
             }

@@ -154,8 +154,8 @@ impl Servo {
         Ok(servo)
     }
 
-    /// Starts a servo without a thread: [`Servo::advance`] runs the ticks that have become due. Only for a device that
-    /// renders no force, because many ticks run at once.
+    /// Starts a servo without a thread: [`Servo::advance`] runs the ticks that have become due. It must be called every few
+    /// milliseconds for a device whose force is felt.
     pub fn start_inline(
         simulation: Simulation,
         device: Box<dyn Device + Send>,

@@ -54,11 +54,11 @@ impl TickTimer {
         }
     }
 
-    /// Returns the number of ticks that are due and have not run, at most `most`, and records their lateness. The oldest
-    /// beyond `most` are skipped and counted as missed.
-    pub fn ticks_due(&mut self, most: u32, stats: &mut TimingStats) -> u32 {
+    /// Returns the number of ticks that are due and have not run, at most `most`, and the lateness of the oldest of all;
+    /// records the lateness of each. The oldest beyond `most` are skipped and counted as missed.
+    pub fn ticks_due(&mut self, most: u32, stats: &mut TimingStats) -> (u32, Duration) {
         let now = Instant::now();
-        let Some(behind) = now.checked_duration_since(self.next_due) else { return 0 };
+        let Some(behind) = now.checked_duration_since(self.next_due) else { return (0, Duration::ZERO) };
         let due = (behind.as_secs_f64() / TICK_S) as u32 + 1;
         let run = due.min(most);
         stats.missed += u64::from(due - run);
@@ -68,7 +68,7 @@ impl TickTimer {
             self.next_due += TICK_INTERVAL;
         }
         self.last_tick = now;
-        run
+        (run, behind)
     }
 
     /// Records that a tick was reached. Returns its lateness, or `None` if it comes before it is due.

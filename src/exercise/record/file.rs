@@ -5,7 +5,7 @@ use crate::scenario::Scenario;
 use crate::session::{AnswerValue, ChartInput, EndedBy, Input, MirrorFace, TraineeView};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use typodont_core::device::DeviceSpec;
+use typodont_core::device::{DeviceSpec, PageForce};
 use typodont_core::frame::{Quat, Vec3};
 use typodont_core::sim::{Command, HandFrame, Simulation};
 use typodont_core::tick::TICK_S;
@@ -184,6 +184,19 @@ pub struct DeviceSpecFile {
     pub resolution_mm: f32,
     pub workspace_half_mm: [f32; 3],
     pub apparent_mass_kg: f32,
+    /// Force that was left in a browser's page; absent outside of a page, and for a device that renders none anyway.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub page_force: Option<PageForceFile>,
+}
+
+/// Force of a device in a browser's page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PageForceFile {
+    /// A part of it was rendered.
+    Reduced,
+    /// It was not rendered.
+    Off,
 }
 
 impl From<&DeviceSpec> for DeviceSpecFile {
@@ -198,6 +211,10 @@ impl From<&DeviceSpec> for DeviceSpecFile {
             resolution_mm: spec.resolution,
             workspace_half_mm: spec.workspace_half.to_array(),
             apparent_mass_kg: spec.apparent_mass,
+            page_force: spec.page_force.map(|force| match force {
+                PageForce::Reduced => PageForceFile::Reduced,
+                PageForce::Off => PageForceFile::Off,
+            }),
         }
     }
 }
@@ -214,6 +231,10 @@ impl From<&DeviceSpecFile> for DeviceSpec {
             resolution: file.resolution_mm,
             workspace_half: Vec3::from_array(file.workspace_half_mm),
             apparent_mass: file.apparent_mass_kg,
+            page_force: file.page_force.map(|force| match force {
+                PageForceFile::Reduced => PageForce::Reduced,
+                PageForceFile::Off => PageForce::Off,
+            }),
         }
     }
 }

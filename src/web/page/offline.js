@@ -7,7 +7,7 @@
 const OWN = `typodont ${registration.scope} `;
 const CACHE = OWN + "DIGEST";
 const PROGRAM = ["typodont-web.js", "typodont-web_bg.wasm"];
-const OTHERS = ["./", "start.js", "kept.js", "worker.js", "style.css", "icon.png", "page.webmanifest"];
+const OTHERS = ["./", "start.js", "kept.js", "hid.js", "worker.js", "style.css", "icon.png", "page.webmanifest"];
 
 /** Time for which a server is waited for where a file is kept, ms. */
 const PATIENCE = 5000;

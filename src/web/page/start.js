@@ -10,6 +10,7 @@ for (const text of document.querySelectorAll("main [lang]")) {
 
 // A browser that keeps nothing can still be worked in.
 await import("./kept.js").catch(() => {});
+await import("./hid.js").catch(() => {});
 
 // Without a graphics processor nothing can be drawn, not even by the program that would say so.
 const lost = document.getElementById("lost");

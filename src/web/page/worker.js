@@ -3,6 +3,7 @@
 // The page's first message is the program as it has compiled it; the program answers when it is ready, and takes all further
 // messages. The page keeps the recording, so that it can delete it when the bundle is saved.
 import init from "./typodont-web.js";
+import "./hid.js";
 
 const keep = (name) => (...given) => postMessage({ keep: name, given });
 globalThis.typodontKept = { begin: keep("begin"), keep: keep("keep"), replace: keep("replace") };

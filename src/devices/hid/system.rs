@@ -1,92 +1,13 @@
-//! HID reports: finding devices, opening them, reading and writing.
+//! HID devices of the system.
 //!
-//! Takes a vendor, products and a usage page. Gives an open [`Transport`], or an error that says what to install.
-//! Never interprets a report. Reads block, so each caller uses a thread of its own.
+//! Takes what a driver looks for. Gives the connected devices, and an open one. Reads block, so each caller uses a thread of
+//! its own.
 
-use crate::{FoundDevice, OpenError};
+use super::{HidDeviceInfo, HidMatch, Transport};
+use crate::OpenError;
 use hidapi::{HidApi, HidDevice, HidError};
-use std::ffi::CString;
 use std::time::Duration;
 use typodont_core::device::DeviceError;
-
-/// Length of the longest report of any supported device, including the id byte.
-pub const REPORT_MAX: usize = 65;
-
-/// Reports discarded at most while looking for the newest one. The deepest queue of any system is 64 (hidraw); a
-/// device that sends faster than it is read must not block its reader.
-const DRAIN_MAX: usize = 128;
-
-/// Channel for reports: a pair of endpoints of a device, or that of a test.
-pub trait Transport: Send + 'static {
-    /// Reads the next report in the queue, waiting up to `wait`. Zero bytes mean that none came in time, never that
-    /// the device has gone.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`DeviceError::Lost`] if reading fails.
-    fn read(&mut self, report: &mut [u8], wait: Duration) -> Result<usize, DeviceError>;
-
-    /// Sends a report; its first byte is the report id, 0 for a device without ids.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`DeviceError::Lost`] if writing fails.
-    fn write(&mut self, report: &[u8]) -> Result<(), DeviceError>;
-
-    /// Reads the newest report, waiting up to `wait` for the first one. Older reports are discarded: systems queue 30
-    /// to 64 reports, and a reader that once fell behind would stay late for ever.
-    ///
-    /// # Errors
-    ///
-    /// Returns [`DeviceError::Lost`] if reading fails.
-    fn read_newest(&mut self, report: &mut [u8], wait: Duration) -> Result<usize, DeviceError> {
-        let mut length = self.read(report, wait)?;
-        let mut newer = [0; REPORT_MAX];
-        for _ in 0..DRAIN_MAX {
-            if length == 0 {
-                break;
-            }
-            match self.read(&mut newer, Duration::ZERO)? {
-                0 => break,
-                n => {
-                    length = n.min(report.len());
-                    report[..length].copy_from_slice(&newer[..length]);
-                }
-            }
-        }
-        Ok(length)
-    }
-}
-
-/// Selection of the devices that a driver supports.
-#[derive(Clone, Copy, Debug)]
-pub struct HidMatch {
-    pub vendor: u16,
-    /// Empty: all products of the vendor.
-    pub products: &'static [u16],
-    /// Usage page and usage of the top-level collection: a device may have several, of which only one is ours.
-    pub usage: Option<(u16, u16)>,
-}
-
-/// A connected HID device.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HidDeviceInfo {
-    pub vendor: u16,
-    pub product: u16,
-    pub usage: (u16, u16),
-    /// Product name that the device reports; empty if it reports none.
-    pub title: String,
-    pub serial: String,
-    path: CString,
-}
-
-impl HidMatch {
-    pub fn matches(&self, info: &HidDeviceInfo) -> bool {
-        info.vendor == self.vendor
-            && (self.products.is_empty() || self.products.contains(&info.product))
-            && self.usage.is_none_or(|usage| usage == info.usage)
-    }
-}
 
 /// Lists the connected devices that match one of `kinds`. Opens nothing.
 ///
@@ -115,28 +36,6 @@ fn enumeration_error(error: HidError) -> OpenError {
             "unplug the device and plug it in again; if that does not help, restart the computer"
         },
     )
-}
-
-/// Converts devices to the list for `typodont devices`: their serial numbers tell them apart.
-pub fn found_devices(found: Vec<HidDeviceInfo>) -> Vec<FoundDevice> {
-    found.into_iter().map(|p| FoundDevice { title: p.title, argument: p.serial }).collect()
-}
-
-/// Returns the device with a serial number, or the first one.
-///
-/// # Errors
-///
-/// Returns an error, with `title` and `help`, if there is none.
-pub fn select(
-    found: Vec<HidDeviceInfo>,
-    serial: Option<&str>,
-    title: &str,
-    help: &str,
-) -> Result<HidDeviceInfo, OpenError> {
-    found.into_iter().find(|p| serial.is_none_or(|serial| p.serial == serial)).ok_or_else(|| {
-        let which = serial.map_or(String::new(), |serial| format!(" with the serial number {serial}"));
-        OpenError::new(format!("no {title}{which} is connected"), help)
-    })
 }
 
 /// Opens a device returned by [`find`].
@@ -248,16 +147,6 @@ mod tests {
     }
 
     #[test]
-    fn a_device_matches_by_vendor_product_and_usage() {
-        let kind = HidMatch { vendor: 0x046d, products: &[0xc626], usage: Some((1, 8)) };
-        assert!(kind.matches(&plugged(0x046d, 0xc626, (1, 8))));
-        assert!(!kind.matches(&plugged(0x046d, 0xc626, (12, 1))), "another collection of the same device");
-        assert!(!kind.matches(&plugged(0x046d, 0xc077, (1, 8))), "a plain mouse of the same vendor");
-        assert!(!kind.matches(&plugged(0x256f, 0xc626, (1, 8))));
-        assert!(HidMatch { products: &[], usage: None, ..kind }.matches(&plugged(0x046d, 1, (0, 0))));
-    }
-
-    #[test]
     fn a_device_that_may_not_be_opened_names_the_rule_to_install() {
         let device = plugged(0x046d, 0xc626, (1, 8));
         let error =
@@ -272,7 +161,7 @@ mod tests {
     fn the_rules_that_are_shipped_cover_every_hid_device() {
         // Aim: the rules that the error message recommends cover each vendor. Method: the file contains the rule of
         // each vendor.
-        let rules = include_str!("../../content/devices/70-typodont.rules");
+        let rules = include_str!("../../../content/devices/70-typodont.rules");
         let kinds = [crate::spacemouse::HID_MATCHES, crate::polhem::HID_MATCHES, &[crate::open_handle::HID_MATCH]];
         for kind in kinds.into_iter().flatten() {
             assert!(rules.contains(&udev_rule(kind.vendor)), "{:04x}", kind.vendor);
