@@ -33,6 +33,9 @@ struct View {
 const OPENING: vec3f = vec3f(0.0, 0.28, 0.96);
 const BRIGHT: vec3f = vec3f(1.30, 1.30, 1.28);
 const DEEP: vec3f = vec3f(0.42, 0.24, 0.20);
+// Gloss above which a surface mirrors the edge of the mouth's opening, and where that edge lies.
+const POLISHED: f32 = 0.5;
+const EDGE: vec2f = vec2f(0.35, 0.7);
 // Share of the light that hollows lose and their walls throw back, for a white wall.
 const RETURNED: f32 = 0.5;
 // Brightness up to which the tone map changes nothing, and the rate at which brighter light turns white.
@@ -59,6 +62,11 @@ fn depth_of(buffer: f32) -> f32 {
 // Light of the surroundings from a direction; a shorter vector gives a blurred mean.
 fn surroundings(toward: vec3f) -> vec3f {
     return view.ambient.x * mix(DEEP, BRIGHT, 0.5 + 0.5 * dot(toward, OPENING));
+}
+
+// Light of the surroundings as polished metal mirrors it: the opening of the mouth has an edge.
+fn mirrored_surroundings(toward: vec3f) -> vec3f {
+    return view.ambient.x * mix(DEEP, BRIGHT, smoothstep(EDGE.x, EDGE.y, 0.5 + 0.5 * dot(toward, OPENING)));
 }
 
 // Squared roughness of a coat: rougher where it is duller.
@@ -124,7 +132,11 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
     let mirrored = coat_albedo(finish.a, eye_cosine);
     // The mean over a hemisphere of a light that changes evenly is that from two thirds of the way.
     var light = surroundings(normal * 0.6667);
-    var shine = surroundings(reflect(-to_eye, normal)) * mirrored;
+    let toward = reflect(-to_eye, normal);
+    var shine = surroundings(toward) * mirrored;
+    if finish.a > POLISHED {
+        shine = mirrored_surroundings(toward) * mirrored;
+    }
     for (var i = 0; i < 2; i++) {
         let lamp = view.lamps[i];
         if all(lamp.colour.xyz == vec3f(0.0)) {

@@ -184,7 +184,9 @@ impl LessonPort {
         let open_device = match input_device {
             InputDevice::Mouse => None,
             InputDevice::Device(held) => Some(held),
-            InputDevice::InWorker(name) => Some(typodont_lesson::open_device(&name)?),
+            InputDevice::InWorker(name) => {
+                return Err(LessonError::NoDevice { name, why: "the lesson's worker opens it".into() });
+            }
         };
         let (name, device, reconnect) = match (open_device, mouse) {
             (Some(held), _) => (held.name, held.device, Some((held.driver, held.argument))),

@@ -29,6 +29,9 @@ const SCRIPT: &str = "./worker.js";
 /// Interval between two steps of the lesson, ms: the shortest that browsers grant.
 const INTERVAL_MS: i32 = 4;
 
+/// Time in which a lesson that is left releases its device before its worker ends, ms.
+const RELEASE_MS: i32 = 150;
+
 /// The lesson of a worker, on the page's side; the worker ends when it is dropped.
 struct WorkerLesson {
     remote: RemoteLesson,
@@ -70,7 +73,16 @@ impl Drop for WorkerLesson {
     fn drop(&mut self) {
         self.worker.worker.set_onmessage(None);
         self.worker.worker.set_onerror(None);
-        self.worker.worker.terminate();
+        // The lesson releases its device first.
+        let _ = self.worker.worker.post_message(&JsValue::NULL);
+        let worker = self.worker.worker.clone();
+        let end = Closure::once_into_js(move || worker.terminate());
+        let timer = web_sys::window().and_then(|window| {
+            window.set_timeout_with_callback_and_timeout_and_arguments_0(end.unchecked_ref(), RELEASE_MS).ok()
+        });
+        if timer.is_none() {
+            self.worker.worker.terminate();
+        }
     }
 }
 
@@ -184,7 +196,7 @@ enum WorkerState {
     Empty,
     AwaitingDevice(AwaitedDevice),
     Running(LessonHost),
-    /// The lesson's device cannot be opened.
+    /// The lesson was left, has failed, or its device cannot be opened.
     Failed,
 }
 
@@ -229,7 +241,8 @@ impl AwaitedDevice {
             }
             Err(_) if self.begun.elapsed() < DEVICE_TIMEOUT => Ok(WorkerState::AwaitingDevice(self)),
             Err(why) => {
-                let failed = vec![EventMessage::Failed(why.to_string())];
+                let why = page_hid::refusal().unwrap_or(why.to_string());
+                let failed = vec![EventMessage::Failed(format!("no-device: {}: {why}", self.name))];
                 let news = LessonNews { events: failed, is_over: true, ..LessonNews::default() };
                 send_to_page(LessonMessage::new(&news, vec![Vec::new()])?);
                 Ok(WorkerState::Failed)
@@ -244,20 +257,23 @@ fn begin_lesson(start: LessonMessage, device: Option<OpenDevice>) -> Result<Less
 
 /// Changes the worker's state; a failure reaches the page as one of the worker.
 fn update_worker(change: impl FnOnce(WorkerState) -> Result<WorkerState, String>) {
-    let state = WORKER.replace(WorkerState::Empty);
-    match change(state) {
-        Ok(state) => WORKER.set(state),
-        Err(why) => wasm_bindgen::throw_str(&why),
-    }
+    // After an error or a panic it has failed.
+    let changed = change(WORKER.replace(WorkerState::Failed));
+    let failure = changed.map(|state| WORKER.set(state)).err();
     page_hid::send_outgoing();
+    if let Some(why) = failure {
+        wasm_bindgen::throw_str(&why);
+    }
 }
 
 /// Runs a lesson in this worker, once the page describes it. Returns false anywhere else than in a worker.
 pub fn serve_lesson() -> bool {
     let Ok(scope) = js_sys::global().dyn_into::<DedicatedWorkerGlobalScope>() else { return false };
     let on_message = Closure::<dyn FnMut(MessageEvent)>::new(|event: MessageEvent| {
-        if let Some(message) = of_js(&event.data()) {
-            update_worker(|state| receive(state, message));
+        match of_js(&event.data()) {
+            Some(message) => update_worker(|state| receive(state, message)),
+            // The lesson is left: dropped with its device, it releases the hand.
+            None => update_worker(|_| Ok(WorkerState::Failed)),
         }
     });
     scope.set_onmessage(Some(on_message.as_ref().unchecked_ref()));
@@ -298,7 +314,7 @@ fn receive(state: WorkerState, message: LessonMessage) -> Result<WorkerState, St
         WorkerState::Empty => match message.content::<StartMessage>()?.device {
             None => begin_lesson(message, None).map(WorkerState::Running),
             Some(name) => {
-                page_hid::serve(&name, run_ticks);
+                page_hid::open_allowed(&name, run_ticks);
                 Ok(WorkerState::AwaitingDevice(AwaitedDevice::new(name, message)))
             }
         },

@@ -7,6 +7,8 @@
 //! because removal follows from the force: exercises are as difficult as elsewhere.
 
 use crate::Protocol;
+use crate::hid::DRAIN_MAX;
+use crate::hid::forwarded::QUEUE_MAX;
 use crate::protocol::LastReport;
 use typodont_core::device::{Device, DeviceError, DeviceSpec, DeviceState, PageForce, Reading, Wrench};
 use web_time::Duration;
@@ -21,8 +23,9 @@ const RELEASE_TIME_MAX: Duration = Duration::from_millis(50);
 /// timer of 4 ms.
 const FORCE_SHARE: f32 = 1.0 / 8.0;
 
-/// Exchanges before the first one that counts: they read what the device has sent while the exercise was being prepared.
-const OLD_EXCHANGES: usize = 8;
+/// Exchanges before the first one that counts: they read all reports that have come while the exercise was being prepared, and
+/// render no force.
+const OLD_EXCHANGES: usize = QUEUE_MAX.div_ceil(DRAIN_MAX);
 
 /// Device on the servo's own thread.
 pub struct DirectDevice<P: Protocol> {

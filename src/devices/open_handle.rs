@@ -124,7 +124,7 @@ impl<T: Transport> OpenHandleProtocol<T> {
         body[26..].copy_from_slice(&FORCE_LIFE_MS.to_le_bytes());
         self.command_number = self.command_number.wrapping_add(1);
         self.sent_at[usize::from(self.command_number) % SENT_HISTORY] = Some(now);
-        self.transport.write(&encode(FROM_HOST, COMMAND, self.command_number, &body))
+        self.transport.write_newest(&encode(FROM_HOST, COMMAND, self.command_number, &body))
     }
 
     /// Returns whether the handle obeys commands that are too old.

@@ -103,7 +103,7 @@ impl LabelPalette {
 pub struct Appearance {
     pub colour: Rgb,
     /// Square root of the share of light that the surface mirrors straight back, 0 to 1: a film of saliva has 0.14 (its
-    /// refractive index is 1.33), enamel under it 0.2, steel 0.6. A duller surface is also a rougher one.
+    /// refractive index is 1.33), enamel under it 0.2, polished steel 0.8. A duller surface is also a rougher one.
     pub gloss: f32,
 }
 

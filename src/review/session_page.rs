@@ -50,6 +50,8 @@ pub(super) struct SessionFacts {
     pub began: String,
     pub length: String,
     pub operator: Option<String>,
+    /// Number of interruptions after which the session went on.
+    pub resumed: usize,
     /// Reason for which the session ended early.
     pub broken_off: Option<String>,
     pub device: Option<String>,
@@ -202,6 +204,7 @@ pub(super) fn facts(
         began: app.display_start(indexed),
         length: app.translate(context, &Message::text("head.length", &[("length", Message::plain(length(session)))])),
         operator: session.operator.as_ref().map(|o| sanitize_display(o, SHOWN_MAX)),
+        resumed: session.resumed.len(),
         broken_off: broken_off.map(|why| sanitize_display(why, LONG_MAX)),
         device: session.device.as_ref().map(|d| sanitize_display(&d.name, SHOWN_MAX)),
         verification: ShownVerification::of(&app.verification(indexed)),

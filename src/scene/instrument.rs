@@ -9,7 +9,8 @@ use typodont_formats::diagnostic::Diagnostic;
 use typodont_formats::{Library, visual_mesh};
 use typodont_render::{Appearance, MeshInstance, PlaneMirror, Rgb};
 
-const STEEL: Appearance = Appearance { colour: [0.72, 0.74, 0.77], gloss: 0.6 };
+/// Polished steel: it mirrors two thirds of the light, and scatters next to none.
+const STEEL: Appearance = Appearance { colour: [0.34, 0.35, 0.37], gloss: 0.8 };
 
 /// An instrument with its tip at the origin and +z along the shaft toward the handle: the mesh that its entry names, or
 /// else [`procedural_instrument`].

@@ -55,12 +55,17 @@ main(async () => {
   await until('over', over => over === 'settings');
   // The window is in its place some frames later.
   await page.waitForTimeout(1000);
-  for (const mark of ['settings.device', `settings.device.${kind}`, 'settings.allow_device']) {
-    // As long as a finger holds the button: a click within one frame would close the list that it opens.
-    await page.mouse.click(...await placeOf(mark), { delay: 200 });
-    await page.waitForTimeout(1000);
-  }
-  await page.waitForFunction(() => globalThis.asked);
+  // Where drawing is slow, a click may come within one frame and close the list that it has opened: then it is opened again.
+  const clickUntil = async (mark, isDone) => {
+    for (const end = Date.now() + 60000; !await isDone(); await page.waitForTimeout(1000)) {
+      if (Date.now() > end) throw new Error(`${mark} has no effect: ${JSON.stringify(state)}`);
+      await page.mouse.click(...await placeOf(mark), { delay: 300 });
+    }
+  };
+  const isShown = mark => state.marks.split(' ').some(shown => shown.startsWith(`${mark}=`));
+  await clickUntil('settings.device', () => isShown(`settings.device.${kind}`));
+  await clickUntil(`settings.device.${kind}`, () => isShown('settings.allow_device'));
+  await clickUntil('settings.allow_device', () => page.evaluate(() => Boolean(globalThis.asked)));
   const asked = await page.evaluate(() => globalThis.asked);
   claim(asked.isActive && asked.filters.length > 0, `the browser is asked ${JSON.stringify(asked)}`);
   await page.waitForTimeout(500);
@@ -105,7 +110,7 @@ main(async () => {
     });
     await picture('contact');
     claim(measured.wrong === 0, `${measured.wrong} reports break the protocol`);
-    claim(measured.most < 5.01, `up to ${measured.most} N`);
+    claim(measured.most <= 5 / 8 + 0.01, `up to ${measured.most} N`);
     // Unplugged, the lesson waits; plugged in again, it goes on.
     await order({ unplug: true });
     await until('standstill', why => why !== '');
@@ -113,8 +118,10 @@ main(async () => {
     await picture('unplugged');
     await order({ goal: [0, 14, 0], plug: true });
     await until('standstill', why => why === '');
-    const before = Number(state.ticks);
-    await until('ticks', ticks => Number(ticks) > before + 500);
+    await untilTold('the hand does not follow', ({ position }) => Math.abs(position[1] - 14) < 0.5);
+    await order({ goal: [0, goal, 0] });
+    const again = await untilTold('no tooth is felt again', ({ force }) => force[1] > 0.03);
+    claim(again.opened === 2, `the device was opened ${again.opened} times`);
   } else {
     const before = numbers(state.hand);
     await order({ deflection: kind === 'spacemouse' ? [300, 0, 0, 0, 0, 0] : [0, 200, 0, 0, 0, 0] });

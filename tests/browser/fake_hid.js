@@ -115,7 +115,7 @@
       sendReport: async (id, bytes) => {
         if (!device.opened || device !== plugged) throw new Error('the device is not open');
         told.received++;
-        kind.receive(id, new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength));
+        setTimeout(() => kind.receive(id, new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength)));
       },
     };
     kind.send = (reportId, data) => device.opened && device === plugged && device.oninputreport?.({ device, reportId, data });
@@ -135,16 +135,13 @@
   channel.onmessage = ({ data }) => {
     if (data.goal) goal = data.goal;
     if (data.deflection) deflection = data.deflection;
-    if (data.forget) told.most = 0;
     if (data.unplug) {
       const device = plugged;
       plugged = undefined;
       hid.dispatchEvent(Object.assign(new Event('disconnect'), { device }));
     }
-    if (data.plug) {
-      plug();
-      hid.dispatchEvent(Object.assign(new Event('connect'), { device: plugged }));
-    }
+    // A browser that has forgotten the permission and is given it again tells nobody.
+    if (data.plug) plug();
   };
   setInterval(() => channel.postMessage({ told }), 20);
 }

@@ -350,7 +350,7 @@ fn hid_devices_work_in_the_page() {
         let session: Value = serde_json::from_slice(&bundle.read(SESSION_FILE).unwrap()).unwrap();
         assert_eq!(session["device"]["page_force"].as_str(), force, "{kind}");
         let report = String::from_utf8_lossy(&bundle.read("report.html").unwrap()).into_owned();
-        assert_eq!(report.contains("an eighth of the force"), force == Some("reduced"), "{kind}");
+        assert_eq!(report.contains("an eighth of this force"), force == Some("reduced"), "{kind}");
         assert_eq!(report.contains("No force was felt"), force == Some("off"), "{kind}");
         if kind == "open-handle" {
             let told: Value = serde_json::from_str(&told).unwrap();

@@ -58,7 +58,7 @@ fn pass_on(mut handle: impl Transport, page: &ForwardedDevice, use_: &Weak<()>) 
                 Err(_) => return,
             }
         }
-        page.send_outgoing(|id, bytes| _ = handle.write(&[&[id], bytes].concat()));
+        page.send_next(|id, bytes| _ = handle.write(&[&[id], bytes].concat()));
         std::thread::sleep(TIMER);
     }
 }

@@ -29,12 +29,12 @@ pub trait Rig {
     fn hand(&self) -> SharedHand;
 
     /// Capabilities of this kind of device; the suite tests only these.
+    fn abilities(&self) -> Abilities;
+
     /// Share of the force it is told that the device lets be felt.
     fn force_share(&self) -> f32 {
         1.0
     }
-
-    fn abilities(&self) -> Abilities;
 
     /// Switches on a fault until `recover`. Only faults listed in `abilities` are requested.
     fn misbehave(&mut self, how: Misbehaviour);

@@ -183,6 +183,21 @@ fn a_judgement_is_complete_or_refused_completely() {
 }
 
 #[test]
+fn a_session_that_was_continued_is_named_as_one() {
+    let folder = folder("review_continued");
+    let mut one = graded("P1", [20.0, 30.0]);
+    let moment = |s: f64| json!({ "session_s": s, "at": "2026-11-26T10:00:00Z" });
+    one["resumed"] = json!([moment(12.0), moment(80.5)]);
+    enter(&folder, &one);
+    enter(&folder, &graded("P2", [20.0, 30.0]));
+    let desk = Desk::open(&folder, &[]);
+    let browser = desk.browser();
+    let pages = browser.ids("/").into_iter().map(|id| browser.get(&format!("/session/{id}")).text());
+    let told = pages.filter(|page| page.contains("continued after an interruption (2×)")).count();
+    assert_eq!(told, 1, "of two sessions, one was continued");
+}
+
+#[test]
 fn whatever_a_person_wrote_stays_a_text() {
     // Aim: nothing that a person wrote runs in a browser, a spreadsheet, SQL or a terminal. Method: the same texts as participant,
     // title, item, stage, answer, metric, reason, name and search; every page is looked at for what is not the template's.

@@ -472,6 +472,9 @@ impl App {
         if settings.font_size == self.settings.font_size {
             theme::apply(ctx, &settings);
         }
+        if settings.device != self.settings.device {
+            self.device_answer = None;
+        }
         self.settings = settings;
         self.has_unsaved_settings = true;
     }

@@ -11,7 +11,7 @@ use std::time::Duration;
 use typodont_core::device::DeviceError;
 
 /// Reports kept in each direction: those of a second at 1 kHz, for a driver that tries again twice a second.
-const QUEUE_MAX: usize = 1024;
+pub(crate) const QUEUE_MAX: usize = 1024;
 
 /// Devices that are connected now.
 static CONNECTED: Mutex<Vec<(HidDeviceInfo, Arc<Mutex<ReportQueues>>)>> = Mutex::new(Vec::new());
@@ -21,12 +21,14 @@ static CONNECTED: Mutex<Vec<(HidDeviceInfo, Arc<Mutex<ReportQueues>>)>> = Mutex:
 struct QueuedReport {
     bytes: [u8; REPORT_MAX],
     length: usize,
+    /// True if a later report takes the place of this one.
+    is_replaceable: bool,
 }
 
 impl QueuedReport {
     /// The report, or as much of it as any supported device sends.
     fn new(parts: [&[u8]; 2]) -> QueuedReport {
-        let mut report = QueuedReport { bytes: [0; REPORT_MAX], length: 0 };
+        let mut report = QueuedReport { bytes: [0; REPORT_MAX], length: 0, is_replaceable: false };
         for byte in parts.into_iter().flatten().take(REPORT_MAX) {
             report.bytes[report.length] = *byte;
             report.length += 1;
@@ -74,14 +76,12 @@ impl ForwardedDevice {
         push(&mut lock(&self.queues).incoming, QueuedReport::new([id_byte, report]));
     }
 
-    /// Calls `send` with the id and the bytes of each report to the device, in order.
-    pub fn send_outgoing(&self, mut send: impl FnMut(u8, &[u8])) {
-        loop {
-            // Not locked while `send` runs.
-            let Some(report) = lock(&self.queues).outgoing.pop_front() else { return };
-            if let Some((id, bytes)) = report.bytes[..report.length].split_first() {
-                send(*id, bytes);
-            }
+    /// Calls `send` with the id and the bytes of the next report to the device, if there is one.
+    pub fn send_next(&self, send: impl FnOnce(u8, &[u8])) {
+        // Not locked while `send` runs.
+        let next = lock(&self.queues).outgoing.pop_front();
+        if let Some((id, bytes)) = next.as_ref().and_then(|report| report.bytes[..report.length].split_first()) {
+            send(*id, bytes);
         }
     }
 }
@@ -140,6 +140,16 @@ impl Transport for ForwardedTransport {
         Ok(())
     }
 
+    fn write_newest(&mut self, report: &[u8]) -> Result<(), DeviceError> {
+        let report = QueuedReport { is_replaceable: true, ..QueuedReport::new([report, &[]]) };
+        let mut queues = lock(&self.queues);
+        match queues.outgoing.back_mut().filter(|last| last.is_replaceable) {
+            Some(last) => *last = report,
+            None => push(&mut queues.outgoing, report),
+        }
+        Ok(())
+    }
+
     fn can_wait(&self) -> bool {
         false
     }
@@ -173,9 +183,13 @@ mod tests {
         assert_eq!((transport.read(&mut report, Duration::ZERO), &report[..2]), (Ok(2), &[7, 8][..]));
         assert_eq!((transport.read(&mut report, Duration::ZERO), &report[..2]), (Ok(2), &[3, 9][..]));
         transport.write(&[4, 1, 2]).unwrap();
+        transport.write_newest(&[0, 1]).unwrap();
+        transport.write_newest(&[0, 2]).unwrap();
         let mut sent = Vec::new();
-        forwarded.send_outgoing(|id, bytes| sent.push((id, bytes.to_vec())));
-        assert_eq!(sent, [(4, vec![1, 2])]);
+        for _ in 0..3 {
+            forwarded.send_next(|id, bytes| sent.push((id, bytes.to_vec())));
+        }
+        assert_eq!(sent, [(4, vec![1, 2]), (0, vec![2])], "of two commands that wait, the older is obsolete");
         drop(forwarded);
         assert!(transport.read(&mut report, Duration::ZERO).is_err());
         assert!(open(&device("passes")).is_err());

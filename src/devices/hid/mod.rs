@@ -22,7 +22,7 @@ pub const REPORT_MAX: usize = 65;
 
 /// Reports discarded at most while looking for the newest one. The deepest queue of any system is 64 (hidraw); a
 /// device that sends faster than it is read must not block its reader.
-const DRAIN_MAX: usize = 128;
+pub(crate) const DRAIN_MAX: usize = 128;
 
 /// Channel for reports: a pair of endpoints of a device, or that of a test.
 pub trait Transport: Send + 'static {
@@ -40,6 +40,15 @@ pub trait Transport: Send + 'static {
     ///
     /// Returns [`DeviceError::Lost`] if writing fails.
     fn write(&mut self, report: &[u8]) -> Result<(), DeviceError>;
+
+    /// Sends a report that makes those of its kind obsolete that have not been sent yet.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`DeviceError::Lost`] if writing fails.
+    fn write_newest(&mut self, report: &[u8]) -> Result<(), DeviceError> {
+        self.write(report)
+    }
 
     /// Reads the newest report, waiting up to `wait` for the first one. Older reports are discarded: systems queue 30
     /// to 64 reports, and a reader that once fell behind would stay late for ever.
@@ -120,8 +129,13 @@ pub fn select(
 ) -> Result<HidDeviceInfo, OpenError> {
     found.into_iter().find(|p| serial.is_none_or(|serial| p.serial == serial)).ok_or_else(|| {
         let which = serial.map_or(String::new(), |serial| format!(" with the serial number {serial}"));
-        OpenError::new(format!("no {title}{which} is connected"), help)
+        OpenError::new(format!("no {title}{which} is connected"), connect_help(help))
     })
+}
+
+/// Advice for a device that is not connected: that of the driver, or what a page needs.
+pub fn connect_help(of_driver: &str) -> &str {
+    if cfg!(target_family = "wasm") { "allow it in the settings (F2), and plug it in" } else { of_driver }
 }
 
 #[cfg(test)]

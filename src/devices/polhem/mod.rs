@@ -141,7 +141,9 @@ fn open_any() -> Result<Box<dyn Device + Send>, OpenError> {
     ports::open_first().ok_or_else(|| {
         OpenError::new(
             "no Polhem is connected",
-            "plug it in and switch its motors on; on Linux you must be in the group dialout to open a serial port",
+            hid::connect_help(
+                "plug it in and switch its motors on; on Linux you must be in the group dialout to open a serial port",
+            ),
         )
     })
 }

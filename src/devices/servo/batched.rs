@@ -7,11 +7,11 @@
 
 use super::ServoEvent;
 use super::tick_timer::TickTimer;
-use super::{ServoExit, ServoLoop};
+use super::{RELEASE_AFTER, ServoExit, ServoLoop};
 use crate::realtime::Priority;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use typodont_core::device::{Device, DeviceError, Pacing};
+use typodont_core::device::{Device, DeviceError, Pacing, Wrench};
 use web_time::Duration;
 
 /// Ticks that a page makes up for in one call. A frame of a slow computer takes a tenth of a second; whoever waits longer has
@@ -70,9 +70,10 @@ impl BatchedServo {
     fn run_due(&mut self, limit: u32) {
         let (count, mut late) = self.timer.ticks_due(limit, &mut self.servo.sink.timing);
         for _ in 0..count {
-            let exchanged = self.servo.device.exchange(&self.servo.output);
             // A hand that feels no force moves with the ticks, so that a late one need not release it.
             let late = if self.servo.device.renders_force() { std::mem::take(&mut late) } else { Duration::ZERO };
+            let output = if late > RELEASE_AFTER { Wrench::ZERO } else { self.servo.output };
+            let exchanged = self.servo.device.exchange(&output);
             if let Err(gone) = self.servo.process(exchanged, late) {
                 self.device_error = Some(gone);
                 return;

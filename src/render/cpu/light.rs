@@ -9,6 +9,10 @@ use typodont_core::frame::Vec3;
 const OPENING: Vec3 = Vec3::new(0.0, 0.28, 0.96);
 const BRIGHT: Vec3 = Vec3::new(1.30, 1.30, 1.28);
 const DEEP: Vec3 = Vec3::new(0.42, 0.24, 0.20);
+/// Gloss above which a surface mirrors the edge of the mouth's opening, and where that edge lies between the depth of the mouth
+/// (0) and its opening (1).
+const POLISHED: f32 = 0.5;
+const EDGE: [f32; 2] = [0.35, 0.7];
 /// Share of the light that hollows lose and their walls throw back, for a white wall: so fissures are warm, not grey.
 const RETURNED: f32 = 0.5;
 /// Brightness up to which the tone map changes nothing, and the rate at which brighter light turns white.
@@ -36,7 +40,12 @@ impl CpuView {
         let mirrored = coat_albedo(finish.gloss, normal.dot(to_eye).clamp(0.0, 1.0));
         // The mean over a hemisphere of a light that changes evenly is that from two thirds of the way.
         let mut light = self.surroundings(normal * 0.6667);
-        let mut shine = self.surroundings(normal * (2.0 * normal.dot(to_eye)) - to_eye) * mirrored;
+        let toward = normal * (2.0 * normal.dot(to_eye)) - to_eye;
+        let mut shine = mirrored
+            * match finish.gloss > POLISHED {
+                true => self.mirrored_surroundings(toward),
+                false => self.surroundings(toward),
+            };
         for lamp in [&self.lights.chair, &self.lights.head] {
             let colour = Vec3::from(lamp.colour) * lamp.strength;
             let to_lamp = (lamp.position - point).normalize_or_zero();
@@ -52,7 +61,18 @@ impl CpuView {
 
     /// Light of the surroundings from a direction; a shorter vector gives a blurred mean.
     fn surroundings(&self, toward: Vec3) -> Vec3 {
-        self.lights.ambient * (DEEP + (BRIGHT - DEEP) * (0.5 + 0.5 * toward.dot(OPENING)))
+        self.surroundings_at(0.5 + 0.5 * toward.dot(OPENING))
+    }
+
+    /// Light of the surroundings as polished metal mirrors it: the opening of the mouth has an edge.
+    fn mirrored_surroundings(&self, toward: Vec3) -> Vec3 {
+        let x = ((0.5 + 0.5 * toward.dot(OPENING) - EDGE[0]) / (EDGE[1] - EDGE[0])).clamp(0.0, 1.0);
+        self.surroundings_at(x * x * (3.0 - 2.0 * x))
+    }
+
+    /// Light of the surroundings between their depth (0) and the opening of the mouth (1).
+    fn surroundings_at(&self, share: f32) -> Vec3 {
+        self.lights.ambient * (DEEP + (BRIGHT - DEEP) * share)
     }
 }
 

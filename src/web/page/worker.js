@@ -9,4 +9,5 @@ const keep = (name) => (...given) => postMessage({ keep: name, given });
 globalThis.typodontKept = { begin: keep("begin"), keep: keep("keep"), replace: keep("replace") };
 
 // A failure of the program is to reach the page as one of the worker.
-onmessage = ({ data }) => init({ module_or_path: data }).catch((error) => setTimeout(() => { throw error; }));
+// A lesson that is left before the program is ready says so by an empty message.
+onmessage = ({ data }) => data && init({ module_or_path: data }).catch((error) => setTimeout(() => { throw error; }));
