@@ -105,6 +105,7 @@ fn texts(text: &str) -> Result<BTreeMap<String, String>, serde_json::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use eframe::egui;
     use regex_lite::Regex;
     use std::collections::BTreeSet;
 
@@ -114,6 +115,25 @@ mod tests {
         let words = Translations { code: "en".into(), texts };
         assert_eq!(words.format_all("two", &["a {} b", "Press less."]), "Near “a {} b”. Press less.");
         assert_eq!(words.format("two", "pulp"), "Near “pulp”. {}");
+    }
+
+    #[test]
+    fn the_windows_fonts_have_every_character() {
+        // Aim: no text shows an empty box. Regression: the ticks of the introduction and of the list were one.
+        let context = egui::Context::default();
+        // The fonts are loaded with the first frame.
+        let _ = context.run_ui(egui::RawInput::default(), |_| ());
+        let font = egui::FontId::proportional(14.0);
+        for (code, text) in SHIPPED {
+            for (key, text) in texts(text).unwrap() {
+                let lacks: String = text
+                    .chars()
+                    .filter(|c| !context.fonts_mut(|fonts| fonts.has_glyphs(&font, &c.to_string())))
+                    .collect();
+                assert!(lacks.is_empty(), "{code}: {key}: {lacks:?}");
+            }
+        }
+        assert!(!context.fonts_mut(|fonts| fonts.has_glyphs(&font, "\u{2714}")), "the test notices nothing");
     }
 
     #[test]

@@ -9,8 +9,8 @@ use typodont_formats::diagnostic::Diagnostic;
 use typodont_formats::{Library, visual_mesh};
 use typodont_render::{Appearance, MeshInstance, PlaneMirror, Rgb};
 
-/// Polished steel: it mirrors two thirds of the light, and scatters next to none.
-const STEEL: Appearance = Appearance { colour: [0.34, 0.35, 0.37], gloss: 0.8 };
+/// Polished steel: it mirrors two thirds of the light, and scatters little.
+const STEEL: Appearance = Appearance { colour: [0.52, 0.53, 0.55], gloss: 0.8 };
 
 /// An instrument with its tip at the origin and +z along the shaft toward the handle: the mesh that its entry names, or
 /// else [`procedural_instrument`].

@@ -72,8 +72,7 @@ fn row_ui(ui: &mut egui::Ui, picture: ActionPicture, text: &str, is_done: bool) 
         }
         let (mark, _) = ui.allocate_exact_size(vec2(18.0, 18.0), egui::Sense::hover());
         if is_done {
-            let font = egui::FontId::proportional(17.0);
-            ui.painter().text(mark.center(), egui::Align2::CENTER_CENTER, "✔", font, theme::SUCCESS);
+            theme::tick(ui.painter(), mark, Stroke::new(2.5, theme::SUCCESS));
         } else {
             ui.painter().circle_stroke(mark.center(), 6.0, Stroke::new(1.5, theme::WARNING));
         }

@@ -85,7 +85,9 @@ fn task_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, comman
         && let Some(cleared) = lesson.snapshot.and_then(|seen| seen.cleared_pct)
     {
         let left = 100.0 - cleared;
-        ui.label(words.format("practice.left", format!("{left:.0}")));
+        // Towards the end every stroke is to be seen in the number.
+        let digits = usize::from(left < 9.95);
+        ui.label(words.format("practice.left", format!("{left:.digits$}")));
         ui.add(egui::ProgressBar::new(left / 100.0).fill(theme::ACCENT).desired_height(10.0));
     }
     ui.add_space(8.0);
@@ -295,7 +297,7 @@ fn view_ui(
         second_eye_window(ui.ctx(), viewport, view.has_volume(), words);
     }
     if lesson.has_mouse() && lesson.scene.is_some() {
-        pointer_hint_ui(ui, rect, lesson.is_pointer_captured, words, commands);
+        pointer_hint_ui(ui, rect, lesson.is_pointer_captured, lesson.is_paused, words, commands);
     }
 }
 
@@ -305,6 +307,7 @@ fn pointer_hint_ui(
     ui: &mut egui::Ui,
     view: Rect,
     is_captured: bool,
+    is_paused: bool,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -317,7 +320,7 @@ fn pointer_hint_ui(
     let text = |key| egui::RichText::new(words.get(key)).size(13.0);
     let hint = |key| egui::Label::new(text(key).color(Color32::WHITE)).selectable(false);
     if !is_captured {
-        ui.put(place, hint("practice.free"));
+        ui.put(place, hint(if is_paused { "practice.free_paused" } else { "practice.free" }));
         return;
     }
     let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));

@@ -199,12 +199,12 @@ fn legend_ui(ui: &mut egui::Ui, legend: &[LegendEntry], texts: &ResultTexts) {
     }
 }
 
-/// Draws the sign of a verdict. The window's fonts lack the tick and the cross, which are drawn as lines.
+/// Draws the sign of a verdict. The window's fonts lack the cross, too.
 fn sign_ui(painter: &egui::Painter, rect: egui::Rect, sign: &str, ink: egui::Color32) {
     let at = |x: f32, y: f32| rect.lerp_inside(egui::vec2(x, y));
     let stroke = egui::Stroke::new(2.0, ink);
     match sign {
-        "✓" => _ = painter.line(vec![at(0.22, 0.52), at(0.42, 0.72), at(0.78, 0.28)], stroke),
+        "✓" => theme::tick(painter, rect, stroke),
         "✗" => {
             painter.line_segment([at(0.28, 0.28), at(0.72, 0.72)], stroke);
             painter.line_segment([at(0.72, 0.28), at(0.28, 0.72)], stroke);
