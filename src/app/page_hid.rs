@@ -38,6 +38,7 @@ pub fn open_allowed(device_name: &str, run: fn()) {
             let path = CString::new(number.to_string()).unwrap_or_default();
             let (title, serial) = (title.trim().to_string(), String::new());
             let info = HidDeviceInfo { vendor, product, usage: (usage_page, usage), title, serial, path };
+            REFUSAL.set(None);
             DEVICES.with_borrow_mut(|devices| devices.insert(number, ForwardedDevice::connect(info)));
         },
     );

@@ -17,10 +17,10 @@ use web_time::Duration;
 /// with 3 N moves some millimetres.
 const RELEASE_TIME_MAX: Duration = Duration::from_millis(50);
 
-/// Share of the force and torque that is rendered, and so of the stiffness that is felt. A sampled spring of stiffness K is passive if the damping of
-/// the device is above K·T/2 (Colgate and Schenkel 1997): the stiffness falls with the period T. From a report to the force
-/// that answers it, a page takes up to 8 ms where a program takes 1 ms: two passages between processes, and the browser's
-/// timer of 4 ms.
+/// Share of the force and torque that is rendered, and so of the stiffness that is felt. A sampled spring of stiffness K is
+/// passive if the damping of the device is above K·T/2 (Colgate and Schenkel 1997): the stiffness falls with the period T.
+/// From a report to the force that answers it, a page takes up to 8 ms where a program takes 1 ms: two passages between
+/// processes, and the browser's timer of 4 ms.
 const FORCE_SHARE: f32 = 1.0 / 8.0;
 
 /// Exchanges before the first one that counts: they read all reports that have come while the exercise was being prepared, and
