@@ -157,17 +157,11 @@ impl Transport for ForwardedTransport {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::plugged;
     use super::*;
 
     fn device(serial: &str) -> HidDeviceInfo {
-        HidDeviceInfo {
-            vendor: 0x16c0,
-            product: 0xfeed,
-            usage: (1, 8),
-            title: "device of a page".into(),
-            serial: serial.into(),
-            path: c"1".into(),
-        }
+        HidDeviceInfo { serial: serial.into(), ..plugged(0x16c0, 0xfeed, (1, 8)) }
     }
 
     const KIND: HidMatch = HidMatch { vendor: 0x16c0, products: &[0xfeed], usage: None };

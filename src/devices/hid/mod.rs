@@ -142,7 +142,8 @@ pub fn connect_help(of_driver: &str) -> &str {
 mod tests {
     use super::*;
 
-    fn plugged(vendor: u16, product: u16, usage: (u16, u16)) -> HidDeviceInfo {
+    /// A connected device of a vendor.
+    pub(super) fn plugged(vendor: u16, product: u16, usage: (u16, u16)) -> HidDeviceInfo {
         HidDeviceInfo {
             vendor,
             product,

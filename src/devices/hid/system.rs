@@ -133,18 +133,8 @@ fn device_lost(why: &'static str, error: &HidError) -> DeviceError {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::plugged;
     use super::*;
-
-    fn plugged(vendor: u16, product: u16, usage: (u16, u16)) -> HidDeviceInfo {
-        HidDeviceInfo {
-            vendor,
-            product,
-            usage,
-            title: "SpaceNavigator".into(),
-            serial: String::new(),
-            path: c"/x".into(),
-        }
-    }
 
     #[test]
     fn a_device_that_may_not_be_opened_names_the_rule_to_install() {
