@@ -3,6 +3,7 @@
 use super::RATE;
 use std::fs::{self, File};
 use std::io::Read;
+use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -54,7 +55,8 @@ pub fn server(folder: &Path) -> Option<Running> {
         return None;
     };
     let running = Running(child);
-    wait_for("the server's socket", || socket.exists().then_some(()));
+    // The file is there before the server listens on it.
+    wait_for("the server's socket", || UnixStream::connect(&socket).ok());
     Some(running)
 }
 
