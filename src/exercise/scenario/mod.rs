@@ -12,6 +12,7 @@ mod decay_file;
 mod periodontium_file;
 mod calculus_and_fillings;
 pub mod file;
+mod generated_teeth;
 mod lesion;
 mod limits_file;
 pub mod metric;

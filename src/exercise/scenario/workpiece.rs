@@ -6,6 +6,7 @@
 use super::arch_volume::{ArchSeats, in_arch};
 use super::calculus_and_fillings::{apply_calculus, apply_old_filling};
 use super::cavity::CavityError;
+use super::generated_teeth::generated_tooth;
 use super::lesion::{DecayPlacementError, Lesion, apply_decay, drawn_lesion, locate_lesion};
 use super::tooth_bounds::{ToothBounds, VolumePart, anatomy_tissues};
 use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec, distal};
@@ -331,10 +332,8 @@ fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, Work
         ToothSource::Given(volume) => Ok(volume.as_ref().clone()),
         ToothSource::Recorded => Err(WorkpieceError::OnlyRecorded),
         ToothSource::Procedural { spacing, age } => {
-            let form = typodont_anatomy::teeth::tooth_of_age(tooth.fdi, *age)
-                .ok_or(WorkpieceError::NoSuchTooth { fdi: tooth.fdi })?;
-            let grid = typodont_anatomy::grid_of_spacing(&form, *spacing);
-            Ok(typodont_anatomy::grow(&form, grid, &anatomy_tissues(tissues)))
+            generated_tooth(tooth.fdi, *age, *spacing, anatomy_tissues(tissues))
+                .ok_or(WorkpieceError::NoSuchTooth { fdi: tooth.fdi })
         }
     }
 }

@@ -93,12 +93,14 @@ impl<'a> SectionPlane<'a> {
             return None;
         }
         let mut found: [([f32; 3], f32); 27] = [([0.0; 3], 0.0); 27];
+        let mut count = 0;
         for_each_solid_neighbour(self.volume, at, |label, index, share| {
             let own = colour(label, index);
-            let place = found.iter().position(|(c, weight)| *weight == 0.0 || *c == own).unwrap_or(0);
+            let place = found[..count].iter().position(|(c, _)| *c == own).unwrap_or(count);
+            count = count.max(place + 1);
             found[place] = (own, found[place].1 + share);
         });
-        let heaviest = found.iter().fold(&found[0], |best, next| if next.1 > best.1 { next } else { best });
+        let heaviest = found[..count].iter().reduce(|best, next| if next.1 > best.1 { next } else { best })?;
         (heaviest.1 > 0.0).then_some(heaviest.0)
     }
 
