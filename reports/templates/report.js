@@ -328,7 +328,11 @@ class Page {
   wire() {
     const slider = byId('moment');
     slider.max = this.session.seconds;
-    slider.oninput = () => this.setMoment(Number(slider.value));
+    // The last step of the slider may lie short of the end.
+    slider.oninput = () => {
+      const [value, step] = [Number(slider.value), Number(slider.step)];
+      this.setMoment(this.session.seconds - value < step ? this.session.seconds : value);
+    };
     this.wireCuts();
     if (this.solid) this.wireSolid();
     this.wireCurves();

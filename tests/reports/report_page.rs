@@ -4,14 +4,14 @@
 
 use crate::support::browser;
 use crate::support::bundle;
+use crate::support::coarse_exercise::coarse_exercise;
 use crate::support::folder;
 
 use browser::browser;
 use bundle::*;
 use folder::folder;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use std::sync::LazyLock;
 use typodont_exercise::record::Recording;
 
 fn opens(bundle: &Path, pictures: &Path, part: &str) {
@@ -24,21 +24,8 @@ fn opens(bundle: &Path, pictures: &Path, part: &str) {
     println!("{}", told(&output));
 }
 
-/// Bundle at the voxel size of a micro-CT (0.067 mm, some 10 million voxels), made once.
-fn fine_bundle() -> &'static Path {
-    static BUNDLE: LazyLock<PathBuf> = LazyLock::new(|| {
-        let out = folder("report_page");
-        let text = std::fs::read_to_string("scenarios/5-grinding.json").unwrap();
-        let fine = text
-            .replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.067")
-            .replace(r#""$schema": "scenario.schema.json","#, "");
-        assert_ne!(fine, text);
-        let scenario = out.join("fine.json");
-        std::fs::write(&scenario, fine).unwrap();
-        run(scenario.to_str().unwrap(), "hasty", &out, &["--participant", "P07"])
-    });
-    &BUNDLE
-}
+/// Voxel size of a micro-CT, mm: some 10 million voxels.
+const FINE: f32 = 0.067;
 
 #[test]
 fn a_report_is_explored_in_a_browser() {
@@ -47,7 +34,9 @@ fn a_report_is_explored_in_a_browser() {
     if browser().is_none() {
         return;
     }
-    opens(fine_bundle(), &folder("report_explored"), "explored");
+    let exercise = coarse_exercise("5-grinding", FINE, "report_explored");
+    let bundle = run(&exercise, "hasty", &folder("report_explored_bundle"), &["--participant", "P07"]);
+    opens(&bundle, &folder("report_explored"), "explored");
 }
 
 #[test]
@@ -57,9 +46,11 @@ fn a_report_plays_the_hand_back_in_a_browser() {
     if browser().is_none() {
         return;
     }
-    let (bundle, pictures) = (fine_bundle(), folder("report_played"));
-    std::fs::write(pictures.join("poses.json"), recorded_poses(bundle).to_string()).unwrap();
-    opens(bundle, &pictures, "played");
+    let pictures = folder("report_played");
+    let exercise = coarse_exercise("5-grinding", 0.2, "report_played");
+    let bundle = run(&exercise, "hasty", &folder("report_played_bundle"), &["--participant", "P07"]);
+    std::fs::write(pictures.join("poses.json"), recorded_poses(&bundle).to_string()).unwrap();
+    opens(&bundle, &pictures, "played");
 }
 
 /// Poses of the instrument in tooth space at some thirty ticks of a recording, in no regular order.
