@@ -6,7 +6,6 @@ use crate::support::folder;
 
 use bundle::*;
 use folder::folder;
-use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,7 +13,7 @@ use std::sync::{Arc, Mutex};
 use typodont_core::device::DeviceSpec;
 use typodont_core::parallel::available_threads;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
-use typodont_exercise::score::{SCORER_VERSION, idle_grade, trainee_grade};
+use typodont_exercise::score::{SCORER_VERSION, Scored, idle_grade, score_trainee};
 use typodont_exercise::session::{Operator, OperatorFile};
 use typodont_formats::Library;
 
@@ -24,26 +23,41 @@ const OPERATORS: [&str; 4] = ["expert", "careful", "hasty", "timid"];
 const COARSE: f32 = 0.2;
 
 /// Seeds of the exercises: lesions in different quarters and on either tooth.
-const SEEDS: [&str; 2] = ["1", "2"];
+const SEEDS: [u64; 2] = [1, 2];
 
 /// A measure's mean over the seeds, by operator; `None` where none of an operator's sessions has it.
 fn means(scenario: &str) -> impl Fn(&str, &str) -> Option<f64> + use<> {
-    means_over(scenario, &SEEDS)
+    means_over(scenario, &OPERATORS, &SEEDS)
 }
 
-fn means_over(scenario: &str, seeds: &[&str]) -> impl Fn(&str, &str) -> Option<f64> + use<> {
-    let out = folder(&format!("operators_{}", scenario.replace('/', "_")));
-    let mut sessions: Vec<(&str, Vec<Value>)> = Vec::new();
-    for operator in OPERATORS {
-        let of_seed = |seed: &&str| session(&run(scenario, operator, &out, &["--seed", seed]));
-        sessions.push((operator, seeds.iter().map(of_seed).collect()));
+fn means_over(scenario: &str, operators: &[&str], seeds: &[u64]) -> impl Fn(&str, &str) -> Option<f64> + use<> {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(scenario);
+    let scenario = Arc::new(typodont_lesson::read_scenario(&file, ResolveMode::ReadScans).unwrap());
+    let mut sessions: Vec<(String, Scored)> = Vec::new();
+    for &seed in seeds {
+        let workpiece = Arc::new(Workpiece::make(&scenario, seed).unwrap());
+        let of = |operator: &&str| (operator.to_string(), score_of(&scenario, &workpiece, operator, seed));
+        sessions.extend(operators.iter().map(of));
     }
     move |operator, name| {
-        let found = sessions.iter().find(|(o, _)| *o == operator).unwrap();
-        let value = |s: &Value| if name == "points" { s["grade"]["points"].as_f64() } else { metric(s, name) };
-        let values: Vec<f64> = found.1.iter().filter_map(value).collect();
+        let value = |scored: &Scored| match name {
+            "points" => scored.grade.as_ref().map(|grade| grade.points),
+            _ => {
+                let measure = scored.measures.all.iter().find(|measure| measure.metric.name() == name);
+                measure.unwrap_or_else(|| panic!("no metric {name}")).value
+            }
+        };
+        let values: Vec<f64> = sessions.iter().filter(|(o, _)| o == operator).filter_map(|(_, s)| value(s)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
     }
+}
+
+/// Score of a session in memory.
+fn score_of(scenario: &Arc<Scenario>, workpiece: &Arc<Workpiece>, operator: &str, seed: u64) -> Scored {
+    let file = OperatorFile::read(&Library::shipped(), operator).unwrap();
+    let spec = DeviceSpec::phantom_omni();
+    let trainee = Operator::new(file, scenario.clone(), workpiece.clone(), spec, seed);
+    score_trainee(scenario, workpiece, seed, trainee).unwrap()
 }
 
 /// Asserts that a metric increases along a list of operators, and prints its values.
@@ -96,7 +110,7 @@ fn grinding_tells_them_apart() {
 #[ignore = "scripts/test --long"]
 fn excavating_a_fissure_tells_them_apart() {
     // Excavating takes minutes: one seed.
-    let mean = means_over("scenarios/8-fissure.json", &SEEDS[..1]);
+    let mean = means_over("scenarios/8-fissure.json", &OPERATORS, &SEEDS[..1]);
     grows(&mean, "force_max_n", &["careful", "hasty"]);
     grows(&mean, "decay_cleared_pct", &["timid", "careful"]);
     for better in ["careful", "expert"] {
@@ -109,15 +123,9 @@ fn excavating_a_fissure_tells_them_apart() {
     }
 }
 
-/// One measure of one session each of some operators.
-fn played(name: &str, operators: &[&str]) -> impl Fn(&str, &str) -> Option<f64> {
-    let (scenario, out) = (coarse_exercise(name, COARSE, "played"), folder(&format!("played_{name}")));
-    let sessions: Vec<(String, Value)> =
-        operators.iter().map(|o| (o.to_string(), session(&run(&scenario, o, &out, &[])))).collect();
-    move |operator, name| {
-        let (_, session) = sessions.iter().find(|(o, _)| o == operator).unwrap();
-        if name == "points" { session["grade"]["points"].as_f64() } else { metric(session, name) }
-    }
+/// One measure of one session each of some operators, in coarse voxels.
+fn played(name: &str, operators: &[&str]) -> impl Fn(&str, &str) -> Option<f64> + use<> {
+    means_over(&coarse_exercise(name, COARSE, "played"), operators, &SEEDS[..1])
 }
 
 #[test]
@@ -160,7 +168,7 @@ fn scooping_soft_decay_tells_them_apart_and_leaves_sound_dentine() {
 #[ignore = "scripts/test --long"]
 fn charting_tells_them_apart() {
     // A chart takes minutes: one seed.
-    let mean = means_over("scenarios/15-charting.json", &SEEDS[..1]);
+    let mean = means_over("scenarios/15-charting.json", &OPERATORS, &SEEDS[..1]);
     for better in ["careful", "expert"] {
         assert_eq!(mean(better, "probing_within_1mm_pct"), Some(100.0), "{better}");
         assert_eq!(mean(better, "calculus_found_pct"), Some(100.0), "{better}");
@@ -275,15 +283,10 @@ fn graded_exercises(spacing: &str) -> Vec<(String, Arc<Scenario>)> {
 /// Points of a session of an operator, and true if it was passed.
 fn points_of(scenario: &Arc<Scenario>, workpiece: &Arc<Workpiece>, operator: &str, seed: u64) -> (f64, bool) {
     let grade = match operator {
-        "idle" => idle_grade(scenario, workpiece, seed),
-        _ => {
-            let file = OperatorFile::read(&Library::shipped(), operator).unwrap();
-            let spec = DeviceSpec::phantom_omni();
-            let trainee = Operator::new(file, scenario.clone(), workpiece.clone(), spec, seed);
-            trainee_grade(scenario, workpiece, seed, trainee)
-        }
+        "idle" => idle_grade(scenario, workpiece, seed).unwrap(),
+        _ => score_of(scenario, workpiece, operator, seed).grade,
     };
-    let grade = grade.unwrap().unwrap();
+    let grade = grade.unwrap();
     (grade.points, grade.passed)
 }
 

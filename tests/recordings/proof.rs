@@ -294,8 +294,8 @@ fn a_school_s_own_page_is_judged_where_its_templates_are() {
     let program = |arguments: &[&str]| {
         std::process::Command::new(program()).args(arguments).current_dir(&school).output().unwrap()
     };
-    let scenario = std::path::absolute("scenarios/4-diagnosis.json").unwrap();
-    let output = program(&["run", scenario.to_str().unwrap(), "--headless", "--seed", "1", "--out", "sessions"]);
+    let scenario = coarse_exercise("4-diagnosis", 0.3, "own_templates");
+    let output = program(&["run", &scenario, "--headless", "--seed", "1", "--out", "sessions"]);
     assert!(output.status.success(), "{}", complained(&output));
     let bundle = school.join(told(&output).trim());
     let of_school = ["--templates", templates.to_str().unwrap()];
@@ -341,7 +341,7 @@ fn inside_a_chunk(recording: &[u8], place: usize) -> usize {
 fn an_interrupted_session_can_be_finished_but_not_passed() {
     // Aim: whatever a power cut leaves, the session before it is kept, its loss is told, and the bundle verifies as what
     // it is.
-    let whole = run(&grinding("cut"), "careful", &folder("cut_whole"), &[]);
+    let whole = run(&coarse_exercise("5-grinding", 0.3, "cut"), "hasty", &folder("cut_whole"), &[]);
     let bytes = fs::read(whole.join("recording.mcap")).unwrap();
     let size = bytes.len();
     let mut flipped = bytes.clone();
@@ -416,9 +416,9 @@ fn a_file_in_the_place_of_the_output_folder_is_named() {
 fn a_size_limit_ends_a_session_with_a_sentence_and_without_a_loss() {
     // Aim: the limit for files, like a full disk, is met while the session is recorded and while its report is made. Method:
     // `ulimit -f` in units of 512 bytes; first below the size of the recording, then between that and the report's.
-    // With voxels that give the report its usual size.
-    let exercise = "scenarios/5-grinding.json";
-    let whole = run(exercise, "careful", &folder("limit_whole"), &[]);
+    // Of a short session: its report is larger than its recording.
+    let exercise = grinding("limit");
+    let whole = run(&exercise, "hasty", &folder("limit_whole"), &[]);
     let size = |name: &str| fs::metadata(whole.join(name)).unwrap().len();
     let (recording, page) = (size("recording.mcap"), size("report.html"));
     assert!(page > recording + 20_000, "the page has {page} bytes, the recording {recording}");
@@ -428,7 +428,8 @@ fn a_size_limit_ends_a_session_with_a_sentence_and_without_a_loss() {
     ] {
         let out = folder(name);
         let command = format!("ulimit -f {}; exec \"$0\" \"$@\"", limit / 512);
-        let arguments = [program(), "run", exercise, "--headless", "--seed", "1", "--out", out.to_str().unwrap()];
+        let session = ["--operator", "hasty", "--seed", "1", "--out", out.to_str().unwrap()];
+        let arguments = [&[program(), "run", &exercise, "--headless"], &session[..]].concat();
         let output = std::process::Command::new("sh").arg("-c").arg(command).args(arguments).output().unwrap();
         let complaint = complained(&output);
         assert_eq!(output.status.code(), Some(1), "{name}: {complaint}");

@@ -4,7 +4,7 @@
 //! rubric pays for absence: of contact, of force, of cuts. Never guesses: the session is recorded in memory and scored
 //! like any other.
 
-use super::Grade;
+use super::{Grade, Scored};
 use crate::record::{Recording, RecordingEndFile, RecordingHeadFile, ReplayCheck, ServoStatsFile, TickRecord};
 use crate::scenario::{Scenario, Workpiece};
 use crate::session::{self, Effect, Input, Observer, Session, Trainee};
@@ -29,23 +29,23 @@ const STAGE_TICKS: u64 = 100;
 /// # Errors
 /// Returns a message if the workpiece does not fit the scenario.
 pub fn idle_grade(scenario: &Arc<Scenario>, workpiece: &Workpiece, seed: u64) -> Result<Option<Grade>, String> {
+    if scenario.rubric.is_none() {
+        return Ok(None);
+    }
     let trainee = IdleTrainee { spec: DeviceSpec::phantom_omni(), stage: None, ticks: 0 };
-    trainee_grade(scenario, workpiece, seed, trainee)
+    Ok(score_trainee(scenario, workpiece, seed, trainee)?.grade)
 }
 
-/// Runs a session in memory and returns the trainee's grade; `None` without a rubric.
+/// Runs a session in memory and scores it.
 ///
 /// # Errors
 /// Returns a message if the workpiece does not fit the scenario.
-pub fn trainee_grade(
+pub fn score_trainee(
     scenario: &Arc<Scenario>,
     workpiece: &Workpiece,
     seed: u64,
     mut trainee: impl Trainee,
-) -> Result<Option<Grade>, String> {
-    if scenario.rubric.is_none() {
-        return Ok(None);
-    }
+) -> Result<Scored, String> {
     let spec = trainee.spec().clone();
     let head = RecordingHeadFile::of(scenario, &spec, seed);
     let mut simulation = Simulation::new(session::setup(scenario, workpiece, spec));
@@ -58,7 +58,7 @@ pub fn trainee_grade(
     recording.ticks = log.ticks;
     recording.inputs = log.inputs;
     recording.commands = log.commands;
-    Ok(super::score(&recording, ReplayCheck::Skip)?.grade)
+    super::score(&recording, ReplayCheck::Skip)
 }
 
 /// A trainee whose hand rests above the teeth.

@@ -26,7 +26,7 @@ pub use charting::{ProbingReading, SiteResult};
 pub use contact_spell::ContactSpell;
 pub use error_episodes::{EpisodeKind, ErrorEpisode, error_episodes};
 pub use grade::{Grade, HardFailResult, ItemFactor, ItemResult};
-pub use idle::{idle_grade, trainee_grade};
+pub use idle::{idle_grade, score_trainee};
 pub use limit_monitor::{EXCEEDANCE_GAP_TICKS, Exceedance, LimitMonitor};
 pub use measures::{Evidence, Measure, Measures};
 pub use nearest_offset::AnatomicalDirection;
