@@ -269,6 +269,13 @@ impl ExerciseList {
         (self.selected, self.scroll_to_selected) = (place.unwrap_or(self.selected), true);
         place.is_some()
     }
+
+    /// Selects the exercise that follows the one with this id, if there is one.
+    pub fn select_after(&mut self, id: &str) {
+        if self.select_id(id) {
+            self.selected = (self.selected + 1).min(self.exercises.len() - 1);
+        }
+    }
 }
 
 /// The text of an exercise built into the program; `None` for an unknown name.

@@ -199,6 +199,7 @@ mod tests {
             handle: typodont_core::device::UPRIGHT,
             world_from_device: typodont_core::frame::Quat::IDENTITY,
             is_hand_free: false,
+            is_hand_blocked: false,
             touch: touched.map(|(label, spring)| Touch { label, spring, normal: Vec3::Y }),
             cutting: touched.is_some(),
             removed: 0,

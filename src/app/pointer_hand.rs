@@ -24,6 +24,11 @@ const BUR_STRENGTH: f32 = 1.2;
 const PROBE_STRENGTH: f32 = 0.25;
 const EXPLORER_STRENGTH: f32 = 0.5;
 
+/// Further withdrawal in each picture while the hand is inside matter without force, and the greatest, mm: a handpiece
+/// is out of the deepest cavity in less than a second.
+const WITHDRAWAL_STEP: f32 = 1.0;
+const WITHDRAWAL_MAX: f32 = 15.0;
+
 /// Point of the view under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointedPlace {
@@ -47,13 +52,23 @@ pub struct PointerHand {
     pub pen: Option<[f32; 2]>,
     /// Surface under the pointer.
     pub spot: Option<SurfaceSpot>,
+    /// Distance by which the hand is withdrawn along the handle to get clear of matter, mm.
+    withdrawal: f32,
     /// Maximum force of a press, N, by instrument, where the trainee has changed it.
     strengths: Vec<Option<f32>>,
 }
 
 impl Default for PointerHand {
     fn default() -> PointerHand {
-        PointerHand { is_pressing: false, pressure: 1.0, lean: [0.0; 2], pen: None, spot: None, strengths: Vec::new() }
+        PointerHand {
+            is_pressing: false,
+            pressure: 1.0,
+            lean: [0.0; 2],
+            pen: None,
+            spot: None,
+            withdrawal: 0.0,
+            strengths: Vec::new(),
+        }
     }
 }
 
@@ -109,7 +124,7 @@ impl PointerHand {
     }
 
     /// Aims the hand at the surface under the pointer. `None`: the pointer is outside the view, and the hand stays where
-    /// it is, without force.
+    /// it is, without force. After a pause, a hand that is inside matter is withdrawn first: it would cut nothing there.
     pub fn point_at(
         &mut self,
         place: Option<PointedPlace>,
@@ -148,6 +163,11 @@ impl PointerHand {
             }
             None => (beside_the_tooth(&eye, along, snapshot.tip), REST_FORCE),
         };
+        self.withdrawal = match snapshot.is_hand_blocked {
+            true => (self.withdrawal + WITHDRAWAL_STEP).min(WITHDRAWAL_MAX),
+            false => 0.0,
+        };
+        let place = place + held.orientation() * Vec3::Z * self.withdrawal;
         mouse.aim(HandTarget { place, max_force, ..held });
     }
 }
@@ -167,4 +187,57 @@ fn beside_the_tooth(eye: &Eye, along: Vec3, tip: Vec3) -> Vec3 {
     const NEAREST: f32 = 5.0;
     let depth = (tip - eye.position).dot(eye.forward).max(NEAREST);
     eye.position + along * (depth / along.dot(eye.forward).max(1e-3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use typodont_core::device::{Device, Wrench};
+    use typodont_core::sim::{Command, Simulation};
+    use typodont_exercise::scenario::{self, ResolveMode, Workpiece};
+    use typodont_exercise::session;
+    use typodont_formats::Library;
+    use typodont_formats::diagnostic::SourceText;
+
+    #[test]
+    fn a_hand_inside_the_tooth_is_withdrawn_and_then_presses_again() {
+        // Aim: after a pause the pointer is somewhere else, and its hand may be inside the tooth, where it has no force and cuts
+        // nothing; a newcomer once pressed there in vain. Method: a bur that begins deep in the tooth, pictures of 16 ticks.
+        let text =
+            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.3");
+        let library = Library::shipped();
+        let source = SourceText::new("coarse.json", text);
+        let scenario = scenario::resolve(source, &library, ResolveMode::MakeWorkpiece).unwrap();
+        let workpiece = Arc::new(Workpiece::make(&scenario, 1).unwrap());
+        let (scene, _) = LessonScene::build(&scenario, &library, workpiece.clone(), true);
+        let (mouse, mut device) = Mouse::new();
+        let mut simulation = Simulation::new(session::setup(&scenario, &workpiece, device.spec().clone()));
+        let bur = scenario.instruments.iter().position(|instrument| instrument.is_bur()).unwrap();
+        simulation.apply(&Command::SelectInstrument { instrument: bur });
+        mouse.aim(HandTarget { place: Vec3::new(0.0, -6.0, 0.0), max_force: 1.0, yaw: 0.0, lean: [0.0; 2] });
+        for _ in 0..300 {
+            device.exchange(&Wrench::ZERO).unwrap();
+        }
+
+        let mut hand = PointerHand { is_pressing: true, ..PointerHand::default() };
+        let orbit = Orbit { elevation: 1.2, ..Orbit::around(Vec3::ZERO, 10.0) };
+        let middle = Some(PointedPlace { share: [0.5; 2], aspect: 1.0 });
+        let (mut blocked, mut wrench, mut greatest) = (Vec::new(), Wrench::ZERO, 0.0f32);
+        for _ in 0..120 {
+            let mut seen = None;
+            for _ in 0..16 {
+                let step = simulation.step(&device.exchange(&wrench).unwrap());
+                (wrench, seen) = (step.wrench(), Some(step));
+            }
+            let snapshot = LessonSnapshot::new(&seen.unwrap(), Quat::IDENTITY, 0.0, None, None);
+            blocked.push(snapshot.is_hand_blocked);
+            greatest = greatest.max(snapshot.spring);
+            hand.point_at(middle, &mouse, &orbit, &scene, &snapshot, &scenario.instruments[bur]);
+        }
+        let pictures = blocked.iter().filter(|is_blocked| **is_blocked).count();
+        assert!(blocked[0] && (2..40).contains(&pictures), "blocked in {pictures} pictures");
+        assert!(!blocked[pictures..].contains(&true), "it stays free: {blocked:?}");
+        assert!(greatest > 0.8, "{greatest} N");
+    }
 }

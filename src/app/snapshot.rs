@@ -19,6 +19,8 @@ pub struct LessonSnapshot {
     /// The spring's part of the force, N.
     pub spring: f32,
     pub cutting: bool,
+    /// True while the hand is inside matter without force, and is to be lifted off.
+    pub is_hand_blocked: bool,
     pub instrument: u32,
     pub stage_seconds: f32,
     /// Share of the decay that has been removed, %.
@@ -109,6 +111,7 @@ impl LessonSnapshot {
             touch: step.touch.map(|t| t.label),
             spring: step.touch.map_or(0.0, |t| t.spring),
             cutting: step.cutting,
+            is_hand_blocked: step.is_hand_blocked,
             instrument: step.instrument as u32,
             stage_seconds: stage_seconds as f32,
             cleared_pct: cleared_pct.map(|pct| pct as f32),
@@ -123,7 +126,7 @@ impl LessonSnapshot {
         const VISIBLE_FORCE: f32 = 0.05;
         InstrumentPose::from(self) != InstrumentPose::from(other)
             || (self.touch, self.cutting, self.cleared_pct) != (other.touch, other.cutting, other.cleared_pct)
-            || self.warning != other.warning
+            || (self.warning, self.is_hand_blocked) != (other.warning, other.is_hand_blocked)
             || (self.spring - other.spring).abs() > VISIBLE_FORCE
     }
 
@@ -136,7 +139,7 @@ impl LessonSnapshot {
         let [spring, seconds] = [self.spring, self.stage_seconds].map(f32::to_bits);
         let cleared = self.cleared_pct.unwrap_or(NO_SHARE).to_bits();
         let ServoTiming { ticks, late_p99, late_max, missed, dropped } = self.timing;
-        let cutting = u32::from(self.cutting);
+        let flags = u32::from(self.cutting) | u32::from(self.is_hand_blocked) << 1;
         let [limit, peak] = self.warning.map_or([NO_LIMIT, 0], |warning| [warning.limit, warning.peak.to_bits()]);
         [
             a,
@@ -150,7 +153,7 @@ impl LessonSnapshot {
             i,
             touch,
             spring,
-            cutting,
+            flags,
             self.instrument,
             seconds,
             cleared,
@@ -178,7 +181,8 @@ impl LessonSnapshot {
             force: vector(6),
             touch: (words[9] != 0).then_some(Label(words[9] as u8)),
             spring: f32::from_bits(words[10]),
-            cutting: words[11] != 0,
+            cutting: words[11] & 1 != 0,
+            is_hand_blocked: words[11] & 2 != 0,
             instrument: words[12],
             stage_seconds: f32::from_bits(words[13]),
             cleared_pct: (cleared >= 0.0).then_some(cleared),
@@ -222,6 +226,7 @@ mod tests {
             touch: Some(Label(4)),
             spring: 1.25,
             cutting: true,
+            is_hand_blocked: false,
             instrument: 2,
             stage_seconds: 12.5,
             cleared_pct: Some(33.0),
@@ -229,7 +234,14 @@ mod tests {
             warning: Some(LimitWarning { limit: 3, peak: 2.75 }),
         };
         assert_eq!(LessonSnapshot::decode(seen.encode()), seen);
-        let nothing = LessonSnapshot { touch: None, cleared_pct: None, warning: None, ..seen };
+        let nothing = LessonSnapshot {
+            touch: None,
+            cutting: false,
+            is_hand_blocked: true,
+            cleared_pct: None,
+            warning: None,
+            ..seen
+        };
         assert_eq!(LessonSnapshot::decode(nothing.encode()), nothing);
     }
 }

@@ -2,12 +2,14 @@
 
 use super::feedback::{self, Feedback};
 use super::language::Message;
+use super::phrases;
 use super::pictures::srgb_to_linear;
 use super::session_file::SessionFile;
 use super::templates::Templates;
+use std::collections::BTreeMap;
 use typodont_exercise::local_text::LocalTexts;
 use typodont_exercise::record::Recording;
-use typodont_exercise::scenario::Scenario;
+use typodont_exercise::scenario::{Metric, Scenario};
 use typodont_exercise::score::{Scored, Verdict};
 
 /// Result of a session before its files are made.
@@ -20,6 +22,8 @@ pub struct FirstResult {
     pub legend: Vec<LegendEntry>,
     /// Translations of the exercise's texts.
     pub texts: LocalTexts,
+    /// Titles of the exercise's zones, by id.
+    zone_titles: BTreeMap<String, Message>,
 }
 
 /// A colour of the map.
@@ -55,7 +59,18 @@ impl FirstResult {
     ) -> FirstResult {
         let feedback = feedback::build(&session, scenario, templates.rules());
         let legend = volumes.iter().map(|(verdict, volume)| LegendEntry::new(*verdict, *volume)).collect();
-        FirstResult { session, feedback, legend, texts: scenario.texts.clone() }
+        let zones = scenario.zones.iter();
+        let zone_titles =
+            zones.map(|zone| (zone.id.clone(), Message::authored(&scenario.texts, &zone.title))).collect();
+        FirstResult { session, feedback, legend, texts: scenario.texts.clone(), zone_titles }
+    }
+}
+
+impl FirstResult {
+    /// Title of a measure of the session, by name.
+    pub fn measure_title(&self, name: &str) -> Message {
+        let zone_title = |zone: &str| self.zone_titles.get(zone).cloned();
+        Metric::parse(name).map_or_else(|_| Message::plain(name), |m| phrases::measure_of_zone(&m, zone_title))
     }
 }
 

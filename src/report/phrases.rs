@@ -15,13 +15,19 @@ pub fn value(metric: &str, value: Option<f64>) -> Message {
     value_text(display_format::measure(metric, value))
 }
 
-/// Title of a measure, with its zone or tolerance where it has one.
+/// Title of a measure, with the id of its zone or its tolerance where it has one.
 pub fn measure(metric: &Metric) -> Message {
+    measure_of_zone(metric, |_| None)
+}
+
+/// The same with the title of its zone, where it is known.
+pub fn measure_of_zone(metric: &Metric, zone_title: impl FnOnce(&str) -> Option<Message>) -> Message {
     let title = Message::text_or(format!("measure.{}", metric.info.name), metric.info.title);
     match &metric.argument {
         None => title,
         Some(MetricArgument::Zone(zone)) => {
-            Message::text("measures.zone", &[("title", title), ("zone", Message::plain(zone))])
+            let zone = zone_title(zone).unwrap_or_else(|| Message::plain(zone));
+            Message::text("measures.zone", &[("title", title), ("zone", zone)])
         }
         Some(MetricArgument::ToleranceMm(mm)) => {
             Message::text("measures.within", &[("title", title), ("mm", Message::plain(mm.to_string()))])

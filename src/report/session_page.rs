@@ -474,10 +474,14 @@ impl ReportLocalizer<'_> {
         let rubric_metrics: Vec<&Metric> = scenario.rubric.iter().flat_map(Rubric::metrics).collect();
         let is_shown =
             |m: &&score::Measure| has_target || !m.metric.info.is_of_target || rubric_metrics.contains(&&m.metric);
+        let zone_title = |id: &str| {
+            let zone = scenario.zones.iter().find(|zone| zone.id == id)?;
+            Some(Message::authored(&scenario.texts, &zone.title))
+        };
         let line = |m: &score::Measure| {
             let name = m.metric.name();
             ReportMeasure {
-                title: self.html(&phrases::measure(&m.metric)),
+                title: self.html(&phrases::measure_of_zone(&m.metric, zone_title)),
                 formula: self.formula(&name),
                 value: self.value(&name, m.value),
                 applies: m.value.is_some(),

@@ -26,7 +26,7 @@ use typodont_exercise::scenario::Scenario;
 use typodont_exercise::session::Input;
 use typodont_formats::Library;
 use typodont_lesson as lesson;
-use typodont_lesson::SessionSeed;
+use typodont_lesson::{Attempt, SessionSeed};
 
 impl App {
     /// Shows the list without a participant. In a kiosk, the language and the size of the last one are forgotten, too.
@@ -204,6 +204,12 @@ impl App {
 
     /// Returns to the author's screen after a test run, otherwise to the list of exercises.
     pub(super) fn go_back(&mut self) {
+        if let Screen::Results(results) = &self.screen
+            && let session = &results.first.session
+            && Attempt::of(session).is_some_and(|attempt| attempt.is_passed())
+        {
+            self.exercise_list.select_after(&session.scenario.id);
+        }
         self.leave_results();
         self.examiner_code.clear();
         self.shown_picture = None;

@@ -1,4 +1,4 @@
-//! The briefing before an exercise: the task, the time allowed and the instruments.
+//! The briefing before an exercise: the task, the time allowed, the instruments and the marking scheme.
 
 use crate::command::{AppCommand, TextField};
 use crate::completion::CompletionProgress;
@@ -8,8 +8,9 @@ use crate::ui::text_field::{field_id, participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;
-use typodont_exercise::scenario::{Scenario, Stage};
+use typodont_exercise::scenario::{Rubric, Scenario, Stage};
 use typodont_lesson as lesson;
+use typodont_report::display_format::plain_number;
 
 /// Texts typed before an exercise.
 pub struct BriefingFields<'a> {
@@ -45,15 +46,19 @@ pub fn briefing_ui(
         let below = [(true, 140.0), (completion.is_some(), 70.0), (examiner_code.is_some(), 60.0)];
         let below: f32 = below.iter().filter(|(is_shown, _)| *is_shown).map(|(_, height)| height).sum();
         let room = (ui.available_height() - below).max(160.0);
-        egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
+        let area = egui::ScrollArea::vertical().id_salt(("briefing", &scenario.id));
+        area.max_height(room).auto_shrink([false, true]).show(ui, |ui| {
             for (number, stage) in scenario.stages.iter().enumerate() {
                 stage_ui(ui, scenario, stage, number + 1, words);
+            }
+            if let Some(rubric) = &scenario.rubric {
+                rubric_ui(ui, scenario, rubric, words);
             }
         });
         ui.add_space(16.0);
         ui.horizontal(|ui| {
             let label = ui.label(words.get("briefing.participant")).id;
-            participant_field(ui, participant, label, words, commands);
+            participant_field(ui, participant, is_code_required, label, words, commands);
         });
         if !lesson::is_valid_participant_code(participant) {
             ui.colored_label(theme::ERROR, words.get("briefing.participant_wrong"));
@@ -116,6 +121,28 @@ fn stage_ui(ui: &mut egui::Ui, scenario: &Scenario, stage: &Stage, number: usize
         if let Some(limit) = stage.time_limit {
             ui.weak(words.format("briefing.limit", crate::ui::practice::format_time(limit)));
         }
+    });
+    ui.add_space(6.0);
+}
+
+/// Draws the marking scheme: each criterion with its points, the critical errors and the pass mark.
+fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, words: &Translations) {
+    egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(8).inner_margin(14).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        ui.label(egui::RichText::new(words.get("briefing.marking")).strong().size(18.0));
+        egui::Grid::new("rubric").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
+            for item in &rubric.items {
+                ui.label(words.own(&scenario.texts, &item.title));
+                ui.label(words.format("briefing.points", plain_number(item.points)));
+                ui.end_row();
+            }
+        });
+        if !rubric.hard_fails.is_empty() {
+            let errors = rubric.hard_fails.iter().map(|fail| words.own(&scenario.texts, &fail.title));
+            let errors = errors.collect::<Vec<_>>().join(", ");
+            ui.label(words.format("briefing.critical_errors", errors));
+        }
+        ui.weak(words.format("results.pass_at", format!("{:.0}", rubric.pass_points)));
     });
     ui.add_space(6.0);
 }

@@ -33,7 +33,7 @@ pub fn exercise_list_ui(
     let words = context.words;
     theme::centered_column(ui, |ui| {
         ui.heading(words.get("shelf.title"));
-        participant_ui(ui, participant, words, commands);
+        participant_ui(ui, participant, context.is_kiosk, words, commands);
         if let Some(session) = context.history.interrupted() {
             // In a kiosk, nobody takes over the work of somebody else.
             let is_own = !context.is_kiosk || session.participant == participant;
@@ -41,21 +41,24 @@ pub fn exercise_list_ui(
         }
         ui.add_space(8.0);
         let room = (ui.available_height() - 150.0).max(160.0);
-        egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
-            for (place, exercise) in list.exercises.iter().enumerate() {
-                let required = list.required_before(place, context.history, participant, context.settings);
-                let card = ExerciseCard {
-                    place,
-                    is_selected: list.selected == place,
-                    summary: context.history.summary(exercise.id(), participant),
-                    required: required.map(|first| first.title(words)),
-                };
-                let card = exercise_ui(ui, exercise, &card, words, commands);
-                if card.gained_focus() || (list.scroll_to_selected && list.selected == place) {
-                    card.scroll_to_me(None);
+        egui::ScrollArea::vertical().id_salt("exercise list").max_height(room).auto_shrink([false, true]).show(
+            ui,
+            |ui| {
+                for (place, exercise) in list.exercises.iter().enumerate() {
+                    let required = list.required_before(place, context.history, participant, context.settings);
+                    let card = ExerciseCard {
+                        place,
+                        is_selected: list.selected == place,
+                        summary: context.history.summary(exercise.id(), participant),
+                        required: required.map(|first| first.title(words)),
+                    };
+                    let card = exercise_ui(ui, exercise, &card, words, commands);
+                    if card.gained_focus() || (list.scroll_to_selected && list.selected == place) {
+                        card.scroll_to_me(None);
+                    }
                 }
-            }
-        });
+            },
+        );
         ui.add_space(12.0);
         let is_valid = list.can_open_selected(context.history, participant, context.settings);
         ui.horizontal(|ui| {
@@ -103,10 +106,16 @@ fn folder_ui(ui: &mut egui::Ui, folder: &str, words: &Translations, commands: &m
 }
 
 /// The field for the participant code, whose results the list shows.
-fn participant_ui(ui: &mut egui::Ui, participant: &str, words: &Translations, commands: &mut Vec<AppCommand>) {
+fn participant_ui(
+    ui: &mut egui::Ui,
+    participant: &str,
+    is_required: bool,
+    words: &Translations,
+    commands: &mut Vec<AppCommand>,
+) {
     ui.horizontal_wrapped(|ui| {
         let label = ui.label(words.get("briefing.participant")).id;
-        participant_field(ui, participant, label, words, commands);
+        participant_field(ui, participant, is_required, label, words, commands);
         if !participant.is_empty() && ui.button(words.get("shelf.someone_else")).clicked() {
             commands.push(AppCommand::ChangeParticipant);
         }

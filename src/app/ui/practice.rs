@@ -117,6 +117,11 @@ fn task_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, comman
         ui.colored_label(theme::ERROR, words.format("practice.refused", words.get(why)));
     }
     ui.add_space(16.0);
+    let key = if lesson.is_paused { "practice.resume" } else { "practice.pause" };
+    if ui.button(words.get(key)).clicked() {
+        commands.push(AppCommand::Practice(PracticeCommand::Pause(!lesson.is_paused)));
+    }
+    ui.add_space(8.0);
     abort_ui(ui, lesson, words, commands);
 }
 
@@ -222,6 +227,7 @@ fn warning(lesson: &LessonState, snapshot: &LessonSnapshot, words: &Translations
     let of_limit = || Some(messages::limit_text(limit?, snapshot.warning?.peak, &lesson.scenario, words));
     let text = |key| Some(words.get(key).to_string());
     match snapshot.touch.and_then(|label| lesson.scenario.tissues.role(label)) {
+        _ if snapshot.is_hand_blocked && !lesson.is_standing_still() => text("practice.blocked"),
         Some(TissueRole::Soft) if is_cutting => text("practice.warn_soft"),
         Some(TissueRole::Neighbour) if is_cutting => text("practice.warn_neighbour"),
         Some(TissueRole::Vulnerable) if is_cutting => text("practice.warn_pulp"),
@@ -276,7 +282,7 @@ fn view_ui(
                 pointer_ring(ui, lesson, rect);
             }
             if is_section_allowed(lesson) {
-                section_view::section_ui(ui, rect, lesson, &mut view.section);
+                section_view::section_ui(ui, rect, lesson, &mut view.section, words);
             }
             controls_guide::controls_guide_ui(ui, lesson, rect, words);
         }

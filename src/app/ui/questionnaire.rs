@@ -23,32 +23,35 @@ pub fn questionnaire_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Transla
         ui.weak(format!("1 = {lowest}, {} = {highest}", questionnaire.steps));
         ui.add_space(10.0);
         let room = (ui.available_height() - 100.0).max(200.0);
-        egui::ScrollArea::vertical().max_height(room).auto_shrink([false, true]).show(ui, |ui| {
-            let mut place = 0;
-            for category in &questionnaire.categories {
-                ui.add_space(8.0);
-                ui.label(
-                    egui::RichText::new(words.own(texts, &category.title)).strong().size(18.0).color(theme::ACCENT),
-                );
-                for item in &category.items {
-                    let is_current = place == lesson.statement;
-                    let rating = lesson.ratings.get(&item.id).copied();
-                    statement_ui(
-                        ui,
-                        &item.id,
-                        words.own(texts, &item.text),
-                        RatingScale {
-                            steps: questionnaire.steps,
-                            rating,
-                            is_current,
-                            scroll_into_view: is_current && lesson.scroll_to_statement,
-                        },
-                        commands,
+        egui::ScrollArea::vertical().id_salt("questionnaire").max_height(room).auto_shrink([false, true]).show(
+            ui,
+            |ui| {
+                let mut place = 0;
+                for category in &questionnaire.categories {
+                    ui.add_space(8.0);
+                    ui.label(
+                        egui::RichText::new(words.own(texts, &category.title)).strong().size(18.0).color(theme::ACCENT),
                     );
-                    place += 1;
+                    for item in &category.items {
+                        let is_current = place == lesson.statement;
+                        let rating = lesson.ratings.get(&item.id).copied();
+                        statement_ui(
+                            ui,
+                            &item.id,
+                            words.own(texts, &item.text),
+                            RatingScale {
+                                steps: questionnaire.steps,
+                                rating,
+                                is_current,
+                                scroll_into_view: is_current && lesson.scroll_to_statement,
+                            },
+                            commands,
+                        );
+                        place += 1;
+                    }
                 }
-            }
-        });
+            },
+        );
         ui.add_space(14.0);
         let (given, all) = (lesson.ratings.len(), questionnaire.items().count());
         ui.horizontal(|ui| {

@@ -9,7 +9,7 @@ use crate::ui::ui_anchors;
 use eframe::egui;
 use typodont_lesson::Attempt;
 use typodont_report::display_format::{item_points, plain_number, points};
-use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, SessionFile, phrases};
+use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, phrases};
 
 /// Texts of the results: those of the window, and those of the report in the window's language.
 pub struct ResultTexts<'a> {
@@ -67,12 +67,15 @@ pub fn results_ui(
             ui.colored_label(theme::WARNING, words.format("results.time_up", texts.own(&results.first, &stage.title)));
         }
         ui.add_space(6.0);
-        egui::ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
+        // Every result begins at its top.
+        let area = egui::ScrollArea::vertical().id_salt(("results", &session.scenario.id, &session.started));
+        area.auto_shrink(false).show(ui, |ui| {
             feedback_ui(ui, &results.first, texts);
             if let Some(grade) = &session.grade {
                 items_ui(ui, grade, &results.first, texts);
             }
-            egui::CollapsingHeader::new(words.get("results.measures")).show(ui, |ui| measures_ui(ui, session, texts));
+            egui::CollapsingHeader::new(words.get("results.measures"))
+                .show(ui, |ui| measures_ui(ui, &results.first, texts));
         });
     });
 }
@@ -153,10 +156,10 @@ fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &R
     ui.add_space(10.0);
 }
 
-fn measures_ui(ui: &mut egui::Ui, session: &SessionFile, texts: &ResultTexts) {
+fn measures_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ResultTexts) {
     egui::Grid::new("measures").num_columns(2).spacing([24.0, 6.0]).striped(true).show(ui, |ui| {
-        for (name, value) in &session.metrics {
-            ui.label(texts.text(&phrases::measure_title(name))).on_hover_text(name);
+        for (name, value) in &first.session.metrics {
+            ui.label(texts.text(&first.measure_title(name))).on_hover_text(name);
             ui.label(texts.text(&phrases::value(name, *value)));
             ui.end_row();
         }
@@ -245,7 +248,17 @@ fn buttons_ui(
 ) {
     ui.add_space(6.0);
     ui.horizontal_wrapped(|ui| {
-        if results.has_retry && ui.add(theme::primary_button(words.get("results.retry"))).clicked() {
+        let leave = words.get(if is_test_run { "author.back" } else { "results.again" });
+        // What most want to do next: another attempt, or the next exercise.
+        let is_done = Attempt::of(&results.first.session).is_some_and(|attempt| attempt.is_passed());
+        if is_done && ui.add(theme::primary_button(leave)).clicked() {
+            commands.push(AppCommand::BackToList);
+        }
+        let retry = match is_done {
+            true => egui::Button::new(words.get("results.retry")),
+            false => theme::primary_button(words.get("results.retry")),
+        };
+        if results.has_retry && ui.add(retry).clicked() {
             commands.push(AppCommand::TryAgain);
         }
         let is_finished = matches!(results.state, BundleState::Finished(_));
@@ -261,7 +274,7 @@ fn buttons_ui(
                 commands.push(AppCommand::DownloadBundle);
             }
         }
-        if ui.button(words.get(if is_test_run { "author.back" } else { "results.again" })).clicked() {
+        if !is_done && ui.button(leave).clicked() {
             commands.push(AppCommand::BackToList);
         }
     });

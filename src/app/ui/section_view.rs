@@ -1,5 +1,6 @@
 //! A section through the working end, beside the picture: how deep the instrument is, which the picture does not show.
 
+use crate::i18n::Translations;
 use crate::lesson_scene::LessonScene;
 use crate::lesson_state::LessonState;
 use crate::snapshot::is_still;
@@ -34,7 +35,13 @@ const LINE: Color32 = Color32::from_rgba_premultiplied(190, 190, 190, 190);
 
 /// Draws the section in the lower right corner of the view. The section plane is upright, contains the tip, and is
 /// parallel to the picture's horizontal.
-pub fn section_ui(ui: &egui::Ui, view: Rect, lesson: &LessonState, section: &mut Option<SectionImage>) {
+pub fn section_ui(
+    ui: &egui::Ui,
+    view: Rect,
+    lesson: &LessonState,
+    section: &mut Option<SectionImage>,
+    words: &Translations,
+) {
     let (Some(scene), Some(snapshot)) = (&lesson.scene, &lesson.snapshot) else { return };
     let Some(instrument) = lesson.scenario.instruments.get(snapshot.instrument as usize) else { return };
     if view.width() < 3.0 * SIDE || view.height() < 2.0 * SIDE {
@@ -59,6 +66,9 @@ pub fn section_ui(ui: &egui::Ui, view: Rect, lesson: &LessonState, section: &mut
     painter.line_segment(shaft, Stroke::new(2.0, LINE));
     painter.rect(outline, rounding, Color32::from_white_alpha(70), Stroke::new(1.5, LINE), egui::StrokeKind::Inside);
     scale_ui(&painter, rect, points_per_mm);
+    let title_at = rect.left_top() + vec2(6.0, 4.0);
+    let font = egui::FontId::proportional(12.0);
+    painter.text(title_at, egui::Align2::LEFT_TOP, words.get("practice.section"), font, Color32::WHITE);
     ui.painter().rect_stroke(rect, 4.0, Stroke::new(1.0, Color32::from_black_alpha(120)), egui::StrokeKind::Outside);
 }
 

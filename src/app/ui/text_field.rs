@@ -8,14 +8,16 @@ use eframe::egui;
 pub fn participant_field(
     ui: &mut egui::Ui,
     participant: &str,
+    is_required: bool,
     label: egui::Id,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
     let mut typed = participant.to_string();
     let id = field_id(ui, TextField::Participant, participant);
-    let edit = egui::TextEdit::singleline(&mut typed).id(id).char_limit(64).desired_width(180.0);
-    ui.add(edit.hint_text(words.get("briefing.participant_hint"))).labelled_by(label);
+    let edit = egui::TextEdit::singleline(&mut typed).id(id).char_limit(64).desired_width(250.0);
+    let hint = if is_required { "briefing.participant_hint" } else { "briefing.participant_optional" };
+    ui.add(edit.hint_text(words.get(hint))).labelled_by(label);
     push_typed(TextField::Participant, participant, typed, commands);
 }
 

@@ -87,6 +87,8 @@ pub struct Step {
     pub world_from_device: Quat,
     /// True while the hand is placed anew or the clutch is pressed: the tip then does not follow the hand.
     pub is_hand_free: bool,
+    /// True while the hand was released and is inside matter: it renders no force and cuts nothing until it is clear of it.
+    pub is_hand_blocked: bool,
     pub touch: Option<Touch>,
     /// True while matter is being cut, even if the cut was too small to change a voxel in this tick.
     pub cutting: bool,
@@ -112,6 +114,7 @@ impl Step {
             handle: hand.orientation,
             world_from_device: Quat::IDENTITY,
             is_hand_free: false,
+            is_hand_blocked: false,
             touch: None,
             cutting: false,
             removed: 0,
@@ -417,7 +420,7 @@ impl Simulation {
             self.proxy.reset_to(last.tip);
             self.is_engaged = true;
         }
-        step
+        Step { is_hand_blocked: !self.is_engaged, ..step }
     }
 
     /// Moves the working end after the hand and computes the contact force.
