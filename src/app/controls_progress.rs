@@ -4,7 +4,7 @@ use typodont_core::frame::Vec3;
 use typodont_render::Orbit;
 
 /// Movement of the hand that counts as deliberate, mm.
-const MOVED: f32 = 5.0;
+const MOVED: f32 = 3.0;
 
 /// Force that counts as a press, N.
 const PRESSED: f32 = 0.4;

@@ -32,6 +32,9 @@ use typodont_scene::particles::CollisionWorld;
 use typodont_scene::{self as scene};
 use web_time::{Duration, Instant};
 
+/// Distance by which an instrument that is put down is lifted along its handle, mm.
+const PUT_DOWN_DISTANCE: f32 = 8.0;
+
 /// Maximum number of voxel edits taken over per frame, so that a burst of edits does not delay the frame.
 const MAX_EDITS_PER_FRAME: usize = 1 << 16;
 
@@ -528,12 +531,12 @@ impl LessonState {
         self.send(LessonCommand::StageInput(stage, Input::Confirm));
     }
 
-    /// Releases the pointer: the instrument stays in place without force.
+    /// Releases the pointer: the instrument is lifted off, without force, so that it touches nothing while nobody holds it.
     pub fn release_pointer(&mut self) {
-        self.is_pointer_captured = false;
+        let was_captured = std::mem::take(&mut self.is_pointer_captured);
         (self.pointer_hand.is_pressing, self.pointer_hand.spot) = (false, None);
-        if let Some((mouse, seen)) = self.mouse().zip(self.snapshot.as_ref()) {
-            mouse.release_at(seen.tip);
+        if let Some((mouse, seen)) = self.mouse().zip(self.snapshot.as_ref()).filter(|_| was_captured) {
+            mouse.release_at(seen.tip + seen.orientation * Vec3::Z * PUT_DOWN_DISTANCE);
         }
     }
 
@@ -554,14 +557,14 @@ impl LessonState {
     pub fn press_strength(&self) -> Option<f32> {
         let index = self.snapshot?.instrument as usize;
         let instrument = self.scenario.instruments.get(index)?;
-        self.has_mouse().then(|| self.pointer_hand.strength(index, instrument))
+        self.has_mouse().then(|| self.pointer_hand.strength(instrument))
     }
 
     /// Changes the strength of a press with the instrument in use, by steps of the wheel.
     pub fn change_strength(&mut self, steps: f32) {
         let Some(index) = self.snapshot.map(|seen| seen.instrument as usize) else { return };
         if let Some(instrument) = self.scenario.instruments.get(index) {
-            self.pointer_hand.change_strength(steps, index, instrument);
+            self.pointer_hand.change_strength(steps, instrument);
         }
     }
 

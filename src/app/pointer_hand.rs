@@ -54,8 +54,9 @@ pub struct PointerHand {
     pub spot: Option<SurfaceSpot>,
     /// Distance by which the hand is withdrawn along the handle to get clear of matter, mm.
     withdrawal: f32,
-    /// Maximum force of a press, N, by instrument, where the trainee has changed it.
-    strengths: Vec<Option<f32>>,
+    /// Maximum forces of a press, N, that the trainee has changed: that at the start, which all instruments of a kind share, and
+    /// the chosen one.
+    strengths: Vec<[f32; 2]>,
 }
 
 impl Default for PointerHand {
@@ -74,19 +75,18 @@ impl Default for PointerHand {
 
 impl PointerHand {
     /// Maximum force of a press with an instrument, N.
-    pub fn strength(&self, index: usize, instrument: &InstrumentEntry) -> f32 {
-        (self.exact_strength(index, instrument) * 10.0).round() / 10.0
+    pub fn strength(&self, instrument: &InstrumentEntry) -> f32 {
+        (self.exact_strength(instrument) * 10.0).round() / 10.0
     }
 
-    /// Changes the strength by steps of the wheel; forward is stronger.
-    pub fn change_strength(&mut self, steps: f32, index: usize, instrument: &InstrumentEntry) {
-        let strength = self.exact_strength(index, instrument) + STRENGTH_STEP * steps;
+    /// Changes the strength of an instrument, and of all of its kind, by steps of the wheel; forward is stronger.
+    pub fn change_strength(&mut self, steps: f32, instrument: &InstrumentEntry) {
         let [least, most] = STRENGTH_RANGE;
-        if self.strengths.len() <= index {
-            self.strengths.resize(index + 1, None);
-        }
         // Not rounded: a touchpad sends small parts of a step.
-        self.strengths[index] = Some(strength.clamp(least, most));
+        let strength = (self.exact_strength(instrument) + STRENGTH_STEP * steps).clamp(least, most);
+        let first = first_strength(instrument);
+        self.strengths.retain(|[kind, _]| *kind != first);
+        self.strengths.push([first, strength]);
     }
 
     /// Leans the handle further to the right and toward the eye, as shares of its length.
@@ -119,8 +119,9 @@ impl PointerHand {
         Vec2::from_array(self.lean).length().asin()
     }
 
-    fn exact_strength(&self, index: usize, instrument: &InstrumentEntry) -> f32 {
-        self.strengths.get(index).copied().flatten().unwrap_or_else(|| first_strength(instrument))
+    fn exact_strength(&self, instrument: &InstrumentEntry) -> f32 {
+        let first = first_strength(instrument);
+        self.strengths.iter().find(|[kind, _]| *kind == first).map_or(first, |[_, chosen]| *chosen)
     }
 
     /// Aims the hand at the surface under the pointer. `None`: the pointer is outside the view, and the hand stays where
@@ -153,9 +154,7 @@ impl PointerHand {
         let (place, max_force) = match self.spot {
             Some(spot) => {
                 let action = match self.is_pressing {
-                    true => HandAction::Press {
-                        max_force: self.pressure * self.strength(snapshot.instrument as usize, instrument),
-                    },
+                    true => HandAction::Press { max_force: self.pressure * self.strength(instrument) },
                     false => HandAction::Rest,
                 };
                 let hand = hand_at_spot(&spot, snapshot.tip, instrument, held.orientation(), action);

@@ -5,6 +5,7 @@
 use crate::completion::Completion;
 use crate::platform;
 use eframe::egui;
+use typodont_lesson::Attempt;
 use typodont_report::FirstResult;
 use typodont_report::bundle::BundleFolder;
 
@@ -34,6 +35,16 @@ pub enum BundleState {
 const MAPS: [&str; 2] = ["map-occlusal", "after-occlusal"];
 
 impl LessonResults {
+    /// True if the exercise was passed or performed.
+    pub fn is_done(&self) -> bool {
+        Attempt::of(&self.first.session).is_some_and(|attempt| attempt.is_passed())
+    }
+
+    /// True if most want to try again next.
+    pub fn invites_retry(&self) -> bool {
+        self.has_retry && !self.is_done()
+    }
+
     /// The result of a session whose bundle is still being made.
     pub fn new(first: FirstResult, completion: Completion, has_retry: bool, has_report: bool) -> LessonResults {
         LessonResults {

@@ -104,6 +104,12 @@ pub fn hand_at_spot(
     const PROBE_DEPTH: f32 = 12.0;
     /// Maximum offset of a working end that presses, mm: about the radius of a bur, whose flank may bear on a wall.
     const PRESS_REACH: f32 = 0.9;
+    /// Offset up to which a bur moves within one cavity, mm: raised there, it would not get below an overhang again.
+    const CAVITY_REACH: f32 = 3.0;
+    /// Maximum height by which a bur is raised on its way to another place, mm: that of a crown.
+    const CLIMB_MAX: f32 = 6.0;
+    /// Distance below that height at which it counts as raised, mm.
+    const RAISED: f32 = 0.3;
     let touching = spot.place + spot.normal * support(&instrument.end, world_from_handle.inverse() * spot.normal);
     // Offset of the working end along the surface. A hand that presses is moved by as much beyond the spot, so that a slope
     // does not lead it away.
@@ -117,8 +123,16 @@ pub fn hand_at_spot(
             let depth = PRESS_DEPTH + DEPTH_PER_FORCE * (max_force - DEEP_FORCE).max(0.0);
             PointedHand { place: touching + aside - spot.normal * depth, max_force }
         }
-        HandAction::Rest | HandAction::Press { .. } if instrument.is_bur() => {
+        HandAction::Press { .. } if instrument.is_bur() => {
             PointedHand { place: touching + spot.normal * HOVER, max_force: REST_FORCE }
+        }
+        HandAction::Rest if instrument.is_bur() => {
+            // On its way to a spot beyond a cavity it is raised first, and passes over what stands between.
+            let climb = (aside.length() - CAVITY_REACH).clamp(0.0, CLIMB_MAX);
+            let over = touching + spot.normal * HOVER - shaft_down * climb;
+            let rise = (tip - over).dot(shaft_down);
+            let place = if climb > 0.0 && rise > RAISED { tip - shaft_down * rise } else { over };
+            PointedHand { place, max_force: REST_FORCE }
         }
         HandAction::Rest | HandAction::Press { .. } => {
             PointedHand { place: touching - spot.normal * REST_DEPTH, max_force: REST_FORCE }

@@ -26,7 +26,7 @@ use typodont_exercise::scenario::Scenario;
 use typodont_exercise::session::Input;
 use typodont_formats::Library;
 use typodont_lesson as lesson;
-use typodont_lesson::{Attempt, SessionSeed};
+use typodont_lesson::SessionSeed;
 
 impl App {
     /// Shows the list without a participant. In a kiosk, the language and the size of the last one are forgotten, too.
@@ -205,10 +205,9 @@ impl App {
     /// Returns to the author's screen after a test run, otherwise to the list of exercises.
     pub(super) fn go_back(&mut self) {
         if let Screen::Results(results) = &self.screen
-            && let session = &results.first.session
-            && Attempt::of(session).is_some_and(|attempt| attempt.is_passed())
+            && results.is_done()
         {
-            self.exercise_list.select_after(&session.scenario.id);
+            self.exercise_list.select_after(&results.first.session.scenario.id);
         }
         self.leave_results();
         self.examiner_code.clear();
@@ -265,11 +264,6 @@ impl App {
     /// Shows one page over the screen, or none. The pointer is released while a page is shown.
     pub(super) fn open_overlay(&mut self, overlay: shortcuts::OverlayState) {
         self.overlay = overlay;
-        if let Screen::Lesson(lesson) = &mut self.screen
-            && lesson.is_pointer_captured
-        {
-            lesson.release_pointer();
-        }
     }
 
     /// Aborts the lesson and closes the window when its bundle is written, or continues the lesson.
@@ -546,8 +540,8 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
 
 /// Makes the pointer act as the device if the lesson has a mouse and is not paused, or releases it.
 fn capture_pointer(lesson: &mut LessonState, is_held: bool) {
-    lesson.is_pointer_captured = is_held && lesson.has_mouse() && !lesson.is_paused;
-    if !is_held {
-        lesson.release_pointer();
+    match is_held && lesson.has_mouse() && !lesson.is_paused {
+        true => lesson.is_pointer_captured = true,
+        false => lesson.release_pointer(),
     }
 }

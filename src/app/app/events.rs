@@ -61,8 +61,9 @@ impl App {
         }
         match &mut self.screen {
             Screen::Lesson(lesson) => {
-                // A page that nobody sees stands still, and goes on where it stopped.
-                lesson.set_hidden(platform::IS_PAGE && is_hidden(ctx));
+                // A page that nobody sees stands still, and goes on where it stopped; so does a lesson behind another page.
+                let is_covered = self.overlay.shortcuts || self.overlay.settings;
+                lesson.set_hidden(is_covered || platform::IS_PAGE && is_hidden(ctx));
                 let (elapsed, is_dragging, now) =
                     ctx.input(|input| (input.unstable_dt, input.pointer.any_down(), input.time));
                 lesson.poll(self.settings.volume, elapsed);

@@ -1,8 +1,9 @@
 //! A card over the view that teaches how the instrument is handled, with a picture of each action and a mark for those
-//! that were done. Pointers and haptic devices have cards of their own.
+//! that were done. Pointers, pens and haptic devices have cards of their own.
 
 use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
+use crate::platform;
 use crate::ui::theme;
 use eframe::egui::{self, Color32, Pos2, Rect, Stroke, Vec2, vec2};
 
@@ -27,18 +28,23 @@ pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, wo
     let Some(stage) = lesson.stage().filter(|stage| stage.shows_controls) else { return };
     let progress = lesson.controls;
     let is_pointer = lesson.has_mouse();
-    let mut rows = match is_pointer {
-        true => vec![
-            (
-                ActionPicture::Mouse(MousePart::LeftButton),
-                "guide.mouse_pick_up",
-                lesson.is_pointer_captured || progress.has_moved,
-            ),
-            (ActionPicture::Mouse(MousePart::Whole), "guide.mouse_move", progress.has_moved && progress.has_touched),
+    let is_pen = is_pointer && platform::pen().is_some();
+    let is_picked_up = lesson.is_pointer_captured || progress.has_moved;
+    let has_followed = progress.has_moved && progress.has_touched;
+    let mut rows = match (is_pointer, is_pen) {
+        (true, true) => vec![
+            (ActionPicture::Stylus(0.0), "guide.pen_pick_up", is_picked_up),
+            (ActionPicture::Stylus(0.35), "guide.pen_move", has_followed),
+            (ActionPicture::Stylus(-0.12), "guide.pen_press", progress.has_pressed),
+            (ActionPicture::Stylus(0.0), "guide.pen_rotate", progress.has_rotated),
+        ],
+        (true, false) => vec![
+            (ActionPicture::Mouse(MousePart::LeftButton), "guide.mouse_pick_up", is_picked_up),
+            (ActionPicture::Mouse(MousePart::Whole), "guide.mouse_move", has_followed),
             (ActionPicture::Mouse(MousePart::LeftButton), "guide.mouse_press", progress.has_pressed),
             (ActionPicture::Mouse(MousePart::RightButton), "guide.mouse_rotate", progress.has_rotated),
         ],
-        false => vec![
+        (false, _) => vec![
             (ActionPicture::Stylus(0.35), "guide.arm_move", progress.has_moved),
             (ActionPicture::Stylus(0.0), "guide.arm_touch", progress.has_touched),
             (ActionPicture::Stylus(-0.12), "guide.arm_press", progress.has_pressed),
@@ -46,8 +52,11 @@ pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, wo
         ],
     };
     if stage.cutting {
-        let picture =
-            if is_pointer { ActionPicture::Mouse(MousePart::LeftButton) } else { ActionPicture::Stylus(-0.12) };
+        let picture = if is_pointer && !is_pen {
+            ActionPicture::Mouse(MousePart::LeftButton)
+        } else {
+            ActionPicture::Stylus(-0.12)
+        };
         rows.push((picture, "guide.cut", progress.has_cut));
     }
     let width = 300.0f32.min(view.width() - 24.0);
@@ -58,6 +67,9 @@ pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, wo
         ui.strong(words.get("guide.title"));
         for (picture, key, is_done) in rows {
             row_ui(ui, picture, words.get(key), is_done);
+        }
+        if is_pointer && !is_pen {
+            ui.add(egui::Label::new(egui::RichText::new(words.get("guide.keyboard")).size(14.0).weak()).wrap());
         }
     });
 }

@@ -4,6 +4,7 @@ use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
 use crate::messages;
+use crate::platform;
 use crate::settings::Settings;
 use crate::snapshot::LessonSnapshot;
 use crate::ui::lesson_view::PictureFrame;
@@ -162,21 +163,37 @@ fn time_ui(ui: &mut egui::Ui, limit: Option<f64>, snapshot: Option<&LessonSnapsh
 }
 
 fn abort_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations, commands: &mut Vec<AppCommand>) {
-    if !lesson.is_confirming_abort {
-        if ui.button(words.get("practice.give_up")).clicked() {
-            commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(true)));
-        }
-        return;
+    if ui.button(words.get("practice.give_up")).clicked() {
+        commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(true)));
     }
-    ui.colored_label(theme::ERROR, words.get("practice.give_up_sure"));
-    ui.horizontal(|ui| {
-        if ui.button(words.get("practice.give_up_yes")).clicked() {
-            commands.push(AppCommand::Practice(PracticeCommand::Abort));
-        }
-        if ui.button(words.get("practice.give_up_no")).clicked() {
-            commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(false)));
-        }
+    if lesson.is_confirming_abort {
+        confirm_abort_ui(ui.ctx(), words, commands);
+    }
+}
+
+/// The question before an exercise ends, over the screen. Enter continues, unless another button is chosen.
+fn confirm_abort_ui(ctx: &egui::Context, words: &Translations, commands: &mut Vec<AppCommand>) {
+    let frame = egui::Frame::popup(&ctx.global_style()).inner_margin(24);
+    let shown = egui::Modal::new(egui::Id::unique("abort")).frame(frame).show(ctx, |ui| {
+        ui.set_max_width(440.0);
+        ui.label(words.get("practice.give_up_sure"));
+        ui.add_space(8.0);
+        ui.horizontal_wrapped(|ui| {
+            let stay = ui.add(theme::primary_button(words.get("practice.give_up_no")));
+            if ui.memory(|memory| memory.focused().is_none()) {
+                stay.request_focus();
+            }
+            if stay.clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(false)));
+            }
+            if ui.button(words.get("practice.give_up_yes")).clicked() {
+                commands.push(AppCommand::Practice(PracticeCommand::Abort));
+            }
+        });
     });
+    if shown.should_close() {
+        commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(false)));
+    }
 }
 
 /// Force applied by the trainee, as a bar, with a warning about tissue that should not be touched.
@@ -302,6 +319,10 @@ fn view_ui(
     if let Some(viewport) = viewport.as_mut().filter(|_| settings.has_second_window()) {
         second_eye_window(ui.ctx(), viewport, view.has_volume(), words);
     }
+    // A hand inside the tooth is withdrawn in each picture.
+    if lesson.is_pointer_captured && lesson.snapshot.is_some_and(|seen| seen.is_hand_blocked) {
+        ui.ctx().request_repaint();
+    }
     if lesson.has_mouse() && lesson.scene.is_some() {
         pointer_hint_ui(ui, rect, lesson.is_pointer_captured, lesson.is_paused, words, commands);
     }
@@ -330,7 +351,10 @@ fn pointer_hint_ui(
         return;
     }
     let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));
-    ui.put(left.shrink2(egui::vec2(8.0, 0.0)), hint("practice.held"));
+    ui.put(
+        left.shrink2(egui::vec2(8.0, 0.0)),
+        hint(if platform::pen().is_some() { "practice.held_pen" } else { "practice.held" }),
+    );
     if ui
         .put(
             right.shrink(4.0),

@@ -7,7 +7,6 @@ use crate::results::{BundleState, LessonResults};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;
-use typodont_lesson::Attempt;
 use typodont_report::display_format::{item_points, plain_number, points};
 use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, phrases};
 
@@ -55,8 +54,7 @@ pub fn results_ui(
             Some(grade) => verdict_ui(ui, grade, &results.first, texts),
             None => {
                 ui.label(words.get("results.no_grade"));
-                let is_done = Attempt::of(session).is_some_and(|attempt| attempt.is_passed());
-                let (key, colour) = match is_done {
+                let (key, colour) = match results.is_done() {
                     true => ("results.performed", theme::SUCCESS),
                     false => ("results.not_performed", theme::WARNING),
                 };
@@ -70,12 +68,16 @@ pub fn results_ui(
         // Every result begins at its top.
         let area = egui::ScrollArea::vertical().id_salt(("results", &session.scenario.id, &session.started));
         area.auto_shrink(false).show(ui, |ui| {
+            theme::scroll_by_keys(ui);
             feedback_ui(ui, &results.first, texts);
             if let Some(grade) = &session.grade {
                 items_ui(ui, grade, &results.first, texts);
             }
-            egui::CollapsingHeader::new(words.get("results.measures"))
-                .show(ui, |ui| measures_ui(ui, &results.first, texts));
+            let measures = egui::CollapsingHeader::new(words.get("results.measures"));
+            let header = measures.show(ui, |ui| measures_ui(ui, &results.first, texts)).header_response;
+            if header.gained_focus() {
+                header.scroll_to_me(None);
+            }
         });
     });
 }
@@ -250,14 +252,13 @@ fn buttons_ui(
     ui.horizontal_wrapped(|ui| {
         let leave = words.get(if is_test_run { "author.back" } else { "results.again" });
         // What most want to do next: another attempt, or the next exercise.
-        let is_done = Attempt::of(&results.first.session).is_some_and(|attempt| attempt.is_passed());
-        if is_done && ui.add(theme::primary_button(leave)).clicked() {
+        let (retry, is_left_first) = match results.invites_retry() {
+            true => (theme::primary_button(words.get("results.retry")), false),
+            false => (egui::Button::new(words.get("results.retry")), true),
+        };
+        if is_left_first && ui.add(theme::primary_button(leave)).clicked() {
             commands.push(AppCommand::BackToList);
         }
-        let retry = match is_done {
-            true => egui::Button::new(words.get("results.retry")),
-            false => theme::primary_button(words.get("results.retry")),
-        };
         if results.has_retry && ui.add(retry).clicked() {
             commands.push(AppCommand::TryAgain);
         }
@@ -274,7 +275,7 @@ fn buttons_ui(
                 commands.push(AppCommand::DownloadBundle);
             }
         }
-        if !is_done && ui.button(leave).clicked() {
+        if !is_left_first && ui.button(leave).clicked() {
             commands.push(AppCommand::BackToList);
         }
     });

@@ -29,20 +29,20 @@ const SHORTCUTS: [(&str, &str); 32] = [
     ("J M", "keys.mouth"),
     ("keyname.arrows", "keys.turn_by_key"),
     ("+ -", "keys.nearer_by_key"),
-    ("keyname.shift_arrows", "keys.shift_by_key"),
+    ("keyname.arrows", "keys.move_by_key"),
+    ("keyname.space", "keys.press_by_key"),
+    ("keyname.page_keys", "keys.strength_by_key"),
+    ("keyname.ctrl_arrows", "keys.turn_in_hand"),
     ("keyname.digits", "keys.rate"),
     ("keyname.mouse", "keys.mouse"),
     ("keyname.wheel", "keys.wheel"),
     ("keyname.left_drag", "keys.turn"),
     ("keyname.right_drag", "keys.nearer"),
-    ("keyname.middle_drag", "keys.shift"),
     ("keyname.ctrl_drag", "keys.touchpad_nearer"),
-    ("keyname.shift_drag", "keys.touchpad_shift"),
+    ("keyname.middle_drag", "keys.shift"),
     ("R", "keys.report"),
-    ("Ctrl S", "keys.save"),
-    ("Ctrl Z, Ctrl Y", "keys.undo"),
-    ("F5", "keys.try"),
-    ("F8", "keys.check"),
+    ("Ctrl S, Z, Y", "keys.save"),
+    ("F5, F8", "keys.try"),
 ];
 
 /// Key that is the clutch of an arm.
@@ -123,6 +123,14 @@ pub fn collect_commands(
         editor_shortcuts(ctx, editor.dialog.is_some(), commands);
     }
     let is_done = is_pressed(ctx, Modifiers::COMMAND, Key::Enter);
+    // A focused button needs no letters.
+    if let Screen::Lesson(lesson) = screen
+        && !lesson.are_stages_over
+        && !lesson.is_confirming_finish
+        && !ctx.text_edit_focused()
+    {
+        letter_shortcuts(ctx, lesson, commands);
+    }
     if (had_focus || ctx.egui_wants_keyboard_input()) && !is_done {
         return;
     }
@@ -137,11 +145,15 @@ pub fn collect_commands(
                 commands.push(AppCommand::OpenBriefing);
             }
         }
-        Screen::Editor(editor) if editor.dialog.is_none() => camera_shortcuts(ctx, commands),
+        Screen::Editor(editor) if editor.dialog.is_none() => camera_shortcuts(ctx, Modifiers::NONE, commands),
         Screen::Briefing if pressed(Key::Enter) => commands.push(AppCommand::BeginLesson),
         Screen::Briefing if pressed(Key::Escape) => commands.push(AppCommand::BackToList),
         Screen::Lesson(lesson) if lesson.are_stages_over => questionnaire_shortcuts(ctx, lesson, is_done, commands),
         Screen::Lesson(lesson) => practice_shortcuts(ctx, lesson, is_done, commands),
+        // As the coloured button.
+        Screen::Results(results) if results.invites_retry() && pressed(Key::Enter) => {
+            commands.push(AppCommand::TryAgain);
+        }
         Screen::Results(_) | Screen::Verification(_) | Screen::Failed(_)
             if pressed(Key::Enter) || pressed(Key::Escape) =>
         {
@@ -208,7 +220,32 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
         }
         return;
     }
+    match lesson.is_pointer_captured {
+        // The arrows alone move the instrument (`viewport_input`).
+        true => {
+            camera_shortcuts(ctx, Modifiers::COMMAND, commands);
+            for (key, steps) in [(Key::PageUp, 1.0), (Key::PageDown, -1.0)] {
+                if is_down(ctx, key) {
+                    commands.push(AppCommand::Practice(PracticeCommand::ChangeStrength(steps)));
+                }
+            }
+        }
+        false => camera_shortcuts(ctx, Modifiers::NONE, commands),
+    }
+    if pressed(Key::Escape) {
+        commands.push(match lesson.is_pointer_captured {
+            true => AppCommand::Practice(PracticeCommand::CapturePointer(false)),
+            false => AppCommand::Practice(PracticeCommand::AskToAbort(!lesson.is_confirming_abort)),
+        });
+    }
+}
+
+/// Shortcuts of the practice screen that are letters.
+fn letter_shortcuts(ctx: &egui::Context, lesson: &LessonState, commands: &mut Vec<AppCommand>) {
+    let pressed = |key| is_pressed(ctx, Modifiers::NONE, key);
     if lesson.has_mouse() && pressed(Key::O) {
+        // From now on the arrows and Space are for the instrument.
+        ctx.memory_mut(|memory| memory.stop_text_input());
         commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(!lesson.is_pointer_captured)));
     }
     if lesson.has_placeable_hand() {
@@ -237,13 +274,6 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
             commands.push(AppCommand::Practice(PracticeCommand::AdjustMouthOpening(by)));
         }
     }
-    camera_shortcuts(ctx, commands);
-    if pressed(Key::Escape) {
-        commands.push(match lesson.is_pointer_captured {
-            true => AppCommand::Practice(PracticeCommand::CapturePointer(false)),
-            false => AppCommand::Practice(PracticeCommand::AskToAbort(!lesson.is_confirming_abort)),
-        });
-    }
 }
 
 /// Presses and releases the clutch with its key, in order: two short presses in one frame recentre the arm.
@@ -259,8 +289,8 @@ fn clutch_shortcut(ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
     });
 }
 
-/// Shortcuts that move the camera, for users whose mouse is not free.
-fn camera_shortcuts(ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
+/// Shortcuts that move the camera, for users whose mouse is not free. The arrows are used with the modifiers.
+fn camera_shortcuts(ctx: &egui::Context, modifiers: Modifiers, commands: &mut Vec<AppCommand>) {
     /// rad
     const TURN_STEP: f32 = 0.1;
     /// Share of the picture's height.
@@ -275,9 +305,9 @@ fn camera_shortcuts(ctx: &egui::Context, commands: &mut Vec<AppCommand>) {
     ];
     for (key, right, up) in arrows {
         // Checked with Shift first: without it the same key rotates the camera.
-        if ctx.input_mut(|input| input.consume_key(Modifiers::SHIFT, key)) {
+        if ctx.input_mut(|input| input.consume_key(modifiers | Modifiers::SHIFT, key)) {
             commands.push(AppCommand::Camera(CameraCommand::Pan { right: SHIFT * right, up: SHIFT * up }));
-        } else if is_down(ctx, key) {
+        } else if ctx.input_mut(|input| input.consume_key(modifiers, key)) {
             commands.push(AppCommand::Camera(CameraCommand::Orbit { right: TURN_STEP * right, up: TURN_STEP * up }));
         }
     }

@@ -1,7 +1,7 @@
 //! Fonts and colours, with sufficient contrast between text and background.
 
 use crate::settings::Settings;
-use eframe::egui::{self, Color32, FontFamily, FontId, TextStyle};
+use eframe::egui::{self, Color32, FontFamily, FontId, Key, Modifiers, TextStyle};
 use std::time::Duration;
 
 /// Colour of the primary action. Its contrast with white is 5.2:1, above the 4.5:1 that WCAG 2.2 requires of text.
@@ -36,6 +36,8 @@ pub fn apply(context: &egui::Context, settings: &Settings) {
     visuals.selection.bg_fill = ACCENT.gamma_multiply(0.30);
     visuals.selection.stroke = egui::Stroke::new(if settings.high_contrast { 3.0 } else { 2.0 }, ACCENT);
     visuals.hyperlink_color = ACCENT;
+    // So that one sees which of them has the keyboard focus.
+    visuals.collapsing_header_frame = true;
     context.set_visuals_of(egui::Theme::Light, visuals);
     context.all_styles_mut(|style| {
         let sizes = [
@@ -50,6 +52,30 @@ pub fn apply(context: &egui::Context, settings: &Settings) {
         style.spacing.button_padding = egui::vec2(14.0, 7.0);
         style.spacing.interact_size.y = 30.0;
     });
+}
+
+/// Scrolls the area around by the arrow and page keys, while no widget has the keyboard focus.
+pub fn scroll_by_keys(ui: &mut egui::Ui) {
+    /// Points: of an arrow key, and more than any area has.
+    const LINE: f32 = 40.0;
+    const WHOLE: f32 = 1e6;
+    if ui.ctx().memory(|memory| memory.focused().is_some()) {
+        return;
+    }
+    let page = (ui.clip_rect().height() - LINE).max(LINE);
+    let keys = [
+        (Key::ArrowUp, LINE),
+        (Key::ArrowDown, -LINE),
+        (Key::PageUp, page),
+        (Key::PageDown, -page),
+        (Key::Home, WHOLE),
+        (Key::End, -WHOLE),
+    ];
+    for (key, by) in keys {
+        if ui.input_mut(|input| input.consume_key(Modifiers::NONE, key)) {
+            ui.scroll_with_delta(egui::vec2(0.0, by));
+        }
+    }
 }
 
 /// The button for what is done next on a screen.

@@ -3,7 +3,7 @@
 //! While it is free, its buttons move the camera as in the thesis: left rotates, right zooms, middle shifts. While it
 //! acts as the device, the hand follows the surface under the pointer, the left button presses, the wheel sets the
 //! strength, and the right button rotates the view; with the Ctrl key the buttons and the wheel move the camera as
-//! before. While the key A is held, the pointer tilts the instrument, and a press of the key alone holds it upright again. A
+//! before. The arrow keys move the hand as the pointer does, and the space bar presses. While the key A is held, the pointer or the arrows tilt the instrument, and a press of the key alone holds it upright again. A
 //! pen presses as hard as it is pressed, and the instrument is tilted as the pen is; one finger points, and a second one
 //! presses.
 
@@ -136,8 +136,10 @@ fn captured_pointer(
 ) {
     view.clone().on_hover_cursor(egui::CursorIcon::Crosshair);
     let rect = view.rect;
-    let (modifiers, at) = ui.input(|input| (input.modifiers, input.pointer.latest_pos()));
-    let is_on_view = view.contains_pointer() || contact.began_on_view;
+    let (modifiers, pointer) = ui.input(|input| (input.modifiers, input.pointer.latest_pos()));
+    let keyed = keyed_place(ui, view, pointer);
+    let at = keyed.or(pointer);
+    let is_on_view = view.contains_pointer() || contact.began_on_view || keyed.is_some();
     let drag = match (ui.input(camera_drag), modifiers.command) {
         (drag, true) => drag,
         (Some(CameraDrag::Zoom), false) => Some(CameraDrag::Orbit),
@@ -171,7 +173,8 @@ fn captured_pointer(
     // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
     let of_pen = pen.and_then(|pen| pen.pressure).map(pen_pressure);
     let pressure = of_pen.or(contact.touches.pressure()).unwrap_or(1.0);
-    let is_down = is_working && contact.began_on_view && pressure > 0.0;
+    let is_pressed_by_key = tilting.is_none() && is_space_down(ui);
+    let is_down = is_working && (contact.began_on_view && pressure > 0.0 || is_pressed_by_key);
     commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
     commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
     let place = at.filter(|_| is_working).map(|at| {
@@ -180,6 +183,76 @@ fn captured_pointer(
     });
     commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
 }
+
+/// Speed of a hand that the arrow keys move, points/s: at first, for small corrections, and after [`KEY_RAMP`] seconds.
+const KEY_SPEEDS: [f32; 2] = [25.0, 150.0];
+const KEY_RAMP: f32 = 1.2;
+
+/// Longest time that a frame counts for, s: after a longer one the hand would jump.
+const FRAME_MAX: f32 = 0.1;
+
+/// Place to which the arrow keys have moved the hand.
+#[derive(Clone, Copy, Default)]
+struct KeyedHand {
+    place: egui::Pos2,
+    /// Time for which the arrows have been held, s.
+    held: f32,
+    /// Place of the pointer, which takes over when it moves.
+    pointer: Option<egui::Pos2>,
+}
+
+/// Moves the hand by the arrow keys. Returns its place while the keys lead it: from the first arrow, or a press of the space
+/// bar while the pointer is elsewhere, until the pointer moves.
+fn keyed_place(ui: &egui::Ui, view: &egui::Response, pointer: Option<egui::Pos2>) -> Option<egui::Pos2> {
+    let id = view.id.with("keyed");
+    let known = ui.data(|data| data.get_temp::<KeyedHand>(id)).filter(|hand| hand.pointer == pointer);
+    let arrows = arrows(ui);
+    let (is_tilting, seconds) = ui.input(|input| (input.key_down(Key::A), input.unstable_dt.min(FRAME_MAX)));
+    let on_view = pointer.filter(|at| view.rect.contains(*at));
+    let begins = arrows != egui::Vec2::ZERO || on_view.is_none() && is_space_down(ui);
+    if known.is_none() && !begins {
+        ui.data_mut(|data| data.remove_temp::<KeyedHand>(id));
+        return None;
+    }
+    let start = KeyedHand { place: on_view.unwrap_or(view.rect.center()), held: 0.0, pointer };
+    let KeyedHand { place, held, .. } = known.unwrap_or(start);
+    let (place, held) = if arrows == egui::Vec2::ZERO {
+        (place, 0.0)
+    } else if is_tilting {
+        (place, held)
+    } else {
+        let [first, last] = KEY_SPEEDS;
+        let speed = first + (last - first) * (held / KEY_RAMP).min(1.0);
+        (view.rect.clamp(place + arrows * speed * seconds), held + seconds)
+    };
+    if arrows != egui::Vec2::ZERO {
+        ui.ctx().request_repaint();
+    }
+    ui.data_mut(|data| data.insert_temp(id, KeyedHand { place, held, pointer }));
+    Some(place)
+}
+
+/// True while the space bar is held, unless it is for a focused button.
+fn is_space_down(ui: &egui::Ui) -> bool {
+    let has_focus = ui.ctx().memory(|memory| memory.focused().is_some());
+    !has_focus && ui.input(|input| input.key_down(Key::Space))
+}
+
+/// Direction of the arrow keys that are held, unless Ctrl makes them move the camera or a widget has the keyboard focus; of
+/// length 0 or 1.
+fn arrows(ui: &egui::Ui) -> egui::Vec2 {
+    if ui.ctx().memory(|memory| memory.focused().is_some()) {
+        return egui::Vec2::ZERO;
+    }
+    ui.input(|input| {
+        let held = |key| f32::from(u8::from(input.key_down(key)));
+        let along = egui::vec2(held(Key::ArrowRight) - held(Key::ArrowLeft), held(Key::ArrowDown) - held(Key::ArrowUp));
+        if input.modifiers.command { egui::Vec2::ZERO } else { along.normalized() }
+    })
+}
+
+/// Movement by which an arrow key tilts the instrument, points/s.
+const KEY_TILT_SPEED: f32 = 120.0;
 
 /// Lean of the handle by a movement of one point.
 const LEAN_PER_POINT: f32 = 0.004;
@@ -211,6 +284,8 @@ fn tilting(ui: &egui::Ui, view: egui::Id, at: Option<egui::Pos2>, commands: &mut
         end_tilting(ui, view);
         return None;
     };
+    let seconds = ui.input(|input| input.unstable_dt.min(FRAME_MAX));
+    let by = by + arrows(ui) * KEY_TILT_SPEED * seconds;
     let Tilting { place, moved } = begun.unwrap_or(Tilting { place, moved: 0.0 });
     let now = Tilting { place, moved: moved + by.length() };
     ui.data_mut(|data| data.insert_temp(id, now));
@@ -391,6 +466,37 @@ mod tests {
         // The key alone.
         screen.commands(None, vec![key(true)]);
         assert_eq!(tilts(&screen.commands(None, vec![key(false)])), [[0.0; 2]]);
+    }
+
+    #[test]
+    fn the_arrow_keys_move_the_hand_and_the_space_bar_presses() {
+        let screen = Screen::default();
+        let key = |key, pressed| {
+            vec![Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: Modifiers::NONE }]
+        };
+        let mut time = 0.0;
+        let mut frame = |events| {
+            time += 0.05;
+            screen.frame_at(Some(time), events)
+        };
+        frame(Vec::new());
+        assert_eq!(frame(Vec::new()), (0.0, None), "nobody has pointed yet");
+        assert_eq!(frame(key(Key::Space, true)), (1.0, Some([0.5; 2])), "the middle of the view");
+        assert_eq!(frame(key(Key::Space, false)), (0.0, Some([0.5; 2])));
+        let (_, Some([near, y])) = frame(key(Key::ArrowRight, true)) else { panic!("the hand does not point") };
+        for _ in 0..20 {
+            frame(Vec::new());
+        }
+        let (_, Some([far, _])) = frame(Vec::new()) else { panic!("the hand does not point") };
+        assert!(
+            y == 0.5 && near > 0.5 && near < 0.505 && far > near + 0.08,
+            "{near} {far}: slowly at first, then faster"
+        );
+        frame(key(Key::ArrowRight, false));
+        let (pressure, Some([stays, _])) = frame(key(Key::Space, true)) else { panic!("the hand does not point") };
+        assert!(pressure == 1.0 && (stays - far).abs() < 0.02, "{stays}");
+        // The pointer takes over.
+        assert_eq!(frame(vec![Event::PointerMoved(Pos2::new(200.0, 150.0))]), (1.0, Some([0.25; 2])));
     }
 
     #[test]

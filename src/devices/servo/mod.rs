@@ -26,7 +26,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use tick_timer::TickTimer;
-use typodont_core::device::{Device, DeviceError, DeviceState, Reading, Wrench};
+use typodont_core::device::{Device, DeviceError, DeviceState, Pacing, Reading, Wrench};
 use typodont_core::frame::Vec3;
 use typodont_core::mailbox;
 use typodont_core::mailbox::{Receiver, Sender, SeqLock};
@@ -122,6 +122,9 @@ const RELEASE_AFTER: Duration = Duration::from_millis(10);
 /// Movement of the device with which a waiting simulation goes on, mm: more than a hand trembles, less than a deliberate
 /// movement.
 const FIRST_MOVEMENT: f32 = 3.0;
+
+/// The same for a pointer, which only a deliberate movement moves, mm.
+const FIRST_POINTED: f32 = 0.1;
 
 /// Ticks between two updates of the timing summary.
 const SUMMARY_TICKS: u64 = 500;
@@ -270,13 +273,13 @@ impl EventSink {
 struct FirstReading(Option<(Vec3, u32)>);
 
 impl FirstReading {
-    /// Returns true if a reading differs from the first one by a movement or a button.
-    fn is_left_by(&mut self, reading: &Reading) -> bool {
+    /// Returns true if a reading differs from the first one by a button, or by a movement of at least `least` mm.
+    fn is_left_by(&mut self, reading: &Reading, least: f32) -> bool {
         if !reading.pose.is_valid() {
             return false;
         }
         let (position, buttons) = *self.0.get_or_insert((reading.pose.position, reading.buttons));
-        buttons != reading.buttons || position.distance(reading.pose.position) > FIRST_MOVEMENT
+        buttons != reading.buttons || position.distance(reading.pose.position) > least
     }
 }
 
@@ -415,8 +418,11 @@ impl ServoLoop {
         if self.simulation.tick() == Tick::ZERO {
             return false;
         }
+        // Trackers without force tremble, too.
+        let is_pointer = self.device.pacing() == Pacing::Host && !self.device.renders_force();
+        let least = if is_pointer { FIRST_POINTED } else { FIRST_MOVEMENT };
         let is_led = self.second.as_mut().is_some_and(|second| second.await_lead(reading));
-        if !is_led && !first.is_left_by(reading) {
+        if !is_led && !first.is_left_by(reading, least) {
             return true;
         }
         self.stop_awaiting();
