@@ -69,7 +69,7 @@ pub struct LessonState {
     /// The interrupted session that goes on, until its first tick: if that fails, it is still offered.
     pub former: Option<InterruptedSession>,
     pub is_paused: bool,
-    /// True while the window cannot be seen, and the lesson is paused for it.
+    /// True while the lesson cannot be seen, and is paused for it.
     is_hidden: bool,
     /// True while the pointer acts as the device.
     pub is_pointer_captured: bool,
@@ -424,8 +424,9 @@ impl LessonState {
             Effect::StageEnded { stage, by } => {
                 let is_timed_out = *by == EndedBy::Time && self.scenario.stages[*stage].draw.is_none();
                 self.timed_out_stage = is_timed_out.then(|| self.scenario.stages[*stage].title.clone());
-                if is_timed_out && self.is_pointer_captured {
-                    self.release_pointer();
+                if is_timed_out {
+                    // A movement would start the clock of the next stage.
+                    self.put_down(0.0);
                 }
             }
             Effect::Command(_) | Effect::StepStarted { .. } => {}
@@ -532,11 +533,17 @@ impl LessonState {
     }
 
     /// Releases the pointer: the instrument is lifted off, without force, so that it touches nothing while nobody holds it.
+    /// Before the work has begun it stays, since a movement would start the clock.
     pub fn release_pointer(&mut self) {
+        self.put_down(if self.is_awaiting_movement { 0.0 } else { PUT_DOWN_DISTANCE });
+    }
+
+    /// Releases the pointer, and moves the instrument along its handle, mm.
+    fn put_down(&mut self, distance: f32) {
         let was_captured = std::mem::take(&mut self.is_pointer_captured);
         (self.pointer_hand.is_pressing, self.pointer_hand.spot) = (false, None);
         if let Some((mouse, seen)) = self.mouse().zip(self.snapshot.as_ref()).filter(|_| was_captured) {
-            mouse.release_at(seen.tip + seen.orientation * Vec3::Z * PUT_DOWN_DISTANCE);
+            mouse.release_at(seen.tip + seen.orientation * Vec3::Z * distance);
         }
     }
 
@@ -607,9 +614,9 @@ impl LessonState {
         self.client.send(LessonCommand::Pause(is_paused));
     }
 
-    /// Pauses a lesson that nobody sees, and resumes it when it is seen again.
+    /// Pauses a lesson that nobody sees or that another page covers, and resumes it when it is seen again.
     pub fn set_hidden(&mut self, is_hidden: bool) {
-        if is_hidden == self.is_hidden || self.are_stages_over {
+        if is_hidden == self.is_hidden || is_hidden && self.are_stages_over {
             return;
         }
         self.is_hidden = is_hidden;

@@ -54,9 +54,8 @@ pub struct PointerHand {
     pub spot: Option<SurfaceSpot>,
     /// Distance by which the hand is withdrawn along the handle to get clear of matter, mm.
     withdrawal: f32,
-    /// Maximum forces of a press, N, that the trainee has changed: that at the start, which all instruments of a kind share, and
-    /// the chosen one.
-    strengths: Vec<[f32; 2]>,
+    /// Maximum forces of a press, N, that the trainee has chosen, by kind of instrument.
+    strengths: Vec<(InstrumentKind, f32)>,
 }
 
 impl Default for PointerHand {
@@ -84,9 +83,9 @@ impl PointerHand {
         let [least, most] = STRENGTH_RANGE;
         // Not rounded: a touchpad sends small parts of a step.
         let strength = (self.exact_strength(instrument) + STRENGTH_STEP * steps).clamp(least, most);
-        let first = first_strength(instrument);
-        self.strengths.retain(|[kind, _]| *kind != first);
-        self.strengths.push([first, strength]);
+        let kind = InstrumentKind::of(instrument);
+        self.strengths.retain(|(known, _)| *known != kind);
+        self.strengths.push((kind, strength));
     }
 
     /// Leans the handle further to the right and toward the eye, as shares of its length.
@@ -120,8 +119,8 @@ impl PointerHand {
     }
 
     fn exact_strength(&self, instrument: &InstrumentEntry) -> f32 {
-        let first = first_strength(instrument);
-        self.strengths.iter().find(|[kind, _]| *kind == first).map_or(first, |[_, chosen]| *chosen)
+        let kind = InstrumentKind::of(instrument);
+        self.strengths.iter().find(|(known, _)| *known == kind).map_or(kind.first_strength(), |(_, chosen)| *chosen)
     }
 
     /// Aims the hand at the surface under the pointer. `None`: the pointer is outside the view, and the hand stays where
@@ -171,12 +170,34 @@ impl PointerHand {
     }
 }
 
-fn first_strength(instrument: &InstrumentEntry) -> f32 {
-    match &instrument.end {
-        _ if instrument.cuts => BUR_STRENGTH,
-        WorkingEndEntry::Probe(_) => PROBE_STRENGTH,
-        WorkingEndEntry::Point | WorkingEndEntry::Bent(_) => EXPLORER_STRENGTH,
-        _ => BUR_STRENGTH,
+/// Instruments that are pressed alike.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum InstrumentKind {
+    Bur,
+    Blade,
+    Probe,
+    Explorer,
+    Other,
+}
+
+impl InstrumentKind {
+    fn of(instrument: &InstrumentEntry) -> InstrumentKind {
+        match &instrument.end {
+            _ if instrument.is_bur() => InstrumentKind::Bur,
+            _ if instrument.cuts => InstrumentKind::Blade,
+            WorkingEndEntry::Probe(_) => InstrumentKind::Probe,
+            WorkingEndEntry::Point | WorkingEndEntry::Bent(_) => InstrumentKind::Explorer,
+            _ => InstrumentKind::Other,
+        }
+    }
+
+    /// Strength at the start, N.
+    fn first_strength(self) -> f32 {
+        match self {
+            InstrumentKind::Bur | InstrumentKind::Blade | InstrumentKind::Other => BUR_STRENGTH,
+            InstrumentKind::Probe => PROBE_STRENGTH,
+            InstrumentKind::Explorer => EXPLORER_STRENGTH,
+        }
     }
 }
 

@@ -83,7 +83,8 @@ fn collider_on_ray(obstacles: &[Collider], from: Vec3, along: Vec3, farthest: f3
 /// Returns the target of a hand that works at a spot with an instrument. `tip` is the present place of the working end,
 /// `world_from_handle` the orientation of the instrument.
 ///
-/// A hand that is to press beside its working end is lifted first, so that a bur never ploughs to where it is sent.
+/// A hand that is to press beside its working end is lifted off the surface first. A bur that rests passes over the tooth on its
+/// way to a distant spot.
 pub fn hand_at_spot(
     spot: &SurfaceSpot,
     tip: Vec3,
@@ -110,6 +111,8 @@ pub fn hand_at_spot(
     const CLIMB_MAX: f32 = 6.0;
     /// Distance below that height at which it counts as raised, mm.
     const RAISED: f32 = 0.3;
+    /// Share of the way aside that it takes while it is raised.
+    const SIDEWAYS: f32 = 0.1;
     let touching = spot.place + spot.normal * support(&instrument.end, world_from_handle.inverse() * spot.normal);
     // Offset of the working end along the surface. A hand that presses is moved by as much beyond the spot, so that a slope
     // does not lead it away.
@@ -131,7 +134,9 @@ pub fn hand_at_spot(
             let climb = (aside.length() - CAVITY_REACH).clamp(0.0, CLIMB_MAX);
             let over = touching + spot.normal * HOVER - shaft_down * climb;
             let rise = (tip - over).dot(shaft_down);
-            let place = if climb > 0.0 && rise > RAISED { tip - shaft_down * rise } else { over };
+            // A little aside, so that it slides out from under an overhang.
+            let raised = tip - shaft_down * rise + (over - tip).reject_from_normalized(shaft_down) * SIDEWAYS;
+            let place = if climb > 0.0 && rise > RAISED { raised } else { over };
             PointedHand { place, max_force: REST_FORCE }
         }
         HandAction::Rest | HandAction::Press { .. } => {

@@ -40,6 +40,7 @@ fn means_over(scenario: &str, operators: &[&str], seeds: &[u64]) -> impl Fn(&str
         sessions.extend(operators.iter().map(of));
     }
     move |operator, name| {
+        assert!(sessions.iter().any(|(o, _)| o == operator), "{operator} played nothing");
         let value = |scored: &Scored| match name {
             "points" => scored.grade.as_ref().map(|grade| grade.points),
             _ => {

@@ -206,6 +206,7 @@ impl App {
     pub(super) fn go_back(&mut self) {
         if let Screen::Results(results) = &self.screen
             && results.is_done()
+            && self.test_run_origin.is_none()
         {
             self.exercise_list.select_after(&results.first.session.scenario.id);
         }
@@ -261,7 +262,7 @@ impl App {
         };
     }
 
-    /// Shows one page over the screen, or none. The pointer is released while a page is shown.
+    /// Shows one page over the screen, or none.
     pub(super) fn open_overlay(&mut self, overlay: shortcuts::OverlayState) {
         self.overlay = overlay;
     }
@@ -490,7 +491,10 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::FinishStage => lesson.finish_stage(),
         PracticeCommand::ContinueStage => lesson.is_confirming_finish = false,
         PracticeCommand::Pause(is_paused) => lesson.pause(is_paused),
-        PracticeCommand::AskToAbort(is_giving_up) => lesson.is_confirming_abort = is_giving_up,
+        PracticeCommand::AskToAbort(is_giving_up) => {
+            lesson.is_confirming_abort = is_giving_up;
+            lesson.release_pointer();
+        }
         PracticeCommand::Abort => lesson.abort(),
         PracticeCommand::AdjustCoefficient(label, coefficient, value) => lesson.adjust(label, coefficient, value),
         PracticeCommand::SetDisplayMode(way) => lesson.display_mode = way,

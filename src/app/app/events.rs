@@ -62,7 +62,8 @@ impl App {
         match &mut self.screen {
             Screen::Lesson(lesson) => {
                 // A page that nobody sees stands still, and goes on where it stopped; so does a lesson behind another page.
-                let is_covered = self.overlay.shortcuts || self.overlay.settings;
+                let is_asked = self.closing == CloseState::Asked || self.kiosk_exit.is_asked;
+                let is_covered = self.overlay.shortcuts || self.overlay.settings || is_asked;
                 lesson.set_hidden(is_covered || platform::IS_PAGE && is_hidden(ctx));
                 let (elapsed, is_dragging, now) =
                     ctx.input(|input| (input.unstable_dt, input.pointer.any_down(), input.time));

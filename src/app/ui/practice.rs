@@ -320,7 +320,8 @@ fn view_ui(
         second_eye_window(ui.ctx(), viewport, view.has_volume(), words);
     }
     // A hand inside the tooth is withdrawn in each picture.
-    if lesson.is_pointer_captured && lesson.snapshot.is_some_and(|seen| seen.is_hand_blocked) {
+    let is_blocked = lesson.snapshot.is_some_and(|seen| seen.is_hand_blocked);
+    if is_blocked && lesson.pointer_hand.spot.is_some() && !lesson.is_standing_still() {
         ui.ctx().request_repaint();
     }
     if lesson.has_mouse() && lesson.scene.is_some() {

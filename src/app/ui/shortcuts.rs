@@ -127,6 +127,7 @@ pub fn collect_commands(
     if let Screen::Lesson(lesson) = screen
         && !lesson.are_stages_over
         && !lesson.is_confirming_finish
+        && !lesson.is_confirming_abort
         && !ctx.text_edit_focused()
     {
         letter_shortcuts(ctx, lesson, commands);
@@ -208,6 +209,12 @@ fn is_down(ctx: &egui::Context, key: Key) -> bool {
 
 fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, commands: &mut Vec<AppCommand>) {
     let pressed = |key| is_pressed(ctx, Modifiers::NONE, key);
+    if lesson.is_confirming_abort {
+        if pressed(Key::Escape) {
+            commands.push(AppCommand::Practice(PracticeCommand::AskToAbort(false)));
+        }
+        return;
+    }
     if is_done && lesson.stage().is_some_and(|stage| stage.ends.confirmed) {
         commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
     }
@@ -235,7 +242,7 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
     if pressed(Key::Escape) {
         commands.push(match lesson.is_pointer_captured {
             true => AppCommand::Practice(PracticeCommand::CapturePointer(false)),
-            false => AppCommand::Practice(PracticeCommand::AskToAbort(!lesson.is_confirming_abort)),
+            false => AppCommand::Practice(PracticeCommand::AskToAbort(true)),
         });
     }
 }

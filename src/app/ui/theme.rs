@@ -54,12 +54,12 @@ pub fn apply(context: &egui::Context, settings: &Settings) {
     });
 }
 
-/// Scrolls the area around by the arrow and page keys, while no widget has the keyboard focus.
+/// Scrolls the area around by the arrow and page keys, while no widget has the keyboard focus and no page lies over it.
 pub fn scroll_by_keys(ui: &mut egui::Ui) {
     /// Points: of an arrow key, and more than any area has.
     const LINE: f32 = 40.0;
     const WHOLE: f32 = 1e6;
-    if ui.ctx().memory(|memory| memory.focused().is_some()) {
+    if ui.ctx().memory(|memory| memory.focused().is_some() || memory.top_modal_layer().is_some()) {
         return;
     }
     let page = (ui.clip_rect().height() - LINE).max(LINE);

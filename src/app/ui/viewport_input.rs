@@ -3,7 +3,8 @@
 //! While it is free, its buttons move the camera as in the thesis: left rotates, right zooms, middle shifts. While it
 //! acts as the device, the hand follows the surface under the pointer, the left button presses, the wheel sets the
 //! strength, and the right button rotates the view; with the Ctrl key the buttons and the wheel move the camera as
-//! before. The arrow keys move the hand as the pointer does, and the space bar presses. While the key A is held, the pointer or the arrows tilt the instrument, and a press of the key alone holds it upright again. A
+//! before. The arrow keys move the hand as the pointer does, and the space bar presses. While the key A is held, the pointer
+//! or the arrows tilt the instrument, and a press of the key alone holds it upright again. A
 //! pen presses as hard as it is pressed, and the instrument is tilted as the pen is; one finger points, and a second one
 //! presses.
 
@@ -32,6 +33,7 @@ pub fn collect_commands(ui: &egui::Ui, view: &egui::Response, is_captured: bool,
         true => captured_pointer(ui, view, &mut contact, commands),
         false => {
             end_tilting(ui, view.id);
+            stop_keyed_hand(ui, view.id);
             free_pointer(ui, view, commands)
         }
     }
@@ -84,6 +86,8 @@ fn free_pointer(ui: &egui::Ui, view: &egui::Response, commands: &mut Vec<AppComm
         commands.push(camera_command(drag, view.drag_motion(), height));
     }
     if view.clicked() {
+        // From now on the arrows and Space are for the instrument, also if Space chose the view.
+        ui.memory_mut(|memory| memory.stop_text_input());
         commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(true)));
     }
     let steps = wheel(ui);
@@ -171,14 +175,17 @@ fn captured_pointer(
     let pen = platform::pen();
     commands.push(AppCommand::Practice(PracticeCommand::SetPenDirection(pen.and_then(|pen| pen.direction()))));
     // A finger or a pen on the screen counts as the left button, and yet a finger alone only points.
-    let of_pen = pen.and_then(|pen| pen.pressure).map(pen_pressure);
-    let pressure = of_pen.or(contact.touches.pressure()).unwrap_or(1.0);
     let is_pressed_by_key = tilting.is_none() && is_space_down(ui);
+    let of_pen = pen.and_then(|pen| pen.pressure).map(pen_pressure);
+    let of_contact = of_pen.or(contact.touches.pressure()).unwrap_or(1.0);
+    let pressure = if is_pressed_by_key { 1.0 } else { of_contact };
     let is_down = is_working && (contact.began_on_view && pressure > 0.0 || is_pressed_by_key);
     commands.push(AppCommand::Practice(PracticeCommand::SetPressure(pressure)));
     commands.push(AppCommand::Practice(PracticeCommand::SetDeviceButton { bit: 0, is_down }));
     let place = at.filter(|_| is_working).map(|at| {
-        let share = (fine_position(ui, view.id, at, modifiers.shift) - rect.min) / rect.size();
+        // The keys move the hand more finely by themselves.
+        let at = if keyed.is_some() { at } else { fine_position(ui, view.id, at, modifiers.shift) };
+        let share = (at - rect.min) / rect.size();
         PointedPlace { share: [share.x, share.y], aspect: rect.width() / rect.height().max(1.0) }
     });
     commands.push(AppCommand::Practice(PracticeCommand::PointAt(place)));
@@ -199,22 +206,27 @@ struct KeyedHand {
     held: f32,
     /// Place of the pointer, which takes over when it moves.
     pointer: Option<egui::Pos2>,
+    /// False once the pointer leads the hand.
+    is_leading: bool,
 }
 
 /// Moves the hand by the arrow keys. Returns its place while the keys lead it: from the first arrow, or a press of the space
 /// bar while the pointer is elsewhere, until the pointer moves.
 fn keyed_place(ui: &egui::Ui, view: &egui::Response, pointer: Option<egui::Pos2>) -> Option<egui::Pos2> {
     let id = view.id.with("keyed");
-    let known = ui.data(|data| data.get_temp::<KeyedHand>(id)).filter(|hand| hand.pointer == pointer);
+    let last = ui.data(|data| data.get_temp::<KeyedHand>(id)).filter(|hand| hand.place != egui::Pos2::ZERO);
+    let known = last.filter(|hand| hand.is_leading && hand.pointer == pointer);
     let arrows = arrows(ui);
-    let (is_tilting, seconds) = ui.input(|input| (input.key_down(Key::A), input.unstable_dt.min(FRAME_MAX)));
+    let (is_tilting, is_fine, seconds) =
+        ui.input(|input| (input.key_down(Key::A), input.modifiers.shift, input.unstable_dt.min(FRAME_MAX)));
     let on_view = pointer.filter(|at| view.rect.contains(*at));
     let begins = arrows != egui::Vec2::ZERO || on_view.is_none() && is_space_down(ui);
     if known.is_none() && !begins {
-        ui.data_mut(|data| data.remove_temp::<KeyedHand>(id));
+        stop_keyed_hand(ui, view.id);
         return None;
     }
-    let start = KeyedHand { place: on_view.unwrap_or(view.rect.center()), held: 0.0, pointer };
+    let last = last.map_or(view.rect.center(), |hand| view.rect.clamp(hand.place));
+    let start = KeyedHand { place: on_view.unwrap_or(last), held: 0.0, pointer, is_leading: true };
     let KeyedHand { place, held, .. } = known.unwrap_or(start);
     let (place, held) = if arrows == egui::Vec2::ZERO {
         (place, 0.0)
@@ -222,14 +234,19 @@ fn keyed_place(ui: &egui::Ui, view: &egui::Response, pointer: Option<egui::Pos2>
         (place, held)
     } else {
         let [first, last] = KEY_SPEEDS;
-        let speed = first + (last - first) * (held / KEY_RAMP).min(1.0);
+        let speed = (first + (last - first) * (held / KEY_RAMP).min(1.0)) * if is_fine { FINE_SHARE } else { 1.0 };
         (view.rect.clamp(place + arrows * speed * seconds), held + seconds)
     };
     if arrows != egui::Vec2::ZERO {
         ui.ctx().request_repaint();
     }
-    ui.data_mut(|data| data.insert_temp(id, KeyedHand { place, held, pointer }));
+    ui.data_mut(|data| data.insert_temp(id, KeyedHand { place, held, pointer, is_leading: true }));
     Some(place)
+}
+
+/// Ends the lead of the keys; the next key goes on from where they left the hand.
+fn stop_keyed_hand(ui: &egui::Ui, view: egui::Id) {
+    ui.data_mut(|data| data.get_temp_mut_or_default::<KeyedHand>(view.with("keyed")).is_leading = false);
 }
 
 /// True while the space bar is held, unless it is for a focused button.

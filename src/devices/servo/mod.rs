@@ -418,8 +418,9 @@ impl ServoLoop {
         if self.simulation.tick() == Tick::ZERO {
             return false;
         }
-        // Trackers without force tremble, too.
-        let is_pointer = self.device.pacing() == Pacing::Host && !self.device.renders_force();
+        // Trackers tremble, and so does an arm whose force a page leaves out.
+        let is_arm = self.device.renders_force() || self.device.spec().page_force.is_some();
+        let is_pointer = self.device.pacing() == Pacing::Host && !is_arm;
         let least = if is_pointer { FIRST_POINTED } else { FIRST_MOVEMENT };
         let is_led = self.second.as_mut().is_some_and(|second| second.await_lead(reading));
         if !is_led && !first.is_left_by(reading, least) {
