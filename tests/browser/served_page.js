@@ -170,7 +170,8 @@ const moveAbout = async (page, time) => {
 
 /** Ends a lesson before its time; resolves with the moment in which that was confirmed. */
 const finishLesson = async ({ page, state, until }) => {
-  await page.keyboard.press('Escape');
+  // With the instrument put down, Esc would ask whether the exercise is to end.
+  if (state.pointer === 'held') await page.keyboard.press('Escape');
   await until('pointer', pointer => pointer === 'free');
   let ended;
   while (state.screen === 'practice') {

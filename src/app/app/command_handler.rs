@@ -165,10 +165,10 @@ impl App {
             AppCommand::ResumeInterrupted => self.resume_interrupted(ctx),
             AppCommand::SetAsideInterrupted => self.set_interrupted_aside(),
             AppCommand::ShowShortcuts(is_open) => {
-                self.open_overlay(shortcuts::OverlayState { shortcuts: is_open, settings: false })
+                self.overlay = shortcuts::OverlayState { shortcuts: is_open, settings: false };
             }
             AppCommand::ShowSettings(is_open) => {
-                self.open_overlay(shortcuts::OverlayState { shortcuts: false, settings: is_open })
+                self.overlay = shortcuts::OverlayState { shortcuts: false, settings: is_open };
             }
             AppCommand::ChangeParticipant => self.change_participant(ctx),
             AppCommand::AskToLeaveKiosk(is_asked) => self.kiosk_exit.ask(is_asked),
@@ -260,11 +260,6 @@ impl App {
             CameraCommand::Zoom(factor) => orbit.zoomed(factor),
             CameraCommand::Pan { right, up } => orbit.panned(right, up),
         };
-    }
-
-    /// Shows one page over the screen, or none.
-    pub(super) fn open_overlay(&mut self, overlay: shortcuts::OverlayState) {
-        self.overlay = overlay;
     }
 
     /// Aborts the lesson and closes the window when its bundle is written, or continues the lesson.
@@ -492,7 +487,8 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::ContinueStage => lesson.is_confirming_finish = false,
         PracticeCommand::Pause(is_paused) => lesson.pause(is_paused),
         PracticeCommand::AskToAbort(is_giving_up) => {
-            lesson.is_confirming_abort = is_giving_up;
+            // One question at a time: two keys of one frame may ask for both.
+            lesson.is_confirming_abort = is_giving_up && !lesson.is_confirming_finish;
             lesson.release_pointer();
         }
         PracticeCommand::Abort => lesson.abort(),

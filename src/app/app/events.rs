@@ -222,7 +222,7 @@ impl App {
         let is_asked = ctx.input(|input| input.viewport().close_requested());
         if is_asked && self.options.kiosk().is_some() && !self.kiosk_exit.is_allowed {
             ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.open_overlay(shortcuts::OverlayState::default());
+            self.overlay = shortcuts::OverlayState::default();
             return self.kiosk_exit.ask(true);
         }
         let is_in_lesson = matches!(self.screen, Screen::Lesson(_));
@@ -243,7 +243,7 @@ impl App {
             if is_completing {
                 self.closing = CloseState::AfterLesson;
             } else if self.closing == CloseState::No {
-                self.open_overlay(shortcuts::OverlayState::default());
+                self.overlay = shortcuts::OverlayState::default();
                 self.closing = CloseState::Asked;
             }
         }

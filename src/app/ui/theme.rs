@@ -59,7 +59,7 @@ pub fn scroll_by_keys(ui: &mut egui::Ui) {
     /// Points: of an arrow key, and more than any area has.
     const LINE: f32 = 40.0;
     const WHOLE: f32 = 1e6;
-    if ui.ctx().memory(|memory| memory.focused().is_some() || memory.top_modal_layer().is_some()) {
+    if ui.ctx().egui_wants_keyboard_input() || ui.memory(|memory| memory.top_modal_layer().is_some()) {
         return;
     }
     let page = (ui.clip_rect().height() - LINE).max(LINE);

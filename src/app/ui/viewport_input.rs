@@ -199,7 +199,7 @@ const KEY_RAMP: f32 = 1.2;
 const FRAME_MAX: f32 = 0.1;
 
 /// Place to which the arrow keys have moved the hand.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct KeyedHand {
     place: egui::Pos2,
     /// Time for which the arrows have been held, s.
@@ -214,7 +214,7 @@ struct KeyedHand {
 /// bar while the pointer is elsewhere, until the pointer moves.
 fn keyed_place(ui: &egui::Ui, view: &egui::Response, pointer: Option<egui::Pos2>) -> Option<egui::Pos2> {
     let id = view.id.with("keyed");
-    let last = ui.data(|data| data.get_temp::<KeyedHand>(id)).filter(|hand| hand.place != egui::Pos2::ZERO);
+    let last = ui.data(|data| data.get_temp::<KeyedHand>(id));
     let known = last.filter(|hand| hand.is_leading && hand.pointer == pointer);
     let arrows = arrows(ui);
     let (is_tilting, is_fine, seconds) =
@@ -246,19 +246,23 @@ fn keyed_place(ui: &egui::Ui, view: &egui::Response, pointer: Option<egui::Pos2>
 
 /// Ends the lead of the keys; the next key goes on from where they left the hand.
 fn stop_keyed_hand(ui: &egui::Ui, view: egui::Id) {
-    ui.data_mut(|data| data.get_temp_mut_or_default::<KeyedHand>(view.with("keyed")).is_leading = false);
+    let id = view.with("keyed");
+    ui.data_mut(|data| {
+        if let Some(last) = data.get_temp::<KeyedHand>(id) {
+            data.insert_temp(id, KeyedHand { is_leading: false, ..last });
+        }
+    });
 }
 
 /// True while the space bar is held, unless it is for a focused button.
 fn is_space_down(ui: &egui::Ui) -> bool {
-    let has_focus = ui.ctx().memory(|memory| memory.focused().is_some());
-    !has_focus && ui.input(|input| input.key_down(Key::Space))
+    !ui.ctx().egui_wants_keyboard_input() && ui.input(|input| input.key_down(Key::Space))
 }
 
 /// Direction of the arrow keys that are held, unless Ctrl makes them move the camera or a widget has the keyboard focus; of
 /// length 0 or 1.
 fn arrows(ui: &egui::Ui) -> egui::Vec2 {
-    if ui.ctx().memory(|memory| memory.focused().is_some()) {
+    if ui.ctx().egui_wants_keyboard_input() {
         return egui::Vec2::ZERO;
     }
     ui.input(|input| {
