@@ -4,7 +4,7 @@
 //! queries. All coordinates are in handle space: +z along the shaft toward the hand, the origin at the tip of the
 //! device.
 
-use super::profile::{Profile, ProfilePoint, ProfileSample};
+use super::profile::{Profile, ProfilePoint, ProfileSample, StraightSide};
 use super::sampled_shape::SampledShape;
 use crate::aabb::Aabb;
 use crate::frame::Vec3;
@@ -228,6 +228,14 @@ impl Body {
                 let aside = low.abs().max(high.abs());
                 (ProfilePoint::of(aside).r, [low.z, high.z])
             }
+        }
+    }
+
+    /// Straight part of the side of the cutting part, if it is a body of revolution that has one.
+    pub(super) fn straight_side(&self) -> Option<StraightSide> {
+        match &self.head {
+            HeadGeometry::Revolved { profile, .. } => profile.straight_side(),
+            HeadGeometry::Sampled(_) => None,
         }
     }
 

@@ -17,7 +17,7 @@ use super::wear::{WearRate, WorkBudget};
 use crate::aabb::Aabb;
 use crate::frame::{Quat, Vec3};
 use crate::tick::TICK_S;
-use crate::volume::{Density, Edit, Label, Volume, Voxel, density_at_distance};
+use crate::volume::{BRICK, Density, Edit, Label, Volume, Voxel, density_at_distance};
 use std::ops::Range;
 
 /// Parameters of the cutting laws, from the scenario.
@@ -288,21 +288,47 @@ impl Carver {
     ) -> Option<u32> {
         let (grid, band) = (*volume.grid(), volume.half_band());
         let cylinder = SweptCylinder::of(body, increment, increment.run_out + band);
+        let trailing = TrailingSide::of(body, increment);
+        let handle_from_tooth = glam::Mat3::from_quat(increment.orientation.conjugate());
+        let frame = HandleFrame {
+            handle_from_tooth,
+            along: handle_from_tooth.x_axis * grid.spacing.x,
+            back: handle_from_tooth * increment.feed,
+            far: increment.feed.length(),
+        };
         let Aabb { low, high } = cylinder.extent();
         let [xs, ys, zs] = grid.cells_within(low, high);
         if xs.is_empty() {
             return None;
         }
         let to_steps = grid.spacing.x.recip();
+        let row_length = grid.spacing.x * xs.len() as f32;
+        let bricks = [xs.start, xs.end - 1].map(|x| x / BRICK);
+        let mut known = None;
         for (row, [y, z]) in progress.rows_left(ys, zs) {
             if self.examined >= EXAMINED_MAX {
                 return Some(row);
             }
             let first = grid.centre([xs.start, y, z]);
-            let Some([low, high]) = cylinder.clip_row(first) else { continue };
+            // Rows beside each other are mostly of the same bricks.
+            let row_of_bricks = [y / BRICK, z / BRICK];
+            let is_empty = match known {
+                Some((same, is_empty)) if same == row_of_bricks => is_empty,
+                _ => !(bricks[0]..=bricks[1]).any(|x| volume.bricks().is_occupied([x, y / BRICK, z / BRICK])),
+            };
+            known = Some((row_of_bricks, is_empty));
+            if is_empty {
+                continue;
+            }
+            let trailing = trailing.as_ref().map_or(TrailingSide::NOWHERE, |trailing| trailing.along_row(first));
+            if trailing[0] <= 0.0 && trailing[1] >= row_length {
+                continue;
+            }
+            let Some(within) = cylinder.clip_row(first) else { continue };
+            let Some([low, high]) = without(within, trailing) else { continue };
             let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
             let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
-            self.carve_body_row(volume, body, increment, [xs.start, y, z], steps);
+            self.carve_body_row(volume, body, (increment, &frame), [xs.start, y, z], steps);
         }
         None
     }
@@ -312,7 +338,7 @@ impl Carver {
         &mut self,
         volume: &mut Volume,
         body: &Body,
-        increment: &CutIncrement,
+        (increment, frame): (&CutIncrement, &HandleFrame),
         row: [u32; 3],
         steps: Range<u32>,
     ) {
@@ -324,25 +350,30 @@ impl Carver {
         self.examined += steps.len();
         let [x, y, z] = row;
         let (grid, band) = (*volume.grid(), volume.half_band());
-        let handle_from_tooth = glam::Mat3::from_quat(increment.orientation.conjugate());
+        let HandleFrame { handle_from_tooth, along, back, far } = *frame;
         let first = handle_from_tooth * (grid.centre(row) - increment.tip - increment.feed);
-        let along = handle_from_tooth.x_axis * grid.spacing.x;
-        // In a harder tissue the bur advances less: it is set back along the feed in proportion to the missing
-        // advance.
-        let back = handle_from_tooth * increment.feed;
-        let far = increment.feed.length();
+        // Distance, by density, from which the tool certainly leaves what there is: a step of density more than exact, for
+        // rounding.
+        let rise = 2.0 * band / f32::from(u8::MAX);
+        let base = increment.run_out - band + rise;
+        let (mut label, mut share) = (Label::AIR, 0.0);
         for step in steps {
-            if volume.densities()[start + step as usize] == Density::EMPTY {
-                continue;
-            }
             let before = volume.voxel(start + step as usize);
-            let advance = self.advance[usize::from(before.label.0)];
-            if advance <= 0.0 {
+            if before.density == Density::EMPTY {
                 continue;
             }
-            let share = advance / increment.deepest;
+            if before.label != label {
+                label = before.label;
+                share = self.advance[usize::from(label.0)] / increment.deepest;
+            }
+            if share <= 0.0 {
+                continue;
+            }
             let here = first + along * step as f32;
             let distance = body.head_distance(here + back * (1.0 - share));
+            if distance > base + rise * f32::from(before.density.bits()) {
+                continue;
+            }
             let remaining = density_at_distance(increment.run_out - distance, band);
             if remaining >= before.density || self.edits.len() >= EDITS_MAX {
                 continue;
@@ -439,6 +470,17 @@ struct CutIncrement {
     orientation: Quat,
 }
 
+/// An increment in handle space.
+struct HandleFrame {
+    handle_from_tooth: glam::Mat3,
+    /// From a voxel to the next one of its row, mm.
+    along: Vec3,
+    /// The feed. In a harder tissue the bur advances less: it is set back along the feed in proportion to the missing advance.
+    back: Vec3,
+    /// Length of the feed, mm.
+    far: f32,
+}
+
 /// Part of an increment that is done: whole phases, and rows of the next one.
 #[derive(Clone, Copy, Debug, Default)]
 struct CutProgress {
@@ -449,10 +491,100 @@ struct CutProgress {
 impl CutProgress {
     /// The rows of the phase that are not done yet, as their number within the phase and their y and z, in order.
     fn rows_left(self, ys: Range<u32>, zs: Range<u32>) -> impl Iterator<Item = (u32, [u32; 2])> {
-        let rows =
-            zs.flat_map(move |z| ys.clone().filter(move |y| (y + z) % INTERLEAVE == self.phase).map(move |y| [y, z]));
+        let rows = zs.flat_map(move |z| {
+            let first = (self.phase + INTERLEAVE - (ys.start + z) % INTERLEAVE) % INTERLEAVE;
+            (ys.start + first..ys.end).step_by(INTERLEAVE as usize).map(move |y| [y, z])
+        });
         (0..).zip(rows).skip(self.rows as usize)
     }
+}
+
+/// The part of the space beside a body's straight side that the feed leads away from: nothing is cut there. What moves
+/// neither toward the side nor off one of its ends comes no nearer to the body.
+struct TrailingSide {
+    tip: Vec3,
+    /// Unit.
+    axis: Vec3,
+    /// Part of the feed across the axis, unit.
+    ahead: Vec3,
+    /// Lowest and highest coordinate along the axis from the tip, mm.
+    along: [f32; 2],
+    /// Change of the coordinates ahead and along the axis per step along x.
+    ahead_rise: Rise,
+    along_rise: Rise,
+}
+
+/// Distance by which the trailing side is taken smaller than it is, mm: more than rounding.
+const TRAILING_MARGIN: f32 = 1e-4;
+
+impl TrailingSide {
+    /// A trailing side that a row does not meet.
+    const NOWHERE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
+
+    fn of(body: &Body, increment: &CutIncrement) -> Option<TrailingSide> {
+        let side = body.straight_side()?;
+        let axis = increment.orientation * Vec3::Z;
+        let (far, climb) = (increment.feed.length(), increment.feed.dot(axis));
+        // A leaning side also cuts by its feed along the axis.
+        if side.sine * climb > 0.5 * MIN_FACING_COSINE * far {
+            return None;
+        }
+        let ahead = (increment.feed - axis * climb).try_normalize()?;
+        let [low, high] = side.z;
+        let margin = climb.abs() + TRAILING_MARGIN;
+        Some(TrailingSide {
+            tip: increment.tip,
+            axis,
+            ahead,
+            along: [low + margin, high - margin],
+            ahead_rise: Rise::of(ahead.x),
+            along_rise: Rise::of(axis.x),
+        })
+    }
+
+    /// The part of a line along x through `from` that is on the trailing side, as signed distances from that point.
+    fn along_row(&self, from: Vec3) -> [f32; 2] {
+        let out = from - self.tip;
+        let behind = self.ahead_rise.below(out.dot(self.ahead) + TRAILING_MARGIN);
+        let along = out.dot(self.axis);
+        let above = self.along_rise.above(along - self.along[0]);
+        let under = self.along_rise.below(along - self.along[1]);
+        [behind[0].max(above[0]).max(under[0]), behind[1].min(above[1]).min(under[1])]
+    }
+}
+
+/// Change of a linear quantity along x, as its reciprocal: infinite if it does not change.
+#[derive(Clone, Copy)]
+struct Rise(f32);
+
+impl Rise {
+    fn of(rise: f32) -> Rise {
+        Rise(if rise.abs() < 1e-6 { f32::INFINITY } else { rise.recip() })
+    }
+
+    /// The interval of x in which the quantity, `at` at the origin, is negative.
+    fn below(self, at: f32) -> [f32; 2] {
+        let zero = -at * self.0;
+        match self.0 {
+            f32::INFINITY if at < 0.0 => [f32::NEG_INFINITY, f32::INFINITY],
+            f32::INFINITY => TrailingSide::NOWHERE,
+            inverse if inverse > 0.0 => [f32::NEG_INFINITY, zero],
+            _ => [zero, f32::INFINITY],
+        }
+    }
+
+    /// The interval in which it is positive.
+    fn above(self, at: f32) -> [f32; 2] {
+        let opposite = if self.0 == f32::INFINITY { self } else { Rise(-self.0) };
+        opposite.below(-at)
+    }
+}
+
+/// An interval without the part of it that another takes from one of its ends; `None` if nothing is left.
+fn without([low, high]: [f32; 2], taken: [f32; 2]) -> Option<[f32; 2]> {
+    let low = if taken[0] <= low { low.max(taken[1]) } else { low };
+    let high = if taken[1] >= high { high.min(taken[0]) } else { high };
+    (low < high).then_some([low, high])
 }
 
 /// Cylinder about the shaft that contains everything an increment of a body can reach, tooth space.
@@ -462,6 +594,10 @@ struct SweptCylinder {
     axis: Vec3,
     radius: f32,
     half_length: f32,
+    /// Part of x across the axis, its squared length and the reciprocal of that.
+    drift: Vec3,
+    drift_squared: f32,
+    drift_inverse: f32,
 }
 
 impl SweptCylinder {
@@ -471,7 +607,16 @@ impl SweptCylinder {
         // In a harder tissue the body advances less, so the cylinder is centred at half the advance.
         let middle = increment.tip + increment.feed * 0.5 + axis * (0.5 * (low + high));
         let margin = margin + 0.5 * increment.feed.length();
-        SweptCylinder { middle, axis, radius: radius + margin, half_length: 0.5 * (high - low) + margin }
+        let drift = Vec3::X - axis * axis.x;
+        SweptCylinder {
+            middle,
+            axis,
+            radius: radius + margin,
+            half_length: 0.5 * (high - low) + margin,
+            drift,
+            drift_squared: drift.length_squared(),
+            drift_inverse: drift.length_squared().recip(),
+        }
     }
 
     /// Bounding box.
@@ -485,23 +630,23 @@ impl SweptCylinder {
     fn clip_row(&self, from: Vec3) -> Option<[f32; 2]> {
         let out = from - self.middle;
         let (along, climb) = (out.dot(self.axis), self.axis.x);
-        let aside = out - self.axis * along;
-        let drift = Vec3::X - self.axis * climb;
         let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
-        let (a, b, c) = (drift.length_squared(), drift.dot(aside), aside.length_squared() - self.radius * self.radius);
+        if climb.abs() > 1e-4 {
+            let (near, far) = ((-self.half_length - along) / climb, (self.half_length - along) / climb);
+            (low, high) = (near.min(far), near.max(far));
+        } else if along.abs() > self.half_length {
+            return None;
+        }
+        let aside = out - self.axis * along;
+        let (a, b, c) = (self.drift_squared, self.drift.dot(aside), aside.length_squared() - self.radius * self.radius);
         if a > 1e-6 {
             let inside = b * b - a * c;
             if inside <= 0.0 {
                 return None;
             }
-            (low, high) = ((-b - inside.sqrt()) / a, (-b + inside.sqrt()) / a);
+            let (middle, half) = (-b * self.drift_inverse, inside.sqrt() * self.drift_inverse);
+            (low, high) = (low.max(middle - half), high.min(middle + half));
         } else if c > 0.0 {
-            return None;
-        }
-        if climb.abs() > 1e-4 {
-            let (near, far) = ((-self.half_length - along) / climb, (self.half_length - along) / climb);
-            (low, high) = (low.max(near.min(far)), high.min(near.max(far)));
-        } else if along.abs() > self.half_length {
             return None;
         }
         (low < high).then_some([low, high])
@@ -539,6 +684,51 @@ mod tests {
                 return (examined, ticks, removed);
             }
         }
+    }
+
+    #[test]
+    fn nothing_is_cut_on_the_trailing_side() {
+        // Aim: what is left out would not have been cut. Method: rows beside burs that are fed in random directions; every
+        // point of a row that is on the trailing side comes no nearer to the bur, whatever part of the feed its tissue allows.
+        let mut state = 7u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
+        };
+        let profiles = [
+            Profile::frustum(0.5, 0.5, 4.0, [EDGE_RADIUS; 2]),
+            Profile::frustum(0.3, 0.45, 4.2, [EDGE_RADIUS; 2]),
+            Profile::frustum(0.6, 0.5, 4.0, [EDGE_RADIUS; 2]),
+            Profile::round_ended(0.4, 0.5, 4.0),
+            Profile::round_ended(0.5, 0.3, 4.0),
+        ];
+        let (mut left_out, mut cut) = (0, 0);
+        for (round, profile) in profiles.iter().cycle().take(5000).enumerate() {
+            let body = Body::revolved(profile.clone(), None);
+            let mut direction = || Vec3::new(random(), random(), random()).normalize_or(Vec3::X);
+            // Upright, along x or in any direction.
+            let axis = [Vec3::Z, Vec3::X, direction()][round % 3];
+            let (feed, tip) = (direction() * 0.06, direction());
+            let orientation = Quat::from_rotation_arc(Vec3::Z, axis);
+            let increment = CutIncrement { tip, feed, deepest: 0.06, run_out: RUN_OUT, radius: 0.0, orientation };
+            let Some(trailing) = TrailingSide::of(&body, &increment) else { continue };
+            let from = tip + axis * (2.0 + 2.2 * random()) + Vec3::new(-4.0, 0.7 * random(), 0.7 * random());
+            let [low, high] = trailing.along_row(from);
+            for step in 0..80 {
+                let x = step as f32 * 0.1;
+                let at = from + Vec3::X * x;
+                let distance = |advance: f32| body.head_distance(orientation.conjugate() * (at - tip - feed * advance));
+                let gain = |share: f32| distance(0.0) - distance(share) - MIN_FACING_COSINE * 0.06 * share;
+                let is_cut = [0.25, 1.0].into_iter().any(|share| gain(share) > 0.0);
+                if low < x && x < high && distance(0.0) < 0.45 {
+                    assert!(!is_cut, "{profile:?} {increment:?} {at}: {} {}", gain(0.25), gain(1.0));
+                    left_out += 1;
+                } else if is_cut {
+                    cut += 1;
+                }
+            }
+        }
+        assert!(left_out > 5000 && cut > 5000, "{left_out} left out, {cut} cut");
     }
 
     #[test]

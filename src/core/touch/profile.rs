@@ -12,6 +12,7 @@ use std::f32::consts::{FRAC_PI_2, PI};
 #[derive(Clone, Debug, PartialEq)]
 pub struct Profile {
     pieces: Vec<ProfilePiece>,
+    side: Option<StraightSide>,
 }
 
 /// Point in the half plane of a section, mm.
@@ -29,6 +30,41 @@ pub struct NearestProfilePoint {
     pub point: ProfilePoint,
     /// Unit normal, outward.
     pub normal: ProfilePoint,
+}
+
+/// Longest straight piece of a side, and the heights at which it is nearer than all other pieces, however deep inside: there
+/// the distance is linear in r and z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StraightSide {
+    /// Lowest and highest z, mm.
+    pub z: [f32; 2],
+    /// The z of the outward normal: 0 for a cylinder.
+    pub sine: f32,
+}
+
+/// Distance from the profile up to which a [`StraightSide`] is nearest, mm: more than the widest surface band.
+const SIDE_MARGIN: f32 = 0.5;
+
+impl StraightSide {
+    fn of(pieces: &[ProfilePiece]) -> Option<StraightSide> {
+        let height = |piece: &ProfilePiece| piece.to().z - piece.from().z;
+        let lines = pieces.iter().filter(|p| matches!(p, ProfilePiece::Line { .. }));
+        let side = lines.max_by(|a, b| height(a).total_cmp(&height(b)))?;
+        let (from, to) = (side.from(), side.to());
+        let (tip, top) = (pieces.first()?.from().z, pieces.last()?.to().z);
+        let radius = greatest_radius(pieces);
+        let sine = (from.r - to.r) / side.length();
+        // What is deep inside may be nearer to an end; what is far outside is projected up or down a leaning side.
+        let aside = (radius + SIDE_MARGIN) * sine.abs();
+        let low = from.z.max(tip + radius) + aside;
+        let high = to.z.min(top - radius) - aside;
+        (low < high).then_some(StraightSide { z: [low, high], sine })
+    }
+}
+
+/// Greatest distance from the axis, mm.
+fn greatest_radius(pieces: &[ProfilePiece]) -> f32 {
+    pieces.iter().map(|p| p.from().r.max(p.to().r)).fold(0.0, f32::max)
 }
 
 /// Sample point of a profile.
@@ -149,7 +185,7 @@ impl Profile {
 
     /// Greatest distance of the profile from the axis, mm.
     pub fn radius(&self) -> f32 {
-        self.pieces.iter().map(|p| p.from().r.max(p.to().r)).fold(0.0, f32::max)
+        greatest_radius(&self.pieces)
     }
 
     /// Distance of the profile from the axis at a height, mm; 0 above and below the profile.
@@ -197,6 +233,11 @@ impl Profile {
             f64::from(high - low) / STEPS as f64 / 3.0 * (at(0) + inner + at(STEPS))
         };
         self.pieces.iter().filter(|p| p.to().z > p.from().z).map(slab).sum()
+    }
+
+    /// Straight part of the side, if there is one.
+    pub(super) fn straight_side(&self) -> Option<StraightSide> {
+        self.side
     }
 
     /// Returns the profile as a polyline from the tip to the top, of which no point is farther than `sag` mm from it.
@@ -270,7 +311,7 @@ impl ProfileBuilder {
     }
 
     fn build(self) -> Profile {
-        Profile { pieces: self.pieces }
+        Profile { side: StraightSide::of(&self.pieces), pieces: self.pieces }
     }
 }
 
