@@ -8,7 +8,7 @@ use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::{Scenario, Stage, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::Diagnostic;
-use typodont_render::{LabelPalette, MeshInstance, RenderMode, TransferFunction};
+use typodont_render::{EnamelDepth, LabelPalette, MeshInstance, RenderMode, TransferFunction};
 use typodont_scene::particles;
 use typodont_scene::particles::ParticleField;
 use typodont_scene::{self as scene, ContraAngle, Mouth};
@@ -42,6 +42,7 @@ pub struct LessonScene {
     /// Bricks of the volume that were edited and are not drawn yet, in ascending order.
     pub undrawn: Vec<usize>,
     histogram: OnceCell<DensityHistogram>,
+    enamel_depth: OnceCell<EnamelDepth>,
     pub transfer_function: TransferFunctionDraft,
     presets: TransferFunctionPresets,
 }
@@ -70,6 +71,7 @@ impl LessonScene {
         };
         let built = LessonScene {
             histogram: OnceCell::new(),
+            enamel_depth: OnceCell::new(),
             transfer_function: TransferFunctionDraft::new(TransferFunction::tissue(&palette)),
             presets: TransferFunctionPresets::new(tissues, &palette, is_decay_shown),
             volume,
@@ -90,6 +92,12 @@ impl LessonScene {
             undrawn: Vec::new(),
         };
         (built, complaints.iter().flatten().map(Diagnostic::headline).collect())
+    }
+
+    /// Thickness of the enamel before the session, where dentine shines through it.
+    pub fn enamel_depth(&self, tissues: &TissueTable) -> Option<&EnamelDepth> {
+        let is_seen = self.palette.under_translucent.is_some();
+        is_seen.then(|| self.enamel_depth.get_or_init(|| scene::enamel_depth(&self.workpiece.volume, tissues)))
     }
 
     /// Applies an edit of the session to the window's own copy of the volume.

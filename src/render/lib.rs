@@ -38,6 +38,7 @@
 //!         changes: Changes::Bricks(&changed),
 //!         world_from_tooth: Pose::IDENTITY,
 //!         palette,
+//!         enamel_depth: None,
 //!         mode: RenderMode::Iso,
 //!     }),
 //!     ..RenderScene::empty()
@@ -55,6 +56,7 @@ mod camera;
 #[cfg(feature = "gpu")]
 mod downsampled;
 mod empty_space;
+mod enamel_depth;
 mod error;
 mod eye;
 #[cfg(feature = "gpu")]
@@ -99,6 +101,7 @@ mod volume_pass;
 pub mod cpu;
 
 pub use camera::{Orbit, Quadrant, Viewpoint};
+pub use enamel_depth::EnamelDepth;
 pub use error::RenderError;
 pub use eye::{Eye, FrustumWindow};
 #[cfg(feature = "gpu")]

@@ -1,5 +1,6 @@
 //! A scene as plain data: the carved tooth, other meshes, particles, lamps and a background.
 
+use super::enamel_depth::EnamelDepth;
 use super::mirror::PlaneMirror;
 use super::transfer_function::TransferFunction;
 use std::sync::Arc;
@@ -52,6 +53,9 @@ pub struct VolumeInstance<'a> {
     pub changes: Changes<'a>,
     pub world_from_tooth: Pose,
     pub palette: &'a LabelPalette,
+    /// Thickness of its enamel before it was worked on. With it, dentine shines through enamel where the palette says what
+    /// colour it has.
+    pub enamel_depth: Option<&'a EnamelDepth>,
     pub mode: RenderMode,
 }
 
@@ -82,15 +86,17 @@ pub struct LabelPalette {
     pub appearances: [Appearance; 256],
     /// True for labels that are drawn as decay, with a soft border.
     pub is_decay: [bool; 256],
-    /// Label of the tissue that shows decay near it as a white spot: enamel.
+    /// Label of the tissue that shows decay near it as a white spot, and what is under it: enamel.
     pub translucent: Option<Label>,
+    /// Colour that shines through it: that of dentine.
+    pub under_translucent: Option<Rgb>,
 }
 
 impl LabelPalette {
     /// Builds a palette with one colour per label and the same gloss for all, without decay.
     pub fn from_colours(colour: impl Fn(Label) -> Rgb, gloss: f32) -> LabelPalette {
         let appearances = std::array::from_fn(|l| Appearance { colour: colour(Label(l as u8)), gloss });
-        LabelPalette { appearances, is_decay: [false; 256], translucent: None }
+        LabelPalette { appearances, is_decay: [false; 256], translucent: None, under_translucent: None }
     }
 
     pub fn appearance(&self, label: Label) -> Appearance {

@@ -4,7 +4,8 @@
 //! the renderers interpolate. Decay has a soft border: from sound tissue over a white spot (in enamel) and amber to its own
 //! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
 
-use super::scene::{Appearance, LabelPalette};
+use super::enamel_depth::{EnamelDepth, EnamelLayers};
+use super::scene::{Appearance, LabelPalette, VolumeInstance};
 use typodont_core::frame::{Vec3, smooth_step};
 use typodont_core::parallel::par_map;
 use typodont_core::volume::{BRICK, Label, Volume};
@@ -83,7 +84,8 @@ impl Matter {
 }
 
 impl SurfaceColours {
-    pub fn new(volume: &Volume, palette: &LabelPalette) -> SurfaceColours {
+    pub fn new(tooth: &VolumeInstance) -> SurfaceColours {
+        let VolumeInstance { volume, palette, .. } = *tooth;
         let grid = volume.grid();
         let voxels = CELL_WIDTH / grid.spacing.min_element();
         let cell_voxels = [1, 2, 4, BRICK].into_iter().rfind(|&edge| edge as f32 <= voxels).unwrap_or(1);
@@ -91,7 +93,7 @@ impl SurfaceColours {
         let texels = vec![[0; 4]; dims.iter().map(|&n| n as usize).product()];
         let mut colours = SurfaceColours { palette: palette.clone(), cell_voxels, dims, texels };
         let bricks: Vec<usize> = (0..volume.bricks().len()).collect();
-        colours.compute(volume, &bricks);
+        colours.compute(tooth, &bricks);
         colours
     }
 
@@ -116,8 +118,8 @@ impl SurfaceColours {
     }
 
     /// Computes the colours again that changed bricks can affect. Returns the bricks that were computed.
-    pub fn update(&mut self, volume: &Volume, changed: &[usize]) -> Vec<usize> {
-        let bricks = volume.bricks();
+    pub fn update(&mut self, tooth: &VolumeInstance, changed: &[usize]) -> Vec<usize> {
+        let bricks = tooth.volume.bricks();
         let last = bricks.dims().map(|n| n - 1);
         let mut affected: Vec<usize> = Vec::new();
         for &brick in changed {
@@ -133,7 +135,7 @@ impl SurfaceColours {
         }
         affected.sort_unstable();
         affected.dedup();
-        self.compute(volume, &affected)
+        self.compute(tooth, &affected)
     }
 
     /// Cells of a brick: the first, and the number along each axis.
@@ -177,13 +179,14 @@ impl SurfaceColours {
     }
 
     /// Computes the cells of those bricks that are near the surface, and returns these bricks.
-    fn compute(&mut self, volume: &Volume, bricks: &[usize]) -> Vec<usize> {
+    fn compute(&mut self, tooth: &VolumeInstance, bricks: &[usize]) -> Vec<usize> {
         /// Number of bricks from which threads are started: a cut changes fewer, in every picture.
         const MANY: usize = 64;
         if bricks.is_empty() {
             return Vec::new();
         }
-        let mixer = Mixer::new(&self.palette);
+        let volume = tooth.volume;
+        let mixer = Mixer::new(&self.palette, tooth.enamel_depth);
         let make = |i: usize| {
             let block = self.block(volume, bricks[i]);
             self.is_near_surface(volume, block).then(|| self.colours_of(volume, &mixer, block))
@@ -231,21 +234,38 @@ impl SurfaceColours {
     fn colours_of(&self, volume: &Volume, mixer: &Mixer, (first, size): ([u32; 3], [u32; 3])) -> Vec<[u8; 4]> {
         let window = self.window(volume, mixer, first);
         let size = size.map(|n| n as usize);
-        if let Some(Label(sole)) = window.sole_label.filter(|_| !window.has_decay) {
-            return vec![texel(mixer.matter[usize::from(sole)].sound, 1.0); size.iter().product()];
-        }
-        let narrow = blurred(&window.cells, size, &NARROW);
-        let wide = window.has_decay.then(|| blurred(&window.cells, size, &WIDE));
+        let count: usize = size.iter().product();
+        let cell_at = |i: usize| -> Vec3 {
+            let cell = [i % size[0], i / size[0] % size[1], i / (size[0] * size[1])];
+            Vec3::from(std::array::from_fn(|a| (first[a] as usize + cell[a]) as f32))
+        };
         let grid = volume.grid();
-        let scale = grid.spacing * self.cell_voxels as f32;
-        let mut texels = Vec::with_capacity(narrow.len());
+        let edge = self.cell_voxels as f32;
+        let in_tooth = |cell: Vec3| grid.origin + (cell * edge + 0.5 * (edge - 1.0)) * grid.spacing;
+        if let Some(Label(sole)) = window.sole_label.filter(|_| !window.has_decay) {
+            let matter = &mixer.matter[usize::from(sole)];
+            return match mixer.enamel.as_ref().filter(|_| matter.enamel > 0.0) {
+                None => vec![texel(matter.sound, 1.0); count],
+                Some(enamel) => {
+                    (0..count).map(|i| texel(enamel.seen_through(matter, in_tooth(cell_at(i))).sound, 1.0)).collect()
+                }
+            };
+        }
+        let mut narrow = blurred(&window.cells, size, &NARROW);
+        let mut wide = window.has_decay.then(|| blurred(&window.cells, size, &WIDE));
+        if let Some(enamel) = &mixer.enamel {
+            let all = narrow.iter_mut().enumerate().chain(wide.iter_mut().flatten().enumerate());
+            for (i, matter) in all.filter(|(_, matter)| matter.enamel > 0.0) {
+                *matter = enamel.seen_through(matter, in_tooth(cell_at(i)));
+            }
+        }
+        let mut texels = Vec::with_capacity(count);
         for (i, near) in narrow.iter().enumerate() {
             let Some(wide) = wide.as_ref().map(|wide| &wide[i]).filter(|wide| wide.decay_amount > 0.0) else {
                 texels.push(texel(near.sound, near.sound_amount));
                 continue;
             };
-            let cell = [i % size[0], i / size[0] % size[1], i / (size[0] * size[1])];
-            let place = Vec3::from(std::array::from_fn(|a| (first[a] as usize + cell[a]) as f32)) * scale;
+            let place = cell_at(i) * (grid.spacing * edge);
             texels.push(decayed_texel(near, wide, mottle(place)));
         }
         texels
@@ -294,14 +314,35 @@ struct Window {
 }
 
 /// Matter of one full voxel of each label.
-struct Mixer {
+struct Mixer<'a> {
     matter: Vec<Matter>,
+    enamel: Option<TranslucentEnamel<'a>>,
     /// The first label that looks like each label: where decay is hidden, sums must not differ in the last bit either.
     alike: Vec<Label>,
 }
 
-impl Mixer {
-    fn new(palette: &LabelPalette) -> Mixer {
+/// Enamel through which dentine shines.
+struct TranslucentEnamel<'a> {
+    /// Colour without dentine.
+    own: [f32; 3],
+    layers: EnamelLayers,
+    depth: &'a EnamelDepth,
+}
+
+impl TranslucentEnamel<'_> {
+    /// The same matter, with the colour that its enamel has at a place in tooth space.
+    fn seen_through(&self, matter: &Matter, place: Vec3) -> Matter {
+        let seen = self.layers.at(self.depth.at(place));
+        let mut matter = *matter;
+        for ((sum, seen), own) in matter.sound.iter_mut().zip(seen).zip(self.own) {
+            *sum += matter.enamel * (seen - own);
+        }
+        matter
+    }
+}
+
+impl<'a> Mixer<'a> {
+    fn new(palette: &LabelPalette, depth: Option<&'a EnamelDepth>) -> Mixer<'a> {
         let look = |label: u8| {
             let index = usize::from(label);
             (palette.appearances[index], palette.is_decay[index])
@@ -322,7 +363,15 @@ impl Mixer {
                 },
             }
         };
-        Mixer { matter: (0..=u8::MAX).map(matter).collect(), alike: std::iter::once(Label::AIR).chain(alike).collect() }
+        let enamel = depth.zip(palette.translucent).zip(palette.under_translucent).map(|((depth, label), under)| {
+            let own = palette.appearance(label).colour;
+            TranslucentEnamel { own, layers: EnamelLayers::new(own, under), depth }
+        });
+        Mixer {
+            matter: (0..=u8::MAX).map(matter).collect(),
+            enamel,
+            alike: std::iter::once(Label::AIR).chain(alike).collect(),
+        }
     }
 }
 
@@ -423,22 +472,41 @@ fn lattice_value([x, y, z]: [u32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use typodont_core::frame::Vec3;
+    use crate::scene::{Changes, RenderMode};
+    use typodont_core::frame::{Pose, Vec3};
     use typodont_core::volume::{Grid, Voxel};
 
     const DECAY: Label = Label(2);
+    const DENTINE: Label = Label(3);
 
     fn palette() -> LabelPalette {
         let mut palette =
             LabelPalette::from_colours(|label| [[0.9, 0.9, 0.8], [0.4, 0.2, 0.1]][usize::from(label == DECAY)], 0.2);
         palette.is_decay[usize::from(DECAY.0)] = true;
+        palette.translucent = Some(Label(1));
+        palette.under_translucent = Some([0.8, 0.7, 0.5]);
         palette
     }
 
-    /// A ball whose upper part is decayed.
+    fn tooth<'a>(volume: &'a Volume, palette: &'a LabelPalette, depth: &'a EnamelDepth) -> VolumeInstance<'a> {
+        VolumeInstance {
+            volume,
+            changes: Changes::All,
+            world_from_tooth: Pose::IDENTITY,
+            palette,
+            enamel_depth: Some(depth),
+            mode: RenderMode::Surface,
+        }
+    }
+
+    /// A ball of enamel over dentine, whose upper part is decayed.
     fn ball(spacing: f32) -> Volume {
         let grid = Grid::centred([52, 47, 44], Vec3::splat(spacing));
-        let label = |p: Vec3| if p.z > 9.0 * spacing { DECAY } else { Label(1) };
+        let label = |p: Vec3| match p.length() / spacing {
+            _ if p.z > 9.0 * spacing => DECAY,
+            steps if steps > 12.0 => Label(1),
+            _ => DENTINE,
+        };
         Volume::from_distance(grid, 1.5 * spacing, |p| (p.length() - 18.0 * spacing, label(p)))
     }
 
@@ -448,13 +516,15 @@ mod tests {
         // cut through the decay and one at the border of the grid.
         for spacing in [0.2, 0.06, 0.03] {
             let mut volume = ball(spacing);
-            let mut colours = SurfaceColours::new(&volume, &palette());
+            let palette = palette();
+            let depth = EnamelDepth::of(&volume, |label| label == DENTINE);
+            let mut colours = SurfaceColours::new(&tooth(&volume, &palette, &depth));
             for cell in [[26, 23, 40], [26, 24, 39], [27, 24, 38], [26, 23, 31], [8, 23, 22]] {
                 volume.set_cell(cell, Voxel::AIR);
             }
             let changed = volume.take_dirty();
-            let computed = colours.update(&volume, &changed);
-            let anew = SurfaceColours::new(&volume, &palette());
+            let computed = colours.update(&tooth(&volume, &palette, &depth), &changed);
+            let anew = SurfaceColours::new(&tooth(&volume, &palette, &depth));
             assert!(!computed.is_empty());
             for brick in 0..volume.bricks().len() {
                 let (first, size) = anew.block(&volume, brick);
@@ -467,6 +537,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn dentine_shines_through_thin_enamel() {
+        // Aim: enamel over dentine is yellower the thinner it is, and the border between both has no edge. Method: a wedge of
+        // enamel over dentine, seen from above.
+        let spacing = 0.1;
+        let grid = Grid::centred([60, 20, 40], Vec3::splat(spacing));
+        let thickness = |x: f32| 0.4 * (x + 2.0);
+        let label = |p: Vec3| if p.z < 1.0 - thickness(p.x) { DENTINE } else { Label(1) };
+        let volume = Volume::from_distance(grid, 1.5 * spacing, |p| (p.z - 1.0, label(p)));
+        let mut palette =
+            LabelPalette::from_colours(|l| if l == DENTINE { [0.8, 0.7, 0.5] } else { [0.95, 0.94, 0.9] }, 0.2);
+        palette.translucent = Some(Label(1));
+        palette.under_translucent = Some([0.8, 0.7, 0.5]);
+        let depth = EnamelDepth::of(&volume, |label| label == DENTINE);
+        let colours = SurfaceColours::new(&tooth(&volume, &palette, &depth));
+        let blue: Vec<f32> = (0..50)
+            .map(|i| colours.at(grid.from_tooth(Vec3::new(-2.5 + 0.1 * i as f32, 0.0, 1.0))).colour[2])
+            .collect();
+        assert!(blue.windows(2).all(|pair| pair[1] > pair[0] - 0.005 && pair[1] < pair[0] + 0.05), "{blue:?}");
+        assert!(blue[0] < 0.51 && blue[49] > 0.82, "{blue:?}");
+        // Without the depth, or where the palette hides what is under enamel, all enamel has one colour.
+        palette.under_translucent = None;
+        let plain = SurfaceColours::new(&tooth(&volume, &palette, &depth));
+        assert!((plain.at(grid.from_tooth(Vec3::new(1.5, 0.0, 1.0))).colour[2] - 0.9).abs() < 0.005);
     }
 
     #[test]

@@ -97,7 +97,7 @@ impl ToothTextures {
         let dims = volume.grid().dims;
         let empty_space = EmptySpaceMap::new(volume, &tooth.mode);
         let occlusion = OcclusionVolume::new(volume);
-        let colours = SurfaceColours::new(volume, tooth.palette);
+        let colours = SurfaceColours::new(tooth);
         use wgpu::TextureFormat as Format;
         let space = |label, dims, format| resources::volume_texture(device, label, dims, format);
         let voxels = space("voxels", dims, Format::Rg8Unorm);
@@ -198,10 +198,10 @@ impl ToothTextures {
 
     fn update_colours(&mut self, queue: &wgpu::Queue, tooth: &VolumeInstance, changed: &[usize]) {
         if !self.colours.has_palette(tooth.palette) {
-            self.colours = SurfaceColours::new(tooth.volume, tooth.palette);
+            self.colours = SurfaceColours::new(tooth);
             return self.upload_colours(queue);
         }
-        for brick in self.colours.update(tooth.volume, changed) {
+        for brick in self.colours.update(tooth, changed) {
             let (first, size) = self.colours.block(tooth.volume, brick);
             let texels = self.colours.texels_of((first, size));
             resources::write_box(queue, &self.colour_texture, first, size, &texels);

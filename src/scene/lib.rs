@@ -29,6 +29,6 @@ mod views;
 
 pub use instrument::{ContraAngle, contra_angle, instrument_solid, mirror_face, procedural_instrument};
 pub use jaw::{Mouth, StandaloneJaw, WORKING_OPENING_DEG};
-pub use palette::{tissue_palette, x_ray_attenuation};
+pub use palette::{enamel_depth, tissue_palette, x_ray_attenuation};
 pub use surroundings::surrounding_solids;
 pub use views::{ToothSide, tooth_view, work_view};

@@ -1,14 +1,15 @@
 //! Colours of the tissues.
 
-use typodont_core::volume::Label;
+use typodont_core::volume::{Label, Volume};
 use typodont_exercise::catalog::{TissueRole, TissueTable};
-use typodont_render::{Appearance, LabelPalette};
+use typodont_render::{Appearance, EnamelDepth, LabelPalette};
 
 /// Gloss of tissue under a film of saliva, and of dull decay and deposits; see [`Appearance`](typodont_render::Appearance).
 pub(super) const GLOSS: f32 = 0.2;
 const DULL: f32 = 0.1;
 
-/// Colour of each tissue. Unless the exercise shows decay, it has the colour of enamel and cannot be seen.
+/// Colour of each tissue. Unless the exercise shows decay, it has the colour of enamel and cannot be seen; dentine does not
+/// shine through enamel then, because it would not where it is decayed.
 pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalette {
     let enamel = tissues.by_name("enamel");
     let entry =
@@ -19,7 +20,19 @@ pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalet
         Appearance { colour: entry.map_or([0.85, 0.82, 0.75], |e| e.rgb()), gloss: if is_dull { DULL } else { GLOSS } }
     });
     let is_decay = std::array::from_fn(|label| entry(label as u8).is_some_and(|entry| entry.role == TissueRole::Decay));
-    LabelPalette { appearances, is_decay, translucent: enamel.map(|entry| entry.label()) }
+    let dentine = tissues.by_name("dentine").filter(|_| is_decay_shown);
+    LabelPalette {
+        appearances,
+        is_decay,
+        translucent: enamel.map(|entry| entry.label()),
+        under_translucent: dentine.map(|entry| entry.rgb()),
+    }
+}
+
+/// Thickness of the enamel of a tooth that nobody has worked on yet, over its sound dentine and pulp.
+pub fn enamel_depth(volume: &Volume, tissues: &TissueTable) -> EnamelDepth {
+    let under = ["dentine", "pulp"].map(|name| tissues.by_name(name).map(|entry| entry.label()));
+    EnamelDepth::of(volume, |label| under.contains(&Some(label)))
 }
 
 /// Attenuation of X-rays by a tissue, per mm, at 40 keV: about the mean of a dental tube of 65 kV. Unless the exercise

@@ -19,6 +19,7 @@ pub struct FixedCase {
     workpiece: Workpiece,
     prepared: Volume,
     palette: LabelPalette,
+    enamel_depth: EnamelDepth,
 }
 
 /// One view of a case.
@@ -55,7 +56,8 @@ impl FixedCase {
         prepare(&mut prepared, &workpiece);
         prepared.take_dirty();
         let palette = tissue_palette(&scenario.tissues, true);
-        FixedCase { number, scenario, workpiece, prepared, palette }
+        let enamel_depth = enamel_depth(&workpiece.volume, &scenario.tissues);
+        FixedCase { number, scenario, workpiece, prepared, palette, enamel_depth }
     }
 
     /// The scene as the trainee has it, drawn by rays, and where it is seen from.
@@ -75,6 +77,7 @@ impl FixedCase {
                 changes: Changes::All,
                 world_from_tooth: self.workpiece.world_from_tooth,
                 palette: &self.palette,
+                enamel_depth: Some(&self.enamel_depth),
                 mode,
             }),
             solids: mouth.solids(WORKING_OPENING_DEG),

@@ -48,6 +48,7 @@ fn film_of(painter: &mut OffscreenRenderer, volume: &Volume, solids: Vec<MeshIns
         changes: Changes::All,
         world_from_tooth: Pose::IDENTITY,
         palette: &palette,
+        enamel_depth: None,
         mode: RenderMode::Volume(Arc::new(function)),
     };
     let background = Background::plain([0.0; 3]);

@@ -99,7 +99,14 @@ pub struct Story<'a> {
 }
 
 pub fn tooth<'a>(volume: &'a Volume, palette: &'a LabelPalette, shown: RenderMode) -> VolumeInstance<'a> {
-    VolumeInstance { volume, changes: Changes::All, world_from_tooth: upright(), palette, mode: shown }
+    VolumeInstance {
+        volume,
+        changes: Changes::All,
+        world_from_tooth: upright(),
+        palette,
+        enamel_depth: None,
+        mode: shown,
+    }
 }
 
 pub fn tissue(palette: &LabelPalette) -> RenderMode {

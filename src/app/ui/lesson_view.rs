@@ -122,6 +122,7 @@ impl LessonView {
                 changes: if self.has_volume { Changes::Bricks(&lesson_scene.undrawn) } else { Changes::All },
                 world_from_tooth: lesson_scene.workpiece.world_from_tooth,
                 palette: &lesson_scene.palette,
+                enamel_depth: lesson_scene.enamel_depth(&lesson.scenario.tissues),
                 mode: lesson_scene.render_mode(mode),
             }),
             solids: solids(lesson, lesson_scene, settings, &viewpoint),

@@ -74,6 +74,7 @@ pub fn measure_tooth(tooth: &Volume) -> Result<FrameTimings, String> {
                 changes,
                 world_from_tooth: upright,
                 palette: &palette,
+                enamel_depth: None,
                 mode: mode.clone(),
             }),
             is_antialiased,
@@ -95,6 +96,7 @@ pub fn measure_tooth(tooth: &Volume) -> Result<FrameTimings, String> {
 pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<StereoTimings, String> {
     let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();
     let palette = scene::tissue_palette(&scenario.tissues, true);
+    let enamel_depth = scene::enamel_depth(&workpiece.volume, &scenario.tissues);
     let function = Arc::new(TransferFunction::tissue(&palette));
     let solids: Vec<MeshInstance> = match Mouth::around(workpiece, &scenario.tissues) {
         Some(mouth) => mouth.solids(scene::WORKING_OPENING_DEG),
@@ -109,6 +111,7 @@ pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<St
                 changes,
                 world_from_tooth: workpiece.world_from_tooth,
                 palette: &palette,
+                enamel_depth: Some(&enamel_depth),
                 mode: mode.clone(),
             }),
             solids: solids.clone(),

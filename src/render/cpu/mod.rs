@@ -44,12 +44,12 @@ struct CachedVolume {
 
 impl CachedVolume {
     fn new(tooth: &VolumeInstance) -> CachedVolume {
-        let VolumeInstance { volume, mode, palette, .. } = tooth;
+        let VolumeInstance { volume, mode, .. } = tooth;
         CachedVolume {
             dims: volume.grid().dims,
             empty_space: EmptySpaceMap::new(volume, mode),
             occlusion: OcclusionVolume::new(volume),
-            colours: SurfaceColours::new(volume, palette),
+            colours: SurfaceColours::new(tooth),
             surface: OnceLock::new(),
         }
     }
@@ -60,9 +60,9 @@ impl CachedVolume {
         self.empty_space.update(volume, changed);
         self.occlusion.update(volume, changed);
         if self.colours.has_palette(palette) {
-            self.colours.update(volume, changed);
+            self.colours.update(tooth, changed);
         } else {
-            self.colours = SurfaceColours::new(volume, palette);
+            self.colours = SurfaceColours::new(tooth);
         }
         if !changed.is_empty() {
             self.surface = OnceLock::new();
