@@ -94,7 +94,8 @@ impl LessonScene {
         (built, complaints.iter().flatten().map(Diagnostic::headline).collect())
     }
 
-    /// Thickness of the enamel before the session, where dentine shines through it.
+    /// Thickness of the enamel before the session, where dentine shines through it; measured at the first call. `tissues`: those
+    /// of the exercise.
     pub fn enamel_depth(&self, tissues: &TissueTable) -> Option<&EnamelDepth> {
         let is_seen = self.palette.under_translucent.is_some();
         is_seen.then(|| self.enamel_depth.get_or_init(|| scene::enamel_depth(&self.workpiece.volume, tissues)))

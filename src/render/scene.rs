@@ -53,8 +53,8 @@ pub struct VolumeInstance<'a> {
     pub changes: Changes<'a>,
     pub world_from_tooth: Pose,
     pub palette: &'a LabelPalette,
-    /// Thickness of its enamel before it was worked on. With it, dentine shines through enamel where the palette says what
-    /// colour it has.
+    /// Thickness of its enamel before it was worked on: dentine shines through it if the palette says what colour that has.
+    /// Another one is used only after [`Changes::All`] or with another palette.
     pub enamel_depth: Option<&'a EnamelDepth>,
     pub mode: RenderMode,
 }
@@ -86,7 +86,8 @@ pub struct LabelPalette {
     pub appearances: [Appearance; 256],
     /// True for labels that are drawn as decay, with a soft border.
     pub is_decay: [bool; 256],
-    /// Label of the tissue that shows decay near it as a white spot, and what is under it: enamel.
+    /// Label of the translucent tissue, enamel: decay near its surface is seen as a white spot, and the tissue beneath shines
+    /// through.
     pub translucent: Option<Label>,
     /// Colour that shines through it: that of dentine.
     pub under_translucent: Option<Rgb>,

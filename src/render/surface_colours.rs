@@ -4,7 +4,7 @@
 //! the renderers interpolate. Decay has a soft border: from sound tissue over a white spot (in enamel) and amber to its own
 //! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
 
-use super::enamel_depth::{EnamelDepth, EnamelLayers};
+use super::enamel_depth::EnamelLayers;
 use super::scene::{Appearance, LabelPalette, VolumeInstance};
 use typodont_core::frame::{Vec3, smooth_step};
 use typodont_core::parallel::par_map;
@@ -42,6 +42,7 @@ const MOTTLE: [f32; 2] = [0.55, 0.21];
 #[derive(Clone, Debug)]
 pub struct SurfaceColours {
     palette: LabelPalette,
+    mixer: Mixer,
     /// Voxels along a cell's edge: 1, 2, 4 or 8.
     cell_voxels: u32,
     dims: [u32; 3],
@@ -50,7 +51,7 @@ pub struct SurfaceColours {
 }
 
 /// Matter of a cell, or a weighted sum over cells.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Matter {
     /// Colour and gloss of sound matter, and its amount.
     sound: [f32; 4],
@@ -91,7 +92,8 @@ impl SurfaceColours {
         let cell_voxels = [1, 2, 4, BRICK].into_iter().rfind(|&edge| edge as f32 <= voxels).unwrap_or(1);
         let dims = grid.dims.map(|n| n.div_ceil(cell_voxels));
         let texels = vec![[0; 4]; dims.iter().map(|&n| n as usize).product()];
-        let mut colours = SurfaceColours { palette: palette.clone(), cell_voxels, dims, texels };
+        let mixer = Mixer::new(palette);
+        let mut colours = SurfaceColours { palette: palette.clone(), mixer, cell_voxels, dims, texels };
         let bricks: Vec<usize> = (0..volume.bricks().len()).collect();
         colours.compute(tooth, &bricks);
         colours
@@ -186,10 +188,9 @@ impl SurfaceColours {
             return Vec::new();
         }
         let volume = tooth.volume;
-        let mixer = Mixer::new(&self.palette, tooth.enamel_depth);
         let make = |i: usize| {
             let block = self.block(volume, bricks[i]);
-            self.is_near_surface(volume, block).then(|| self.colours_of(volume, &mixer, block))
+            self.is_near_surface(volume, block).then(|| self.colours_of(tooth, block))
         };
         let made =
             if bricks.len() < MANY { (0..bricks.len()).map(make).collect() } else { par_map(bricks.len(), make) };
@@ -231,8 +232,9 @@ impl SurfaceColours {
     }
 
     /// Colours of a block of cells, x fastest.
-    fn colours_of(&self, volume: &Volume, mixer: &Mixer, (first, size): ([u32; 3], [u32; 3])) -> Vec<[u8; 4]> {
-        let window = self.window(volume, mixer, first);
+    fn colours_of(&self, tooth: &VolumeInstance, (first, size): ([u32; 3], [u32; 3])) -> Vec<[u8; 4]> {
+        let (volume, mixer) = (tooth.volume, &self.mixer);
+        let window = self.window(volume, first);
         let size = size.map(|n| n as usize);
         let count: usize = size.iter().product();
         let cell_at = |i: usize| -> Vec3 {
@@ -242,21 +244,23 @@ impl SurfaceColours {
         let grid = volume.grid();
         let edge = self.cell_voxels as f32;
         let in_tooth = |cell: Vec3| grid.origin + (cell * edge + 0.5 * (edge - 1.0)) * grid.spacing;
+        let enamel = mixer.enamel.as_ref().zip(tooth.enamel_depth);
         if let Some(Label(sole)) = window.sole_label.filter(|_| !window.has_decay) {
             let matter = &mixer.matter[usize::from(sole)];
-            return match mixer.enamel.as_ref().filter(|_| matter.enamel > 0.0) {
+            return match enamel.filter(|_| matter.enamel > 0.0) {
                 None => vec![texel(matter.sound, 1.0); count],
-                Some(enamel) => {
-                    (0..count).map(|i| texel(enamel.seen_through(matter, in_tooth(cell_at(i))).sound, 1.0)).collect()
+                Some((enamel, depth)) => {
+                    let seen = |i: usize| enamel.seen_through(matter, depth.at(in_tooth(cell_at(i))));
+                    (0..count).map(|i| texel(seen(i).sound, 1.0)).collect()
                 }
             };
         }
         let mut narrow = blurred(&window.cells, size, &NARROW);
         let mut wide = window.has_decay.then(|| blurred(&window.cells, size, &WIDE));
-        if let Some(enamel) = &mixer.enamel {
+        if let Some((enamel, depth)) = enamel {
             let all = narrow.iter_mut().enumerate().chain(wide.iter_mut().flatten().enumerate());
             for (i, matter) in all.filter(|(_, matter)| matter.enamel > 0.0) {
-                *matter = enamel.seen_through(matter, in_tooth(cell_at(i)));
+                *matter = enamel.seen_through(matter, depth.at(in_tooth(cell_at(i))));
             }
         }
         let mut texels = Vec::with_capacity(count);
@@ -272,7 +276,8 @@ impl SurfaceColours {
     }
 
     /// Matter of a block of cells and of its surroundings.
-    fn window(&self, volume: &Volume, mixer: &Mixer, first: [u32; 3]) -> Window {
+    fn window(&self, volume: &Volume, first: [u32; 3]) -> Window {
+        let mixer = &self.mixer;
         let mut cells = vec![Matter::default(); WINDOW * WINDOW * WINDOW];
         let (mut has_decay, mut first_label, mut is_sole) = (false, Label::AIR, true);
         let grid = volume.grid();
@@ -314,25 +319,27 @@ struct Window {
 }
 
 /// Matter of one full voxel of each label.
-struct Mixer<'a> {
+#[derive(Clone, Debug)]
+struct Mixer {
     matter: Vec<Matter>,
-    enamel: Option<TranslucentEnamel<'a>>,
+    /// `None` if nothing shines through enamel.
+    enamel: Option<TranslucentEnamel>,
     /// The first label that looks like each label: where decay is hidden, sums must not differ in the last bit either.
     alike: Vec<Label>,
 }
 
 /// Enamel through which dentine shines.
-struct TranslucentEnamel<'a> {
-    /// Colour without dentine.
+#[derive(Clone, Debug)]
+struct TranslucentEnamel {
+    /// Its colour in the palette.
     own: [f32; 3],
     layers: EnamelLayers,
-    depth: &'a EnamelDepth,
 }
 
-impl TranslucentEnamel<'_> {
-    /// The same matter, with the colour that its enamel has at a place in tooth space.
-    fn seen_through(&self, matter: &Matter, place: Vec3) -> Matter {
-        let seen = self.layers.at(self.depth.at(place));
+impl TranslucentEnamel {
+    /// The same matter, with the colour that its enamel has at a thickness, mm.
+    fn seen_through(&self, matter: &Matter, thickness: f32) -> Matter {
+        let seen = self.layers.at(thickness);
         let mut matter = *matter;
         for ((sum, seen), own) in matter.sound.iter_mut().zip(seen).zip(self.own) {
             *sum += matter.enamel * (seen - own);
@@ -341,8 +348,8 @@ impl TranslucentEnamel<'_> {
     }
 }
 
-impl<'a> Mixer<'a> {
-    fn new(palette: &LabelPalette, depth: Option<&'a EnamelDepth>) -> Mixer<'a> {
+impl Mixer {
+    fn new(palette: &LabelPalette) -> Mixer {
         let look = |label: u8| {
             let index = usize::from(label);
             (palette.appearances[index], palette.is_decay[index])
@@ -363,9 +370,9 @@ impl<'a> Mixer<'a> {
                 },
             }
         };
-        let enamel = depth.zip(palette.translucent).zip(palette.under_translucent).map(|((depth, label), under)| {
+        let enamel = palette.translucent.zip(palette.under_translucent).map(|(label, under)| {
             let own = palette.appearance(label).colour;
-            TranslucentEnamel { own, layers: EnamelLayers::new(own, under), depth }
+            TranslucentEnamel { own, layers: EnamelLayers::new(own, under) }
         });
         Mixer {
             matter: (0..=u8::MAX).map(matter).collect(),
@@ -472,6 +479,7 @@ fn lattice_value([x, y, z]: [u32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::enamel_depth::EnamelDepth;
     use crate::scene::{Changes, RenderMode};
     use typodont_core::frame::{Pose, Vec3};
     use typodont_core::volume::{Grid, Voxel};
@@ -560,9 +568,14 @@ mod tests {
         assert!(blue.windows(2).all(|pair| pair[1] > pair[0] - 0.005 && pair[1] < pair[0] + 0.05), "{blue:?}");
         assert!(blue[0] < 0.51 && blue[49] > 0.82, "{blue:?}");
         // Without the depth, or where the palette hides what is under enamel, all enamel has one colour.
+        let without_depth =
+            SurfaceColours::new(&VolumeInstance { enamel_depth: None, ..tooth(&volume, &palette, &depth) });
         palette.under_translucent = None;
-        let plain = SurfaceColours::new(&tooth(&volume, &palette, &depth));
-        assert!((plain.at(grid.from_tooth(Vec3::new(1.5, 0.0, 1.0))).colour[2] - 0.9).abs() < 0.005);
+        let hidden = SurfaceColours::new(&tooth(&volume, &palette, &depth));
+        assert!(colours.has_palette(&palette) != hidden.has_palette(&palette));
+        for plain in [without_depth, hidden] {
+            assert!((plain.at(grid.from_tooth(Vec3::new(1.5, 0.0, 1.0))).colour[2] - 0.9).abs() < 0.005);
+        }
     }
 
     #[test]

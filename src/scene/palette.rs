@@ -9,7 +9,7 @@ pub(super) const GLOSS: f32 = 0.2;
 const DULL: f32 = 0.1;
 
 /// Colour of each tissue. Unless the exercise shows decay, it has the colour of enamel and cannot be seen; dentine does not
-/// shine through enamel then, because it would not where it is decayed.
+/// shine through enamel then, because its absence above decayed dentine would give the decay away.
 pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalette {
     let enamel = tissues.by_name("enamel");
     let entry =
@@ -29,7 +29,8 @@ pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalet
     }
 }
 
-/// Thickness of the enamel of a tooth that nobody has worked on yet, over its sound dentine and pulp.
+/// Thickness of the enamel of a tooth that nobody has worked on yet, over its sound dentine and pulp. Decay does not count as
+/// dentine: what is decayed is drawn as decay, and its part in enamel would make the enamel around it look thin.
 pub fn enamel_depth(volume: &Volume, tissues: &TissueTable) -> EnamelDepth {
     let under = ["dentine", "pulp"].map(|name| tissues.by_name(name).map(|entry| entry.label()));
     EnamelDepth::of(volume, |label| under.contains(&Some(label)))

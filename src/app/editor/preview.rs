@@ -5,7 +5,7 @@ use std::sync::Arc;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::TissueRole;
-use typodont_render::{EnamelDepth, LabelPalette, MeshInstance, Orbit, RenderMode, TransferFunction};
+use typodont_render::{LabelPalette, MeshInstance, Orbit, RenderMode, TransferFunction};
 use typodont_scene as scene;
 
 /// The way in which the tooth is shown.
@@ -36,8 +36,6 @@ pub struct PreviewState {
     /// Number of builds taken over so far.
     pub generation: u64,
     pub palette: LabelPalette,
-    /// Thickness of the enamel, once a tooth is shown.
-    pub enamel_depth: Option<EnamelDepth>,
     pub surroundings: Vec<MeshInstance>,
     glass: Arc<TransferFunction>,
     decay: Arc<TransferFunction>,
@@ -57,7 +55,6 @@ impl Default for PreviewState {
             glass: Arc::new(TransferFunction::tissue(&palette)),
             decay: Arc::new(TransferFunction::highlighting(&[], &palette)),
             palette,
-            enamel_depth: None,
             surroundings: Vec::new(),
             teeth: Vec::new(),
         }
@@ -69,7 +66,6 @@ impl PreviewState {
     pub fn update(&mut self, build: &BuildResult) {
         let tissues = &build.scenario.tissues;
         self.palette = scene::tissue_palette(tissues, true);
-        self.enamel_depth = Some(scene::enamel_depth(&build.workpiece.volume, tissues));
         let decay: Vec<Label> =
             tissues.entries().iter().filter(|e| e.role == TissueRole::Decay).map(|e| e.label()).collect();
         self.glass = Arc::new(TransferFunction::tissue(&self.palette));

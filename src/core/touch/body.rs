@@ -234,7 +234,12 @@ impl Body {
     /// Straight part of the side of the cutting part, if it is a body of revolution that has one.
     pub(super) fn straight_side(&self) -> Option<StraightSide> {
         match &self.head {
-            HeadGeometry::Revolved { profile, .. } => profile.straight_side(),
+            HeadGeometry::Revolved { profile, .. } => {
+                let side = profile.straight_side()?;
+                // The table mixes what is on both sides of a border within one step.
+                let z = [side.z[0] + TABLE_STEP, side.z[1] - TABLE_STEP];
+                (z[0] < z[1]).then_some(StraightSide { z, ..side })
+            }
             HeadGeometry::Sampled(_) => None,
         }
     }

@@ -66,6 +66,10 @@ const INTERLEAVE: u32 = 3;
 /// examines 18 000 in a tick and changes 7 000, a third of its increment, so that only larger bites take more ticks.
 const EXAMINED_MAX: usize = 1 << 15;
 
+/// Voxels of a whole bite up to which its trailing side is left out, as a multiple of [`EXAMINED_MAX`]: so few that none of its
+/// phases is spread.
+const SHORTENED_MAX: f32 = 2.5;
+
 /// Greatest number of voxels examined, and so of edits, in one tick: a row that has been begun is finished. No row of
 /// voxels within a bur is longer than [`EXAMINED_MAX`].
 const EDITS_MAX: usize = 2 * EXAMINED_MAX;
@@ -288,14 +292,10 @@ impl Carver {
     ) -> Option<u32> {
         let (grid, band) = (*volume.grid(), volume.half_band());
         let cylinder = SweptCylinder::of(body, increment, increment.run_out + band);
-        let trailing = TrailingSide::of(body, increment);
-        let handle_from_tooth = glam::Mat3::from_quat(increment.orientation.conjugate());
-        let frame = HandleFrame {
-            handle_from_tooth,
-            along: handle_from_tooth.x_axis * grid.spacing.x,
-            back: handle_from_tooth * increment.feed,
-            far: increment.feed.length(),
-        };
+        // A bite that is spread over more ticks is spread as if all of it were compared.
+        let is_spread = cylinder.volume() / grid.voxel_mm3() as f32 > SHORTENED_MAX * EXAMINED_MAX as f32;
+        let trailing = TrailingSide::of(body, increment, &self.advance).filter(|_| !is_spread);
+        let placed = PlacedIncrement::new(increment, grid.spacing.x);
         let Aabb { low, high } = cylinder.extent();
         let [xs, ys, zs] = grid.cells_within(low, high);
         if xs.is_empty() {
@@ -303,20 +303,20 @@ impl Carver {
         }
         let to_steps = grid.spacing.x.recip();
         let row_length = grid.spacing.x * xs.len() as f32;
-        let bricks = [xs.start, xs.end - 1].map(|x| x / BRICK);
-        let mut known = None;
+        let bricks = xs.start / BRICK..=(xs.end - 1) / BRICK;
+        let (mut last_brick_row, mut is_empty) = (None, true);
         for (row, [y, z]) in progress.rows_left(ys, zs) {
             if self.examined >= EXAMINED_MAX {
                 return Some(row);
             }
             let first = grid.centre([xs.start, y, z]);
             // Rows beside each other are mostly of the same bricks.
-            let row_of_bricks = [y / BRICK, z / BRICK];
-            let is_empty = match known {
-                Some((same, is_empty)) if same == row_of_bricks => is_empty,
-                _ => !(bricks[0]..=bricks[1]).any(|x| volume.bricks().is_occupied([x, y / BRICK, z / BRICK])),
-            };
-            known = Some((row_of_bricks, is_empty));
+            let brick_row = [y / BRICK, z / BRICK];
+            if last_brick_row != Some(brick_row) {
+                last_brick_row = Some(brick_row);
+                let [brick_y, brick_z] = brick_row;
+                is_empty = !bricks.clone().any(|brick_x| volume.bricks().is_occupied([brick_x, brick_y, brick_z]));
+            }
             if is_empty {
                 continue;
             }
@@ -328,7 +328,7 @@ impl Carver {
             let Some([low, high]) = without(within, trailing) else { continue };
             let step_at = |x: f32| (x * to_steps).clamp(0.0, xs.len() as f32) as u32;
             let steps = step_at(low)..(step_at(high) + 1).min(xs.len() as u32);
-            self.carve_body_row(volume, body, (increment, &frame), [xs.start, y, z], steps);
+            self.carve_body_row(volume, body, &placed, [xs.start, y, z], steps);
         }
         None
     }
@@ -338,7 +338,7 @@ impl Carver {
         &mut self,
         volume: &mut Volume,
         body: &Body,
-        (increment, frame): (&CutIncrement, &HandleFrame),
+        placed: &PlacedIncrement,
         row: [u32; 3],
         steps: Range<u32>,
     ) {
@@ -350,12 +350,11 @@ impl Carver {
         self.examined += steps.len();
         let [x, y, z] = row;
         let (grid, band) = (*volume.grid(), volume.half_band());
-        let HandleFrame { handle_from_tooth, along, back, far } = *frame;
+        let PlacedIncrement { increment, handle_from_tooth, along, feed, feed_length } = *placed;
         let first = handle_from_tooth * (grid.centre(row) - increment.tip - increment.feed);
-        // Distance, by density, from which the tool certainly leaves what there is: a step of density more than exact, for
-        // rounding.
-        let rise = 2.0 * band / f32::from(u8::MAX);
-        let base = increment.run_out - band + rise;
+        // Distance, by density, beyond which the tool certainly removes nothing: a step of density more than exact, for rounding.
+        let per_density = 2.0 * band / f32::from(u8::MAX);
+        let of_empty = increment.run_out - band + per_density;
         let (mut label, mut share) = (Label::AIR, 0.0);
         for step in steps {
             let before = volume.voxel(start + step as usize);
@@ -370,16 +369,16 @@ impl Carver {
                 continue;
             }
             let here = first + along * step as f32;
-            let distance = body.head_distance(here + back * (1.0 - share));
-            if distance > base + rise * f32::from(before.density.bits()) {
+            let distance = body.head_distance(here + feed * (1.0 - share));
+            if distance > of_empty + per_density * f32::from(before.density.bits()) {
                 continue;
             }
             let remaining = density_at_distance(increment.run_out - distance, band);
             if remaining >= before.density || self.edits.len() >= EDITS_MAX {
                 continue;
             }
-            let clearance_gain = body.head_distance(here + back) - distance;
-            if clearance_gain > MIN_FACING_COSINE * far * share {
+            let clearance_gain = body.head_distance(here + feed) - distance;
+            if clearance_gain > MIN_FACING_COSINE * feed_length * share {
                 self.edits.push(volume.set_cell([x + step, y, z], Voxel { density: remaining, ..before }));
             }
         }
@@ -470,15 +469,30 @@ struct CutIncrement {
     orientation: Quat,
 }
 
-/// An increment in handle space.
-struct HandleFrame {
+/// An increment with what every row needs of it, in handle space.
+struct PlacedIncrement<'a> {
+    increment: &'a CutIncrement,
     handle_from_tooth: glam::Mat3,
     /// From a voxel to the next one of its row, mm.
     along: Vec3,
-    /// The feed. In a harder tissue the bur advances less: it is set back along the feed in proportion to the missing advance.
-    back: Vec3,
-    /// Length of the feed, mm.
-    far: f32,
+    /// Added to a place relative to the advanced tool, it gives the place relative to the tool before. In a harder tissue the
+    /// bur advances less: it is set back along the feed in proportion to the missing advance.
+    feed: Vec3,
+    /// mm
+    feed_length: f32,
+}
+
+impl PlacedIncrement<'_> {
+    fn new(increment: &CutIncrement, spacing: f32) -> PlacedIncrement<'_> {
+        let handle_from_tooth = glam::Mat3::from_quat(increment.orientation.conjugate());
+        PlacedIncrement {
+            increment,
+            handle_from_tooth,
+            along: handle_from_tooth.x_axis * spacing,
+            feed: handle_from_tooth * increment.feed,
+            feed_length: increment.feed.length(),
+        }
+    }
 }
 
 /// Part of an increment that is done: whole phases, and rows of the next one.
@@ -514,6 +528,9 @@ struct TrailingSide {
     along_rise: Rise,
 }
 
+/// Feed into a tissue, mm, below which the rounding of distances may make a place beside the tool count as one before it.
+const CLEAR_FEED: f32 = 1e-4;
+
 /// Distance by which the trailing side is taken smaller than it is, mm: more than rounding.
 const TRAILING_MARGIN: f32 = 1e-4;
 
@@ -521,12 +538,17 @@ impl TrailingSide {
     /// A trailing side that a row does not meet.
     const NOWHERE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
-    fn of(body: &Body, increment: &CutIncrement) -> Option<TrailingSide> {
+    /// `advance`: into each tissue, mm, by label. `None` if there is no such side, or the feed is too small to tell.
+    fn of(body: &Body, increment: &CutIncrement, advance: &[f32; 256]) -> Option<TrailingSide> {
         let side = body.straight_side()?;
         let axis = increment.orientation * Vec3::Z;
-        let (far, climb) = (increment.feed.length(), increment.feed.dot(axis));
+        let (feed_length, climb) = (increment.feed.length(), increment.feed.dot(axis));
+        let least = advance.iter().copied().filter(|&advance| advance > 0.0).fold(increment.deepest, f32::min);
+        if feed_length * least < CLEAR_FEED * increment.deepest {
+            return None;
+        }
         // A leaning side also cuts by its feed along the axis.
-        if side.sine * climb > 0.5 * MIN_FACING_COSINE * far {
+        if side.sine * climb > 0.5 * MIN_FACING_COSINE * feed_length {
             return None;
         }
         let ahead = (increment.feed - axis * climb).try_normalize()?;
@@ -619,6 +641,11 @@ impl SweptCylinder {
         }
     }
 
+    /// mm³
+    fn volume(&self) -> f32 {
+        2.0 * std::f32::consts::PI * self.radius * self.radius * self.half_length
+    }
+
     /// Bounding box.
     fn extent(&self) -> Aabb {
         let aside = |along: f32| self.half_length * along.abs() + self.radius * (1.0 - along * along).max(0.0).sqrt();
@@ -708,17 +735,21 @@ mod tests {
             let mut direction = || Vec3::new(random(), random(), random()).normalize_or(Vec3::X);
             // Upright, along x or in any direction.
             let axis = [Vec3::Z, Vec3::X, direction()][round % 3];
-            let (feed, tip) = (direction() * 0.06, direction());
+            let tip = direction();
+            let feed = direction() * 0.06 * [1.0, 0.1, 0.01, 1e-3, 1e-4, 1e-5][round / 15 % 6];
             let orientation = Quat::from_rotation_arc(Vec3::Z, axis);
-            let increment = CutIncrement { tip, feed, deepest: 0.06, run_out: RUN_OUT, radius: 0.0, orientation };
-            let Some(trailing) = TrailingSide::of(&body, &increment) else { continue };
+            let deepest = feed.length();
+            let increment = CutIncrement { tip, feed, deepest, run_out: RUN_OUT, radius: 0.0, orientation };
+            let mut advance = [0.0; 256];
+            (advance[1], advance[2]) = (deepest, 0.25 * deepest);
+            let Some(trailing) = TrailingSide::of(&body, &increment, &advance) else { continue };
             let from = tip + axis * (2.0 + 2.2 * random()) + Vec3::new(-4.0, 0.7 * random(), 0.7 * random());
             let [low, high] = trailing.along_row(from);
             for step in 0..80 {
                 let x = step as f32 * 0.1;
                 let at = from + Vec3::X * x;
                 let distance = |advance: f32| body.head_distance(orientation.conjugate() * (at - tip - feed * advance));
-                let gain = |share: f32| distance(0.0) - distance(share) - MIN_FACING_COSINE * 0.06 * share;
+                let gain = |share: f32| distance(0.0) - distance(share) - MIN_FACING_COSINE * deepest * share;
                 let is_cut = [0.25, 1.0].into_iter().any(|share| gain(share) > 0.0);
                 if low < x && x < high && distance(0.0) < 0.45 {
                     assert!(!is_cut, "{profile:?} {increment:?} {at}: {} {}", gain(0.25), gain(1.0));
@@ -729,6 +760,92 @@ mod tests {
             }
         }
         assert!(left_out > 5000 && cut > 5000, "{left_out} left out, {cut} cut");
+    }
+
+    /// Removes in one phase what a body's increment reaches, voxel by voxel, without any shortcut.
+    fn carved_plainly(
+        volume: &mut Volume,
+        body: &Body,
+        carver: &Carver,
+        increment: &CutIncrement,
+        phase: u32,
+    ) -> Vec<Edit> {
+        let (grid, band) = (*volume.grid(), volume.half_band());
+        let placed = PlacedIncrement::new(increment, grid.spacing.x);
+        let mut edits = Vec::new();
+        for cell in grid.cells().filter(|[_, y, z]| (y + z) % INTERLEAVE == phase) {
+            let before = volume.voxel(grid.index(cell));
+            let share = carver.advance[usize::from(before.label.0)] / increment.deepest;
+            if before.density == Density::EMPTY || share <= 0.0 {
+                continue;
+            }
+            // As the carver counts along a row, so that roundings are the same: from the first cell within reach.
+            let cylinder = SweptCylinder::of(body, increment, increment.run_out + band);
+            let [xs, ys, zs] = grid.cells_within(cylinder.extent().low, cylinder.extent().high);
+            if !(xs.contains(&cell[0]) && ys.contains(&cell[1]) && zs.contains(&cell[2])) {
+                continue;
+            }
+            let row = grid.centre([xs.start, cell[1], cell[2]]);
+            let first = placed.handle_from_tooth * (row - increment.tip - increment.feed);
+            let here = first + placed.along * (cell[0] - xs.start) as f32;
+            let distance = body.head_distance(here + placed.feed * (1.0 - share));
+            let remaining = density_at_distance(increment.run_out - distance, band);
+            let gain = body.head_distance(here + placed.feed) - distance;
+            if remaining < before.density && gain > MIN_FACING_COSINE * placed.feed_length * share {
+                edits.push(volume.set_cell(cell, Voxel { density: remaining, ..before }));
+            }
+        }
+        edits
+    }
+
+    #[test]
+    fn shortcuts_change_no_voxel() {
+        // Aim: recordings replay bit by bit. Method: burs in random poses and with feeds of any length in matter of two tissues
+        // that they have partly removed; each phase gives the very edits of a loop over all voxels.
+        let mut state = 11u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
+        };
+        let profiles = [
+            Profile::frustum(0.5, 0.5, 2.4, [EDGE_RADIUS; 2]),
+            Profile::frustum(0.3, 0.4, 2.2, [EDGE_RADIUS; 2]),
+            Profile::round_ended(0.4, 0.5, 2.4),
+            Profile::flame(0.5, 2.4, 0.1),
+        ];
+        let mut edited = 0;
+        for round in 0..240 {
+            let spacing = [Vec3::splat(0.09), Vec3::splat(0.13), Vec3::new(0.1, 0.08, 0.15)][round % 3];
+            let dims = std::array::from_fn(|a| (3.6 / spacing[a]) as u32);
+            let label = |p: Vec3| if p.x + p.y > 0.0 { Label(1) } else { Label(2) };
+            let top = 0.8 * random();
+            let band = 1.5 * spacing.max_element();
+            let grid = Grid::centred(dims, spacing);
+            let mut volume = Volume::from_distance(grid, band, |p| (p.z - top, label(p)));
+            let body = Body::revolved(profiles[round % 4].clone(), None);
+            let mut vector = || Vec3::new(random(), random(), random());
+            let axis = if round % 2 == 0 { Vec3::Z } else { vector().normalize_or(Vec3::Z) };
+            let orientation = Quat::from_rotation_arc(Vec3::Z, axis);
+            let tip = vector() - axis;
+            let law = CuttingLaw::Threshold;
+            let mut carver = Carver::new(CarvingParameters { dwell: 1.0, dwell_share: 1.0, max_feed: 20.0, law });
+            // The first increment clears the place where the bur is.
+            for length in [0.06, 0.06 * [1.0, 0.1, 1e-2, 1e-4, 1e-6][round % 5]] {
+                let feed = vector().normalize_or(Vec3::X) * length;
+                (carver.advance[1], carver.advance[2]) = (length, [1.0, 0.3, 0.0][round / 4 % 3] * length);
+                let increment = CutIncrement { tip, feed, deepest: length, run_out: RUN_OUT, radius: 0.0, orientation };
+                for phase in 0..INTERLEAVE {
+                    let mut plain = volume.clone();
+                    let expected = carved_plainly(&mut plain, &body, &carver, &increment, phase);
+                    carver.edits.clear();
+                    carver.examined = 0;
+                    assert_eq!(carver.carve_body(&mut volume, &body, &increment, CutProgress { phase, rows: 0 }), None);
+                    assert_eq!(carver.edits, expected, "round {round}, feed {feed}");
+                    edited += expected.len();
+                }
+            }
+        }
+        assert!(edited > 20_000, "{edited}");
     }
 
     #[test]

@@ -32,8 +32,8 @@ pub struct NearestProfilePoint {
     pub normal: ProfilePoint,
 }
 
-/// Longest straight piece of a side, and the heights at which it is nearer than all other pieces, however deep inside: there
-/// the distance is linear in r and z.
+/// Longest straight piece of a side, by the heights at which it is the nearest piece to all points inside and to those up to
+/// [`SIDE_MARGIN`] outside: there the distance is linear in r and z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StraightSide {
     /// Lowest and highest z, mm.
