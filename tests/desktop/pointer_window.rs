@@ -13,10 +13,13 @@ use typodont_app::AppOptions;
 struct Task {
     exercise: &'static str,
     points: f64,
+    /// True if a warning is passed over while the section shows caries at the bur, as a fissure is opened through sound enamel,
+    /// and the bur is lifted where it shows the pulp under the bur.
+    looks_at_section: bool,
 }
 
-const GRINDING: Task = Task { exercise: "5-grinding", points: 80.0 };
-const FISSURE: Task = Task { exercise: "8-fissure", points: 70.0 };
+const GRINDING: Task = Task { exercise: "5-grinding", points: 80.0, looks_at_section: false };
+const FISSURE: Task = Task { exercise: "8-fissure", points: 70.0, looks_at_section: true };
 
 /// Spacing of the pixels that are looked at, in each direction.
 const STRIDE: usize = 4;
@@ -38,6 +41,16 @@ const WARNING_PIXELS: usize = 30;
 
 /// Width and height of the lower right corner of the view with the section, which shows caries, too; pixels.
 const SECTION: [usize; 2] = [215, 260];
+
+/// The part of the section in which a millimetre of tissue is seen beside and under the bur: its left, top, right and bottom, by
+/// the distance from the lower right corner of the view, pixels.
+const AROUND_BUR: [usize; 4] = [127, 143, 87, 118];
+
+/// The part in which a millimetre of tissue is seen under the bur, in the same way.
+const UNDER_BUR: [usize; 4] = [117, 133, 97, 108];
+
+/// Time after which the trainee finishes, which leaves a minute of the ten.
+const TIME: Duration = Duration::from_secs(540);
 
 /// Views in turn, as chosen from the list, and presses of the key that turns to the right from there; negative to the left.
 const VIEWS: [(&str, i32); 5] =
@@ -66,6 +79,10 @@ struct Seen {
     is_brown: Vec<bool>,
     /// True while a warning stands below the view.
     is_warned: bool,
+    /// True if the section shows caries beside or under the bur.
+    is_brown_near_bur: bool,
+    /// True if it shows the pulp under the bur.
+    is_pulp_under_bur: bool,
 }
 
 impl Seen {
@@ -91,7 +108,7 @@ fn is_brown(red: u8, green: u8, blue: u8) -> bool {
     red > 55.0 && red < 200.0 && red > 1.28 * green && green > 1.22 * blue
 }
 
-/// True for the colour of warnings.
+/// True for the colour of warnings, and of the pulp in the section.
 fn is_red(red: u8, green: u8, blue: u8) -> bool {
     red > 120 && green < 90 && blue < 90
 }
@@ -102,6 +119,8 @@ struct Trial {
     /// Part of the screen that is looked at: left, top, right and bottom, pixels.
     view: [usize; 4],
     is_touching: bool,
+    looks_at_section: bool,
+    begun: Instant,
 }
 
 impl Trial {
@@ -118,7 +137,14 @@ impl Trial {
         };
         let below = (bottom..SCREEN_SIZE[1] as usize).flat_map(|y| (left..right).map(move |x| pixel(x, y)));
         let is_warned = below.filter(|seen| is_red(seen[0], seen[1], seen[2])).count() > WARNING_PIXELS;
-        Seen { columns, rows, is_brown: (0..columns * rows).map(is_brown_at).collect(), is_warned }
+        let shows = |[left_by, top_by, right_by, bottom_by]: [usize; 4], is_sought: fn(u8, u8, u8) -> bool| {
+            (bottom - top_by..bottom - bottom_by)
+                .flat_map(|y| (right - left_by..right - right_by).map(move |x| pixel(x, y)))
+                .any(|seen| is_sought(seen[0], seen[1], seen[2]))
+        };
+        let (is_brown_near_bur, is_pulp_under_bur) = (shows(AROUND_BUR, is_brown), shows(UNDER_BUR, is_red));
+        let is_brown = (0..columns * rows).map(is_brown_at).collect();
+        Seen { columns, rows, is_brown, is_warned, is_brown_near_bur, is_pulp_under_bur }
     }
 
     fn place(&self, [x, y]: Spot) -> [i32; 2] {
@@ -153,7 +179,7 @@ impl Trial {
     }
 
     fn is_over(&self) -> bool {
-        self.desk.latest("screen").as_deref() != Some("practice")
+        self.begun.elapsed() > TIME || self.desk.latest("screen").as_deref() != Some("practice")
     }
 
     /// Presses on what is brown in this view until nothing is, or all that is stays brown. Returns the number of spots that
@@ -174,7 +200,11 @@ impl Trial {
                 if brown < least {
                     (least, since) = (brown, Instant::now());
                 }
-                if brown == 0 || seen.is_warned {
+                let is_enough = match self.looks_at_section {
+                    true => seen.is_pulp_under_bur || seen.is_warned && !seen.is_brown_near_bur,
+                    false => seen.is_warned,
+                };
+                if brown == 0 || is_enough {
                     break;
                 }
             }
@@ -190,7 +220,7 @@ impl Trial {
 
     fn show(&mut self, (view, turns): (&str, i32)) {
         self.desk.choose_from("View", view);
-        let key = if turns < 0 { "ArrowLeft" } else { "ArrowRight" };
+        let key = if turns < 0 { "ctrl+ArrowLeft" } else { "ctrl+ArrowRight" };
         for _ in 0..turns.abs() {
             self.desk.send_key(key);
         }
@@ -223,7 +253,8 @@ struct Outcome {
 }
 
 /// Performs the exercise by looking at the window; `None` where nothing can draw it.
-fn perform(exercise: &str, seed: u64, pointer: Pointer) -> Option<Outcome> {
+fn perform(task: &Task, seed: u64, pointer: Pointer) -> Option<Outcome> {
+    let Task { exercise, looks_at_section, .. } = *task;
     let place = folder(&format!("pointer_window_{exercise}_{pointer:?}_{seed}"));
     harness::keep_settings(&place, r#"{ "language": "en", "introduction_first": false }"#);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{exercise}.json"));
@@ -234,11 +265,10 @@ fn perform(exercise: &str, seed: u64, pointer: Pointer) -> Option<Outcome> {
     desk.until("hand", |_| true);
     desk.press("o", "pointer", "held");
     let view = desk.view_of("The tooth");
-    let mut trial = Trial { desk, pointer, view, is_touching: false };
-    let begun = Instant::now();
+    let mut trial = Trial { desk, pointer, view, is_touching: false, looks_at_section, begun: Instant::now() };
     trial.work();
+    let Trial { mut desk, begun, .. } = trial;
     let seconds = begun.elapsed().as_secs();
-    let Trial { mut desk, .. } = trial;
     desk.picture(&format!("pointer-{exercise}-{pointer:?}-{seed}"));
     if desk.latest("screen").as_deref() == Some("practice") {
         desk.press("ctrl+Return", "asked", "finish");
@@ -253,12 +283,13 @@ fn perform(exercise: &str, seed: u64, pointer: Pointer) -> Option<Outcome> {
 /// Asserts that a pointer passes with every seed, and with nine of ten (with all of fewer than ten) reaches the points.
 ///
 /// Four seeds place the caries in the four quarters of the tooth; TYPODONT_SEEDS for more.
-fn assert_removes_caries(Task { exercise, points }: Task, pointer: Pointer) {
+fn assert_removes_caries(task: Task, pointer: Pointer) {
+    let Task { exercise, points, .. } = task;
     let _alone = TRIAL.lock();
     let seeds: u64 = std::env::var("TYPODONT_SEEDS").map_or(4, |seeds| seeds.parse().unwrap());
     let mut all = Vec::new();
     for seed in 1..=seeds {
-        let Some(outcome) = perform(exercise, seed, pointer) else { return };
+        let Some(outcome) = perform(&task, seed, pointer) else { return };
         all.push(outcome);
     }
     let enough = all.iter().filter(|outcome| outcome.points >= points).count();
