@@ -713,15 +713,20 @@ mod tests {
         }
     }
 
+    /// Numbers from −1 to 1, always the same.
+    fn random_numbers(seed: u32) -> impl FnMut() -> f32 {
+        let mut state = seed;
+        move || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
+        }
+    }
+
     #[test]
     fn nothing_is_cut_on_the_trailing_side() {
         // Aim: what is left out would not have been cut. Method: rows beside burs that are fed in random directions; every
         // point of a row that is on the trailing side comes no nearer to the bur, whatever part of the feed its tissue allows.
-        let mut state = 7u32;
-        let mut random = || {
-            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
-            (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
-        };
+        let mut random = random_numbers(7);
         let profiles = [
             Profile::frustum(0.5, 0.5, 4.0, [EDGE_RADIUS; 2]),
             Profile::frustum(0.3, 0.45, 4.2, [EDGE_RADIUS; 2]),
@@ -802,11 +807,7 @@ mod tests {
     fn shortcuts_change_no_voxel() {
         // Aim: recordings replay bit by bit. Method: burs in random poses and with feeds of any length in matter of two tissues
         // that they have partly removed; each phase gives the very edits of a loop over all voxels.
-        let mut state = 11u32;
-        let mut random = || {
-            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
-            (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
-        };
+        let mut random = random_numbers(11);
         let profiles = [
             Profile::frustum(0.5, 0.5, 2.4, [EDGE_RADIUS; 2]),
             Profile::frustum(0.3, 0.4, 2.2, [EDGE_RADIUS; 2]),
