@@ -70,6 +70,19 @@ fn refined(start: vec3f, along: vec3f, before: f32, density_before: f32, z: f32,
     return middle;
 }
 
+// The depth alone, for shadows.
+@fragment
+fn iso_depth_fragment(@builtin(position) pixel: vec4f) -> @builtin(frag_depth) f32 {
+    let way = ray(pixel.xy);
+    let start = (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
+    let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
+    let z = first_hit(start, along);
+    if z < 0.0 {
+        discard;
+    }
+    return buffer_depth(z);
+}
+
 @fragment
 fn iso_fragment(@builtin(position) pixel: vec4f) -> Seen {
     let way = ray(pixel.xy);

@@ -8,6 +8,18 @@ struct Lamp {
     colour: vec4f,
 }
 
+// The eye in the chair lamp's place.
+struct Shadow {
+    // w: near.
+    position: vec4f,
+    // w: far.
+    right: vec4f,
+    // w: radius of the lamp's luminous area.
+    up: vec4f,
+    // w: half of the map's width at a depth of 1 mm; 0 where nothing casts shadows.
+    ahead: vec4f,
+}
+
 struct View {
     clip_from_world: mat4x4f,
     // w: near.
@@ -25,9 +37,15 @@ struct View {
     // x: ambient light.
     ambient: vec4f,
     lamps: array<Lamp, 2>,
+    shadow: Shadow,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
+// Depths that the lamp sees: to be compared, and to be read.
+@group(0) @binding(1) var shadow_map: texture_depth_2d;
+@group(0) @binding(2) var shadow_sampler: sampler_comparison;
+@group(0) @binding(3) var shadow_depths: texture_2d<f32>;
+@group(0) @binding(4) var depth_sampler: sampler;
 
 // Light of the surroundings, as shares of the ambient light: from the opening of the mouth, and from its depth.
 const OPENING: vec3f = vec3f(0.0, 0.28, 0.96);
@@ -42,6 +60,19 @@ const RETURNED: f32 = 0.5;
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;
 const PI: f32 = 3.14159265;
+// Places at which a shadow is looked for, and at which its edge is measured.
+const SHADOW_SEARCHES: i32 = 12;
+const SHADOW_TAPS: i32 = 24;
+// Gap between caster and receiver, mm, beyond which shadows get no softer.
+const SHADOW_GAP: f32 = 10.0;
+// Distance, in texels of the map, by which a receiver is moved out along its normal.
+const SHADOW_LIFT: f32 = 5.0;
+// Steepest surface, as seen by the lamp, whose slope is followed between the places: a tangent.
+const SHADOW_SLOPE: f32 = 8.0;
+// Where shadows fade toward the map's border, from its middle (0) to there (1).
+const SHADOW_FADE: vec2f = vec2f(0.8, 0.95);
+// Cosine and sine of the golden angle, which spreads places over a disc evenly.
+const GOLDEN: vec2f = vec2f(-0.73736888, 0.67549029);
 
 // Ray through a pixel, per mm of depth.
 fn ray(pixel: vec2f) -> vec3f {
@@ -123,6 +154,87 @@ fn tone(linear: vec3f) -> vec3f {
     return mix(linear * (compressed / peak), vec3f(compressed), pale);
 }
 
+// A receiver of the lamp's light, as the lamp sees it.
+struct ShadowReceiver {
+    // Place in the map, from 0 to 1, and depth, mm.
+    at: vec2f,
+    depth: f32,
+    // Change of the surface's depth per mm to the right and upward.
+    slope: vec2f,
+    // Change of the place in the map per mm to the right and upward.
+    scale: vec2f,
+}
+
+// Depth of the receiver's plane at an offset in mm.
+fn plane_depth(receiver: ShadowReceiver, offset: vec2f) -> f32 {
+    return receiver.depth / max(1.0 - dot(receiver.slope, offset) / receiver.depth, 0.1);
+}
+
+fn shadow_buffer_depth(z: f32) -> f32 {
+    return view.shadow.right.w / (view.shadow.right.w - view.shadow.position.w) * (1.0 - view.shadow.position.w / z);
+}
+
+fn shadow_depth_of(buffer: f32) -> f32 {
+    return view.shadow.position.w / (1.0 - buffer * (view.shadow.right.w - view.shadow.position.w) / view.shadow.right.w);
+}
+
+// Mean depth, mm, of what lies between the lamp and the receiver; -1 if nothing does.
+fn caster_depth(receiver: ShadowReceiver, reach: f32) -> f32 {
+    var sum = 0.0;
+    var count = 0.0;
+    var way = vec2f(1.0, 0.0);
+    for (var i = 0; i < SHADOW_SEARCHES; i++) {
+        let offset = way * (reach * sqrt((f32(i) + 0.5) / f32(SHADOW_SEARCHES)));
+        let stored = textureSampleLevel(shadow_depths, depth_sampler, receiver.at + offset * receiver.scale, 0.0).r;
+        let depth = shadow_depth_of(stored);
+        if depth < plane_depth(receiver, offset) {
+            sum += depth;
+            count += 1.0;
+        }
+        way = vec2f(way.x * GOLDEN.x - way.y * GOLDEN.y, way.x * GOLDEN.y + way.y * GOLDEN.x);
+    }
+    return select(-1.0, sum / count, count > 0.0);
+}
+
+// Share of the chair lamp that a point with a unit normal sees.
+fn lamp_share(point: vec3f, normal: vec3f) -> f32 {
+    let half = view.shadow.ahead.w;
+    if half == 0.0 {
+        return 1.0;
+    }
+    let distance = dot(point - view.shadow.position.xyz, view.shadow.ahead.xyz);
+    let texel = 2.0 * half * distance / f32(textureDimensions(shadow_map).x);
+    let from_lamp = point + normal * (SHADOW_LIFT * texel) - view.shadow.position.xyz;
+    let z = dot(from_lamp, view.shadow.ahead.xyz);
+    let across = vec2f(dot(from_lamp, view.shadow.right.xyz), dot(from_lamp, view.shadow.up.xyz)) / (z * half);
+    let from_middle = max(abs(across.x), abs(across.y));
+    let along_depth = abs(2.0 * z - view.shadow.position.w - view.shadow.right.w) / (view.shadow.right.w - view.shadow.position.w);
+    let fade = smoothstep(SHADOW_FADE.x, SHADOW_FADE.y, max(from_middle, along_depth));
+    if fade == 1.0 {
+        return 1.0;
+    }
+    let facing = max(-dot(normal, from_lamp) / z, 1e-4);
+    let steep = vec2f(dot(normal, view.shadow.right.xyz), dot(normal, view.shadow.up.xyz)) / facing;
+    let slope = steep * min(1.0, SHADOW_SLOPE / max(length(steep), 1e-6));
+    let scale = vec2f(0.5, -0.5) / (z * half);
+    let receiver = ShadowReceiver(vec2f(0.5 + 0.5 * across.x, 0.5 - 0.5 * across.y), z, slope, scale);
+    let reach = max(view.shadow.up.w * SHADOW_GAP / z, texel);
+    let caster = caster_depth(receiver, reach);
+    if caster < 0.0 {
+        return 1.0;
+    }
+    let blur = clamp(view.shadow.up.w * (z - caster) / caster, texel, reach);
+    var seen = 0.0;
+    var way = vec2f(1.0, 0.0);
+    for (var i = 0; i < SHADOW_TAPS; i++) {
+        let offset = way * (blur * sqrt((f32(i) + 0.5) / f32(SHADOW_TAPS)));
+        let depth = shadow_buffer_depth(plane_depth(receiver, offset));
+        seen += textureSampleCompareLevel(shadow_map, shadow_sampler, receiver.at + offset * receiver.scale, depth);
+        way = vec2f(way.x * GOLDEN.x - way.y * GOLDEN.y, way.x * GOLDEN.y + way.y * GOLDEN.x);
+    }
+    return mix(seen / f32(SHADOW_TAPS), 1.0, fade);
+}
+
 // Shaded colour of a surface (rgb, gloss) at a point with a unit normal; `open`: share of light that reaches it.
 fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
     let to_eye = normalize(view.position.xyz - point);
@@ -145,8 +257,13 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
         let to_lamp = normalize(lamp.position.xyz - point);
         // Light spreads farther in a tissue the less of it is absorbed: red in gingiva. The total stays the same.
         let wrap = lamp.position.w * albedo;
-        light += lamp.colour.xyz * max((dot(normal, to_lamp) + wrap) / ((1.0 + wrap) * (1.0 + wrap)), vec3f(0.0));
-        shine += lamp.colour.xyz * coat(finish.a, normal, to_lamp, to_eye);
+        let scattered = max((dot(normal, to_lamp) + wrap) / ((1.0 + wrap) * (1.0 + wrap)), vec3f(0.0));
+        var strength = lamp.colour.xyz;
+        if i == 0 && any(scattered > vec3f(0.0)) {
+            strength *= lamp_share(point, normal);
+        }
+        light += strength * scattered;
+        shine += strength * coat(finish.a, normal, to_lamp, to_eye);
     }
     let reached = open / (1.0 - RETURNED * albedo * (1.0 - open));
     return sqrt(tone(albedo * light * reached * (1.0 - mirrored) + shine * open));

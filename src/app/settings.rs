@@ -35,6 +35,8 @@ pub struct Settings {
     pub eye_distance_mm: f32,
     /// True to smooth edges; without a value edges are smoothed if a graphics processor draws.
     pub smooth_edges: Option<bool>,
+    /// True if the lamp casts shadows; without a value, if a graphics processor draws and is quick enough.
+    pub shadows: Option<bool>,
     /// Share of full scale, 0 to 1.
     pub volume: f32,
     pub high_contrast: bool,
@@ -72,6 +74,7 @@ impl Default for Settings {
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,
             smooth_edges: None,
+            shadows: None,
             volume: VOLUME,
             high_contrast: false,
             font_size: 1.0,
@@ -138,6 +141,11 @@ impl Settings {
     /// in software, smoothing takes too large a part of each frame.
     pub fn is_smooth(&self, has_graphics: bool) -> bool {
         self.smooth_edges.unwrap_or(has_graphics)
+    }
+
+    /// True if the lamp casts shadows. `is_quick`: a graphics processor draws, and has not been too slow.
+    pub fn has_shadows(&self, is_quick: bool) -> bool {
+        self.shadows.unwrap_or(is_quick)
     }
 
     /// Stereo view of the right eye, if it has a picture of its own.

@@ -220,7 +220,9 @@ impl BenchResults {
         }
         for (dims, cases) in &self.stereo_4k_ms {
             line(format!("stereo_4k_ms.{dims}.surface"), &cases.surface);
+            line(format!("stereo_4k_ms.{dims}.surface_shadows"), &cases.surface_shadows);
             line(format!("stereo_4k_ms.{dims}.iso"), &cases.iso);
+            line(format!("stereo_4k_ms.{dims}.iso_shadows"), &cases.iso_shadows);
             line(format!("stereo_4k_ms.{dims}.volume"), &cases.volume);
         }
         let tables = [

@@ -90,7 +90,8 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
     let enamel_depth = scene::enamel_depth(&workpiece.volume, &scenario.tissues);
     let mouth = Mouth::around(workpiece, &scenario.tissues).filter(|_| is_in_mouth);
     let around = || scene::surrounding_solids(workpiece, &scenario.tissues);
-    let viewpoint = scene::work_view(workpiece).viewpoint();
+    let orbit = scene::work_view(workpiece);
+    let viewpoint = orbit.viewpoint();
     let picture = RenderScene {
         tooth: Some(VolumeInstance {
             volume: &workpiece.volume,
@@ -102,6 +103,7 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
         }),
         solids: mouth.map_or_else(around, |mouth| mouth.solids(scene::WORKING_OPENING_DEG)),
         lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+        shadows: Some(scene::shadow_region(workpiece, &orbit)),
         ..RenderScene::empty()
     };
     let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();

@@ -26,12 +26,12 @@ impl FxaaPass {
             label: "fxaa_pass",
             module: &module,
             vertex: "smooth_vertex",
-            fragment: "smooth_fragment",
+            fragment: Some("smooth_fragment"),
             groups: &[None, None, Some(&layout)],
             vertex_buffers: &[],
             faces: DrawnFaces::Front,
             depth: DepthMode::None,
-            format,
+            format: Some(format),
             blend: None,
         };
         FxaaPass { pipeline: pass.build(device), layout }

@@ -18,12 +18,12 @@ pub fn pipeline(
         label: "iso_pass",
         module: &module,
         vertex: "box_vertex",
-        fragment: "iso_fragment",
+        fragment: Some("iso_fragment"),
         groups: &[Some(view), Some(tooth)],
         vertex_buffers: &[],
         faces: DrawnFaces::Back,
         depth: DepthMode::ReadWrite,
-        format,
+        format: Some(format),
         blend: None,
     }
     .build(device)

@@ -83,6 +83,9 @@ mod scene;
 mod fxaa_pass;
 #[cfg(feature = "gpu")]
 mod particle_pass;
+mod shadow;
+#[cfg(feature = "gpu")]
+mod shadow_pass;
 mod stereo;
 #[cfg(feature = "gpu")]
 mod stereo_pass;
@@ -114,7 +117,7 @@ pub use offscreen::OffscreenRenderer;
 pub use renderer::{RenderTarget, Renderer};
 pub use scene::{
     Appearance, Background, Changes, LabelPalette, Lamp, Lights, MeshInstance, Particle, RenderMode, RenderScene, Rgb,
-    VolumeInstance,
+    ShadowRegion, VolumeInstance,
 };
 pub use stereo::{Stereo, StereoLayout};
 #[cfg(feature = "gpu")]
@@ -139,6 +142,7 @@ pub struct Shader {
 pub fn shaders() -> Vec<Shader> {
     let shared = [
         ("Lamp", size_of::<view::gpu::LampUniform>()),
+        ("Shadow", size_of::<view::gpu::ShadowUniform>()),
         ("View", size_of::<view::gpu::ViewUniform>()),
         ("Tooth", size_of::<tooth::gpu::ToothUniform>()),
     ];
@@ -199,6 +203,9 @@ fn validate(
     }
     if scene.tooth.as_ref().is_some_and(|tooth| !tooth.world_from_tooth.is_valid()) {
         return impossible("invalid pose of the tooth".into());
+    }
+    if scene.shadows.is_some_and(|region| !region.is_valid()) {
+        return impossible(format!("invalid region of shadows: {:?}", scene.shadows));
     }
     if scene.mirror.is_some_and(|mirror| !mirror.is_valid()) {
         return impossible(format!("invalid mirror: {:?}", scene.mirror));

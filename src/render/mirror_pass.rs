@@ -36,12 +36,12 @@ impl MirrorPass {
             label: "mirror_pass",
             module: &module,
             vertex: "mirror_vertex",
-            fragment: "mirror_fragment",
+            fragment: Some("mirror_fragment"),
             groups: &[Some(view), None, Some(&layout)],
             vertex_buffers: &[],
             faces: DrawnFaces::Front,
             depth: DepthMode::ReadWrite,
-            format,
+            format: Some(format),
             blend: None,
         };
         let uniform = resources::uniform_buffer(device, "mirror", size_of::<gpu::MirrorUniform>());

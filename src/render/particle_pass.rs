@@ -53,12 +53,12 @@ impl ParticlePass {
                 label,
                 module,
                 vertex,
-                fragment,
+                fragment: Some(fragment),
                 groups,
                 vertex_buffers: corners,
                 faces,
                 depth,
-                format,
+                format: Some(format),
                 blend,
             }
             .build(device)

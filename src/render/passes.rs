@@ -10,13 +10,15 @@ pub struct PipelineDesc<'a> {
     pub label: &'static str,
     pub module: &'a wgpu::ShaderModule,
     pub vertex: &'static str,
-    pub fragment: &'static str,
+    /// `None` if depths alone are drawn.
+    pub fragment: Option<&'static str>,
     /// Bind group layouts by group number; `None` where the pass uses none.
     pub groups: &'a [Option<&'a wgpu::BindGroupLayout>],
     pub vertex_buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     pub faces: DrawnFaces,
     pub depth: DepthMode,
-    pub format: wgpu::TextureFormat,
+    /// Format of the colours; `None` if depths alone are drawn.
+    pub format: Option<wgpu::TextureFormat>,
     pub blend: Option<wgpu::BlendState>,
 }
 
@@ -56,8 +58,15 @@ impl PipelineDesc<'_> {
             stencil: wgpu::StencilState::default(),
             bias: wgpu::DepthBiasState::default(),
         };
-        let target =
-            wgpu::ColorTargetState { format: self.format, blend: self.blend, write_mask: wgpu::ColorWrites::ALL };
+        let target = self.format.map(|format| wgpu::ColorTargetState {
+            format,
+            blend: self.blend,
+            write_mask: wgpu::ColorWrites::ALL,
+        });
+        let targets = match target {
+            Some(_) => &[target][..],
+            None => &[],
+        };
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.label),
             layout: Some(&layout),
@@ -67,11 +76,11 @@ impl PipelineDesc<'_> {
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
                 buffers: self.vertex_buffers,
             },
-            fragment: Some(wgpu::FragmentState {
+            fragment: self.fragment.map(|fragment| wgpu::FragmentState {
                 module: self.module,
-                entry_point: Some(self.fragment),
+                entry_point: Some(fragment),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(target)],
+                targets,
             }),
             primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
             depth_stencil: match self.depth {

@@ -11,6 +11,8 @@ use super::mirror_pass::MirrorPass;
 use super::particle_pass::ParticlePass;
 use super::passes::DEPTH;
 use super::scene::{Background, Changes, RenderMode, RenderScene, VolumeInstance};
+use super::shadow;
+use super::shadow_pass::{ShadowMap, ShadowPass};
 use super::stereo::Stereo;
 use super::stereo_pass::StereoPass;
 use super::surface_pass::SurfacePass;
@@ -32,6 +34,10 @@ pub struct Renderer {
     fxaa_pass: FxaaPass,
     stereo_pass: StereoPass,
     mirror_pass: MirrorPass,
+    /// Present once a scene has had shadows.
+    shadow_pass: Option<ShadowPass>,
+    no_shadows: ShadowMap,
+    lamp_view: ViewBindings,
     views: [ViewBindings; 2],
     /// Image of the mirror for each eye.
     mirror_targets: [Option<MirrorTarget>; 2],
@@ -91,9 +97,10 @@ impl EyeTarget {
 impl Renderer {
     /// Creates the pipelines for targets of a format with 8 bits per channel, sRGB or not, as windows have them.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, format: wgpu::TextureFormat) -> Renderer {
-        let view_layout = resources::layout(device, "view", &[resources::uniform()]);
+        let view_layout = ViewBindings::layout(device);
+        let no_shadows = ShadowMap::none(device);
         let tooth_layout = ToothTextures::layout(device);
-        let views = [0, 1].map(|_| ViewBindings::new(device, &view_layout));
+        let [lamp_view, left, right] = [0; 3].map(|_| ViewBindings::new(device, &view_layout, &no_shadows));
         Renderer {
             surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout),
             iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout),
@@ -107,7 +114,10 @@ impl Renderer {
             queue: queue.clone(),
             format,
             tooth_layout,
-            views,
+            shadow_pass: None,
+            no_shadows,
+            lamp_view,
+            views: [left, right],
             view_layout,
             tooth: None,
             downsampled: None,
@@ -135,6 +145,8 @@ impl Renderer {
         let [width, height] = target.size;
         let aspect = width as f32 / height as f32;
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.fit_shadows(scene);
+        self.draw_shadows(&mut encoder, scene);
         match stereo {
             None => {
                 self.fit_eye_target(0, target.size, scene);
@@ -156,6 +168,47 @@ impl Renderer {
         }
         self.queue.submit([encoder.finish()]);
         Ok(uploads)
+    }
+
+    /// Creates the shadow map and what draws it when a scene first has shadows.
+    fn fit_shadows(&mut self, scene: &RenderScene) {
+        if scene.shadows.is_none() || self.shadow_pass.is_some() {
+            return;
+        }
+        let solid = &self.surface_pass.layout;
+        let pass = ShadowPass::new(&self.device, &self.view_layout, &self.tooth_layout, solid);
+        self.views = [0; 2].map(|_| ViewBindings::new(&self.device, &self.view_layout, &pass.map));
+        self.mirror_targets = [None, None];
+        self.shadow_pass = Some(pass);
+    }
+
+    /// Draws what the lamp sees, so that the rest lies in shadow. A translucent tooth casts none.
+    fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, scene: &RenderScene) {
+        let (Some(shadows), Some(lamp)) = (&self.shadow_pass, shadow::chair_eye(scene)) else { return };
+        let ViewBindings { uniform, group } = &self.lamp_view;
+        let view = view::view_uniform(scene, &lamp, [shadow::MAP_SIZE; 2], false);
+        self.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&view));
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadows"),
+            depth_stencil_attachment: Some(depth_attachment(&shadows.map.depths, wgpu::LoadOp::Clear(1.0))),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, group, &[]);
+        pass.set_pipeline(&shadows.solid);
+        self.surface_pass.draw_shadows(&mut pass, &lamp);
+        match (scene.tooth.as_ref().map(|tooth| &tooth.mode), &self.tooth, &self.surfaces) {
+            (Some(RenderMode::Surface), Some(textures), Some(surfaces)) => {
+                pass.set_bind_group(1, &textures.group, &[]);
+                pass.set_pipeline(&shadows.tooth);
+                surfaces.draw(&mut pass);
+            }
+            (Some(RenderMode::Iso), Some(textures), _) => {
+                pass.set_bind_group(1, &textures.group, &[]);
+                pass.set_pipeline(&shadows.iso);
+                pass.draw(iso_pass::BOX_VERTICES, 0..1);
+            }
+            _ => {}
+        }
     }
 
     /// Uploads what is new in the scene.
@@ -256,7 +309,8 @@ impl Renderer {
         if self.mirror_targets[side].is_none() {
             let eye_target = self.new_eye_target([mirror::PICTURE_SIZE; 2]);
             let group = self.mirror_pass.group(&self.device, &eye_target.colour);
-            let view = ViewBindings::new(&self.device, &self.view_layout);
+            let map = self.shadow_pass.as_ref().map_or(&self.no_shadows, |pass| &pass.map);
+            let view = ViewBindings::new(&self.device, &self.view_layout, map);
             self.mirror_targets[side] = Some(MirrorTarget { view, eye_target, group });
         }
     }
@@ -378,11 +432,27 @@ impl Renderer {
 }
 
 impl ViewBindings {
-    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout) -> ViewBindings {
+    fn layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+        let compared = resources::texture(wgpu::TextureSampleType::Depth, wgpu::TextureViewDimension::D2);
+        let numbers = wgpu::TextureSampleType::Float { filterable: false };
+        let read = resources::texture(numbers, wgpu::TextureViewDimension::D2);
+        let [comparison, nearest] = [wgpu::SamplerBindingType::Comparison, wgpu::SamplerBindingType::NonFiltering]
+            .map(wgpu::BindingType::Sampler);
+        resources::layout(device, "view", &[resources::uniform(), compared, comparison, read, nearest])
+    }
+
+    fn new(device: &wgpu::Device, layout: &wgpu::BindGroupLayout, map: &ShadowMap) -> ViewBindings {
         let uniform = resources::uniform_buffer(device, "view", size_of::<view::gpu::ViewUniform>());
-        let group = resources::group(device, layout, [uniform.as_entire_binding()]);
+        let [compare, nearest] = [&map.compare, &map.nearest].map(wgpu::BindingResource::Sampler);
+        let [compared, read] = [&map.depths; 2].map(wgpu::BindingResource::TextureView);
+        let group = resources::group(device, layout, [uniform.as_entire_binding(), compared, compare, read, nearest]);
         ViewBindings { uniform, group }
     }
+}
+
+fn depth_attachment(view: &wgpu::TextureView, load: wgpu::LoadOp<f32>) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    let depth_ops = Some(wgpu::Operations { load, store: wgpu::StoreOp::Store });
+    wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
 fn begin_pass<'a>(
@@ -391,11 +461,7 @@ fn begin_pass<'a>(
     load: wgpu::LoadOp<wgpu::Color>,
     depth: Option<(&wgpu::TextureView, wgpu::LoadOp<f32>)>,
 ) -> wgpu::RenderPass<'a> {
-    let depth = depth.map(|(view, load)| wgpu::RenderPassDepthStencilAttachment {
-        view,
-        depth_ops: Some(wgpu::Operations { load, store: wgpu::StoreOp::Store }),
-        stencil_ops: None,
-    });
+    let depth = depth.map(|(view, load)| depth_attachment(view, load));
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         label: None,
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {

@@ -24,6 +24,8 @@ pub struct RenderScene<'a> {
     /// A mirror, which shows everything but itself.
     pub mirror: Option<PlaneMirror>,
     pub lights: Lights,
+    /// Region in which the chair lamp casts shadows; `None` for no shadows.
+    pub shadows: Option<ShadowRegion>,
     pub background: Background,
     /// True when the finished image is antialiased.
     pub is_antialiased: bool,
@@ -39,6 +41,7 @@ impl RenderScene<'_> {
             translucent_particles: &[],
             mirror: None,
             lights: Lights::default(),
+            shadows: None,
             background: Background::default(),
             is_antialiased: false,
         }
@@ -123,12 +126,14 @@ pub struct MeshInstance {
     pub vertex_colours: Arc<Vec<Rgb>>,
     pub world_from_solid: Pose,
     pub appearance: Appearance,
+    /// False for what stands in the way of the lamp only because nobody has aimed it.
+    pub casts_shadow: bool,
 }
 
 impl MeshInstance {
     /// Creates an instance of one colour.
     pub fn plain(mesh: Arc<Mesh>, world_from_solid: Pose, appearance: Appearance) -> MeshInstance {
-        MeshInstance { mesh, vertex_colours: Arc::default(), world_from_solid, appearance }
+        MeshInstance { mesh, vertex_colours: Arc::default(), world_from_solid, appearance, casts_shadow: true }
     }
 }
 
@@ -166,6 +171,20 @@ pub struct Lights {
     pub head: Lamp,
 }
 
+/// Ball of world space, mm, within which bodies cast and receive shadows of the chair lamp. The smaller it is, the finer they
+/// are: a thousandth of its diameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadowRegion {
+    pub centre: Vec3,
+    pub radius: f32,
+}
+
+impl ShadowRegion {
+    pub(super) fn is_valid(&self) -> bool {
+        self.centre.is_finite() && (0.1..1000.0).contains(&self.radius)
+    }
+}
+
 /// A large, soft lamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
@@ -177,19 +196,22 @@ pub struct Lamp {
     /// Extent to which the light reaches past the terminator on a white tissue, as a cosine, 0 to 1: light enters,
     /// scatters and leaves elsewhere. Less on a darker one, by each colour's reflectance.
     pub wrap: f32,
+    /// Radius of the luminous area, mm: the larger, the softer are its shadows.
+    pub radius: f32,
 }
 
 impl Lamp {
-    pub const OFF: Lamp = Lamp { position: Vec3::ZERO, strength: 0.0, colour: [1.0; 3], wrap: 0.0 };
+    pub const OFF: Lamp = Lamp { position: Vec3::ZERO, strength: 0.0, colour: [1.0; 3], wrap: 0.0, radius: 0.0 };
 
     /// Returns the operating light, above the patient's chest and to the upper left of the trainee.
     pub fn chair() -> Lamp {
-        Lamp { position: Vec3::new(-350.0, 480.0, 420.0), strength: 0.72, colour: [1.0, 0.98, 0.94], wrap: 0.15 }
+        let position = Vec3::new(-350.0, 480.0, 420.0);
+        Lamp { position, strength: 0.72, colour: [1.0, 0.98, 0.94], wrap: 0.15, radius: 80.0 }
     }
 
     /// Returns a head lamp at the position of an eye, world space.
     pub fn head(eye: Vec3) -> Lamp {
-        Lamp { position: eye, strength: 0.30, colour: [0.96, 0.98, 1.0], wrap: 0.15 }
+        Lamp { position: eye, strength: 0.30, colour: [0.96, 0.98, 1.0], wrap: 0.15, radius: 0.0 }
     }
 }
 

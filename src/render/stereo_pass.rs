@@ -38,12 +38,12 @@ impl StereoPass {
             label: "stereo_pass",
             module: &module,
             vertex: "whole_vertex",
-            fragment: "stereo_fragment",
+            fragment: Some("stereo_fragment"),
             groups: &[Some(&layout)],
             vertex_buffers: &[],
             faces: DrawnFaces::Front,
             depth: DepthMode::None,
-            format,
+            format: Some(format),
             blend: None,
         };
         let pipeline = pass.build(device);

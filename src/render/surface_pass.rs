@@ -29,7 +29,7 @@ pub struct SurfacePass {
     pub background: wgpu::RenderPipeline,
     pub tooth: wgpu::RenderPipeline,
     solid: wgpu::RenderPipeline,
-    layout: wgpu::BindGroupLayout,
+    pub layout: wgpu::BindGroupLayout,
     cached_meshes: Vec<CachedMesh>,
     /// One entry per mesh instance of a scene, in its order.
     draws: Vec<MeshDraw>,
@@ -51,6 +51,7 @@ struct MeshDraw {
     /// Index of the cached mesh.
     mesh: usize,
     world_from_solid: Pose,
+    casts_shadow: bool,
 }
 
 impl SurfacePass {
@@ -62,24 +63,19 @@ impl SurfacePass {
     ) -> SurfacePass {
         let module = passes::shader_module(device, "surface_pass", &passes::full_source(SOURCE));
         let layout = resources::layout(device, "solid", &[resources::uniform()]);
-        let attributes = wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x4, 2 => Unorm8x4];
-        let corners = [Some(wgpu::VertexBufferLayout {
-            array_stride: size_of::<Vertex>() as u64,
-            step_mode: wgpu::VertexStepMode::Vertex,
-            attributes: &attributes,
-        })];
+        let corners = [Some(Vertex::layout())];
         let pass = |label, vertex, fragment, groups, corners, depth| {
             let (module, faces, blend) = (&module, DrawnFaces::Front, None);
             PipelineDesc {
                 label,
                 module,
                 vertex,
-                fragment,
+                fragment: Some(fragment),
                 groups,
                 vertex_buffers: corners,
                 faces,
                 depth,
-                format,
+                format: Some(format),
                 blend,
             }
             .build(device)
@@ -123,10 +119,12 @@ impl SurfacePass {
             if i == self.draws.len() {
                 let uniform = resources::uniform_buffer(device, "solid", size_of::<gpu::SolidUniform>());
                 let group = resources::group(device, &self.layout, [uniform.as_entire_binding()]);
-                self.draws.push(MeshDraw { uniform, group, mesh, world_from_solid: solid.world_from_solid });
+                let (world_from_solid, casts_shadow) = (solid.world_from_solid, solid.casts_shadow);
+                self.draws.push(MeshDraw { uniform, group, mesh, world_from_solid, casts_shadow });
             }
             self.draws[i].mesh = new_indices[mesh];
             self.draws[i].world_from_solid = solid.world_from_solid;
+            self.draws[i].casts_shadow = solid.casts_shadow;
             let [r, g, b] = solid.appearance.colour;
             let uniform = gpu::SolidUniform {
                 world_from_solid: resources::columns(solid.world_from_solid, Vec3::ONE, Vec3::ZERO),
@@ -164,7 +162,16 @@ impl SurfacePass {
     /// Draws all prepared mesh instances that an eye may see; the view's bind group must be set.
     pub fn draw_solids(&self, pass: &mut wgpu::RenderPass, eye: &Eye) {
         pass.set_pipeline(&self.solid);
-        for draw in &self.draws {
+        self.draw_each(pass, eye, |_| true);
+    }
+
+    /// Draws all prepared mesh instances that cast shadows and that a lamp may see, with the pipeline that is set.
+    pub fn draw_shadows(&self, pass: &mut wgpu::RenderPass, lamp: &Eye) {
+        self.draw_each(pass, lamp, |draw| draw.casts_shadow);
+    }
+
+    fn draw_each(&self, pass: &mut wgpu::RenderPass, eye: &Eye, is_drawn: impl Fn(&MeshDraw) -> bool) {
+        for draw in self.draws.iter().filter(|draw| is_drawn(draw)) {
             let cached = &self.cached_meshes[draw.mesh];
             let visible = cached.parts.visible(eye, draw.world_from_solid);
             if visible.is_empty() {

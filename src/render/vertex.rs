@@ -23,6 +23,17 @@ impl Vertex {
     #[cfg(feature = "gpu")]
     pub const PADDING: Vertex = Vertex { position: [0.0; 3], normal: [0; 4], colour: [0; 4] };
 
+    #[cfg(feature = "gpu")]
+    pub fn layout() -> wgpu::VertexBufferLayout<'static> {
+        const ATTRIBUTES: [wgpu::VertexAttribute; 3] =
+            wgpu::vertex_attr_array![0 => Float32x3, 1 => Snorm16x4, 2 => Unorm8x4];
+        wgpu::VertexBufferLayout {
+            array_stride: size_of::<Vertex>() as u64,
+            step_mode: wgpu::VertexStepMode::Vertex,
+            attributes: &ATTRIBUTES,
+        }
+    }
+
     pub fn new(position: Vec3, normal: Vec3, finish: Appearance) -> Vertex {
         let short = |v: f32| (v.clamp(-1.0, 1.0) * 32767.0).round() as i16;
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;

@@ -2,6 +2,7 @@
 
 use super::eye::Eye;
 use super::scene::{Lamp, RenderScene};
+use super::shadow;
 
 /// Layouts that match `view.wgsl`.
 pub mod gpu {
@@ -12,6 +13,15 @@ pub mod gpu {
     pub struct LampUniform {
         pub position: [f32; 4],
         pub colour: [f32; 4],
+    }
+
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub struct ShadowUniform {
+        pub position: [f32; 4],
+        pub right: [f32; 4],
+        pub up: [f32; 4],
+        pub ahead: [f32; 4],
     }
 
     #[derive(Clone, Copy, Pod, Zeroable)]
@@ -28,15 +38,27 @@ pub mod gpu {
         pub background_edge: [f32; 4],
         pub ambient: [f32; 4],
         pub lamps: [LampUniform; 2],
+        pub shadow: ShadowUniform,
     }
 }
 
 pub const SOURCE: &str = include_str!("../../shaders/view.wgsl");
 
 fn lamp_uniform(lamp: &Lamp) -> gpu::LampUniform {
-    let Lamp { position, strength, colour, wrap } = *lamp;
+    let Lamp { position, strength, colour, wrap, radius: _ } = *lamp;
     let [r, g, b] = colour.map(|c| c * strength);
     gpu::LampUniform { position: position.extend(wrap).to_array(), colour: [r, g, b, 0.0] }
+}
+
+/// The eye that casts shadows and the radius of its lamp, mm.
+fn shadow_uniform(lamp: Option<Eye>, radius: f32) -> gpu::ShadowUniform {
+    let Some(eye) = lamp else { return bytemuck::Zeroable::zeroed() };
+    gpu::ShadowUniform {
+        position: eye.position.extend(eye.near).to_array(),
+        right: eye.right.extend(eye.far).to_array(),
+        up: eye.up.extend(radius).to_array(),
+        ahead: eye.forward.extend(eye.window.right).to_array(),
+    }
 }
 
 /// Uniform for a scene and an eye, with the size of the target in pixels. `is_srgb`: the target converts linear light
@@ -55,5 +77,6 @@ pub fn view_uniform(scene: &RenderScene, eye: &Eye, [width, height]: [u32; 2], i
         background_edge: opaque(scene.background.edge),
         ambient: [scene.lights.ambient, 0.0, 0.0, 0.0],
         lamps: [lamp_uniform(&scene.lights.chair), lamp_uniform(&scene.lights.head)],
+        shadow: shadow_uniform(shadow::chair_eye(scene), scene.lights.chair.radius),
     }
 }

@@ -28,12 +28,12 @@ impl VolumePass {
             label: "volume_pass",
             module: &module,
             vertex: "box_vertex",
-            fragment: "volume_fragment",
+            fragment: Some("volume_fragment"),
             groups: &[Some(view), Some(tooth), Some(&layout)],
             vertex_buffers: &[],
             faces: DrawnFaces::Back,
             depth: DepthMode::None,
-            format,
+            format: Some(format),
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         };
         VolumePass { pipeline: pass.build(device), layout, nearest_sampler }

@@ -31,4 +31,4 @@ pub use instrument::{ContraAngle, contra_angle, instrument_solid, mirror_face, p
 pub use jaw::{Mouth, StandaloneJaw, WORKING_OPENING_DEG};
 pub use palette::{enamel_depth, tissue_palette, x_ray_attenuation};
 pub use surroundings::surrounding_solids;
-pub use views::{ToothSide, tooth_view, work_view};
+pub use views::{ToothSide, shadow_region, tooth_view, work_view};

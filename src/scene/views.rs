@@ -3,7 +3,7 @@
 use super::jaw::Mouth;
 use typodont_core::frame::Vec3;
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Orbit, Quadrant};
+use typodont_render::{Orbit, Quadrant, ShadowRegion};
 
 /// A side of the tooth, looked at squarely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,6 +60,16 @@ pub fn work_view(workpiece: &Workpiece) -> Orbit {
     let middle = workpiece.world_from_tooth * crowns.centre();
     let radius = 0.5 * crowns.size().max_element() + BESIDE;
     Orbit { azimuth: 0.25, elevation: 0.75, ..Orbit::around(middle, radius) }
+}
+
+/// Region in which the lamp casts shadows: around the teeth worked on, wider as the eye is farther away.
+pub fn shadow_region(workpiece: &Workpiece, orbit: &Orbit) -> ShadowRegion {
+    /// Radius around a single tooth, mm: two teeth on each side, and the head of a handpiece.
+    const AROUND: f32 = 32.0;
+    let crowns = workpiece.crown_bounds();
+    let farther = (orbit.distance / work_view(workpiece).distance).clamp(1.0, 3.0);
+    let radius = (AROUND * farther).max(crowns.half_size().length() + 10.0);
+    ShadowRegion { centre: workpiece.world_from_tooth * crowns.centre(), radius }
 }
 
 impl Mouth {

@@ -61,7 +61,7 @@ impl FixedCase {
     }
 
     /// The scene as the trainee has it, drawn by rays, and where it is seen from.
-    pub fn scene(&self, view: FixedView, mode: RenderMode) -> (RenderScene<'_>, Viewpoint) {
+    pub fn scene(&self, view: FixedView, mode: RenderMode, has_shadows: bool) -> (RenderScene<'_>, Viewpoint) {
         let mouth = Mouth::around(&self.workpiece, &self.scenario.tissues).unwrap();
         let orbit = match view.distance {
             Some(share) => {
@@ -82,6 +82,7 @@ impl FixedCase {
             }),
             solids: mouth.solids(WORKING_OPENING_DEG),
             lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            shadows: has_shadows.then(|| shadow_region(&self.workpiece, &orbit)),
             is_antialiased: true,
             ..RenderScene::empty()
         };

@@ -7,4 +7,5 @@ mod radiograph;
 mod render;
 mod scene;
 mod scenes;
+mod shadows;
 mod tissues;

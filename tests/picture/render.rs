@@ -83,8 +83,19 @@ fn the_fixed_scenes_are_one_picture_and_neither_burn_out_nor_drown() {
     for case in FixedCase::all() {
         for view in FIXED_VIEWS {
             let name = format!("fixed-{}-{}", case.number, view.name);
-            let (scene, viewpoint) = case.scene(view, RenderMode::Iso);
             let size = [800, 500];
+            for mode in [RenderMode::Surface, RenderMode::Iso] {
+                let (shaded, viewpoint) = case.scene(view, mode.clone(), true);
+                let twin = OffscreenRenderer::cpu().draw(&shaded, &viewpoint, None, size).unwrap();
+                let drawn = gpu.draw(&shaded, &viewpoint, None, size).unwrap();
+                keep(&format!("{name}-shadows"), &twin);
+                let (mean, far) = differences(&drawn, &twin);
+                println!("{name}, {mode:?} with shadows: mean {mean:.3}, {:.3} % by 8 or more", 100.0 * far);
+                if !is_close(&drawn, &twin) {
+                    wrong.push(format!("{name} with shadows: mean {mean:.3} of 255, {:.3} % of pixels", 100.0 * far));
+                }
+            }
+            let (scene, viewpoint) = case.scene(view, RenderMode::Iso, false);
             let twin = OffscreenRenderer::cpu().draw(&scene, &viewpoint, None, size).unwrap();
             let drawn = gpu.draw(&scene, &viewpoint, None, size).unwrap();
             keep(&name, &twin);

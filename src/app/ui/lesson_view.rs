@@ -80,6 +80,7 @@ impl LessonView {
             stereo,
             second_size: second_size(settings, viewport, frame.size),
             is_smooth: settings.is_smooth(viewport.has_graphics()),
+            has_shadows: self.has_shadows(settings, viewport),
             is_left_handed: settings.left_handed,
             particle_count,
         };
@@ -100,6 +101,10 @@ impl LessonView {
             Err(_) => self.refresh.invalidate(),
         }
         drawn.map(Some)
+    }
+
+    fn has_shadows(&self, settings: &Settings, viewport: &Viewport) -> bool {
+        settings.has_shadows(viewport.has_graphics() && !self.refresh.has_been_slow())
     }
 
     fn draw_scene(
@@ -130,6 +135,8 @@ impl LessonView {
             translucent_particles: self.particles.translucent(),
             mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
             lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            shadows: (!is_radiograph && self.has_shadows(settings, viewport))
+                .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
             is_antialiased: settings.is_smooth(viewport.has_graphics()),
         };

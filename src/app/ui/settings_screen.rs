@@ -66,6 +66,13 @@ pub fn settings_ui(
         }
         ui.end_row();
         ui.label("");
+        let mut has_shadows = settings.has_shadows(context.has_graphics);
+        let shadows = ui.checkbox(&mut has_shadows, words.get("settings.shadows"));
+        if shadows.on_hover_text(words.get("settings.shadows.hint")).changed() {
+            new.shadows = Some(has_shadows);
+        }
+        ui.end_row();
+        ui.label("");
         ui.checkbox(&mut new.high_contrast, words.get("settings.contrast"));
         ui.end_row();
     });

@@ -35,6 +35,7 @@ pub struct ViewInputs {
     pub stereo: [Option<Stereo>; 2],
     pub second_size: [u32; 2],
     pub is_smooth: bool,
+    pub has_shadows: bool,
     pub is_left_handed: bool,
     /// Number of particles in sight.
     pub particle_count: usize,
@@ -59,6 +60,8 @@ pub struct ViewRefresh {
     last_changing_frame: Option<f64>,
     /// Index of the resolution of a changing view.
     resolution: usize,
+    /// True once images have been so slow that the resolution fell.
+    has_been_slow: bool,
     /// True if the last image has a lower resolution than the view.
     is_coarse: bool,
     slow_frames: u32,
@@ -101,6 +104,11 @@ impl ViewRefresh {
         now - self.changed_at >= SETTLING_TIME
     }
 
+    /// True once images have been so slow that the resolution fell: from then on it is drawn what costs least.
+    pub fn has_been_slow(&self) -> bool {
+        self.has_been_slow
+    }
+
     /// Number of frames per second of a changing view, smoothed.
     pub fn frames_per_second(&self) -> f64 {
         1.0 / self.mean_frame_time.max(1e-3)
@@ -122,6 +130,7 @@ impl ViewRefresh {
         if self.slow_frames >= FRAMES_TO_CHANGE {
             self.resolution = (self.resolution + 1).min(RESOLUTIONS.len() - 1);
             self.slow_frames = 0;
+            self.has_been_slow = true;
         } else if self.fast_frames >= FRAMES_TO_CHANGE {
             self.resolution = self.resolution.saturating_sub(1);
             self.fast_frames = 0;
@@ -145,6 +154,7 @@ mod tests {
             stereo: [None, None],
             second_size: [0, 0],
             is_smooth: false,
+            has_shadows: false,
             is_left_handed: false,
             particle_count: 0,
         }

@@ -9,7 +9,7 @@ use typodont_core::volume::Volume;
 use typodont_exercise::scenario::{Scenario, Workpiece};
 use typodont_render::{
     Appearance, Changes, Lamp, Lights, MeshInstance, OffscreenRenderer, Orbit, Particle, RenderMode, RenderScene,
-    Stereo, StereoLayout, TransferFunction, VolumeInstance,
+    ShadowRegion, Stereo, StereoLayout, TransferFunction, VolumeInstance,
 };
 use typodont_scene::{self as scene, Mouth};
 
@@ -34,7 +34,11 @@ pub struct StereoTimings {
     /// Renderer: the name of a graphics adapter, or `cpu`.
     pub adapter: String,
     pub surface: Percentiles,
+    /// With shadows of the lamp.
+    pub surface_shadows: Percentiles,
     pub iso: Percentiles,
+    /// With shadows of the lamp.
+    pub iso_shadows: Percentiles,
     pub volume: Percentiles,
 }
 
@@ -103,7 +107,7 @@ pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<St
         None => scene::surrounding_solids(workpiece, &scenario.tissues),
     };
     let orbit = scene::work_view(workpiece);
-    let mut times = |mode: RenderMode| {
+    let mut times = |mode: RenderMode, shadows: Option<ShadowRegion>| {
         let mut turn = TurningView { painter: &mut painter, orbit, stereo: Some(BOTH_EYES), size: SCREEN };
         turn.time(SCREEN_IMAGES, |changes, eye| RenderScene {
             tooth: Some(VolumeInstance {
@@ -116,14 +120,18 @@ pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<St
             }),
             solids: solids.clone(),
             lights: Lights { head: Lamp::head(eye), ..Lights::default() },
+            shadows,
             is_antialiased: true,
             ..RenderScene::empty()
         })
     };
-    let surface = times(RenderMode::Surface)?;
-    let iso = times(RenderMode::Iso)?;
-    let volume = times(RenderMode::Volume(function))?;
-    Ok(StereoTimings { adapter: painter.adapter().to_string(), surface, iso, volume })
+    let shadows = Some(scene::shadow_region(workpiece, &orbit));
+    let surface = times(RenderMode::Surface, None)?;
+    let surface_shadows = times(RenderMode::Surface, shadows)?;
+    let iso = times(RenderMode::Iso, None)?;
+    let iso_shadows = times(RenderMode::Iso, shadows)?;
+    let volume = times(RenderMode::Volume(function), None)?;
+    Ok(StereoTimings { adapter: painter.adapter().to_string(), surface, surface_shadows, iso, iso_shadows, volume })
 }
 
 /// Images of a scene whose camera turns around its middle.

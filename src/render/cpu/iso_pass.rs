@@ -28,6 +28,18 @@ pub fn iso_pass(sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Frame
     });
 }
 
+/// The depths alone, for shadows.
+pub fn iso_depth_pass(sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Framebuffer) {
+    framebuffer.for_each_pixel(|x, y, pixel| {
+        let (ray, _) = sampler.ray(view, x, y);
+        let Some(z) = first_hit(sampler, &ray, view.eye.near) else { return };
+        let depth = view.eye.buffer_depth(z);
+        if (0.0..pixel.depth).contains(&depth) {
+            pixel.depth = depth;
+        }
+    });
+}
+
 /// Depth of the first place with matter along a ray.
 fn first_hit(sampler: &VolumeSampler, ray: &Ray, near: f32) -> Option<f32> {
     let [first, last] = sampler.span(ray);

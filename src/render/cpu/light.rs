@@ -46,8 +46,9 @@ impl CpuView {
                 true => self.mirrored_surroundings(toward),
                 false => self.surroundings(toward),
             };
-        for lamp in [&self.lights.chair, &self.lights.head] {
-            let colour = Vec3::from(lamp.colour) * lamp.strength;
+        let chair_share = self.shadows.as_ref().map_or(1.0, |map| map.lamp_share(point, normal));
+        for (lamp, share) in [(&self.lights.chair, chair_share), (&self.lights.head, 1.0)] {
+            let colour = Vec3::from(lamp.colour) * (lamp.strength * share);
             let to_lamp = (lamp.position - point).normalize_or_zero();
             // Light spreads farther in a tissue the less of it is absorbed: red in gingiva. The total stays the same.
             let wrap = lamp.wrap * albedo;
@@ -146,7 +147,7 @@ mod tests {
 
     fn lit_by(chair: Lamp, ambient: f32) -> CpuView {
         let eye = Orbit::around(Vec3::ZERO, 15.0).viewpoint().eye(1.0);
-        CpuView { eye, lights: Lights { ambient, chair, head: Lamp::OFF }, width: 1, height: 1 }
+        CpuView { eye, lights: Lights { ambient, chair, head: Lamp::OFF }, width: 1, height: 1, shadows: None }
     }
 
     /// A direction at an angle from +z with this cosine.

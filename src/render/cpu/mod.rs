@@ -10,6 +10,7 @@ mod mirror_pass;
 mod raster;
 mod fxaa_pass;
 mod particle_pass;
+mod shadow_pass;
 mod stereo_pass;
 mod surface_pass;
 mod volume_pass;
@@ -21,10 +22,12 @@ use super::mirror::{self, PlaneMirror};
 use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
 use super::surface_colours::SurfaceColours;
 use super::{ambient_occlusion::OcclusionVolume, empty_space::EmptySpaceMap};
-use std::sync::OnceLock;
+use shadow_pass::LampDepths;
+use std::sync::{Arc, OnceLock};
 use surface_pass::SurfaceTriangles;
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
+use typodont_core::volume::Volume;
 use volume_sampler::VolumeSampler;
 
 /// CPU renderer, with the data that it keeps between pictures of the same volume.
@@ -52,6 +55,10 @@ impl CachedVolume {
             colours: SurfaceColours::new(tooth),
             surface: OnceLock::new(),
         }
+    }
+
+    fn surface(&self, volume: &Volume) -> &SurfaceTriangles {
+        self.surface.get_or_init(|| SurfaceTriangles::extract(volume))
     }
 
     fn update(&mut self, tooth: &VolumeInstance, changed: &[usize]) {
@@ -84,12 +91,21 @@ impl CpuRenderer {
 
     /// The scene through one eye.
     pub fn draw(&self, scene: &RenderScene, eye: &Eye, [width, height]: [u32; 2]) -> RgbaImage {
+        let shadows = LampDepths::draw(scene, self.cached.as_ref()).map(Arc::new);
         let mirrored = scene.mirror.as_ref().and_then(|mirror| Some((mirror, mirror.reflected_eye(eye)?)));
         let reflected = mirrored.map(|(mirror, image)| {
-            (mirror, self.draw_scene(&mirror.with_reflected_light(scene), None, &image, [mirror::PICTURE_SIZE; 2]))
+            (
+                mirror,
+                self.draw_scene(&mirror.with_reflected_light(scene), None, &shadows, &image, [mirror::PICTURE_SIZE; 2]),
+            )
         });
-        let drawn =
-            self.draw_scene(scene, reflected.as_ref().map(|(mirror, seen)| (*mirror, seen)), eye, [width, height]);
+        let drawn = self.draw_scene(
+            scene,
+            reflected.as_ref().map(|(mirror, seen)| (*mirror, seen)),
+            &shadows,
+            eye,
+            [width, height],
+        );
         if scene.is_antialiased { fxaa_pass::fxaa_pass(&drawn) } else { drawn }
     }
 
@@ -98,10 +114,11 @@ impl CpuRenderer {
         &self,
         scene: &RenderScene,
         mirror: Option<(&PlaneMirror, &RgbaImage)>,
+        shadows: &Option<Arc<LampDepths>>,
         eye: &Eye,
         [width, height]: [u32; 2],
     ) -> RgbaImage {
-        let view = CpuView { eye: *eye, lights: scene.lights, width, height };
+        let view = CpuView { eye: *eye, lights: scene.lights, width, height, shadows: shadows.clone() };
         let mut framebuffer = Framebuffer::with_background(&scene.background, width, height);
         for solid in &scene.solids {
             surface_pass::solid(solid, &view, &mut framebuffer);
@@ -114,8 +131,7 @@ impl CpuRenderer {
             let sampler = VolumeSampler::new(tooth, known);
             match &tooth.mode {
                 RenderMode::Surface => {
-                    let surface = known.surface.get_or_init(|| SurfaceTriangles::extract(tooth.volume));
-                    surface_pass::tooth(surface, &sampler, &view, &mut framebuffer);
+                    surface_pass::tooth(known.surface(tooth.volume), &sampler, &view, &mut framebuffer);
                 }
                 RenderMode::Iso => iso_pass::iso_pass(&sampler, &view, &mut framebuffer),
                 RenderMode::Volume(function) => volume_pass::volume_pass(&sampler, function, &view, &mut framebuffer),
@@ -126,12 +142,13 @@ impl CpuRenderer {
     }
 }
 
-/// One eye, the lamps, and the picture's size in pixels.
+/// One eye, the lamps, the picture's size in pixels, and what the chair lamp sees.
 struct CpuView {
     eye: Eye,
     lights: Lights,
     width: u32,
     height: u32,
+    shadows: Option<Arc<LampDepths>>,
 }
 
 /// Colours with the depth buffer's values.

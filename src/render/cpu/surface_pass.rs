@@ -3,7 +3,7 @@
 use super::raster::{self, ShadedVertex};
 use super::volume_sampler::VolumeSampler;
 use super::{CpuView, Framebuffer};
-use crate::scene::{Appearance, MeshInstance};
+use crate::scene::{Appearance, MeshInstance, VolumeInstance};
 use crate::surface_mesh;
 use crate::vertex::Vertex;
 use typodont_core::frame::{Pose, Vec3};
@@ -23,6 +23,22 @@ pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer
             view.shade(Appearance { colour, gloss: finish.gloss * own.gloss }, 1.0, point, normal)
         },
     );
+}
+
+/// The depths of a solid alone, for shadows.
+pub fn solid_depths(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer) {
+    let vertices = surface_mesh::instance_vertices(solid);
+    triangles(&vertices, &solid.mesh.triangles, solid.world_from_solid, view, framebuffer, |_, _, _, _| [0.0; 3]);
+}
+
+/// The depths of the tooth alone, for shadows.
+pub fn tooth_depths(
+    SurfaceTriangles { vertices, triangles: corners }: &SurfaceTriangles,
+    tooth: &VolumeInstance,
+    view: &CpuView,
+    framebuffer: &mut Framebuffer,
+) {
+    triangles(vertices, corners, tooth.world_from_tooth, view, framebuffer, |_, _, _, _| [0.0; 3]);
 }
 
 /// Surface of the tooth, in tooth space.

@@ -106,10 +106,8 @@ impl FinishedMesh {
 
     fn instance(&self, world_from_solid: Pose) -> MeshInstance {
         MeshInstance {
-            mesh: self.mesh.clone(),
             vertex_colours: self.vertex_colours.clone(),
-            world_from_solid,
-            appearance: self.appearance,
+            ..MeshInstance::plain(self.mesh.clone(), world_from_solid, self.appearance)
         }
     }
 }
@@ -184,6 +182,8 @@ impl Mouth {
     /// degrees, 0 to 35; the jaw with these teeth stays where it is.
     pub fn solids(&self, open: f32) -> Vec<MeshInstance> {
         let opposite = self.opposite.iter().flat_map(|jaw| jaw.instances(self.world_from_opposite(open)));
+        // The lamp is aimed past the jaw that is not worked on.
+        let opposite = opposite.map(|solid| MeshInstance { casts_shadow: false, ..solid });
         self.near.instances(self.world_from_near).chain(opposite).chain(self.touched.iter().cloned()).collect()
     }
 
