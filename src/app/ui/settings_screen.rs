@@ -68,7 +68,7 @@ pub fn settings_ui(
         ui.label("");
         let mut has_shadows = settings.has_shadows(context.has_graphics);
         let shadows = ui.checkbox(&mut has_shadows, words.get("settings.shadows"));
-        if shadows.on_hover_text(words.get("settings.shadows.hint")).changed() {
+        if shadows.on_hover_text(words.get("settings.shadows_hint")).changed() {
             new.shadows = Some(has_shadows);
         }
         ui.end_row();
