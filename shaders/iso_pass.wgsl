@@ -73,10 +73,7 @@ fn refined(start: vec3f, along: vec3f, before: f32, density_before: f32, z: f32,
 // The depth alone, for shadows.
 @fragment
 fn iso_depth_fragment(@builtin(position) pixel: vec4f) -> @builtin(frag_depth) f32 {
-    let way = ray(pixel.xy);
-    let start = (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
-    let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
-    let z = first_hit(start, along);
+    let z = first_hit(ray_start(), ray_along(ray(pixel.xy)));
     if z < 0.0 {
         discard;
     }
@@ -86,8 +83,8 @@ fn iso_depth_fragment(@builtin(position) pixel: vec4f) -> @builtin(frag_depth) f
 @fragment
 fn iso_fragment(@builtin(position) pixel: vec4f) -> Seen {
     let way = ray(pixel.xy);
-    let start = (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
-    let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
+    let start = ray_start();
+    let along = ray_along(way);
     let z = first_hit(start, along);
     if z < 0.0 {
         discard;

@@ -41,6 +41,16 @@ const NUDGE: f32 = 0.004;
 const REACH: f32 = 0.7;
 const DARKEST: f32 = 0.62;
 
+// The eye in voxels.
+fn ray_start() -> vec3f {
+    return (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
+}
+
+// A ray of world space in voxels, per mm of depth.
+fn ray_along(way: vec3f) -> vec3f {
+    return (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
+}
+
 // Trilinear; empty beyond the grid.
 fn density(at: vec3f) -> f32 {
     let inside = clamp(min(at + 1.0, tooth.dims.xyz - at), vec3f(0.0), vec3f(1.0));

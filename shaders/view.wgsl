@@ -41,7 +41,7 @@ struct View {
 }
 
 @group(0) @binding(0) var<uniform> view: View;
-// Depths that the lamp sees: to be compared, and to be read.
+// Depths that the lamp sees: to be compared, and to be read. WebGL 2 reads single texels of depths only by a sampler.
 @group(0) @binding(1) var shadow_map: texture_depth_2d;
 @group(0) @binding(2) var shadow_sampler: sampler_comparison;
 @group(0) @binding(3) var shadow_depths: texture_2d<f32>;
@@ -82,12 +82,20 @@ fn ray(pixel: vec2f) -> vec3f {
     return view.ahead.xyz + view.right.xyz * right + view.up.xyz * up;
 }
 
+fn buffer_depth_between(near: f32, far: f32, z: f32) -> f32 {
+    return far / (far - near) * (1.0 - near / z);
+}
+
+fn depth_between(near: f32, far: f32, buffer: f32) -> f32 {
+    return near / (1.0 - buffer * (far - near) / far);
+}
+
 fn buffer_depth(z: f32) -> f32 {
-    return view.right.w / (view.right.w - view.position.w) * (1.0 - view.position.w / z);
+    return buffer_depth_between(view.position.w, view.right.w, z);
 }
 
 fn depth_of(buffer: f32) -> f32 {
-    return view.position.w / (1.0 - buffer * (view.right.w - view.position.w) / view.right.w);
+    return depth_between(view.position.w, view.right.w, buffer);
 }
 
 // Light of the surroundings from a direction; a shorter vector gives a blurred mean.
@@ -170,14 +178,6 @@ fn plane_depth(receiver: ShadowReceiver, offset: vec2f) -> f32 {
     return receiver.depth / max(1.0 - dot(receiver.slope, offset) / receiver.depth, 0.1);
 }
 
-fn shadow_buffer_depth(z: f32) -> f32 {
-    return view.shadow.right.w / (view.shadow.right.w - view.shadow.position.w) * (1.0 - view.shadow.position.w / z);
-}
-
-fn shadow_depth_of(buffer: f32) -> f32 {
-    return view.shadow.position.w / (1.0 - buffer * (view.shadow.right.w - view.shadow.position.w) / view.shadow.right.w);
-}
-
 // Mean depth, mm, of what lies between the lamp and the receiver; -1 if nothing does.
 fn caster_depth(receiver: ShadowReceiver, reach: f32) -> f32 {
     var sum = 0.0;
@@ -186,7 +186,7 @@ fn caster_depth(receiver: ShadowReceiver, reach: f32) -> f32 {
     for (var i = 0; i < SHADOW_SEARCHES; i++) {
         let offset = way * (reach * sqrt((f32(i) + 0.5) / f32(SHADOW_SEARCHES)));
         let stored = textureSampleLevel(shadow_depths, depth_sampler, receiver.at + offset * receiver.scale, 0.0).r;
-        let depth = shadow_depth_of(stored);
+        let depth = depth_between(view.shadow.position.w, view.shadow.right.w, stored);
         if depth < plane_depth(receiver, offset) {
             sum += depth;
             count += 1.0;
@@ -228,7 +228,7 @@ fn lamp_share(point: vec3f, normal: vec3f) -> f32 {
     var way = vec2f(1.0, 0.0);
     for (var i = 0; i < SHADOW_TAPS; i++) {
         let offset = way * (blur * sqrt((f32(i) + 0.5) / f32(SHADOW_TAPS)));
-        let depth = shadow_buffer_depth(plane_depth(receiver, offset));
+        let depth = buffer_depth_between(view.shadow.position.w, view.shadow.right.w, plane_depth(receiver, offset));
         seen += textureSampleCompareLevel(shadow_map, shadow_sampler, receiver.at + offset * receiver.scale, depth);
         way = vec2f(way.x * GOLDEN.x - way.y * GOLDEN.y, way.x * GOLDEN.y + way.y * GOLDEN.x);
     }

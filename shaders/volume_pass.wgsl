@@ -1,9 +1,8 @@
 // Direct volume rendering: colours and opacities by density, blended along each ray. Compiled after view.wgsl and
 // tooth.wgsl. CPU twin: src/render/cpu/volume_pass.rs.
 
-// Depth buffer of the scene drawn so far. WebGL 2 reads single texels of depths only by a sampler.
+// Depth buffer of the scene drawn so far.
 @group(2) @binding(0) var scene_depth: texture_2d<f32>;
-@group(2) @binding(1) var nearest_sampler: sampler;
 
 // Opacity at which nothing behind is visible.
 const OPAQUE: f32 = 0.99;
@@ -165,10 +164,10 @@ fn film(depth: f32) -> f32 {
 @fragment
 fn volume_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let way = ray(pixel.xy);
-    let start = (tooth.voxel_from_world * vec4f(view.position.xyz, 1.0)).xyz;
-    let along = (tooth.voxel_from_world * vec4f(way, 0.0)).xyz;
+    let start = ray_start();
+    let along = ray_along(way);
     let at = pixel.xy / vec2f(textureDimensions(scene_depth));
-    let behind = depth_of(textureSampleLevel(scene_depth, nearest_sampler, at, 0.0).r);
+    let behind = depth_of(textureSampleLevel(scene_depth, depth_sampler, at, 0.0).r);
     if tooth.spacing.w > 0.0 {
         let white = film(optical_depth(start, along, tooth.low.w / length(way), behind));
         return vec4f(screen(FILM) * white, white);

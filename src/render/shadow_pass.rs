@@ -51,11 +51,11 @@ impl ShadowPass {
         let triangles = passes::shader_module(device, "surface_pass", &passes::full_source(surface_pass::SOURCE));
         let rays = passes::shader_module(device, "iso_pass", &passes::full_source(iso_pass::SOURCE));
         let corners = [Some(Vertex::layout())];
-        let pass = |label, module, [vertex, fragment]: [Option<&'static str>; 2], groups, vertex_buffers, faces| {
+        let pass = |label, module, (vertex, fragment), groups, vertex_buffers, faces| {
             PipelineDesc {
                 label,
                 module,
-                vertex: vertex.unwrap_or_default(),
+                vertex,
                 fragment,
                 groups,
                 vertex_buffers,
@@ -70,19 +70,12 @@ impl ShadowPass {
         let front = DrawnFaces::Front;
         ShadowPass {
             map: ShadowMap::new(device, shadow::MAP_SIZE),
-            solid: pass("solid shadow", &triangles, [Some("solid_vertex"), None], &with_solid, &corners, front),
-            tooth: pass(
-                "tooth shadow",
-                &triangles,
-                [Some("tooth_vertex"), None],
-                &with_tooth,
-                &corners,
-                DrawnFaces::Front,
-            ),
+            solid: pass("solid shadow", &triangles, ("solid_vertex", None), &with_solid, &corners, front),
+            tooth: pass("tooth shadow", &triangles, ("tooth_vertex", None), &with_tooth, &corners, DrawnFaces::Front),
             iso: pass(
                 "iso shadow",
                 &rays,
-                [Some("box_vertex"), Some("iso_depth_fragment")],
+                ("box_vertex", Some("iso_depth_fragment")),
                 &with_tooth,
                 &[],
                 DrawnFaces::Back,

@@ -8,7 +8,6 @@ pub const SOURCE: &str = include_str!("../../shaders/volume_pass.wgsl");
 pub struct VolumePass {
     pub pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
-    nearest_sampler: wgpu::Sampler,
 }
 
 impl VolumePass {
@@ -21,9 +20,7 @@ impl VolumePass {
         let module = passes::shader_module(device, "volume_pass", &passes::full_source(SOURCE));
         let numbers = wgpu::TextureSampleType::Float { filterable: false };
         let depth = resources::texture(numbers, wgpu::TextureViewDimension::D2);
-        let nearest = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::NonFiltering);
-        let layout = resources::layout(device, "scene depth", &[depth, nearest]);
-        let nearest_sampler = device.create_sampler(&wgpu::SamplerDescriptor::default());
+        let layout = resources::layout(device, "scene depth", &[depth]);
         let pass = PipelineDesc {
             label: "volume_pass",
             module: &module,
@@ -36,12 +33,11 @@ impl VolumePass {
             format: Some(format),
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
         };
-        VolumePass { pipeline: pass.build(device), layout, nearest_sampler }
+        VolumePass { pipeline: pass.build(device), layout }
     }
 
     /// The depths that end the rays.
     pub fn group(&self, device: &wgpu::Device, depth: &wgpu::TextureView) -> wgpu::BindGroup {
-        let sampler = wgpu::BindingResource::Sampler(&self.nearest_sampler);
-        resources::group(device, &self.layout, [wgpu::BindingResource::TextureView(depth), sampler])
+        resources::group(device, &self.layout, [wgpu::BindingResource::TextureView(depth)])
     }
 }

@@ -2,7 +2,7 @@
 
 use super::CpuView;
 use crate::scene::{Appearance, Rgb};
-use typodont_core::frame::Vec3;
+use typodont_core::frame::{Vec3, smooth_step};
 
 /// Light of the surroundings, as shares of the ambient light: from the opening of the mouth (above and toward the trainee;
 /// a unit vector of world space), and from its depth, which is dark mucosa.
@@ -46,14 +46,15 @@ impl CpuView {
                 true => self.mirrored_surroundings(toward),
                 false => self.surroundings(toward),
             };
-        let chair_share = self.shadows.as_ref().map_or(1.0, |map| map.lamp_share(point, normal));
-        for (lamp, share) in [(&self.lights.chair, chair_share), (&self.lights.head, 1.0)] {
-            let colour = Vec3::from(lamp.colour) * (lamp.strength * share);
+        for (lamp, shadows) in [(&self.lights.chair, self.shadows.as_ref()), (&self.lights.head, None)] {
             let to_lamp = (lamp.position - point).normalize_or_zero();
             // Light spreads farther in a tissue the less of it is absorbed: red in gingiva. The total stays the same.
             let wrap = lamp.wrap * albedo;
             let beyond = Vec3::ONE + wrap;
-            light += colour * ((Vec3::splat(normal.dot(to_lamp)) + wrap) / (beyond * beyond)).max(Vec3::ZERO);
+            let scattered = ((Vec3::splat(normal.dot(to_lamp)) + wrap) / (beyond * beyond)).max(Vec3::ZERO);
+            let seen = shadows.filter(|_| scattered != Vec3::ZERO).map_or(1.0, |map| map.lamp_share(point, normal));
+            let colour = Vec3::from(lamp.colour) * (lamp.strength * seen);
+            light += colour * scattered;
             shine += colour * coat(finish.gloss, normal, to_lamp, to_eye);
         }
         let reached = open / (Vec3::ONE - RETURNED * albedo * (1.0 - open));
@@ -67,8 +68,7 @@ impl CpuView {
 
     /// Light of the surroundings as polished metal mirrors it: the opening of the mouth has an edge.
     fn mirrored_surroundings(&self, toward: Vec3) -> Vec3 {
-        let x = ((0.5 + 0.5 * toward.dot(OPENING) - EDGE[0]) / (EDGE[1] - EDGE[0])).clamp(0.0, 1.0);
-        self.surroundings_at(x * x * (3.0 - 2.0 * x))
+        self.surroundings_at(smooth_step((0.5 + 0.5 * toward.dot(OPENING) - EDGE[0]) / (EDGE[1] - EDGE[0])))
     }
 
     /// Light of the surroundings between their depth (0) and the opening of the mouth (1).

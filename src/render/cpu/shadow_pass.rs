@@ -6,7 +6,7 @@ use super::{CachedVolume, CpuView, Framebuffer, iso_pass, surface_pass};
 use crate::eye::Eye;
 use crate::scene::{Background, RenderMode, RenderScene};
 use crate::shadow;
-use typodont_core::frame::{Vec2, Vec3};
+use typodont_core::frame::{Vec2, Vec3, smooth_step};
 
 /// Places at which a shadow is looked for, and at which its edge is measured.
 const SEARCHES: usize = 12;
@@ -81,7 +81,8 @@ impl LampDepths {
         let z = from_lamp.dot(forward);
         let across = Vec2::new(from_lamp.dot(right), from_lamp.dot(up)) / (z * half);
         let along_depth = (2.0 * z - near - far).abs() / (far - near);
-        let fade = smoothstep(FADE, across.abs().max_element().max(along_depth));
+        let from_middle = across.abs().max_element().max(along_depth);
+        let fade = smooth_step((from_middle - FADE[0]) / (FADE[1] - FADE[0]));
         if fade == 1.0 {
             return 1.0;
         }
@@ -136,9 +137,4 @@ fn places<const N: usize>(radius: f32) -> impl Iterator<Item = Vec2> {
     const GOLDEN: Vec2 = Vec2::new(-0.737_368_9, 0.675_490_3);
     let ways = std::iter::successors(Some(Vec2::X), |way| Some(GOLDEN.rotate(*way)));
     ways.take(N).enumerate().map(move |(i, way)| way * (radius * ((i as f32 + 0.5) / N as f32).sqrt()))
-}
-
-fn smoothstep([from, to]: [f32; 2], value: f32) -> f32 {
-    let x = ((value - from) / (to - from)).clamp(0.0, 1.0);
-    x * x * (3.0 - 2.0 * x)
 }
