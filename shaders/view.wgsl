@@ -16,7 +16,7 @@ struct Shadow {
     right: vec4f,
     // w: radius of the lamp's luminous area.
     up: vec4f,
-    // w: half of the map's width at a depth of 1 mm; 0 where nothing casts shadows.
+    // w: half of the map's width at a depth of 1 mm.
     ahead: vec4f,
 }
 
@@ -60,6 +60,8 @@ const RETURNED: f32 = 0.5;
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;
 const PI: f32 = 3.14159265;
+// False in pipelines for scenes without shadows: in software, a branch costs time even where it is not taken.
+override has_shadows: bool = false;
 // Places at which a shadow is looked for, and at which its edge is measured.
 const SHADOW_SEARCHES: i32 = 12;
 const SHADOW_TAPS: i32 = 24;
@@ -199,9 +201,6 @@ fn caster_depth(receiver: ShadowReceiver, reach: f32) -> f32 {
 // Share of the chair lamp that a point with a unit normal sees.
 fn lamp_share(point: vec3f, normal: vec3f) -> f32 {
     let half = view.shadow.ahead.w;
-    if half == 0.0 {
-        return 1.0;
-    }
     let distance = dot(point - view.shadow.position.xyz, view.shadow.ahead.xyz);
     let texel = 2.0 * half * distance / f32(textureDimensions(shadow_map).x);
     let from_lamp = point + normal * (SHADOW_LIFT * texel) - view.shadow.position.xyz;
@@ -259,7 +258,7 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
         let wrap = lamp.position.w * albedo;
         let scattered = max((dot(normal, to_lamp) + wrap) / ((1.0 + wrap) * (1.0 + wrap)), vec3f(0.0));
         var strength = lamp.colour.xyz;
-        if i == 0 && any(scattered > vec3f(0.0)) {
+        if has_shadows && i == 0 && any(scattered > vec3f(0.0)) {
             strength *= lamp_share(point, normal);
         }
         light += strength * scattered;

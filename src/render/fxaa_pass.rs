@@ -33,6 +33,7 @@ impl FxaaPass {
             depth: DepthMode::None,
             format: Some(format),
             blend: None,
+            has_shadows: false,
         };
         FxaaPass { pipeline: pass.build(device), layout }
     }

@@ -12,6 +12,7 @@ pub fn pipeline(
     format: wgpu::TextureFormat,
     view: &wgpu::BindGroupLayout,
     tooth: &wgpu::BindGroupLayout,
+    has_shadows: bool,
 ) -> wgpu::RenderPipeline {
     let module = passes::shader_module(device, "iso_pass", &passes::full_source(SOURCE));
     PipelineDesc {
@@ -25,6 +26,7 @@ pub fn pipeline(
         depth: DepthMode::ReadWrite,
         format: Some(format),
         blend: None,
+        has_shadows,
     }
     .build(device)
 }

@@ -38,7 +38,12 @@ pub struct ParticlePass {
 }
 
 impl ParticlePass {
-    pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat, view: &wgpu::BindGroupLayout) -> ParticlePass {
+    pub fn new(
+        device: &wgpu::Device,
+        format: wgpu::TextureFormat,
+        view: &wgpu::BindGroupLayout,
+        has_shadows: bool,
+    ) -> ParticlePass {
         let module = passes::shader_module(device, "particle_pass", &passes::full_source(SOURCE));
         let attributes = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4];
         let corners = [Some(wgpu::VertexBufferLayout {
@@ -60,6 +65,7 @@ impl ParticlePass {
                 depth,
                 format: Some(format),
                 blend,
+                has_shadows,
             }
             .build(device)
         };

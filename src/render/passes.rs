@@ -20,6 +20,8 @@ pub struct PipelineDesc<'a> {
     /// Format of the colours; `None` if depths alone are drawn.
     pub format: Option<wgpu::TextureFormat>,
     pub blend: Option<wgpu::BlendState>,
+    /// True if the fragment shader reads the shadow map.
+    pub has_shadows: bool,
 }
 
 /// Faces of triangles that are drawn.
@@ -79,7 +81,10 @@ impl PipelineDesc<'_> {
             fragment: self.fragment.map(|fragment| wgpu::FragmentState {
                 module: self.module,
                 entry_point: Some(fragment),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: if self.has_shadows { &[("has_shadows", 1.0)] } else { &[] },
+                    ..Default::default()
+                },
                 targets,
             }),
             primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },

@@ -34,6 +34,8 @@ pub struct Renderer {
     fxaa_pass: FxaaPass,
     stereo_pass: StereoPass,
     mirror_pass: MirrorPass,
+    /// True while the pipelines read the shadow map.
+    has_shadows: bool,
     /// Present once a scene has had shadows.
     shadow_pass: Option<ShadowPass>,
     no_shadows: ShadowMap,
@@ -102,10 +104,10 @@ impl Renderer {
         let tooth_layout = ToothTextures::layout(device);
         let [lamp_view, left, right] = [0; 3].map(|_| ViewBindings::new(device, &view_layout, &no_shadows));
         Renderer {
-            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout),
-            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout),
-            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout),
-            particle_pass: ParticlePass::new(device, format, &view_layout),
+            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout, false),
+            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout, false),
+            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, false),
+            particle_pass: ParticlePass::new(device, format, &view_layout, false),
             fxaa_pass: FxaaPass::new(device, format),
             stereo_pass: StereoPass::new(device, format),
             mirror_pass: MirrorPass::new(device, format, &view_layout),
@@ -114,6 +116,7 @@ impl Renderer {
             queue: queue.clone(),
             format,
             tooth_layout,
+            has_shadows: false,
             shadow_pass: None,
             no_shadows,
             lamp_view,
@@ -141,11 +144,11 @@ impl Renderer {
     ) -> Result<Uploads, RenderError> {
         let limit = self.device.limits().max_texture_dimension_2d;
         validate(scene, viewpoint, stereo, target.size, limit)?;
+        self.fit_shadows(scene);
         let uploads = self.prepare(scene);
         let [width, height] = target.size;
         let aspect = width as f32 / height as f32;
         let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.fit_shadows(scene);
         self.draw_shadows(&mut encoder, scene);
         match stereo {
             None => {
@@ -170,16 +173,25 @@ impl Renderer {
         Ok(uploads)
     }
 
-    /// Creates the shadow map and what draws it when a scene first has shadows.
+    /// Changes to pipelines with or without shadows as the scene needs, and creates the shadow map when it is first needed.
     fn fit_shadows(&mut self, scene: &RenderScene) {
-        if scene.shadows.is_none() || self.shadow_pass.is_some() {
+        let has_shadows = shadow::chair_eye(scene).is_some();
+        if has_shadows == self.has_shadows {
             return;
         }
-        let solid = &self.surface_pass.layout;
-        let pass = ShadowPass::new(&self.device, &self.view_layout, &self.tooth_layout, solid);
-        self.views = [0; 2].map(|_| ViewBindings::new(&self.device, &self.view_layout, &pass.map));
-        self.mirror_targets = [None, None];
-        self.shadow_pass = Some(pass);
+        self.has_shadows = has_shadows;
+        let (device, format, view, tooth) = (&self.device, self.format, &self.view_layout, &self.tooth_layout);
+        self.surface_pass = SurfacePass::new(device, format, view, tooth, has_shadows);
+        self.iso_pass = iso_pass::pipeline(device, format, view, tooth, has_shadows);
+        self.volume_pass = VolumePass::new(device, format, view, tooth, has_shadows);
+        self.particle_pass = ParticlePass::new(device, format, view, has_shadows);
+        // Their bind groups are of the passes that are gone.
+        (self.eye_targets, self.mirror_targets) = ([None, None], [None, None]);
+        if self.shadow_pass.is_none() {
+            let pass = ShadowPass::new(device, view, tooth, &self.surface_pass.layout);
+            self.views = [0; 2].map(|_| ViewBindings::new(device, view, &pass.map));
+            self.shadow_pass = Some(pass);
+        }
     }
 
     /// Draws what the lamp sees, so that the rest lies in shadow. A translucent tooth casts none.

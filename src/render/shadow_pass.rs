@@ -63,6 +63,7 @@ impl ShadowPass {
                 depth: DepthMode::ReadWrite,
                 format: None,
                 blend: None,
+                has_shadows: false,
             }
             .build(device)
         };

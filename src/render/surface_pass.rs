@@ -60,6 +60,7 @@ impl SurfacePass {
         format: wgpu::TextureFormat,
         view: &wgpu::BindGroupLayout,
         tooth: &wgpu::BindGroupLayout,
+        has_shadows: bool,
     ) -> SurfacePass {
         let module = passes::shader_module(device, "surface_pass", &passes::full_source(SOURCE));
         let layout = resources::layout(device, "solid", &[resources::uniform()]);
@@ -77,6 +78,7 @@ impl SurfacePass {
                 depth,
                 format: Some(format),
                 blend,
+                has_shadows,
             }
             .build(device)
         };

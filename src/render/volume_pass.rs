@@ -16,6 +16,7 @@ impl VolumePass {
         format: wgpu::TextureFormat,
         view: &wgpu::BindGroupLayout,
         tooth: &wgpu::BindGroupLayout,
+        has_shadows: bool,
     ) -> VolumePass {
         let module = passes::shader_module(device, "volume_pass", &passes::full_source(SOURCE));
         let numbers = wgpu::TextureSampleType::Float { filterable: false };
@@ -32,6 +33,7 @@ impl VolumePass {
             depth: DepthMode::None,
             format: Some(format),
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+            has_shadows,
         };
         VolumePass { pipeline: pass.build(device), layout }
     }

@@ -135,7 +135,8 @@ impl LessonView {
             translucent_particles: self.particles.translucent(),
             mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
             lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
-            shadows: (!is_radiograph && self.has_shadows(settings, viewport))
+            shadows: self
+                .has_shadows(settings, viewport)
                 .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
             is_antialiased: settings.is_smooth(viewport.has_graphics()),
