@@ -11,7 +11,7 @@ use typodont_formats::diagnostic::Diagnostic;
 use typodont_render::{EnamelDepth, LabelPalette, MeshInstance, RenderMode, TransferFunction};
 use typodont_scene::particles;
 use typodont_scene::particles::ParticleField;
-use typodont_scene::{self as scene, ContraAngle, Mouth};
+use typodont_scene::{self as scene, ContraAngle, GreyVolume, Mouth};
 
 /// Maximum opening angle of the mouth, degrees: 50 mm between the incisors.
 const MAX_MOUTH_OPENING: f32 = 35.0;
@@ -21,6 +21,8 @@ pub struct LessonScene {
     pub workpiece: Arc<Workpiece>,
     /// The window's own copy of the volume, with all edits received so far.
     pub volume: Volume,
+    /// The same by grey values, if the workpiece is from a CT scan.
+    grey_volume: Option<GreyVolume>,
     pub palette: LabelPalette,
     /// The jaws around the tooth, if the exercise has a mouth.
     pub mouth: Option<Mouth>,
@@ -69,12 +71,17 @@ impl LessonScene {
             true => Some(particles::saliva_ejector(&workpiece)).unzip(),
             false => (None, None),
         };
+        let grey_volume = GreyVolume::new(&workpiece, &volume, tissues, is_decay_shown);
         let built = LessonScene {
             histogram: OnceCell::new(),
             enamel_depth: OnceCell::new(),
-            transfer_function: TransferFunctionDraft::new(TransferFunction::tissue(&palette)),
-            presets: TransferFunctionPresets::new(tissues, &palette, is_decay_shown),
+            transfer_function: match grey_volume {
+                Some(_) => TransferFunctionDraft::straight_line(&palette),
+                None => TransferFunctionDraft::new(TransferFunction::tissue(&palette)),
+            },
+            presets: TransferFunctionPresets::new(tissues, &palette, is_decay_shown, grey_volume.is_some()),
             volume,
+            grey_volume,
             palette,
             surroundings: match &mouth {
                 Some(mouth) => mouth.solids(scene::WORKING_OPENING_DEG),
@@ -107,6 +114,7 @@ impl LessonScene {
             particles.record_removal(edit, self.volume.grid());
         }
         self.volume.apply_edit(edit);
+        self.grey_volume.iter_mut().for_each(|grey| grey.apply_edit(edit));
         self.edit_count += 1;
     }
 
@@ -123,7 +131,8 @@ impl LessonScene {
     /// Sets the colours of the tissues anew, with or without visible decay.
     pub fn colour(&mut self, tissues: &TissueTable, is_decay_shown: bool) {
         self.palette = scene::tissue_palette(tissues, is_decay_shown);
-        self.presets = TransferFunctionPresets::new(tissues, &self.palette, is_decay_shown);
+        self.grey_volume = GreyVolume::new(&self.workpiece, &self.volume, tissues, is_decay_shown);
+        self.presets = TransferFunctionPresets::new(tissues, &self.palette, is_decay_shown, self.grey_volume.is_some());
         self.appearance_count += 1;
     }
 
@@ -141,10 +150,36 @@ impl LessonScene {
         self.appearance_count += 1;
     }
 
-    /// Density histogram of the volume at the first call. It is computed on demand: few users need it, and counting the
-    /// voxels of a fine tooth takes a while.
+    /// Histogram of the grey values, or else of the densities, at the first call. It is computed on demand: few users need it,
+    /// and counting the voxels of a fine tooth takes a while.
     pub fn histogram(&self) -> &DensityHistogram {
-        self.histogram.get_or_init(|| DensityHistogram::new(&self.volume))
+        self.histogram.get_or_init(|| DensityHistogram::new(self.volume_of(VolumeSource::GreyValues)))
+    }
+
+    /// Translucent tissue in its own colours, as a beginning for a transfer function that is drawn by hand.
+    pub fn tissue_function(&self) -> TransferFunction {
+        let function = TransferFunction::tissue(&self.palette);
+        if self.grey_volume.is_none() {
+            return function;
+        }
+        // A table ends at full density, which is the most frequent grey value of its tissue.
+        self.histogram().peaks().iter().fold(function, |made, peak| made.with_full_at(peak.tissue, peak.density))
+    }
+
+    /// Returns what a display mode looks at.
+    pub fn volume_source(&self, mode: DisplayMode) -> VolumeSource {
+        match mode {
+            DisplayMode::Xray | DisplayMode::Drawn if self.grey_volume.is_some() => VolumeSource::GreyValues,
+            _ => VolumeSource::Densities,
+        }
+    }
+
+    /// Returns the volume with these values; without grey values that of the densities.
+    pub fn volume_of(&self, source: VolumeSource) -> &Volume {
+        match (source, &self.grey_volume) {
+            (VolumeSource::GreyValues, Some(grey)) => grey.volume(),
+            _ => &self.volume,
+        }
     }
 
     pub fn render_mode(&self, mode: DisplayMode) -> RenderMode {
@@ -167,17 +202,32 @@ struct TransferFunctionPresets {
 }
 
 impl TransferFunctionPresets {
-    fn new(tissues: &TissueTable, palette: &LabelPalette, is_decay_shown: bool) -> TransferFunctionPresets {
+    fn new(
+        tissues: &TissueTable,
+        palette: &LabelPalette,
+        is_decay_shown: bool,
+        has_grey_values: bool,
+    ) -> TransferFunctionPresets {
         let decay: Vec<Label> =
             tissues.entries().iter().filter(|e| e.role == TissueRole::Decay).map(|e| e.label()).collect();
         TransferFunctionPresets {
             tissue: Arc::new(TransferFunction::tissue(palette)),
-            x_ray: Arc::new(TransferFunction::radiograph(|label| {
-                scene::x_ray_attenuation(tissues, label, is_decay_shown)
-            })),
+            x_ray: Arc::new(match has_grey_values {
+                true => GreyVolume::radiograph(tissues, is_decay_shown),
+                false => TransferFunction::radiograph(|label| scene::x_ray_attenuation(tissues, label, is_decay_shown)),
+            }),
             decay: Arc::new(TransferFunction::highlighting(&decay, palette)),
         }
     }
+}
+
+/// Values of the voxels that a picture is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VolumeSource {
+    /// The share of each voxel that is filled.
+    Densities,
+    /// The grey values of the CT scan that the workpiece is from.
+    GreyValues,
 }
 
 /// Display mode of the tooth.
@@ -213,5 +263,53 @@ impl DisplayMode {
     /// True if tissues beneath the surface are visible.
     pub fn shows_interior(self) -> bool {
         !matches!(self, DisplayMode::Surface | DisplayMode::Iso)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use typodont_exercise::scenario::{self, ResolveMode};
+    use typodont_formats::diagnostic::SourceText;
+    use typodont_formats::import::GreyValues;
+
+    #[test]
+    fn a_scanned_tooth_is_drawn_by_its_grey_values_and_others_by_density() {
+        // Aim: only the radiograph and the user's own colours show grey values, over whose histogram the colours are drawn.
+        // Method: a generated tooth, and the same with the grey values of a scan: 160 where it is enamel, 90 elsewhere.
+        let text =
+            include_str!("../../scenarios/5-grinding.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.3");
+        let library = Library::shipped();
+        let source = SourceText::new("coarse.json", text);
+        let scenario = scenario::resolve(source, &library, ResolveMode::MakeWorkpiece).unwrap();
+        let [enamel, dentine] = ["enamel", "dentine"].map(|name| scenario.tissues.label_of(name).unwrap());
+        let generated = Workpiece::make(&scenario, 1).unwrap();
+        let grey = generated.volume.labels().iter().map(|&label| if label == enamel { 160 } else { 90 });
+        let grey_values = Some(Arc::new(GreyValues::from_values(grey.collect())));
+        let scanned = Workpiece { grey_values, ..generated.clone() };
+        let [generated, mut scanned] =
+            [generated, scanned].map(|made| LessonScene::build(&scenario, &library, Arc::new(made), true).0);
+        let peak = |scene: &LessonScene, tissue: Label| {
+            scene.histogram().peaks().into_iter().find(|peak| peak.tissue == tissue).unwrap().density
+        };
+        assert_eq!([enamel, dentine].map(|tissue| peak(&generated, tissue)), [255, 255]);
+        assert_eq!([enamel, dentine].map(|tissue| peak(&scanned, tissue)), [160, 90]);
+        for mode in DisplayMode::ALL.map(|(mode, _)| mode) {
+            let is_by_grey = matches!(mode, DisplayMode::Xray | DisplayMode::Drawn);
+            assert_eq!(scanned.volume_source(mode) == VolumeSource::GreyValues, is_by_grey, "{mode:?}");
+            assert_eq!(generated.volume_source(mode), VolumeSource::Densities);
+        }
+        // Full tissue looks alike by density and by grey value.
+        let [by_density, by_grey] = [&generated, &scanned].map(|scene| scene.tissue_function());
+        assert_eq!(by_grey.table(dentine)[90], by_density.table(dentine)[255]);
+        assert_eq!(by_grey.table(dentine)[45], by_density.table(dentine)[127]);
+        // What is cut is gone from both.
+        let full = |index: &usize| scanned.volume.voxel(*index).density.unit() == 1.0;
+        let index = (0..scanned.volume.grid().len()).find(full).unwrap();
+        let edit = scanned.volume.clone().set(index, typodont_core::volume::Voxel::AIR);
+        scanned.apply_edit(&edit);
+        for source in [VolumeSource::Densities, VolumeSource::GreyValues] {
+            assert_eq!(scanned.volume_of(source).densities()[index].bits(), 0, "{source:?}");
+        }
     }
 }

@@ -109,7 +109,7 @@ fn measure(arguments: &Arguments, results: &mut BenchResults) -> Result<(), Stri
         let spacing = arguments.tooth_spacing_mm.map(|mm| [mm; 3]);
         let tooth = tooth_import::segmented(&image, spacing, &volumes::tissues()?)
             .map_err(|e| format!("{}: wrong-volume: {e}", path.display()))?;
-        measure_tooth(tooth, results)?;
+        measure_tooth(tooth.volume, results)?;
     }
     if arguments.volume.is_empty() {
         for dims in DIMS {

@@ -15,11 +15,11 @@ use typodont_exercise::scenario;
 use typodont_exercise::tooth_import;
 use typodont_formats::imaging;
 use typodont_formats::imaging::{CropOptions, ReadOptions, raw};
-use typodont_formats::import::voxelize;
 use typodont_formats::import::voxelize::{UNITS, VoxelizeError, Voxelized};
+use typodont_formats::import::{ImportedTooth, set_upright, voxelize};
 use typodont_formats::nrrd::{Samples, VoxelImage};
 use typodont_formats::{Library, surfaces};
-use typodont_report::{sections_png, tissue_map};
+use typodont_report::{grey_value_map, sections_png, tissue_map};
 
 /// Default voxel spacing of a tooth built from surfaces, mm: that of the program's own teeth.
 const SPACING: f32 = 0.1;
@@ -36,6 +36,9 @@ pub struct Arguments {
     /// Image to write: three sections with the tissues in their colours
     #[arg(long, value_name = "FILE.png")]
     preview: Option<PathBuf>,
+    /// Grey values of a CT volume to write, on the grid of the label map; a scenario refers to it under "scan"
+    #[arg(long, value_name = "FILE.nrrd")]
+    grey_values: Option<PathBuf>,
     /// Voxel spacing of the scan, if its file does not state it, or of the volume made from surfaces [default for surfaces: 0.1]
     #[arg(long, value_name = "MM", value_parser = spacing)]
     spacing_mm: Option<[f32; 3]>,
@@ -111,6 +114,18 @@ const NUMBERS: [(&str, raw::RawSampleType); 8] = [
     ("double", raw::RawSampleType::Double),
 ];
 
+/// An imported tooth, and what its author should know about it.
+struct ImportResult {
+    tooth: ImportedTooth,
+    notes: Vec<String>,
+}
+
+impl From<Voxelized> for ImportResult {
+    fn from(Voxelized { volume, notes }: Voxelized) -> ImportResult {
+        ImportResult { tooth: ImportedTooth { volume, grey_values: None }, notes }
+    }
+}
+
 fn numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
     let found: Option<Vec<f32>> = text.split(',').map(|word| word.trim().parse().ok()).collect();
     let numbers: Option<[f32; N]> = found.and_then(|found| found.try_into().ok());
@@ -154,7 +169,12 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let bar = super::run::spinner("segmenting the tissues");
     let made = make_tooth(arguments, &table);
     bar.finish_and_clear();
-    let Voxelized { volume, notes } = made?;
+    let ImportResult { tooth: ImportedTooth { volume, grey_values }, notes } = made?;
+    if let Some(path) = &arguments.grey_values {
+        let missing =
+            || CliError::misuse("--grey-values: only a CT volume has grey values; label maps and surfaces have none");
+        write_file(path, grey_value_map(&volume, grey_values.as_ref().ok_or_else(missing)?).map_err(CliError::Wrong)?)?;
+    }
     write_file(&arguments.output, tissue_map(&volume, &table).map_err(CliError::Wrong)?)?;
     if let Some(preview) = &arguments.preview {
         write_file(preview, sections_png(&volume, &table))?;
@@ -165,17 +185,28 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
 
 /// Checks, before anything is read, that no output file is also an input file.
 fn check_outputs(arguments: &Arguments) -> Result<(), CliError> {
-    let Arguments { output, preview, .. } = arguments;
+    let Arguments { output, preview, grey_values, .. } = arguments;
     if !output.to_string_lossy().ends_with(".nrrd") {
         return Err(CliError::misuse(format!("{}: the name of the label map must end in .seg.nrrd", output.display())));
     }
     if let Some(preview) = preview.as_ref().filter(|p| p.extension().is_none_or(|e| !e.eq_ignore_ascii_case("png"))) {
         return Err(CliError::misuse(format!("{}: the name of the image must end in .png", preview.display())));
     }
+    if let Some(written) = grey_values.as_ref().filter(|p| !p.to_string_lossy().ends_with(".nrrd")) {
+        return Err(CliError::misuse(format!("{}: the name of the grey values must end in .nrrd", written.display())));
+    }
+    if grey_values.as_ref() == Some(output) {
+        return Err(CliError::misuse(format!(
+            "{}: the label map and the grey values need two names",
+            output.display()
+        )));
+    }
     let inputs = arguments.scan.iter().chain(arguments.tissue.iter().map(|(_, file)| file));
     let is_same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
     for input in inputs {
-        if let Some(written) = std::iter::once(output).chain(preview).find(|written| is_same(input, written)) {
+        if let Some(written) =
+            std::iter::once(output).chain(preview).chain(grey_values).find(|written| is_same(input, written))
+        {
             return Err(CliError::misuse(format!(
                 "{}: this is an input file and would be overwritten; choose another \
             name",
@@ -186,17 +217,19 @@ fn check_outputs(arguments: &Arguments) -> Result<(), CliError> {
     Ok(())
 }
 
-fn make_tooth(arguments: &Arguments, table: &TissueTable) -> Result<Voxelized, CliError> {
+fn make_tooth(arguments: &Arguments, table: &TissueTable) -> Result<ImportResult, CliError> {
     match &arguments.scan {
         Some(path) if surfaces::is_surface(path) => {
             let labels = arguments.shells.iter().map(|name| label(table, name)).collect::<Result<Vec<Label>, _>>()?;
             let triangles = triangles(path, arguments)?;
             let parts = voxelize::nested_tissue_surfaces(&labels, &triangles)
                 .map_err(|unsound| surface_error(path, &unsound))?;
-            voxelize_parts(&parts, arguments, table).map_err(|unsound| surface_error(path, &unsound))
+            voxelize_parts(&parts, arguments, table)
+                .map_err(|unsound| surface_error(path, &unsound))
+                .map(ImportResult::from)
         }
         Some(path) => from_scan(path, arguments, table),
-        None => from_tissues(arguments, table),
+        None => from_tissues(arguments, table).map(ImportResult::from),
     }
 }
 
@@ -247,7 +280,7 @@ fn voxelize_parts(
     voxelize::voxelize(parts, spacing, crop_box(arguments), &scenario::anatomy_tissues(table))
 }
 
-fn from_scan(path: &Path, arguments: &Arguments, table: &TissueTable) -> Result<Voxelized, CliError> {
+fn from_scan(path: &Path, arguments: &Arguments, table: &TissueTable) -> Result<ImportResult, CliError> {
     let number = arguments.r#type.as_ref().and_then(|type_name| NUMBERS.iter().find(|(name, _)| name == type_name));
     let raw =
         arguments.size.zip(number).zip(arguments.spacing_mm).map(|((size, (_, number)), spacing)| raw::RawLayout {
@@ -279,23 +312,23 @@ fn from_scan(path: &Path, arguments: &Arguments, table: &TissueTable) -> Result<
         .map_err(|unread| volume_error(path, &unread))?;
     let tissues = scenario::anatomy_tissues(table);
     let dims = image.geometry.dims;
-    let volume = match &names {
+    let tooth = match &names {
         Some(names) => tooth_import::labelled(&image, None, names)
-            .map(|volume| typodont_formats::import::set_upright(volume, &tissues)),
-        None => tooth_import::segmented_labels(image, &tissues),
+            .map(|volume| ImportedTooth { volume: set_upright(volume, &tissues), grey_values: None }),
+        None => tooth_import::segmented_labels(image, &tissues, arguments.grey_values.is_some()),
     };
-    let volume = volume.map_err(|what| volume_error(path, &what))?;
-    if names.is_none() && reaches_border(&volume, dims) {
+    let tooth = tooth.map_err(|what| volume_error(path, &what))?;
+    if names.is_none() && reaches_border(&tooth.volume, dims) {
         notes.push(
             "the tooth extends to the border of the scan or of the cropped box: it may be joined to bone or to a \
              neighbouring tooth; check it with --preview and, if so, draw a label map (3D Slicer: Segment Editor)"
                 .to_string(),
         );
     }
-    if volume.count(tissues.enamel) == 0 {
+    if tooth.volume.count(tissues.enamel) == 0 {
         notes.push("there is no enamel, so the crown could not be located: it must point to +z".to_string());
     }
-    Ok(Voxelized { volume, notes })
+    Ok(ImportResult { tooth, notes })
 }
 
 /// True if solid tissue touches the border of a scan of this many voxels: its volume was then extended by all the room

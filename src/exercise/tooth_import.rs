@@ -7,8 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use typodont_anatomy::TissueLabels;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Grid, Label, Volume};
-use typodont_formats::import::set_upright;
-use typodont_formats::import::{segment, volume_from_label_map};
+use typodont_formats::import::{GreyValues, ImportedTooth, segment, set_upright, volume_from_label_map};
 use typodont_formats::nrrd::segmentation::Segmentation;
 use typodont_formats::nrrd::{CoordinateSystem, Geometry, Samples, VoxelImage};
 
@@ -25,9 +24,12 @@ pub fn tooth_volume(
     spacing: Option<[f32; 3]>,
     table: &TissueTable,
     tissues: &TissueLabels,
-) -> Result<Volume, String> {
+) -> Result<ImportedTooth, String> {
     match labels_by_number(image, table)? {
-        Some(names) => Ok(set_upright(labelled(image, spacing, &names)?, tissues)),
+        Some(names) => {
+            let volume = set_upright(labelled(image, spacing, &names)?, tissues);
+            Ok(ImportedTooth { volume, grey_values: None })
+        }
         None => segmented(image, spacing, tissues),
     }
 }
@@ -38,20 +40,55 @@ pub fn tooth_volume(
 ///
 /// # Errors
 /// Returns a message if the voxel spacing is unknown, or if the tooth cannot be segmented.
-pub fn segmented(image: &VoxelImage, spacing: Option<[f32; 3]>, tissues: &TissueLabels) -> Result<Volume, String> {
+pub fn segmented(
+    image: &VoxelImage,
+    spacing: Option<[f32; 3]>,
+    tissues: &TissueLabels,
+) -> Result<ImportedTooth, String> {
     let (grid, values) = axis_aligned(image, spacing)?;
     segment::segment(&grid, values, tissues).map_err(|unclear| unclear.to_string())
 }
 
 /// Segments a CT scan of one tooth for a label map: large scans are segmented from coarse to fine, and the density is
-/// not smoothed.
+/// not smoothed. Grey values are kept if `keeps_grey_values`.
 ///
 /// # Errors
 /// Returns a message if the voxel spacing is unknown, or if the tooth cannot be segmented.
-pub fn segmented_labels(image: VoxelImage, tissues: &TissueLabels) -> Result<Volume, String> {
+pub fn segmented_labels(
+    image: VoxelImage,
+    tissues: &TissueLabels,
+    keeps_grey_values: bool,
+) -> Result<ImportedTooth, String> {
     let (grid, values) = axis_aligned(&image, None)?;
     drop(image);
-    segment::labels(&grid, values, tissues).map_err(|unclear| unclear.to_string())
+    segment::labels(&grid, values, tissues, keeps_grey_values).map_err(|unclear| unclear.to_string())
+}
+
+/// Returns the grey values of a tooth that was drawn as a label map, from the CT scan on which it was drawn.
+///
+/// `spacing` (mm, along x, y and z) replaces the scan's own spacing.
+///
+/// # Errors
+/// Returns a message if the scan does not lie on the grid of the volume, or if its enamel is not brighter than the air.
+pub fn grey_values_of(
+    scan: &VoxelImage,
+    spacing: Option<[f32; 3]>,
+    volume: &Volume,
+    enamel: Label,
+) -> Result<GreyValues, String> {
+    let (grid, values) = axis_aligned(scan, spacing)?;
+    let own = volume.grid();
+    let is_same =
+        |a: Vec3, b: Vec3, tolerance: f32| (a - b).abs().max_element() <= tolerance * own.spacing.min_element();
+    let from_first = (own.origin - grid.origin) / grid.spacing;
+    if !is_same(own.spacing, grid.spacing, 0.001) || (from_first - from_first.round()).abs().max_element() > 0.01 {
+        return Err("the voxels of the scan are not those of the label map; save the map on the scan's own grid".into());
+    }
+    // The volume is larger than the map where its tooth lies at the border.
+    let at = |cell: [u32; 3]| grid.nearest(own.centre(cell)).map(|cell| values[grid.index(cell)]);
+    let scanned: Vec<f32> = own.cells().map(|cell| at(cell).unwrap_or(f32::NAN)).collect();
+    GreyValues::of_labelled(&scanned, volume, enamel)
+        .ok_or_else(|| "the enamel of the label map is not brighter in the scan than the air around the tooth".into())
 }
 
 /// Returns the grid and the values of an image along +x, +y and +z of its space.
@@ -303,7 +340,7 @@ mod tests {
         };
         segment(0, "dentine", "Segment_1", 7);
         segment(1, "Segment_2", "Pulp", 9);
-        let volume = tooth_volume(&drawn, None, &table, &tissues).unwrap();
+        let volume = tooth_volume(&drawn, None, &table, &tissues).unwrap().volume;
         assert_eq!([tissues.enamel, tissues.dentine, tissues.pulp].map(|label| volume.count(label)), [0, 12, 12]);
         drawn.keys.iter_mut().for_each(|(_, value)| *value = value.replace("Pulp", "Nerve"));
         assert!(tooth_volume(&drawn, None, &table, &tissues).unwrap_err().contains("\"nerve\"; known: "));

@@ -47,17 +47,17 @@ impl ToothScan {
     pub fn replace_teeth(&self, scenario: &mut Scenario) -> Result<(), LessonError> {
         let tissues = scenario::anatomy_tissues(&scenario.tissues);
         let spacing = self.spacing.map(|mm| [mm; 3]);
-        let volume = tooth_import::tooth_volume(&self.image, spacing, &scenario.tissues, &tissues);
-        let volume = Arc::new(volume.map_err(|why| wrong_volume(&self.path, why))?);
+        let scanned = tooth_import::tooth_volume(&self.image, spacing, &scenario.tissues, &tissues);
+        let scanned = Arc::new(scanned.map_err(|why| wrong_volume(&self.path, why))?);
         if scenario.scene.is_arch() {
             let why = "the exercise has all teeth of a jaw; --fdi with the number of one of them says which the volume replaces";
             let mut teeth = scenario.scene.teeth.iter_mut();
             let tooth = teeth.find(|tooth| self.fdi == Some(tooth.fdi));
-            tooth.ok_or_else(|| wrong_volume(&self.path, why.into()))?.source = ToothSource::Given(volume);
+            tooth.ok_or_else(|| wrong_volume(&self.path, why.into()))?.source = ToothSource::Given(scanned);
             return Ok(());
         }
         for tooth in &mut scenario.scene.teeth {
-            tooth.source = ToothSource::Given(volume.clone());
+            tooth.source = ToothSource::Given(scanned.clone());
         }
         if let Some(fdi) = self.fdi {
             scenario.renumber_teeth(fdi).map_err(|why| wrong_volume(&self.path, why))?;

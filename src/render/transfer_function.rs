@@ -66,6 +66,12 @@ impl TransferFunction {
         changed
     }
 
+    /// The same, but one label has what it had at full density from this density on, and the rest in proportion.
+    pub fn with_full_at(&self, label: Label, full: u8) -> TransferFunction {
+        let source = |density: usize| (density * 255 / usize::from(full.max(1))).min(255);
+        self.with_changed_tables([label], |table| std::array::from_fn(|density| table[source(density)]))
+    }
+
     pub fn table(&self, label: Label) -> &TransferTable {
         &self.tables[usize::from(self.table_of_label[usize::from(label.0)])]
     }

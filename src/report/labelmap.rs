@@ -3,6 +3,7 @@
 use typodont_core::volume::{CellBox, Grid, Volume};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::score::{Verdict, VoxelRemovals};
+use typodont_formats::import::GreyValues;
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::segmentation;
 use typodont_formats::nrrd::segmentation::{NamedSegment, Segmentation};
@@ -22,6 +23,18 @@ pub fn tissues(volume: &Volume, table: &TissueTable) -> Result<Vec<u8>, String> 
         color: e.rgb(),
     });
     encode(volume.grid(), labels, segments.collect())
+}
+
+/// Encodes the grey values of a volume as NRRD, on the grid of [`tissues`].
+///
+/// # Errors
+///
+/// When the file cannot be encoded.
+pub fn grey_values(volume: &Volume, values: &GreyValues) -> Result<Vec<u8>, String> {
+    let samples = (0..volume.grid().len()).map(|index| values.of_voxel(index, volume.voxel(index))).collect();
+    let geometry = Geometry::of(volume.grid(), CoordinateSystem::LeftPosteriorSuperior);
+    let image = VoxelImage { geometry, samples: Samples::U8(samples), keys: Vec::new() };
+    nrrd::bytes(&image, Encoding::Gzip).map_err(|e| e.to_string())
 }
 
 /// Encodes the verdicts, one per voxel of the grid, as `.seg.nrrd`.

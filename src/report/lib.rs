@@ -41,7 +41,7 @@ pub use display_format::{measure as measure_in_words, sanitize_display};
 pub use feedback::{Feedback, FeedbackFinding, FeedbackMoment, FeedbackSentence};
 pub use first_result::{FirstResult, LegendEntry};
 pub use glb::{SurfacePart, encode as surfaces_glb};
-pub use labelmap::tissues as tissue_map;
+pub use labelmap::{grey_values as grey_value_map, tissues as tissue_map};
 pub use language::{Languages, Message, Translator};
 pub use pictures::{PREVIEW_SIZE, preview_png, sections_png};
 pub use session_file::{

@@ -19,6 +19,7 @@
 //! assert_eq!(colour("caries"), colour("enamel"));
 //! ```
 
+mod grey_volume;
 mod surroundings;
 pub mod particles;
 mod instrument;
@@ -27,6 +28,7 @@ mod palette;
 pub mod pointing;
 mod views;
 
+pub use grey_volume::GreyVolume;
 pub use instrument::{ContraAngle, contra_angle, instrument_solid, mirror_face, procedural_instrument};
 pub use jaw::{Mouth, StandaloneJaw, WORKING_OPENING_DEG};
 pub use palette::{enamel_depth, tissue_palette, x_ray_attenuation};

@@ -36,6 +36,9 @@ pub fn enamel_depth(volume: &Volume, tissues: &TissueTable) -> EnamelDepth {
     EnamelDepth::of(volume, |label| under.contains(&Some(label)))
 }
 
+/// Attenuation of X-rays by enamel, per mm; see [`x_ray_attenuation`].
+pub(super) const ENAMEL_ATTENUATION: f32 = 0.276;
+
 /// Attenuation of X-rays by a tissue, per mm, at 40 keV: about the mean of a dental tube of 65 kV. Unless the exercise
 /// shows decay, all hard tissues of a tooth attenuate alike, and decay cannot be seen between them.
 ///
@@ -46,7 +49,7 @@ pub fn enamel_depth(volume: &Volume, tissues: &TissueTable) -> EnamelDepth {
 /// 11.5 g/cm³ of mercury, silver, tin and copper (50, 33, 13 and 4 %). A radiopaque composite attenuates as enamel, and
 /// calculus as dentine that has lost a fifth of its mineral; both are estimates.
 pub fn x_ray_attenuation(tissues: &TissueTable, label: Label, is_decay_shown: bool) -> f32 {
-    const ENAMEL: f32 = 0.276;
+    const ENAMEL: f32 = ENAMEL_ATTENUATION;
     const DENTINE: f32 = 0.164;
     const HARD_TISSUE: f32 = 0.5 * (ENAMEL + DENTINE);
     const SOFT: f32 = 0.0277;

@@ -13,14 +13,17 @@ use std::path::Path;
 use std::process::Command;
 use typodont_anatomy::TissueLabels;
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::{Density, Label, Volume, Voxel};
+use typodont_exercise::scenario::{self, ResolveMode, ToothSource};
 use typodont_exercise::tooth_import;
+use typodont_formats::Library;
+use typodont_formats::diagnostic::SourceText;
 use typodont_formats::imaging;
 use typodont_formats::imaging::{ReadOptions, metaimage, nifti, raw};
 use typodont_formats::import::voxelize;
 use typodont_formats::import::voxelize::TissueSurface;
 use typodont_formats::nrrd;
-use typodont_formats::nrrd::{CoordinateSystem, Samples, VoxelImage};
+use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
 use typodont_formats::surfaces;
 
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
@@ -385,6 +388,57 @@ fn one_tooth_is_cut_out_told_apart_and_drawn() {
     let (status, _, err) = import(&[scan, "--at", "90,1,0", "-o", map]);
     assert_eq!(status, 1);
     assert!(err.contains("wrong-volume") && err.contains("the scan extends from"), "{err}");
+}
+
+#[test]
+fn the_grey_values_of_a_scan_go_with_its_label_map() {
+    // Aim: an author who imports a scan, or corrects its label map by hand, keeps what the scanner measured. Method: the
+    // phantom's tooth and its grey values, written by the command, read by an exercise; enamel, dentine and pulp have 3800,
+    // 2800 and 1100 above the background.
+    let folder = folder("import_grey_values");
+    let [scan, map, grey] = ["jaw.mha", "36.seg.nrrd", "36.nrrd"].map(|name| folder.join(name));
+    std::fs::write(&scan, jaw()).unwrap();
+    let [scan, map, grey] = [&scan, &map, &grey].map(|path| path.to_str().unwrap());
+    let (status, _, err) = import(&[scan, "--at", "-6,1,0", "--around", "8.5", "-o", map, "--grey-values", grey]);
+    assert_eq!(status, 0, "{err}");
+    let text = include_str!("../../scenarios/5-grinding.json");
+    let mut exercise: serde_json::Value = serde_json::from_str(text).unwrap();
+    let tissues = serde_json::json!({ "1": "enamel", "2": "dentine", "3": "pulp" });
+    let tooth = &mut exercise["scene"]["jaw"]["tooth"];
+    tooth["form"] = serde_json::json!({ "labels": { "file": "36.seg.nrrd", "tissues": tissues, "scan": "36.nrrd" } });
+    let resolved = |exercise: &serde_json::Value| {
+        let source = SourceText::new("exercise.json", exercise.to_string());
+        scenario::resolve(source, &Library::shipped().with_folder(&folder), ResolveMode::MakeWorkpiece)
+    };
+    let scenario = resolved(&exercise).unwrap();
+    let ToothSource::Given(tooth) = &scenario.scene.teeth[0].source else { panic!("a tooth from a file") };
+    let values = tooth.grey_values.as_ref().unwrap().values();
+    for (name, expected) in [("enamel", 160), ("dentine", 118), ("pulp", 46)] {
+        let label = scenario.tissues.label_of(name).unwrap();
+        let of_tissue = |index: &usize| tooth.volume.voxel(*index) == Voxel { density: Density::FULL, label };
+        let mut found: Vec<u8> = (0..values.len()).filter(of_tissue).map(|index| values[index]).collect();
+        found.sort_unstable();
+        let median = found[found.len() / 2];
+        assert!(median.abs_diff(expected) <= 2, "{name}: {median}, not {expected}");
+    }
+    // A scan of another size, and one that is darker where there is enamel.
+    let image = nrrd::read(Path::new(grey)).unwrap();
+    let Samples::U8(samples) = &image.samples else { panic!("8 bits") };
+    let inverted = Samples::U8(samples.iter().map(|value| 255 - value).collect());
+    let coarser = image.geometry.steps.map(|step| step * 1.5);
+    for (image, said) in [
+        (VoxelImage { geometry: Geometry { steps: coarser, ..image.geometry.clone() }, ..image.clone() }, "own grid"),
+        (VoxelImage { samples: inverted, ..image.clone() }, "not brighter"),
+    ] {
+        std::fs::write(grey, nrrd::bytes(&image, Encoding::Gzip).unwrap()).unwrap();
+        let complaints = resolved(&exercise).unwrap_err();
+        let found = complaints.iter().find(|found| found.path == "/scene/jaw/tooth/form/labels/scan").unwrap();
+        assert!(found.code == "wrong-volume" && found.message.contains(said), "{found:?}");
+    }
+    let (status, _, err) = import(&[map, "-o", folder.join("other.seg.nrrd").to_str().unwrap(), "--grey-values", grey]);
+    assert_eq!(status, 2);
+    assert!(err.contains("only a CT volume has grey values"), "{err}");
+    assert!(!folder.join("other.seg.nrrd").exists());
 }
 
 /// Two balls of 6 mm with caps of enamel, at (−6, 1, 0) and (7, 1, 0) mm, in CT values with some noise.

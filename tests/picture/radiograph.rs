@@ -1,13 +1,22 @@
 //! The radiograph: the line integral of the attenuation along each ray, on the adapter and by its twin.
 
 use crate::scenes;
+use crate::support::shared_data;
 use std::sync::Arc;
+use typodont_anatomy::TissueLabels;
+use typodont_anatomy::lower_first_molar::lower_first;
 use typodont_core::frame::{Pose, Vec3};
-use typodont_core::volume::{Grid, Label, Volume};
+use typodont_core::volume::{Density, Grid, Label, Volume, Voxel};
 use typodont_exercise::catalog::TissueTable;
+use typodont_exercise::scenario::{self, ResolveMode, Scenario, ToothSource, Workpiece};
+use typodont_exercise::tooth_import;
 use typodont_formats::Library;
+use typodont_formats::diagnostic::SourceText;
+use typodont_formats::import::ENAMEL_GREY;
+use typodont_formats::nrrd;
+use typodont_formats::nrrd::{CoordinateSystem, Geometry, Samples, VoxelImage};
 use typodont_render::*;
-use typodont_scene::x_ray_attenuation;
+use typodont_scene::{GreyVolume, x_ray_attenuation};
 
 /// Optical depth that the film shows as white while it is linear.
 const WHITE_DEPTH: f32 = 3.0;
@@ -41,8 +50,19 @@ fn viewpoint() -> Viewpoint {
 }
 
 fn film_of(painter: &mut OffscreenRenderer, volume: &Volume, solids: Vec<MeshInstance>) -> RgbaImage {
-    let (tissues, palette) = (tissues(), scenes::palette());
+    let tissues = tissues();
     let function = TransferFunction::radiograph(|label| x_ray_attenuation(&tissues, label, true));
+    film_by(painter, volume, function, solids, &viewpoint())
+}
+
+fn film_by(
+    painter: &mut OffscreenRenderer,
+    volume: &Volume,
+    function: TransferFunction,
+    solids: Vec<MeshInstance>,
+    viewpoint: &Viewpoint,
+) -> RgbaImage {
+    let palette = scenes::palette();
     let tooth = VolumeInstance {
         volume,
         changes: Changes::All,
@@ -53,12 +73,16 @@ fn film_of(painter: &mut OffscreenRenderer, volume: &Volume, solids: Vec<MeshIns
     };
     let background = Background::plain([0.0; 3]);
     let scene = RenderScene { tooth: Some(tooth), solids, background, ..RenderScene::empty() };
-    painter.draw(&scene, &viewpoint(), None, SIZE).unwrap()
+    painter.draw(&scene, viewpoint, None, SIZE).unwrap()
 }
 
 /// Brightness of the film, 0 to 1, at a place of the world.
 fn brightness(film: &RgbaImage, place: Vec3) -> f32 {
-    let eye = viewpoint().eye(SIZE[0] as f32 / SIZE[1] as f32);
+    brightness_from(&viewpoint(), film, place)
+}
+
+fn brightness_from(viewpoint: &Viewpoint, film: &RgbaImage, place: Vec3) -> f32 {
+    let eye = viewpoint.eye(SIZE[0] as f32 / SIZE[1] as f32);
     let [x, y] = eye.project(place).0;
     f32::from(film.pixel((x * SIZE[0] as f32) as u32, (y * SIZE[1] as f32) as u32)[2]) / 255.0
 }
@@ -123,4 +147,131 @@ fn slabs_of_tissue_are_told_apart_on_a_radiograph() {
         let behind = brightness(&film_of(&mut painter, &volume, vec![card(-5.0)]), at(0));
         assert!(behind > seen[0] + 0.3, "{behind}");
     }
+}
+
+/// A CT scan in a file's order, its voxel size, mm, and the value of its background.
+struct Scan {
+    image: VoxelImage,
+    spacing: f32,
+    background: f32,
+}
+
+/// A molar as a scanner with 12 bits might see it: enamel and dentine are brighter here and darker there, which no
+/// segmentation into three tissues can show.
+fn uneven_molar() -> Scan {
+    let tooth = lower_first(0.2, &TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) });
+    let grid = tooth.grid();
+    let background = 100.0;
+    let value = |(index, cell): (usize, [u32; 3])| {
+        let level = [0.0, 2400.0, 1300.0, 300.0][usize::from(tooth.tissue(index).0)];
+        let [x, y, z] = grid.centre(cell).to_array();
+        let unevenness = 0.1 * libm::sinf(2.0 * x) * libm::sinf(1.5 * y + 1.0) + 0.08 * libm::sinf(2.5 * z);
+        (background + tooth.densities()[index].unit() * level * (1.0 + unevenness)) as u16
+    };
+    let samples = Samples::U16(grid.cells().enumerate().map(value).collect());
+    let geometry = Geometry::of(grid, CoordinateSystem::LeftPosteriorSuperior);
+    Scan { image: VoxelImage { geometry, samples, keys: Vec::new() }, spacing: 0.2, background }
+}
+
+fn ge_tooth() -> Option<Scan> {
+    let image = nrrd::read(&shared_data::find("ge-tooth/tooth_u8_103x94x161.nrrd")?).unwrap();
+    // With its mount.
+    Some(Scan { image, spacing: 0.2, background: 77.0 })
+}
+
+/// The grinding exercise with a scan in place of its tooth, without decay.
+fn on_scan(scan: &Scan) -> (Scenario, Workpiece) {
+    let text = include_str!("../../scenarios/5-grinding.json");
+    let source = SourceText::new("5-grinding.json", text);
+    let mut scenario = scenario::resolve(source, &Library::shipped(), ResolveMode::MakeWorkpiece).unwrap();
+    let tissues = scenario::anatomy_tissues(&scenario.tissues);
+    let tooth = tooth_import::segmented(&scan.image, Some([scan.spacing; 3]), &tissues).unwrap();
+    scenario.scene.teeth[0].source = ToothSource::Given(Arc::new(tooth));
+    scenario.scene.teeth[0].decay.clear();
+    let workpiece = Workpiece::make(&scenario, 1).unwrap();
+    (scenario, workpiece)
+}
+
+#[test]
+fn the_radiograph_of_a_scan_is_the_projection_of_its_grey_values() {
+    // Aim: what a scanner measured is what the film shows, not what the segmentation made of it. Method: along each column of
+    // voxels the values above the background are added up, from the file alone, of an uneven molar and of a scan by others;
+    // they correlate with the optical depth of the film there. By tissues alone, the uneven molar correlates less.
+    for scan in [Some(uneven_molar()), ge_tooth()].into_iter().flatten() {
+        let (scenario, workpiece) = on_scan(&scan);
+        let tissues = &scenario.tissues;
+        let grid = *workpiece.volume.grid();
+        // The scans stand upright in their files. Where a tooth ends at the upper border, the volume is longer there.
+        let file = scan.image.geometry.dims;
+        assert_eq!(grid.dims[..2], file[..2]);
+        let value = |index: usize| match &scan.image.samples {
+            Samples::U8(values) => f32::from(values[index]),
+            Samples::U16(values) => f32::from(values[index]),
+            _ => unreachable!("8 or 16 bits"),
+        };
+        let [nx, ny, nz] = file;
+        let measured = |[x, z]: [u32; 2]| -> f32 {
+            let row = |y: u32| ((z * ny + y) * nx + x) as usize;
+            (0..ny).map(|y| (value(row(y)) - scan.background).max(0.0)).sum()
+        };
+        let [low, high] = [grid.centre([0; 3]), grid.centre(grid.dims.map(|n| n - 1))];
+        let middle = 0.5 * (low + high);
+        // From so far that rays are parallel.
+        let from = middle + 2000.0 * Vec3::Y;
+        let viewpoint = Viewpoint { field_of_view: 0.018, ..Viewpoint::look_at(from, middle, Vec3::Z) };
+        let by_grey = GreyVolume::new(&workpiece, &workpiece.volume, tissues, true).unwrap();
+        let by_tissue = TransferFunction::radiograph(|label| x_ray_attenuation(tissues, label, true));
+        for mut painter in painters() {
+            let mut correlation_of = |volume: &Volume, function: TransferFunction| {
+                let film = film_by(&mut painter, volume, function, vec![], &viewpoint);
+                let shown = |[x, z]: [u32; 2]| brightness_from(&viewpoint, &film, grid.centre([x, ny / 2, z]));
+                let columns: Vec<[u32; 2]> = (0..nz).flat_map(|z| (0..nx).map(move |x| [x, z])).collect();
+                // The film is linear up to three quarters.
+                let linear = columns.iter().filter(|at| shown(**at) < 0.75);
+                let pairs: Vec<[f32; 2]> = linear.map(|&at| [measured(at), shown(at)]).collect();
+                assert!(pairs.len() * 10 > columns.len() * 8, "{} of {} columns", pairs.len(), columns.len());
+                correlation(&pairs)
+            };
+            let found = correlation_of(by_grey.volume(), GreyVolume::radiograph(tissues, true));
+            let flat = correlation_of(&workpiece.volume, by_tissue.clone());
+            println!("{}: by grey values {found:.5}, by tissues {flat:.5}", painter.adapter());
+            assert!(found >= 0.99 && found > flat, "{found}, by tissues {flat}");
+        }
+    }
+}
+
+#[test]
+fn what_is_cut_is_gone_from_the_grey_values() {
+    // Aim: the film follows the bur, and what was never scanned shows by its own attenuation. Method: edits as carving makes
+    // them: a voxel is halved, one is emptied and one is filled with amalgam.
+    let (scenario, workpiece) = on_scan(&uneven_molar());
+    let tissues = &scenario.tissues;
+    let (enamel, amalgam) = (tissues.label_of("enamel").unwrap(), tissues.label_of("amalgam").unwrap());
+    let mut volume = Volume::clone(&workpiece.volume);
+    let mut grey = GreyVolume::new(&workpiece, &volume, tissues, true).unwrap();
+    let is_full = |index: &usize| volume.voxel(*index) == Voxel { density: Density::FULL, label: enamel };
+    let places: Vec<usize> = (0..volume.grid().len()).filter(is_full).skip(1000).step_by(1000).take(3).collect();
+    let before: Vec<u8> = places.iter().map(|&at| grey.volume().densities()[at].bits()).collect();
+    let [half, empty] = [0.5, 0.0].map(|density| Voxel { density: Density::from_unit(density), label: enamel });
+    for (&at, voxel) in places.iter().zip([half, empty, Voxel { density: Density::FULL, label: amalgam }]) {
+        let edit = volume.set(at, voxel);
+        grey.apply_edit(&edit);
+    }
+    let after: Vec<u8> = places.iter().map(|&at| grey.volume().densities()[at].bits()).collect();
+    assert!((120..=200).contains(&before[0]), "enamel is about {ENAMEL_GREY}: {before:?}");
+    assert_eq!(after, [before[0].div_ceil(2), 0, 255]);
+    let anew = GreyVolume::new(&workpiece, &volume, tissues, true).unwrap();
+    assert_eq!(anew.volume().densities(), grey.volume().densities());
+    assert_eq!(anew.volume().labels(), grey.volume().labels());
+}
+
+/// Pearson's correlation coefficient.
+fn correlation(pairs: &[[f32; 2]]) -> f64 {
+    let n = pairs.len() as f64;
+    let mean = |i: usize| pairs.iter().map(|pair| f64::from(pair[i])).sum::<f64>() / n;
+    let means = [mean(0), mean(1)];
+    let product = |i: usize, j: usize| -> f64 {
+        pairs.iter().map(|pair| (f64::from(pair[i]) - means[i]) * (f64::from(pair[j]) - means[j])).sum()
+    };
+    product(0, 1) / (product(0, 0) * product(1, 1)).sqrt()
 }

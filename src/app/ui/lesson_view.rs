@@ -1,7 +1,7 @@
 //! The picture of a lesson: drawn again only when something in it has changed.
 
 use crate::command::{AppCommand, PracticeCommand};
-use crate::lesson_scene::{DisplayMode, LessonScene};
+use crate::lesson_scene::{DisplayMode, LessonScene, VolumeSource};
 use crate::lesson_state::LessonState;
 use crate::settings::Settings;
 use crate::snapshot::{InstrumentPose, LessonSnapshot};
@@ -20,8 +20,8 @@ use typodont_scene::particles::{ParticleField, VisibleParticles};
 #[derive(Default)]
 pub struct LessonView {
     refresh: ViewRefresh,
-    /// True if the renderer has the volume, but for the edits that the scene lists as not drawn.
-    has_volume: bool,
+    /// The values that the renderer has of the volume, but for the edits that the scene lists as not drawn.
+    uploaded: Option<VolumeSource>,
     particles: VisibleParticles,
     /// Last image of the section through the working end.
     pub section: Option<SectionImage>,
@@ -37,7 +37,7 @@ pub struct PictureFrame {
 impl LessonView {
     /// True if the tooth has been drawn.
     pub fn has_volume(&self) -> bool {
-        self.has_volume
+        self.uploaded.is_some()
     }
 
     /// The particles of the last picture.
@@ -95,7 +95,7 @@ impl LessonView {
         let size = frame.size.map(|pixels| (share * pixels as f32).ceil() as u32);
         let drawn = self.draw_scene(lesson, scene, settings, viewport, size);
         // After a failed frame the whole volume is sent to the renderer again, since its changes were lost.
-        self.has_volume = drawn.is_ok();
+        self.uploaded = drawn.is_ok().then(|| scene.volume_source(lesson.display_mode));
         match drawn {
             Ok(_) => commands.push(AppCommand::Practice(PracticeCommand::PictureDrawn)),
             Err(_) => self.refresh.invalidate(),
@@ -116,15 +116,18 @@ impl LessonView {
         size: [u32; 2],
     ) -> Result<egui::TextureId, RenderError> {
         let (viewpoint, mode) = (lesson.orbit.viewpoint(), lesson.display_mode);
-        let is_radiograph = mode == DisplayMode::Xray;
+        let (source, is_radiograph) = (lesson_scene.volume_source(mode), mode == DisplayMode::Xray);
         if let Some(field) = &lesson_scene.particles {
             self.particles.update(field, &viewpoint);
         }
         let entry = |seen: LessonSnapshot| lesson.scenario.instruments.get(seen.instrument as usize);
         let mut scene = RenderScene {
             tooth: Some(VolumeInstance {
-                volume: &lesson_scene.volume,
-                changes: if self.has_volume { Changes::Bricks(&lesson_scene.undrawn) } else { Changes::All },
+                volume: lesson_scene.volume_of(source),
+                changes: match self.uploaded == Some(source) {
+                    true => Changes::Bricks(&lesson_scene.undrawn),
+                    false => Changes::All,
+                },
                 world_from_tooth: lesson_scene.workpiece.world_from_tooth,
                 palette: &lesson_scene.palette,
                 enamel_depth: lesson_scene.enamel_depth(&lesson.scenario.tissues),

@@ -32,15 +32,7 @@ pub fn tools_panel_ui(
     {
         egui::CollapsingHeader::new(words.get("transfer.title")).show(ui, |ui| {
             let tissues = &lesson.scenario.tissues;
-            transfer_function_ui(
-                ui,
-                &scene.transfer_function,
-                scene.histogram(),
-                tissues,
-                &scene.palette,
-                words,
-                commands,
-            );
+            transfer_function_ui(ui, scene, tissues, words, commands);
         });
     }
     section_heading(ui, words.get("menu.views"));

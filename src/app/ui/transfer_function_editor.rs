@@ -3,7 +3,8 @@
 
 use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
-use crate::transfer_function_draft::{DensityHistogram, TissuePeak, TransferFunctionDraft};
+use crate::lesson_scene::LessonScene;
+use crate::transfer_function_draft::{TissuePeak, TransferFunctionDraft};
 use crate::ui::theme;
 use eframe::egui::{self, Color32, Key, Pos2, Rect, Sense, Stroke};
 use typodont_core::volume::Label;
@@ -27,15 +28,15 @@ const HEIGHT: f32 = 120.0;
 /// Presets to begin from, the tissue and channel to draw, and the drawing itself. Asks for the function as it is then.
 pub fn transfer_function_ui(
     ui: &mut egui::Ui,
-    draft: &TransferFunctionDraft,
-    histogram: &DensityHistogram,
+    scene: &LessonScene,
     tissues: &TissueTable,
-    palette: &LabelPalette,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
+    let LessonScene { transfer_function: draft, palette, .. } = scene;
+    let histogram = scene.histogram();
     let mut new = draft.clone();
-    presets_ui(ui, &mut new, palette, words);
+    presets_ui(ui, &mut new, scene, words);
     let title = |label: Label| {
         tissues.by_label(label).map_or(words.get("transfer.all"), |entry| entry.title.in_language(&words.code))
     };
@@ -77,17 +78,17 @@ pub fn transfer_function_ui(
 }
 
 /// Buttons that replace the drawing by a preset.
-fn presets_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, palette: &LabelPalette, words: &Translations) {
+fn presets_ui(ui: &mut egui::Ui, draft: &mut TransferFunctionDraft, scene: &LessonScene, words: &Translations) {
     ui.horizontal_wrapped(|ui| {
         ui.small(words.get("transfer.begin"));
         if ui.small_button(words.get("menu.clear")).clicked() {
-            *draft = TransferFunctionDraft::new(TransferFunction::tissue(palette));
+            *draft = TransferFunctionDraft::new(scene.tissue_function());
         }
         if ui.small_button(words.get("menu.xray")).clicked() {
             *draft = TransferFunctionDraft::new(TransferFunction::x_ray());
         }
         if ui.small_button("y = x").on_hover_text(words.get("transfer.straight")).clicked() {
-            *draft = TransferFunctionDraft::straight_line(palette);
+            *draft = TransferFunctionDraft::straight_line(&scene.palette);
         }
     });
 }

@@ -12,6 +12,7 @@ use typodont_exercise::scenario;
 use typodont_exercise::scenario::{ResolveMode, Scenario, ToothSource, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::{SourceText, headlines};
+use typodont_formats::import::ImportedTooth;
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Encoding, Geometry, Samples, VoxelImage};
 use typodont_render::LabelPalette;
@@ -27,7 +28,7 @@ pub fn exercise(tooth: Volume) -> Result<Scenario, String> {
     let source = SourceText::new(GRINDING.0, GRINDING.1);
     let mut scenario = scenario::resolve(source, &Library::shipped(), ResolveMode::MakeWorkpiece)
         .map_err(|found| headlines(&found))?;
-    let tooth = Arc::new(tooth);
+    let tooth = Arc::new(ImportedTooth { volume: tooth, grey_values: None });
     for each in &mut scenario.scene.teeth {
         each.source = ToothSource::Given(tooth.clone());
     }

@@ -1,7 +1,7 @@
 //! Parts of a grid for local work, so that it takes time in proportion to what is worked on and not to the whole.
 
 use crate::frame::Vec3;
-use crate::volume::{CellBox, Density, Grid, Label};
+use crate::volume::{CellBox, Grid};
 
 /// Box of voxels of a grid, with its own array indices.
 #[derive(Clone, Copy, Debug)]
@@ -66,28 +66,34 @@ impl PaddedGrid {
         self.grid.cells().map(value).collect()
     }
 
-    /// Returns the box in the whole grid, empty elsewhere; the grid is enlarged where the box, without
-    /// `extra_margin`, extends beyond its border.
-    pub fn paste(&self, density: Vec<Density>, label: Vec<Label>) -> (Grid, Vec<Density>, Vec<Label>) {
-        let low = |axis: usize| self.offset[axis] + i64::from(self.extra_margin[axis]);
+    /// Returns the whole grid; enlarged where the box, without `extra_margin`, extends beyond its border.
+    pub fn enlarged_whole(&self) -> Grid {
+        let before = self.before_whole();
         let high =
             |axis: usize| self.offset[axis] + i64::from(self.grid.dims[axis]) - i64::from(self.extra_margin[axis]);
-        let before: [i64; 3] = std::array::from_fn(|axis| low(axis).min(0));
         let end = |axis: usize| high(axis).max(i64::from(self.whole.dims[axis]));
-        let grid = shifted(&self.whole, before, std::array::from_fn(|axis| (end(axis) - before[axis]) as u32));
+        shifted(&self.whole, before, std::array::from_fn(|axis| (end(axis) - before[axis]) as u32))
+    }
+
+    /// Returns the values of the box in the [enlarged whole grid](PaddedGrid::enlarged_whole), `empty` elsewhere.
+    pub fn paste<T: Copy>(&self, values: Vec<T>, empty: T) -> Vec<T> {
+        let (grid, before) = (self.enlarged_whole(), self.before_whole());
         if grid == self.grid {
-            return (grid, density, label);
+            return values;
         }
-        let mut all_density = vec![Density::EMPTY; grid.len()];
-        let mut all_label = vec![Label::AIR; grid.len()];
-        for (from, cell) in self.grid.cells().enumerate() {
+        let mut all = vec![empty; grid.len()];
+        for (value, cell) in values.into_iter().zip(self.grid.cells()) {
             let to: [i64; 3] = std::array::from_fn(|axis| i64::from(cell[axis]) + self.offset[axis] - before[axis]);
             if (0..3).all(|axis| (0..i64::from(grid.dims[axis])).contains(&to[axis])) {
-                let to = grid.index(to.map(|n| n as u32));
-                (all_density[to], all_label[to]) = (density[from], label[from]);
+                all[grid.index(to.map(|n| n as u32))] = value;
             }
         }
-        (grid, all_density, all_label)
+        all
+    }
+
+    /// Returns the first voxel of the enlarged whole grid, counted from that of the whole grid: 0 or negative.
+    fn before_whole(&self) -> [i64; 3] {
+        std::array::from_fn(|axis| (self.offset[axis] + i64::from(self.extra_margin[axis])).min(0))
     }
 
     fn to_whole(&self, cell: [u32; 3]) -> Option<[u32; 3]> {
@@ -114,13 +120,12 @@ mod tests {
         let values: Vec<usize> = (1..=whole.len()).collect();
         let window = PaddedGrid::around(&whole, &CellBox { low: [1, 2, 1], high: [3, 4, 4] }, [2; 3]);
         let cut = window.crop(values, 0);
-        let label: Vec<Label> = cut.iter().map(|&v| Label(v as u8)).collect();
-        let (grid, _, label) = window.paste(vec![Density::FULL; label.len()], label);
+        let (grid, pasted) = (window.enlarged_whole(), window.paste(cut, 0));
         assert_eq!(grid.dims, [9, 9, 10]);
-        for (index, cell) in grid.cells().enumerate().filter(|&(i, _)| label[i] != Label::AIR) {
+        for (&value, cell) in pasted.iter().zip(grid.cells()).filter(|(value, _)| **value != 0) {
             let from = whole.nearest(grid.centre(cell)).unwrap();
-            assert_eq!(usize::from(label[index].0), whole.index(from) + 1);
+            assert_eq!(value, whole.index(from) + 1);
         }
-        assert_eq!(label.iter().filter(|&&l| l != Label::AIR).count(), whole.len(), "the box holds the whole grid");
+        assert_eq!(pasted.iter().filter(|value| **value != 0).count(), whole.len(), "the box holds the whole grid");
     }
 }

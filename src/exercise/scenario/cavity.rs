@@ -134,6 +134,7 @@ impl Workpiece {
     pub fn prepared(whole: Volume, cut: Volume) -> Workpiece {
         Workpiece {
             volume: cut.into(),
+            grey_values: None,
             original: Some(whole.into()),
             teeth: Vec::new(),
             lesions: Vec::new(),

@@ -176,10 +176,10 @@ impl SceneFile {
             SceneFile::Jaw(jaw) => vec![&jaw.tooth],
             SceneFile::DentalArch(arch) => arch.teeth.iter().collect(),
         };
-        teeth.into_iter().filter_map(|tooth| match &tooth.form {
-            ToothSourceFile::Procedural(_) => None,
-            ToothSourceFile::Ct(scan) => Some(scan.file.as_str()),
-            ToothSourceFile::Labels(map) => Some(map.file.as_str()),
+        teeth.into_iter().flat_map(|tooth| match &tooth.form {
+            ToothSourceFile::Procedural(_) => vec![],
+            ToothSourceFile::Ct(scan) => vec![scan.file.as_str()],
+            ToothSourceFile::Labels(map) => std::iter::once(&map.file).chain(&map.scan).map(String::as_str).collect(),
         })
     }
 }
@@ -337,6 +337,11 @@ pub struct LabelsFile {
     /// Tissue for each number in the file, for example { "1": "enamel", "2": "dentine", "3": "pulp" }. The number 0 is
     /// air; every other number in the file must be listed.
     pub tissues: BTreeMap<String, String>,
+    /// NRRD file of the CT scan on which the labels were drawn, voxel by voxel, relative to the scenario's folder. The
+    /// radiograph and the user-defined colours then show its grey values.
+    #[serde(default)]
+    #[schemars(length(min = 1, max = 500))]
+    pub scan: Option<String>,
 }
 
 /// Distance between voxels, mm: 0.01 to 2.

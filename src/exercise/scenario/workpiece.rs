@@ -20,13 +20,17 @@ use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider, Compliance, SdfGrid};
-use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_core::volume::{Density, Grid, Label, Volume, surface};
+use typodont_formats::import::GreyValues;
 use typodont_formats::limits::WORKPIECE_VOXELS_MAX;
 
 /// The workpiece of a session.
 #[derive(Clone, Debug)]
 pub struct Workpiece {
     pub volume: Arc<Volume>,
+    /// Grey values of the CT scan, one per voxel of `volume`; `None` unless all teeth of the volume are from CT scans. A whole
+    /// arch has none.
+    pub grey_values: Option<Arc<GreyValues>>,
     /// The volume before its cavities were cut, with its decay: the original contour. `None` without a cavity.
     pub original: Option<Arc<Volume>>,
     pub teeth: Vec<ToothBounds>,
@@ -161,6 +165,7 @@ impl Workpiece {
             }
             parts.push(volume);
         }
+        let grey_values = grey_values(scenario, if has_cavity { &wholes } else { &parts })?;
         let (volume, original) = match scenario.scene.layout {
             // Both teeth keep their positions: a proximal box may remove a tooth's outermost point.
             SceneLayout::Pair { gap } if has_cavity => {
@@ -183,7 +188,8 @@ impl Workpiece {
                 return Err(WorkpieceError::ZoneSize { zone, map, workpiece: volume.grid().dims });
             }
         }
-        Workpiece::from_volume(scenario, Arc::new(volume), original, seed)
+        let made = Workpiece::from_volume(scenario, Arc::new(volume), original, seed)?;
+        Ok(Workpiece { grey_values: grey_values.map(Arc::new), ..made })
     }
 
     /// Returns the workpiece of a session whose initial volume is known from a recording; `original` is given if the
@@ -240,6 +246,7 @@ impl Workpiece {
         let tooth_from_arch = seats.map(|seats| seats.tooth_from_arch);
         Ok(Workpiece {
             volume,
+            grey_values: None,
             original,
             teeth,
             lesions,
@@ -329,12 +336,41 @@ fn world_from_tooth_above(origin_in_tooth: Vec3, orientation: Quat) -> Pose {
 
 fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, WorkpieceError> {
     match &tooth.source {
-        ToothSource::Given(volume) => Ok(volume.as_ref().clone()),
+        ToothSource::Given(tooth) => Ok(tooth.volume.clone()),
         ToothSource::Recorded => Err(WorkpieceError::OnlyRecorded),
         ToothSource::Procedural { spacing, age } => {
             generated_tooth(tooth.fdi, *age, *spacing, anatomy_tissues(tissues))
                 .ok_or(WorkpieceError::NoSuchTooth { fdi: tooth.fdi })
         }
+    }
+}
+
+/// Returns the grey values of a workpiece, if all its teeth are from CT scans and it is not a whole arch. `whole`: the teeth
+/// before their cavities were cut.
+fn grey_values(scenario: &Scenario, whole: &[Volume]) -> Result<Option<GreyValues>, WorkpieceError> {
+    let scanned = scenario.scene.teeth.iter().map(|tooth| match &tooth.source {
+        ToothSource::Given(tooth) => tooth.grey_values.as_ref(),
+        ToothSource::Procedural { .. } | ToothSource::Recorded => None,
+    });
+    let Some(scanned) = scanned.collect::<Option<Vec<&GreyValues>>>() else { return Ok(None) };
+    match scenario.scene.layout {
+        SceneLayout::Single | SceneLayout::Jaw => Ok(scanned.first().map(|&values| values.clone())),
+        SceneLayout::Pair { gap } => {
+            // The values take the place of the densities and go where the teeth go.
+            let as_volume = |(tooth, values): (&Volume, &&GreyValues)| {
+                let value = |(&value, &label): (&u8, &Label)| {
+                    Density::from_bits(if label == Label::AIR { 0 } else { value.max(1) })
+                };
+                let values = values.values().iter().zip(tooth.labels()).map(value).collect();
+                Volume::from_parts(*tooth.grid(), tooth.half_band(), values, tooth.labels().to_vec())
+            };
+            let Some(teeth) = whole.iter().zip(&scanned).map(as_volume).collect::<Option<Vec<Volume>>>() else {
+                return Ok(None);
+            };
+            let both = side_by_side(&teeth, whole, gap)?;
+            Ok(Some(GreyValues::from_values(both.densities().iter().map(|density| density.bits()).collect())))
+        }
+        SceneLayout::Arch { .. } => Ok(None),
     }
 }
 

@@ -3,7 +3,7 @@
 use typodont_core::volume::redistance;
 use typodont_core::volume::redistance::signed_distance_from_field;
 use typodont_core::volume::subgrid::PaddedGrid;
-use typodont_core::volume::{CellBox, Grid, Label, Volume, density_at_distance, distance};
+use typodont_core::volume::{CellBox, Density, Grid, Label, Volume, density_at_distance, distance};
 
 /// Number of smoothing passes: after six, the voxel steps no longer show in the surface normals.
 const ROUNDS: usize = 6;
@@ -39,8 +39,8 @@ pub fn volume_from_label_map(grid: &Grid, label: Vec<Label>) -> Option<Volume> {
     drop(field);
     let band = redistance::half_band(grid);
     let density = signed_distance.into_iter().map(|distance| density_at_distance(distance, band)).collect();
-    let (grid, density, label) = window.paste(density, label);
-    Some(Volume::new(grid, band, density, label, default_label))
+    let (density, label) = (window.paste(density, Density::EMPTY), window.paste(label, Label::AIR));
+    Some(Volume::new(window.enlarged_whole(), band, density, label, default_label))
 }
 
 #[cfg(test)]

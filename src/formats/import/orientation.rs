@@ -15,15 +15,19 @@ pub struct AxisPermutation {
 /// Rotates a tooth crown up and moves the origin of tooth space: z is 0 at the lowest enamel, x and y are 0 in the
 /// middle of the crown.
 ///
-/// Never mirrors: a left tooth stays a left tooth.
-pub fn upright((grid, density, label): (Grid, Vec<Density>, Vec<Label>), band: f32, tissues: &TissueLabels) -> Volume {
+/// Never mirrors: a left tooth stays a left tooth. Returns with it the rotation, for further values of the same grid.
+pub fn upright(
+    (grid, density, label): (Grid, Vec<Density>, Vec<Label>),
+    band: f32,
+    tissues: &TissueLabels,
+) -> (Volume, AxisPermutation) {
     let tissue = |i: usize| if density[i].is_solid() { label[i] } else { Label::AIR };
     let permutation = AxisPermutation::lifting(crown_from_root(&grid, tissue, tissues.enamel));
     let mut upright_grid = permutation.grid(&grid);
     let (density, label) = (permutation.array(&grid, density), permutation.array(&grid, label));
     let solid_enamel = |i: usize| density[i].is_solid() && label[i] == tissues.enamel;
     upright_grid.origin -= crown_foot(&upright_grid, solid_enamel);
-    Volume::new(upright_grid, band, density, label, tissues.dentine)
+    (Volume::new(upright_grid, band, density, label, tissues.dentine), permutation)
 }
 
 /// Does the same for a volume. A volume without enamel, in which crown and root cannot be told apart, is returned
@@ -33,7 +37,7 @@ pub fn set_upright(volume: Volume, tissues: &TissueLabels) -> Volume {
         return volume;
     }
     let label = volume.tissues().collect();
-    upright((*volume.grid(), volume.densities().to_vec(), label), volume.half_band(), tissues)
+    upright((*volume.grid(), volume.densities().to_vec(), label), volume.half_band(), tissues).0
 }
 
 /// Returns the vector from the centroid of all other matter to the centroid of the enamel, mm.
@@ -87,7 +91,8 @@ impl AxisPermutation {
         Grid::centred(self.source_axis.map(|axis| grid.dims[axis]), spacing)
     }
 
-    fn array<T: Copy>(&self, grid: &Grid, values: Vec<T>) -> Vec<T> {
+    /// Returns the values of a grid, one per voxel, in the order of the rotated grid.
+    pub fn array<T: Copy>(&self, grid: &Grid, values: Vec<T>) -> Vec<T> {
         if *self == (AxisPermutation { source_axis: [0, 1, 2], is_reversed: [false; 3] }) {
             return values;
         }

@@ -8,6 +8,7 @@ use crate::scenario::{
     ArchForm, Calculus, Decay, DecayOrigin, DecayPlace, DecayShape, DentalArches, GrownDecay, OldFilling, Pockets,
     PreparedCavity, ProximalBox, Scene, SceneLayout, ToothSource, ToothSpec,
 };
+use crate::tooth_import;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use typodont_anatomy::age;
@@ -16,7 +17,8 @@ use typodont_anatomy::jaw::Jaw;
 use typodont_core::frame::{Pose, Vec3, rotation_about_axes};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider};
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::Label;
+use typodont_formats::import::ImportedTooth;
 use typodont_formats::pointer;
 
 /// Minimum half-width of a cavity's opening, mm, so that a carrier can place material through it.
@@ -262,36 +264,42 @@ impl Resolver<'_> {
             file::ToothSourceFile::Ct(scan) => {
                 let path = format!("{path}/form/ct/file");
                 let spacing = scan.spacing_mm.map(|s| s.map(|s| s.0));
-                let volume = self.read_scan(&scan.file, &path, |image, tissues| {
-                    crate::tooth_import::segmented(image, spacing, tissues).map_err(|e| e.to_string())
-                })?;
-                Some(ToothSource::Given(Arc::new(volume)))
+                let tooth = self
+                    .read_scan(&scan.file, &path, |image, tissues| tooth_import::segmented(image, spacing, tissues))?;
+                Some(ToothSource::Given(Arc::new(tooth)))
             }
             file::ToothSourceFile::Labels(map) => {
                 let numbers = self.numbers(&map.tissues, &format!("{path}/form/labels/tissues"));
-                let path = format!("{path}/form/labels/file");
                 let spacing = map.spacing_mm.map(|s| s.map(|s| s.0));
-                let volume = self.read_scan(&map.file, &path, |image, _| {
-                    crate::tooth_import::labelled(image, spacing, &numbers).map_err(|e| e.to_string())
+                let volume = self.read_scan(&map.file, &format!("{path}/form/labels/file"), |image, _| {
+                    tooth_import::labelled(image, spacing, &numbers)
                 })?;
-                Some(ToothSource::Given(Arc::new(volume)))
+                let grey_values = match &map.scan {
+                    Some(scan) => {
+                        Some(self.read_scan(scan, &format!("{path}/form/labels/scan"), |image, tissues| {
+                            tooth_import::grey_values_of(image, spacing, &volume, tissues.enamel)
+                        })?)
+                    }
+                    None => None,
+                };
+                Some(ToothSource::Given(Arc::new(ImportedTooth { volume, grey_values })))
             }
         }
     }
 
-    fn read_scan(
+    fn read_scan<T>(
         &mut self,
         name: &str,
         path: &str,
-        make: impl FnOnce(&typodont_formats::nrrd::VoxelImage, &typodont_anatomy::TissueLabels) -> Result<Volume, String>,
-    ) -> Option<Volume> {
+        make: impl FnOnce(&typodont_formats::nrrd::VoxelImage, &typodont_anatomy::TissueLabels) -> Result<T, String>,
+    ) -> Option<T> {
         let image =
             self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
                 typodont_formats::nrrd::parse(&bytes).map_err(|e| ("wrong-volume", e.to_string(), None))
             });
         let tissues = anatomy_tissues(&self.tissues);
         match image.and_then(|image| make(&image, &tissues).map_err(|e| ("wrong-volume", e, None))) {
-            Ok(volume) => Some(volume),
+            Ok(made) => Some(made),
             Err((code, message, help)) => {
                 self.complain(path, code, format!("\"{name}\": {message}"), help.unwrap_or_default());
                 None

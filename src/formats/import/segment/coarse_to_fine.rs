@@ -8,6 +8,7 @@
 use crate::import::orientation::{AxisPermutation, crown_foot, crown_from_root};
 use crate::import::segment::grey_levels::GreyLevels;
 use crate::import::segment::{ClassifiedScan, SegmentationError, TissueClass, classify, label_of};
+use crate::import::{GreyValues, ImportedTooth};
 use typodont_anatomy::TissueLabels;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::{available_threads, par_rows};
@@ -23,18 +24,28 @@ const COARSE: f64 = 2_000_000.0;
 
 /// Labels the tissues of a tooth, upright as [`segment`](crate::import::segment::segment) sets it. Above 6 million
 /// voxels density is either full or empty: sufficient for writing, viewing and counting, but too steep for haptic
-/// contact.
+/// contact. Grey values are kept if `keeps_grey_values`.
 ///
 /// # Errors
 /// Fails when no tooth is found, or when its tissues cannot be told apart.
-pub fn labels(grid: &Grid, values: Vec<f32>, tissues: &TissueLabels) -> Result<Volume, SegmentationError> {
+pub fn labels(
+    grid: &Grid,
+    values: Vec<f32>,
+    tissues: &TissueLabels,
+    keeps_grey_values: bool,
+) -> Result<ImportedTooth, SegmentationError> {
     match grid.len() <= WHOLE_MAX {
         true => crate::import::segment::segment(grid, values, tissues),
-        false => coarse_to_fine(grid, &values, tissues),
+        false => coarse_to_fine(grid, &values, tissues, keeps_grey_values),
     }
 }
 
-fn coarse_to_fine(grid: &Grid, values: &[f32], tissues: &TissueLabels) -> Result<Volume, SegmentationError> {
+fn coarse_to_fine(
+    grid: &Grid,
+    values: &[f32],
+    tissues: &TissueLabels,
+    keeps_grey_values: bool,
+) -> Result<ImportedTooth, SegmentationError> {
     let blocks = Blocks::of(grid);
     let scan = classify(&blocks.coarse, blocks.means(grid, values))?;
     let coarse = scan.window.grid;
@@ -53,8 +64,20 @@ fn coarse_to_fine(grid: &Grid, values: &[f32], tissues: &TissueLabels) -> Result
     });
     keep_largest(upright_grid.dims, &mut label);
     upright_grid.origin -= crown_foot(&upright_grid, |i| label[i] == tissues.enamel);
-    let density = label.iter().map(|l| if *l == Label::AIR { Density::EMPTY } else { Density::FULL }).collect();
-    Ok(Volume::new(upright_grid, redistance::half_band(&upright_grid), density, label, tissues.dentine))
+    let density: Vec<Density> =
+        label.iter().map(|l| if *l == Label::AIR { Density::EMPTY } else { Density::FULL }).collect();
+    let grey_values = keeps_grey_values.then(|| {
+        let mut measured = vec![0; upright_grid.len()];
+        par_rows(&mut measured, nx, available_threads(), |row, measured| {
+            for (x, measured) in (0..).zip(measured) {
+                let cell = permutation.source_cell(grid, [x, row % ny, row / ny]);
+                *measured = scan.levels.grey_value(values[grid.index(cell)]);
+            }
+        });
+        GreyValues::of_matter(&measured, &density)
+    });
+    let volume = Volume::new(upright_grid, redistance::half_band(&upright_grid), density, label, tissues.dentine);
+    Ok(ImportedTooth { volume, grey_values })
 }
 
 /// A coarse grid whose voxels are blocks of another grid.
@@ -270,7 +293,8 @@ mod tests {
             if p.length() < 1.0 { 0.0 } else { full * share - 1000.0 * (1.0 - share) + noise as f32 - 32.0 }
         };
         assert!(grid.len() > WHOLE_MAX);
-        let volume = labels(&grid, grid.cells().map(value).collect(), &tissues).unwrap();
+        let tooth = labels(&grid, grid.cells().map(value).collect(), &tissues, true).unwrap();
+        let volume = &tooth.volume;
         let mm3 = |label| volume.count(label) as f64 * grid.voxel_mm3();
         let (mut enamel, mut whole) = (0, 0);
         for cell in grid.cells() {
@@ -284,5 +308,14 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 0.05, "{found} of {expected}");
         }
         assert_eq!(volume.grid().dims, grid.dims, "the crown already points along z");
+        // Grey values run from the background, -1000, to enamel, 2500; the noise is ±32.
+        let grey = tooth.grey_values.unwrap();
+        let deep = |cell: [u32; 3]| (depth(grid.centre(cell)) > 0.5).then(|| (value(cell) + 1000.0) / 3500.0 * 160.0);
+        for (index, cell) in grid.cells().enumerate().step_by(97) {
+            if let Some(expected) = deep(cell) {
+                let found = f32::from(grey.values()[index]);
+                assert!((found - expected).abs() < 4.0, "{found}, not {expected}");
+            }
+        }
     }
 }

@@ -3,6 +3,7 @@
 //! Method: Otsu, *A Threshold Selection Method from Gray-Level Histograms* (1979), applied first to all voxels, then
 //! to those so deep inside that none is only partly filled.
 
+use crate::import::ENAMEL_GREY;
 use crate::import::segment::SegmentationError;
 use typodont_core::volume::{Grid, distance};
 
@@ -51,6 +52,12 @@ impl GreyLevels {
             true => Ok(GreyLevels { background, dentine: below, enamel: above }),
             false => Err(SegmentationError::OneLevel),
         }
+    }
+
+    /// Returns a value of the scan on the scale of [`ENAMEL_GREY`].
+    pub(super) fn grey_value(&self, value: f32) -> u8 {
+        let share_of_enamel = (value - self.background) / (self.enamel - self.background);
+        (share_of_enamel * f32::from(ENAMEL_GREY) + 0.5).clamp(0.0, 255.0) as u8
     }
 
     /// Value from which on a voxel holds more dentine than background.

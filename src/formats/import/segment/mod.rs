@@ -8,7 +8,7 @@ mod coarse_to_fine;
 mod layers;
 mod grey_levels;
 
-use crate::import::orientation;
+use crate::import::{GreyValues, ImportedTooth, orientation};
 pub use coarse_to_fine::labels;
 use grey_levels::GreyLevels;
 use std::fmt;
@@ -17,7 +17,7 @@ use typodont_core::volume::components::Components;
 use typodont_core::volume::redistance;
 use typodont_core::volume::redistance::signed_distance_from_field;
 use typodont_core::volume::subgrid::PaddedGrid;
-use typodont_core::volume::{CellBox, Grid, Label, Volume, density_at_distance};
+use typodont_core::volume::{CellBox, Density, Grid, Label, density_at_distance};
 
 /// Maximum ratio of a voxel's longest side to its shortest. Clinical scans have up to 10.
 const FLATNESS_MAX: f32 = 20.0;
@@ -92,13 +92,15 @@ impl TissueClass {
 
 /// Segments the tissues of a tooth and sets it upright: crown up along z, which is 0 at the lowest enamel.
 ///
-/// Values must rise from background over dentine to enamel. Their scale does not matter; NaN counts as background.
+/// Values must rise from background over dentine to enamel. Their scale does not matter; NaN counts as background. The
+/// tooth keeps them as [`GreyValues`].
 ///
 /// # Errors
 /// Fails when no tooth is found, or when its tissues cannot be told apart.
-pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &TissueLabels) -> Result<Volume, SegmentationError> {
+pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &TissueLabels) -> Result<ImportedTooth, SegmentationError> {
     let ClassifiedScan { window, levels, mut values, matter, nearest_enamel } = classify(grid, values)?;
     let grid = &window.grid;
+    let measured: Vec<u8> = values.iter().map(|&value| levels.grey_value(value)).collect();
     into_field(&mut values, &matter, &levels, &nearest_enamel);
     drop(nearest_enamel);
     keep_one_piece(grid, &mut values);
@@ -107,9 +109,16 @@ pub fn segment(grid: &Grid, values: Vec<f32>, tissues: &TissueLabels) -> Result<
     drop(values);
     redistance::binomial_smooth(grid, &mut signed_distance);
     let band = redistance::half_band(grid);
-    let density = signed_distance.into_iter().map(|distance| density_at_distance(distance, band)).collect();
+    let density: Vec<Density> =
+        signed_distance.into_iter().map(|distance| density_at_distance(distance, band)).collect();
+    let grey_values = GreyValues::of_matter(&measured, &density).into_values();
+    drop(measured);
     let label = matter.into_iter().map(|matter| label_of(matter, tissues)).collect();
-    Ok(orientation::upright(window.paste(density, label), band, tissues))
+    let whole = window.enlarged_whole();
+    let parts = (whole, window.paste(density, Density::EMPTY), window.paste(label, Label::AIR));
+    let (volume, permutation) = orientation::upright(parts, band, tissues);
+    let grey_values = permutation.array(&whole, window.paste(grey_values, 0));
+    Ok(ImportedTooth { volume, grey_values: Some(GreyValues::from_values(grey_values)) })
 }
 
 /// The part of a scan that contains the tooth, and the tissue of each of its voxels.

@@ -3,7 +3,7 @@
 use super::*;
 use typodont_anatomy::lower_first_molar::lower_first;
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{CellBox, Density};
+use typodont_core::volume::{CellBox, Volume};
 
 const ENAMEL: Label = Label(4);
 const DENTINE: Label = Label(2);
@@ -54,7 +54,7 @@ fn dice(a: &Volume, b: &Volume, tissue: Label) -> f64 {
 }
 
 fn segmented(tooth: &Volume, values: Vec<f32>) -> Volume {
-    segment(tooth.grid(), values, &TISSUES).unwrap()
+    segment(tooth.grid(), values, &TISSUES).unwrap().volume
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn a_tooth_in_any_position_comes_out_upright() {
     let [nx, ny, nz] = tooth.grid().dims;
     let lying = Grid { dims: [nz, nx, ny], ..*tooth.grid() };
     let from = |[x, y, z]: [u32; 3]| values[tooth.grid().index([nx - 1 - y, z, nz - 1 - x])];
-    let found = segment(&lying, lying.cells().map(from).collect(), &TISSUES).unwrap();
+    let found = segment(&lying, lying.cells().map(from).collect(), &TISSUES).unwrap().volume;
     assert_eq!(found.grid().dims, expected.grid().dims);
     assert!((found.grid().origin - expected.grid().origin).length() < 1e-3);
     for tissue in [ENAMEL, DENTINE, PULP] {
@@ -158,7 +158,7 @@ fn a_scan_that_truncates_the_tooth_is_padded() {
     let [nx, ny, nz] = tooth.grid().dims;
     let below = nz / 3;
     let cut = Grid { dims: [nx, ny, nz - below], ..*tooth.grid() };
-    let found = segment(&cut, values[(nx * ny * below) as usize..].to_vec(), &TISSUES).unwrap();
+    let found = segment(&cut, values[(nx * ny * below) as usize..].to_vec(), &TISSUES).unwrap().volume;
     let CellBox { low, high } = found.bounding_box().unwrap();
     for axis in 0..3 {
         assert!(low[axis] >= 2 && high[axis] + 2 < found.grid().dims[axis], "{low:?} {high:?}");

@@ -199,7 +199,7 @@ pub fn voxelize(
         })
         .collect();
     let volume = match label.contains(&tissues.enamel) {
-        true => orientation::upright((grid, density, label), band, tissues),
+        true => orientation::upright((grid, density, label), band, tissues).0,
         false => {
             notes.push("there is no enamel, so the crown could not be located: it must point to +z".to_string());
             let default_label = parts.first().map_or(tissues.dentine, |part| part.label);
