@@ -37,6 +37,7 @@ pub mod caliper;
 pub mod caries;
 pub mod periodontium;
 pub mod crown_contour;
+pub mod cheek_and_tongue;
 pub mod jaw;
 
 pub use form::ToothForm;

@@ -31,6 +31,8 @@ pub struct LessonScene {
     /// Solids around the tooth.
     pub surroundings: Vec<MeshInstance>,
     pub instruments: Vec<MeshInstance>,
+    /// Greatest radius of each instrument's working end, mm.
+    head_radii: Vec<f32>,
     /// The instruments as a pointer holds them; `None` for those that no handpiece turns.
     pub contra_angles: Vec<Option<ContraAngle>>,
     /// Dust and water, if the exercise has any.
@@ -92,6 +94,7 @@ impl LessonScene {
             particles: options.is_any().then(|| ParticleField::new(options, &scenario.instruments, suction_inlet)),
             ejector,
             instruments,
+            head_radii: scenario.instruments.iter().map(|entry| entry.to_instrument().head_radius()).collect(),
             contra_angles: scenario.instruments.iter().map(scene::contra_angle).collect(),
             workpiece,
             edit_count: 0,
@@ -164,6 +167,11 @@ impl LessonScene {
         }
         // A table ends at full density, which is the most frequent grey value of its tissue.
         self.histogram().peaks().iter().fold(function, |made, peak| made.with_full_at(peak.tissue, peak.density))
+    }
+
+    /// Greatest radius of an instrument's working end, mm; 0 for an instrument that is not on the tray.
+    pub fn head_radius(&self, instrument: u32) -> f32 {
+        self.head_radii.get(instrument as usize).copied().unwrap_or(0.0)
     }
 
     /// Returns what a display mode looks at.

@@ -25,6 +25,7 @@ pub mod particles;
 mod instrument;
 mod jaw;
 mod palette;
+mod soft_tissue;
 pub mod pointing;
 mod views;
 

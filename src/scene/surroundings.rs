@@ -1,6 +1,7 @@
 //! Solids around the tooth, drawn as they are touched.
 
 use super::palette::GLOSS;
+use super::soft_tissue::YieldingSurface;
 use std::sync::Arc;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
@@ -18,7 +19,7 @@ const SPACING: f32 = 0.4;
 const GUM_SPACING: f32 = 0.25;
 
 /// Means of normals over neighbouring corners: neither facets nor steps of the samples show.
-const SMOOTHING: usize = 3;
+pub(super) const SMOOTHING: usize = 3;
 
 /// Depth to which the gingiva is lowered at its ends, and the distance over which it is lowered, mm.
 const DIVE: f32 = 1.0;
@@ -39,11 +40,14 @@ pub fn surrounding_solids(workpiece: &Workpiece, tissues: &TissueTable) -> Vec<M
 
 /// False for a hidden collider: the floor of a sulcus.
 pub(super) fn is_visible(shape: &Collider, tissues: &TissueTable) -> bool {
-    let gum = tissues.by_name("gingiva").map(|e| e.label());
-    !matches!(shape.geometry, ColliderGeometry::Sdf(_)) || Some(shape.label) == gum
+    let floor = tissues.by_name("attachment").map(|e| e.label());
+    !matches!(shape.geometry, ColliderGeometry::Sdf(_)) || Some(shape.label) != floor
 }
 
 pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &TissueTable) -> MeshInstance {
+    if let Some(soft) = YieldingSurface::of(shape, workpiece, tissues) {
+        return soft.at_rest().clone();
+    }
     let colour = tissues.by_label(shape.label).map_or([0.8; 3], |e| e.rgb());
     let mesh = Arc::new(shape_mesh(shape, workpiece));
     MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS })

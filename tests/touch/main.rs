@@ -5,6 +5,7 @@ mod support;
 mod adjusting;
 mod allocation;
 mod carving;
+mod soft_neighbours;
 mod continuity;
 mod feel;
 mod force_quality;

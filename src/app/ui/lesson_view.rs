@@ -171,6 +171,10 @@ fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpo
     if lesson.display_mode != DisplayMode::Xray {
         solids.extend(scene.surroundings.iter().chain(&scene.ejector).cloned());
     }
+    if let Some(mouth) = &scene.mouth {
+        let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));
+        mouth.fit_soft_tissue(&mut solids, viewpoint, ball);
+    }
     let Some(seen) = &lesson.snapshot else { return solids };
     let index = seen.instrument as usize;
     let world_from_tip = world_from_tip(seen);

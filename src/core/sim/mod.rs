@@ -213,11 +213,11 @@ impl TipState {
 
     /// Position at which the tip is displayed, mm.
     ///
-    /// Only a compliant collider, the floor of a sulcus, lets the displayed tip sink in; any other tip is displayed
-    /// exactly at the position of the proxy.
-    fn displayed_tip(&self, scene: &CollisionScene) -> Vec3 {
-        let (tip, hand) = (self.tip, self.tooth_from_handle.position);
-        let penetration = self.contact.and_then(|c| scene.penetration(c.label, tip, self.contact_force.spring));
+    /// Only a compliant collider, such as the floor of a sulcus or the cheek, lets the displayed tip sink in; any other tip is
+    /// displayed exactly at the position of the proxy. `radius`: of the working end, mm.
+    fn displayed_tip(&self, scene: &CollisionScene, radius: f32) -> Vec3 {
+        let (tip, hand, force) = (self.tip, self.tooth_from_handle.position, self.contact_force.spring);
+        let penetration = self.contact.and_then(|c| scene.penetration(c.label, (tip, radius), force));
         penetration.map_or(tip, |(depth, out)| tip - out * depth.min((hand - tip).length()))
     }
 }
@@ -357,11 +357,12 @@ impl Simulation {
             &self.world_from_tooth,
         );
         let vibration = if cutting && instrument.is_rotary { self.vibration.force(tick) } else { Vec3::ZERO };
+        let radius = if state.contact.is_some() { instrument.head_radius() } else { 0.0 };
         let Wrench { force, torque } = self.render(&state, vibration, guidance);
         Step {
             force,
             torque,
-            tip: self.world_from_tooth * state.displayed_tip(&self.scene),
+            tip: self.world_from_tooth * state.displayed_tip(&self.scene, radius),
             touch: self.touch(&state),
             cutting,
             removed: self.edits().iter().filter(|e| e.removes()).count() as u32,

@@ -19,8 +19,7 @@ pub struct CollisionScene {
 /// much is out of reach.
 pub(super) const ROUNDING: f32 = 1e-2;
 
-/// Distance of the tip's centre from a compliant collider below which the tip rests on it, mm: more than a probe's
-/// radius.
+/// Distance of a working end from a compliant collider below which it rests on it, mm: more than a probe's radius.
 const SOFT_CONTACT_DISTANCE: f32 = 0.5;
 
 /// Solid described by a formula, a mesh or a distance grid.
@@ -122,11 +121,12 @@ impl Collider {
 
 impl CollisionScene {
     /// Depth, mm, to which the tip sinks into a compliant collider under a force, N, and the outward normal there;
-    /// `None` if the tip does not sink in.
-    pub fn penetration(&self, touched: Label, tip: Vec3, force: f32) -> Option<(f32, Vec3)> {
+    /// `None` if the tip does not sink in. `tip`: its place and the radius of the working end, mm.
+    pub fn penetration(&self, touched: Label, (tip, radius): (Vec3, f32), force: f32) -> Option<(f32, Vec3)> {
+        let within = radius + SOFT_CONTACT_DISTANCE;
         // Distances are computed only for distance grids: those to a mesh are expensive.
         let (collider, compliance) = self.colliders.iter().find_map(|shape| match &shape.geometry {
-            ColliderGeometry::Sdf(field) if shape.label == touched && shape.distance(tip) < SOFT_CONTACT_DISTANCE => {
+            ColliderGeometry::Sdf(field) if shape.label == touched && shape.distance(tip) < within => {
                 Some((shape, field.compliance))
             }
             _ => None,

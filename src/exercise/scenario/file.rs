@@ -217,6 +217,12 @@ pub struct JawFile {
     /// no sulcus.
     #[serde(default)]
     pub periodontium: Option<PeriodontiumFile>,
+    /// True for the cheek, held aside, which gives way and can be hurt. Beside premolars and molars.
+    #[serde(default)]
+    pub cheek: bool,
+    /// True for the tongue, which gives way and can be hurt. Beside lower premolars and molars.
+    #[serde(default)]
+    pub tongue: bool,
     /// Positions of the teeth in both jaws.
     #[serde(default)]
     pub arch: ArchFile,

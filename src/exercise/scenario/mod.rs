@@ -20,6 +20,7 @@ pub mod metric_id;
 mod questionnaire;
 mod resolve;
 mod schema;
+mod soft_neighbours;
 mod tooth_bounds;
 mod tooth_words;
 mod workpiece;
@@ -55,6 +56,7 @@ use file::{AngleClassFile, SurfaceFile, ZoneRole};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_anatomy::caries::LesionDepth;
+use typodont_anatomy::cheek_and_tongue::SoftNeighbour;
 use typodont_anatomy::jaw::{ArchPlan, DentalArch};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
@@ -138,6 +140,8 @@ pub struct Scene {
     /// Gingiva with pockets; `None` outside a jaw.
     pub pockets: Option<Pockets>,
     pub arch: DentalArches,
+    /// The cheek and the tongue beside the tooth, if they are there.
+    pub soft_neighbours: Vec<SoftNeighbour>,
 }
 
 impl Scene {

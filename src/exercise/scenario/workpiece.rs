@@ -8,6 +8,7 @@ use super::calculus_and_fillings::{apply_calculus, apply_old_filling};
 use super::cavity::CavityError;
 use super::generated_teeth::generated_tooth;
 use super::lesion::{DecayPlacementError, Lesion, apply_decay, drawn_lesion, locate_lesion};
+use super::soft_neighbours::soft_neighbour;
 use super::tooth_bounds::{ToothBounds, VolumePart, anatomy_tissues};
 use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec, distal};
 
@@ -229,7 +230,7 @@ impl Workpiece {
                 return Err(WorkpieceError::PocketTooDeep { tenths: (10.0 * beyond).ceil() as u32 });
             }
         }
-        let around = match (scenario.scene.layout, &scenario.scene.surroundings) {
+        let mut around = match (scenario.scene.layout, &scenario.scene.surroundings) {
             (SceneLayout::Jaw, Some(meshes)) => meshes.clone(),
             (SceneLayout::Jaw, None) => surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues),
             (SceneLayout::Single | SceneLayout::Pair { .. }, _) => Vec::new(),
@@ -237,6 +238,8 @@ impl Workpiece {
                 seats.as_ref().map_or_else(Vec::new, |seats| seats.mucosa(&scenario.scene, &scenario.tissues))
             }
         };
+        let soft = scenario.scene.soft_neighbours.iter();
+        around.extend(soft.map(|kind| soft_neighbour(*kind, &teeth[0], &scenario.scene.arch, &scenario.tissues)));
         let crowns = union(teeth.iter().map(|tooth| tooth.crown));
         let orientation = if seats.is_some() { ARCH_ORIENTATION } else { TOOTH_ORIENTATION };
         let world_from_tooth = world_from_tooth_above(crowns.centre().with_z(crowns.high.z), orientation);

@@ -4,6 +4,7 @@
 //! jaw follows the gingiva and neighbours that can be touched, so that the picture agrees with the contact. Where a whole
 //! arch can be touched, its gingiva is drawn as it is felt.
 
+use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
 use typodont_anatomy::jaw::{ArchPlan, DentalArch, FittedTooth, Jaw, TintedMesh, ToothSeat, mirrored_pose};
@@ -16,7 +17,7 @@ use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::file::AngleClassFile;
 use typodont_exercise::scenario::{ToothBounds, Workpiece};
-use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb};
+use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb, Viewpoint};
 
 /// Opening of the mouth during treatment, degrees: some 40 mm between the incisors.
 pub const WORKING_OPENING_DEG: f32 = 26.0;
@@ -65,6 +66,8 @@ pub struct Mouth {
     near_from_opposite: Pose,
     /// Solids that can be touched beside the tooth and are not part of the near jaw's gingiva.
     touched: Vec<MeshInstance>,
+    /// Cheek and tongue.
+    yielding: Vec<YieldingSurface>,
 }
 
 #[derive(Clone, Debug)]
@@ -136,6 +139,7 @@ impl Mouth {
             world_from_near: workpiece.world_from_tooth * tooth_from_arch,
             near_from_opposite: closed_pose(&near, &other, workpiece.arch.angle_class),
             touched: Vec::new(),
+            yielding: Vec::new(),
         }
     }
 
@@ -156,8 +160,14 @@ impl Mouth {
         let near_from_tooth = mirrored_pose(seat.arch_from_tooth(), sign) * Pose::at(-anchor);
         let gums = tissues.by_name("gingiva").map(|e| e.label());
         let periodontium = workpiece.periodontium.as_deref();
-        let geometry =
-            TouchedGeometry { tooth, shapes: &workpiece.surroundings, periodontium, gum_label: gums, near_from_tooth };
+        let geometry = TouchedGeometry {
+            tooth,
+            shapes: &workpiece.surroundings,
+            periodontium,
+            tissues,
+            gum_label: gums,
+            near_from_tooth,
+        };
         let is_left_out = |side: f32, index: usize, seat: &ToothSeat| {
             plan.missing.contains(&jaw.fdi(side, index))
                 || (side == sign && index + 1 == number)
@@ -168,6 +178,7 @@ impl Mouth {
             surroundings::is_visible(shape, tissues) && (!is_soft || has_own_surface(shape))
         };
         let touched = workpiece.surroundings.iter().filter(is_drawn);
+        let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         Some(Mouth {
             near: JawMeshes::new(near.crowns(&is_left_out), near.gum(&|p| geometry.fit_to_gum(p)), tissues),
             opposite: Some(opposite_jaw(workpiece, &other, tissues)),
@@ -175,6 +186,7 @@ impl Mouth {
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
             near_from_opposite: closed_pose(&near, &other, plan.angle_class),
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
+            yielding: yielding.collect(),
         })
     }
 
@@ -184,7 +196,22 @@ impl Mouth {
         let opposite = self.opposite.iter().flat_map(|jaw| jaw.instances(self.world_from_opposite(open)));
         // The lamp is aimed past the jaw that is not worked on.
         let opposite = opposite.map(|solid| MeshInstance { casts_shadow: false, ..solid });
-        self.near.instances(self.world_from_near).chain(opposite).chain(self.touched.iter().cloned()).collect()
+        let yielding = self.yielding.iter().map(|surface| surface.at_rest().clone());
+        let touched = self.touched.iter().cloned().chain(yielding);
+        self.near.instances(self.world_from_near).chain(opposite).chain(touched).collect()
+    }
+
+    /// Fits the cheek and the tongue among the mouth's solids to a picture: without those that hide the work, and with the dent
+    /// of a working end's ball, its middle in world space and its radius, mm.
+    pub fn fit_soft_tissue(&self, solids: &mut Vec<MeshInstance>, viewpoint: &Viewpoint, ball: Option<(Vec3, f32)>) {
+        for surface in &self.yielding {
+            let is_own = |solid: &MeshInstance| Arc::ptr_eq(&solid.mesh, &surface.at_rest().mesh);
+            if surface.hides(viewpoint.position, viewpoint.focus) {
+                solids.retain(|solid| !is_own(solid));
+            } else if let Some(pressed) = ball.and_then(|(middle, radius)| surface.pressed(middle, radius)) {
+                solids.iter_mut().filter(|solid| is_own(solid)).for_each(|solid| *solid = pressed.clone());
+            }
+        }
     }
 
     /// The same without the opposite jaw: as a model jaw lies on the bench.
@@ -276,19 +303,21 @@ struct TouchedGeometry<'a> {
     shapes: &'a [Collider],
     /// Gingiva with a modelled margin, if the exercise has one.
     periodontium: Option<&'a Periodontium>,
+    tissues: &'a TissueTable,
     gum_label: Option<Label>,
     near_from_tooth: Pose,
 }
 
 impl TouchedGeometry<'_> {
-    /// True when a touched shape other than gum stands where a crown would.
+    /// True when a touched shape other than soft tissue stands where a crown would.
     /// `sign` is the side of x on which the seat lies.
     fn occupies(&self, seat: &ToothSeat, sign: f32) -> bool {
         let middle_in_arch = (seat.top - Vec3::Z * (0.5 * seat.crown)) * Vec3::new(sign, 1.0, 1.0);
         let middle = self.near_from_tooth.inverse() * middle_in_arch;
         self.shapes
             .iter()
-            .any(|shape| Some(shape.label) != self.gum_label && shape.distance(middle) < OCCUPIED_DISTANCE)
+            .filter(|shape| self.tissues.role(shape.label) != Some(TissueRole::Soft))
+            .any(|shape| shape.distance(middle) < OCCUPIED_DISTANCE)
     }
 
     /// A place of the gum, arch space: near the tooth laid onto the gum that is felt, or just under it where that is a mesh

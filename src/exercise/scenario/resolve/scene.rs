@@ -3,6 +3,7 @@
 use super::{ResolveMode, Resolver, tooth_path, written_teeth};
 
 use crate::scenario::file;
+use crate::scenario::soft_neighbours::soft_neighbour_tissue;
 use crate::scenario::tooth_bounds::anatomy_tissues;
 use crate::scenario::{
     ArchForm, Calculus, Decay, DecayOrigin, DecayPlace, DecayShape, DentalArches, GrownDecay, OldFilling, Pockets,
@@ -13,6 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use typodont_anatomy::age;
 use typodont_anatomy::caries::LesionDepth;
+use typodont_anatomy::cheek_and_tongue::SoftNeighbour;
 use typodont_anatomy::jaw::Jaw;
 use typodont_core::frame::{Pose, Vec3, rotation_about_axes};
 use typodont_core::touch;
@@ -94,7 +96,39 @@ impl Resolver<'_> {
             let message = "calculus is placed in relation to the gingival margin, but there is no gingiva";
             self.complain(&format!("{}/calculus", tooth_path(written, tooth)), "no-gum", message, help);
         }
-        Some(Scene { layout, teeth: teeth.into_iter().collect::<Option<_>>()?, surroundings: around, pockets, arch })
+        let soft_neighbours = match written {
+            file::SceneFile::Jaw(jaw) => self.soft_neighbours(jaw),
+            _ => Vec::new(),
+        };
+        let teeth = teeth.into_iter().collect::<Option<_>>()?;
+        Some(Scene { layout, teeth, surroundings: around, pockets, arch, soft_neighbours })
+    }
+
+    /// Returns the cheek and the tongue of a jaw, and reports those that are not beside the tooth or have no tissue.
+    fn soft_neighbours(&mut self, jaw: &file::JawFile) -> Vec<SoftNeighbour> {
+        let mut found = Vec::new();
+        let is_front_tooth = jaw.tooth.fdi % 10 <= 3;
+        let is_upper = Jaw::of(jaw.tooth.fdi) == Jaw::Upper;
+        let kinds = [
+            (jaw.cheek, SoftNeighbour::Cheek, is_front_tooth),
+            (jaw.tongue, SoftNeighbour::Tongue, is_front_tooth || is_upper),
+        ];
+        for (_, kind, is_elsewhere) in kinds.into_iter().filter(|(is_wanted, ..)| *is_wanted) {
+            let name = soft_neighbour_tissue(kind);
+            let path = format!("/scene/jaw/{name}");
+            if is_elsewhere {
+                let message = format!("the {name} is not beside tooth {}", jaw.tooth.fdi);
+                let help =
+                    "the cheek is beside premolars and molars, the tongue beside lower premolars and molars; remove it";
+                self.complain(&path, "no-neighbour", message, help);
+            }
+            if self.tissues.by_name(name).is_none() {
+                let message = format!("there is no tissue \"{name}\" in the table of tissues");
+                self.complain(&path, "unknown-tissue", message, "add it to the table, with the role \"soft\"");
+            }
+            found.push(kind);
+        }
+        found
     }
 
     /// Returns the sound teeth of an arch that the author did not list, and reports teeth that cannot stand in one arch.

@@ -1,0 +1,156 @@
+//! Cheek and tongue as they are drawn: with the dent that a working end presses into them.
+
+use super::surroundings::SMOOTHING;
+use std::sync::Arc;
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::mesh::Mesh;
+use typodont_core::touch::{Collider, ColliderGeometry, SdfGrid};
+use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_exercise::catalog::TissueTable;
+use typodont_exercise::scenario::Workpiece;
+use typodont_render::{Appearance, MeshInstance, Rgb};
+
+/// Names of the tissues that are drawn in this way.
+const CHEEK: &str = "cheek";
+const TONGUE: &str = "tongue";
+
+/// Distance between the samples of a surface, mm.
+const SPACING: f32 = 0.8;
+
+/// Gloss of mucosa under saliva.
+const GLOSS: f32 = 0.3;
+
+/// Standard deviation of a dent across the surface: of a light touch, mm, and what its depth adds, per mm.
+const DENT_WIDTH: f32 = 2.0;
+const DENT_WIDTH_PER_MM: f32 = 0.5;
+
+/// A surface of soft tissue.
+#[derive(Clone, Debug)]
+pub struct YieldingSurface {
+    at_rest: MeshInstance,
+    field: Arc<SdfGrid>,
+    is_cheek: bool,
+}
+
+impl YieldingSurface {
+    /// Returns `None` for a shape that is neither cheek nor tongue.
+    pub fn of(shape: &Collider, workpiece: &Workpiece, tissues: &TissueTable) -> Option<YieldingSurface> {
+        let ColliderGeometry::Sdf(field) = &shape.geometry else { return None };
+        let entry = tissues.by_label(shape.label).filter(|entry| [CHEEK, TONGUE].contains(&entry.name.as_str()))?;
+        let extent = field.extent();
+        let grid = Grid::covering(extent.low, extent.high, Vec3::splat(SPACING), 1);
+        let sampled = Volume::from_distance(grid, 2.0 * SPACING, |place| (field.distance(place), Label(1)));
+        let mut mesh = surface::extract(&sampled);
+        mesh.smooth_normals(SMOOTHING);
+        let tints = mesh.positions.iter().map(|place| tint(*place)).collect();
+        let world_from_solid = workpiece.world_from_tooth * shape.tooth_from_collider;
+        let plain =
+            MeshInstance::plain(Arc::new(mesh), world_from_solid, Appearance { colour: entry.rgb(), gloss: GLOSS });
+        let at_rest = MeshInstance { vertex_colours: Arc::new(tints), ..plain };
+        Some(YieldingSurface { at_rest, field: field.clone(), is_cheek: entry.name == CHEEK })
+    }
+
+    fn in_solid(&self, place_in_world: Vec3) -> Vec3 {
+        self.at_rest.world_from_solid.inverse() * place_in_world
+    }
+
+    /// The surface as nobody touches it, world space.
+    pub fn at_rest(&self) -> &MeshInstance {
+        &self.at_rest
+    }
+
+    /// True if the surface stands between an eye and a place, world space, mm. A cheek is in the way, too, where the eye is so
+    /// far off that the lips and the rest of the cheek, which are not modelled, would have to be seen.
+    pub fn hides(&self, eye: Vec3, place: Vec3) -> bool {
+        /// mm
+        const FAR: f32 = 75.0;
+        const STEP: f32 = 1.0;
+        let way = place - eye;
+        if self.is_cheek && way.length() > FAR {
+            return true;
+        }
+        let steps = (way.length() / STEP).ceil().max(1.0);
+        (0..=steps as u32).any(|step| self.field.distance(self.in_solid(eye + way * (step as f32 / steps))) < 0.0)
+    }
+
+    /// The surface with the dent of a ball, world space, mm; `None` if the ball does not press on it.
+    pub fn pressed(&self, middle_in_world: Vec3, radius: f32) -> Option<MeshInstance> {
+        let middle = self.in_solid(middle_in_world);
+        let depth = radius - self.field.distance(middle);
+        if depth <= 0.0 {
+            return None;
+        }
+        let shape = Collider {
+            label: Label::AIR,
+            tooth_from_collider: Pose::IDENTITY,
+            geometry: ColliderGeometry::Sdf(self.field.clone()),
+        };
+        let (distance, out) = shape.distance_and_normal(middle);
+        let place = middle - out * distance;
+        let width = DENT_WIDTH + DENT_WIDTH_PER_MM * depth;
+        let mut mesh = Mesh::clone(&self.at_rest.mesh);
+        for position in &mut mesh.positions {
+            let squared = position.distance_squared(place) / (2.0 * width * width);
+            if squared < 8.0 {
+                *position -= out * (depth * libm::expf(-squared));
+            }
+        }
+        mesh.compute_normals();
+        mesh.smooth_normals(SMOOTHING);
+        Some(MeshInstance { mesh: Arc::new(mesh), ..self.at_rest.clone() })
+    }
+}
+
+/// Tint of mucosa at a place, mm: a little redder here and paler there, over some millimetres.
+fn tint(place: Vec3) -> Rgb {
+    let wave = |steps: Vec3, phase: f32| libm::sinf(place.dot(steps) + phase);
+    let bent = place + 2.0 * Vec3::new(wave(Vec3::new(0.2, 0.5, 0.3), 0.0), wave(Vec3::new(0.6, 0.1, -0.4), 1.0), 0.0);
+    let wave = |steps: Vec3, phase: f32| libm::sinf(bent.dot(steps) + phase);
+    let coarse = wave(Vec3::new(0.31, 0.47, 0.19), 0.4) * wave(Vec3::new(-0.23, 0.29, 0.41), 1.7);
+    let fine = wave(Vec3::new(0.9, -0.7, 1.1), 0.0) * wave(Vec3::new(-0.6, 1.0, 0.8), 2.2);
+    let pale = 0.06 * coarse + 0.03 * fine;
+    [0.96 + 0.5 * pale, 0.93 + 1.4 * pale, 0.93 + 1.3 * pale]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use typodont_exercise::scenario::{self, ResolveMode};
+    use typodont_formats::Library;
+    use typodont_formats::diagnostic::SourceText;
+
+    #[test]
+    fn a_ball_dents_the_cheek_and_does_not_stick_out_of_it() {
+        // Aim: what is pressed gives way in the picture, near the ball only. Method: a ball of 0.7 mm at 0, 2 and 4 mm below the
+        // surface; no corner of the surface is inside it, and corners 20 mm away stay.
+        let text = include_str!("../../scenarios/7-spray.json").replace("\"spacing_mm\": 0.1", "\"spacing_mm\": 0.3");
+        let library = Library::shipped();
+        let source = SourceText::new("7-spray.json", text);
+        let scenario = scenario::resolve(source, &library, ResolveMode::MakeWorkpiece).unwrap();
+        let workpiece = Workpiece::make(&scenario, 1).unwrap();
+        let all: Vec<YieldingSurface> = workpiece
+            .surroundings
+            .iter()
+            .filter_map(|shape| YieldingSurface::of(shape, &workpiece, &scenario.tissues))
+            .collect();
+        assert_eq!(all.len(), 2, "cheek and tongue");
+        let cheek = all.iter().find(|surface| surface.is_cheek).unwrap();
+        let crown = workpiece.teeth[0].crown;
+        let toward = |x: f32| workpiece.world_from_tooth * Vec3::new(x, crown.centre().y, crown.high.z + 2.0);
+        let surface = (0..300).map(|i| crown.high.x + 0.1 * i as f32);
+        let surface = surface.into_iter().find(|x| cheek.field.distance(cheek.in_solid(toward(*x))) < 0.0).unwrap();
+        assert!(cheek.pressed(toward(surface - 1.0), 0.7).is_none());
+        for deep in [0.0, 2.0, 4.0] {
+            let middle = toward(surface + deep);
+            let pressed = cheek.pressed(middle, 0.7).unwrap();
+            for (before, after) in cheek.at_rest.mesh.positions.iter().zip(&pressed.mesh.positions) {
+                let away = after.distance(cheek.in_solid(middle));
+                assert!(away > 0.6, "{deep} mm deep: a corner is {away} mm from the middle");
+                assert!(before.distance(cheek.in_solid(middle)) < 20.0 || before == after);
+            }
+        }
+        // From the tongue's side the cheek is behind the tooth; from the other side it is before it.
+        let [inside, outside] = [crown.low.x - 25.0, crown.high.x + 40.0].map(toward);
+        assert!(!cheek.hides(inside, toward(0.0)) && cheek.hides(outside, toward(0.0)));
+    }
+}
