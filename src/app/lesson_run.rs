@@ -304,7 +304,8 @@ impl LessonPort {
                 live.timing(),
             );
             let limits = lesson.limits();
-            let snapshot = LessonSnapshot { warning: limits.warning(step.tick).map(LimitWarning::from), ..snapshot };
+            let warning = limits.warning(step.tick).map(LimitWarning::from);
+            let snapshot = LessonSnapshot { warning, assistant: live.assistant(), ..snapshot };
             self.queues.snapshot.write(snapshot.encode());
             match session.stage() {
                 Some((_, stage)) if !self.is_paused && !live.is_suspended() => {

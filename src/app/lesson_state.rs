@@ -20,6 +20,7 @@ use typodont_core::frame::{Pose, Vec3};
 use typodont_core::sim::{Command as Tell, HandFrame};
 use typodont_core::touch::{Coefficient, Materials};
 use typodont_core::volume::Label;
+use typodont_devices::servo::{AssistantTool, SecondHandRole};
 use typodont_exercise::scenario::{QuestionKind, Scenario, Stage};
 use typodont_exercise::session::{
     AnswerValue, ChartInput, ChartRecord, Effect, EndedBy, Input, InputError, TraineeView,
@@ -28,7 +29,7 @@ use typodont_formats::Library;
 use typodont_lesson::InterruptedSession;
 use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
-use typodont_scene::particles::CollisionWorld;
+use typodont_scene::particles::{AssistantAction, CollisionWorld};
 use typodont_scene::{self as scene};
 use web_time::{Duration, Instant};
 
@@ -325,6 +326,7 @@ impl LessonState {
     /// Advances dust and water by `elapsed`, s, while the lesson runs.
     fn step_particles(&mut self, elapsed: f32) {
         let does_drill_run = self.stage().is_some_and(|stage| stage.cutting);
+        let assistant = self.snapshot.and_then(|seen| seen.assistant);
         let snapshot = self.snapshot.filter(|_| does_drill_run);
         let is_still = self.is_standing_still();
         let Some(LessonScene { particles: Some(field), volume, workpiece, palette, .. }) = &mut self.scene else {
@@ -337,7 +339,9 @@ impl LessonState {
         let bur = snapshot.and_then(|seen| field.bur(seen.instrument as usize, world_from_tip(seen)));
         let ground =
             CollisionWorld { volume, world_from_tooth: workpiece.world_from_tooth, obstacles: &workpiece.surroundings };
-        field.advance(elapsed, bur.as_ref(), &ground, palette);
+        let aim = workpiece.world_from_tooth * workpiece.crown_bounds().centre();
+        let assistant = assistant.and_then(|tool| assistant_action(&tool, aim));
+        field.advance(elapsed, (bur.as_ref(), assistant), &ground, palette);
     }
 
     fn apply_event(&mut self, event: LessonEvent) {
@@ -674,4 +678,12 @@ fn start_lesson(
     sounds: SoundSender,
 ) -> Result<(LessonClient, Box<dyn LessonBackend>), String> {
     crate::page_worker::start_lesson(config, library, sounds)
+}
+/// Effect of an assistant's tool on dust and water. A syringe is aimed at a place, world space: not every device can be turned.
+fn assistant_action(tool: &AssistantTool, aim: Vec3) -> Option<AssistantAction> {
+    match tool.role {
+        SecondHandRole::Suction => Some(AssistantAction::Draw { inlet: tool.tip }),
+        SecondHandRole::Irrigation => tool.is_pressed.then_some(AssistantAction::Spray { nozzle: tool.tip, aim }),
+        SecondHandRole::Instructor => None,
+    }
 }

@@ -3,7 +3,7 @@
 use typodont_core::frame::{Quat, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::volume::Label;
-use typodont_devices::servo::TimingSummary;
+use typodont_devices::servo::{AssistantTool, SecondHandRole, TimingSummary};
 use typodont_exercise::score::Exceedance;
 
 /// The newest tick, and the progress of the session. World space, mm, N, s.
@@ -28,6 +28,8 @@ pub struct LessonSnapshot {
     pub timing: ServoTiming,
     /// The limit of which a warning is shown.
     pub warning: Option<LimitWarning>,
+    /// The tool of an assistant, if there is one.
+    pub assistant: Option<AssistantTool>,
 }
 
 /// Warning of a value above a limit of the exercise.
@@ -87,7 +89,7 @@ const STILL_DISTANCE: f32 = 0.01;
 const STILL_ROTATION: f32 = 1e-6;
 
 /// Number of words in the mailbox.
-pub const SNAPSHOT_WORDS: usize = 26;
+pub const SNAPSHOT_WORDS: usize = 30;
 
 /// Encodes an absent share.
 const NO_SHARE: f32 = -1.0;
@@ -117,6 +119,7 @@ impl LessonSnapshot {
             cleared_pct: cleared_pct.map(|pct| pct as f32),
             timing: timing.map(ServoTiming::from).unwrap_or_default(),
             warning: None,
+            assistant: None,
         }
     }
 
@@ -128,6 +131,7 @@ impl LessonSnapshot {
             || (self.touch, self.cutting, self.cleared_pct) != (other.touch, other.cutting, other.cleared_pct)
             || (self.warning, self.is_hand_blocked) != (other.warning, other.is_hand_blocked)
             || (self.spring - other.spring).abs() > VISIBLE_FORCE
+            || self.assistant != other.assistant
     }
 
     pub fn encode(&self) -> [u32; SNAPSHOT_WORDS] {
@@ -141,6 +145,7 @@ impl LessonSnapshot {
         let ServoTiming { ticks, late_p99, late_max, missed, dropped } = self.timing;
         let flags = u32::from(self.cutting) | u32::from(self.is_hand_blocked) << 1;
         let [limit, peak] = self.warning.map_or([NO_LIMIT, 0], |warning| [warning.limit, warning.peak.to_bits()]);
+        let [role, at_x, at_y, at_z] = encode_assistant(self.assistant);
         [
             a,
             b,
@@ -168,6 +173,10 @@ impl LessonSnapshot {
             s,
             limit,
             peak,
+            role,
+            at_x,
+            at_y,
+            at_z,
         ]
     }
 
@@ -195,8 +204,34 @@ impl LessonSnapshot {
             },
             warning: (words[24] != NO_LIMIT)
                 .then(|| LimitWarning { limit: words[24], peak: f32::from_bits(words[25]) }),
+            assistant: decode_assistant(words[26], vector(27)),
         }
     }
+}
+
+/// Bits of an assistant's word: a suction tube, a syringe, and a pressed button.
+const SUCTION: u32 = 1;
+const SYRINGE: u32 = 2;
+const PRESSED: u32 = 4;
+
+fn encode_assistant(assistant: Option<AssistantTool>) -> [u32; 4] {
+    let Some(AssistantTool { role, tip, is_pressed }) = assistant else { return [0; 4] };
+    let tool = match role {
+        SecondHandRole::Instructor => 0,
+        SecondHandRole::Suction => SUCTION,
+        SecondHandRole::Irrigation => SYRINGE,
+    };
+    let [x, y, z] = tip.to_array().map(f32::to_bits);
+    [if is_pressed { tool | PRESSED } else { tool }, x, y, z]
+}
+
+fn decode_assistant(word: u32, tip: Vec3) -> Option<AssistantTool> {
+    let role = match word & (SUCTION | SYRINGE) {
+        SUCTION => SecondHandRole::Suction,
+        SYRINGE => SecondHandRole::Irrigation,
+        _ => return None,
+    };
+    Some(AssistantTool { role, tip, is_pressed: word & PRESSED != 0 })
 }
 
 impl From<TimingSummary> for ServoTiming {
@@ -232,6 +267,11 @@ mod tests {
             cleared_pct: Some(33.0),
             timing: ServoTiming { ticks: 9, late_p99: 8, late_max: 7, missed: 6, dropped: 5 },
             warning: Some(LimitWarning { limit: 3, peak: 2.75 }),
+            assistant: Some(AssistantTool {
+                role: SecondHandRole::Irrigation,
+                tip: Vec3::new(4.0, 5.0, -6.0),
+                is_pressed: true,
+            }),
         };
         assert_eq!(LessonSnapshot::decode(seen.encode()), seen);
         let nothing = LessonSnapshot {
@@ -240,6 +280,7 @@ mod tests {
             is_hand_blocked: true,
             cleared_pct: None,
             warning: None,
+            assistant: None,
             ..seen
         };
         assert_eq!(LessonSnapshot::decode(nothing.encode()), nothing);

@@ -114,8 +114,10 @@ enum SecondHandRoleName {
     /// Follows the trainee's device, and leads it while the button is held
     #[default]
     Instructor,
-    /// Holds the suction tube, which touches the tooth
+    /// Holds the suction tube, which touches the tooth and removes debris and water
     Suction,
+    /// Holds the syringe, which touches the tooth and washes debris away while the button is held
+    Irrigation,
 }
 
 #[cfg(feature = "devices")]
@@ -124,6 +126,7 @@ impl From<SecondHandRoleName> for SecondHandRole {
         match role {
             SecondHandRoleName::Instructor => SecondHandRole::Instructor,
             SecondHandRoleName::Suction => SecondHandRole::Suction,
+            SecondHandRoleName::Irrigation => SecondHandRole::Irrigation,
         }
     }
 }

@@ -14,7 +14,7 @@ use typodont_core::touch::Gate;
 use typodont_core::volume::Edit;
 use typodont_devices::realtime::Priority;
 use typodont_devices::servo::{
-    SecondHandLink, Servo, ServoCommand, ServoEvent, ServoExit, TickReport, TimingStats, TimingSummary,
+    AssistantTool, SecondHandLink, Servo, ServoCommand, ServoEvent, ServoExit, TickReport, TimingStats, TimingSummary,
 };
 use typodont_exercise::record::ServoStatsFile;
 use typodont_exercise::scenario::Stage;
@@ -453,6 +453,14 @@ impl LiveSession {
             LiveState::Running(servo) => servo.timing(),
             LiveState::Suspended(left) => Some(left.timing.summary()),
             LiveState::Ended => self.final_timing,
+        }
+    }
+
+    /// The tool of an assistant's hand; `None` without one.
+    pub fn assistant(&self) -> Option<AssistantTool> {
+        match &self.state {
+            LiveState::Running(servo) => servo.assistant(),
+            LiveState::Suspended(_) | LiveState::Ended => None,
         }
     }
 

@@ -10,7 +10,7 @@ use typodont_core::device::DeviceSpec;
 use typodont_core::frame::Vec3;
 use typodont_core::sim::{Command, Simulation, Step};
 use typodont_devices::HandLink;
-use typodont_devices::servo::{SecondHandLink, SecondHandRole, SecondHandServo};
+use typodont_devices::servo::{AssistantTool, SecondHandLink, SecondHandRole, SecondHandServo};
 use typodont_exercise::record::{Recorder, Recording, RecordingEndFile, RecordingHeadFile, ReplayCheck, replay};
 use typodont_exercise::scenario;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
@@ -256,6 +256,53 @@ fn an_instructor_leads_the_trainee_and_feels_them() {
             assert!((0.1..=1.5001).contains(&most), "{kind}: led with {most} N");
         }
     })
+}
+
+#[test]
+fn an_assistants_syringe_is_seen_where_it_is_and_sprays_while_its_button_is_held() {
+    crate::support::peace::in_real_time(|| {
+        // Aim: the trainee's window knows the tool of the second hand. Method: two simulated wires; a second hand in free space,
+        // its button held and let go; then it goes onto the tooth, and the tool stays outside.
+        let (mut first, mut second) = (Simulated::new(), Simulated::new());
+        let (trainee, assistant) = (first.hand(), second.hand());
+        trainee.reach(Vec3::Y * 12.0);
+        assistant.reach(Vec3::new(9.0, 12.0, 0.0));
+        let device = first.open().unwrap();
+        let Begun { workpiece, mut recorder, mut session, simulation, .. } = begun("irrigated", device.spec());
+        let (here, there) = HandLink::pair();
+        let end = SecondHandLink::new(here, device.spec().max_damping, SecondHandRole::Irrigation);
+        let (mut live, _) = LiveSession::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();
+        let _assist = SecondHandServo::start(second.open().unwrap(), there).unwrap();
+        let mut turn_until = |holds: &mut dyn FnMut(Option<AssistantTool>) -> bool, what: &str| {
+            let start = Instant::now();
+            while !holds(live.assistant()) {
+                live.poll(&mut session, &mut recorder).unwrap();
+                assert!(start.elapsed() < Duration::from_secs(20), "{what}: {:?}", live.assistant());
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        };
+        let place = Vec3::new(2.0, 12.0, 1.0);
+        assistant.reach(place);
+        let is_there = |tool: Option<AssistantTool>| {
+            tool.filter(|tool| tool.role == SecondHandRole::Irrigation && tool.tip.distance(place) < 0.5)
+        };
+        turn_until(&mut |tool| is_there(tool).is_some_and(|tool| !tool.is_pressed), "the syringe is not seen");
+        assistant.press_buttons(1);
+        turn_until(&mut |tool| is_there(tool).is_some_and(|tool| tool.is_pressed), "it does not spray");
+        assistant.press_buttons(0);
+        turn_until(&mut |tool| is_there(tool).is_some_and(|tool| !tool.is_pressed), "it does not stop");
+        let crown = workpiece.world_from_tooth * workpiece.lesions[0].centre;
+        assistant.reach(crown + Vec3::Y * 12.0);
+        turn_until(
+            &mut |tool| tool.is_some_and(|tool| tool.tip.distance(crown + Vec3::Y * 12.0) < 0.5),
+            "it does not come over the tooth",
+        );
+        assistant.reach(crown - Vec3::Y * 6.0);
+        turn_until(&mut |_| assistant.felt().force.y > 0.1, "the tooth is not felt");
+        let tip = live.assistant().unwrap().tip;
+        assert!(tip.y > crown.y, "the nozzle is inside the tooth: {tip}, {crown}");
+        live.end::<Recorder>().unwrap();
+    });
 }
 
 #[test]

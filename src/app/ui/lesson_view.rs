@@ -10,10 +10,12 @@ use crate::ui::view_refresh::{Redraw, ViewInputs, ViewRefresh};
 use crate::ui::viewport::{EyeWindow, Viewport};
 use eframe::egui;
 use typodont_core::frame::{Pose, Vec3};
+use typodont_devices::servo::SecondHandRole;
 use typodont_render::{
     Background, Changes, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
 };
 use typodont_scene as scene;
+use typodont_scene::particles;
 use typodont_scene::particles::{ParticleField, VisibleParticles};
 
 /// The last picture of a lesson.
@@ -75,6 +77,7 @@ impl LessonView {
             orbit: lesson.orbit,
             mode: lesson.display_mode,
             instrument: lesson.snapshot.as_ref().map(InstrumentPose::from),
+            assistant: lesson.snapshot.and_then(|seen| seen.assistant),
             edit_count: scene.edit_count,
             appearance_count: scene.appearance_count,
             stereo,
@@ -169,7 +172,8 @@ fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpo
     // On a radiograph neither gingiva nor neighbours cover the tooth; the instrument stays.
     let mut solids = Vec::new();
     if lesson.display_mode != DisplayMode::Xray {
-        solids.extend(scene.surroundings.iter().chain(&scene.ejector).cloned());
+        solids.extend(scene.surroundings.iter().cloned());
+        solids.extend(suction_and_syringe(lesson, scene));
     }
     if let Some(mouth) = &scene.mouth {
         let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));
@@ -189,6 +193,21 @@ fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpo
         None => solids.extend(scene.instruments.get(index).map(placed)),
     }
     solids
+}
+
+/// The saliva ejector, or the tool that an assistant holds; a held tube takes its place.
+fn suction_and_syringe(lesson: &LessonState, scene: &LessonScene) -> Vec<MeshInstance> {
+    let tool = lesson.snapshot.and_then(|seen| seen.assistant);
+    let held = tool.and_then(|tool| match tool.role {
+        SecondHandRole::Suction => Some(particles::suction_tube(tool.tip)),
+        SecondHandRole::Irrigation => {
+            let crowns = scene.workpiece.crown_bounds().centre();
+            Some(particles::syringe(tool.tip, scene.workpiece.world_from_tooth * crowns))
+        }
+        SecondHandRole::Instructor => None,
+    });
+    let is_tube_held = tool.is_some_and(|tool| tool.role == SecondHandRole::Suction);
+    scene.ejector.iter().filter(|_| !is_tube_held).cloned().chain(held).collect()
 }
 
 /// True if a handpiece over the working end would hide the work: it is seen from above, within 42° of its axis.

@@ -3,6 +3,7 @@
 
 use crate::lesson_scene::DisplayMode;
 use crate::snapshot::InstrumentPose;
+use typodont_devices::servo::AssistantTool;
 use typodont_render::{Orbit, Stereo};
 
 /// Frame time above which the resolution falls, and below which it rises again, s.
@@ -29,6 +30,7 @@ pub struct ViewInputs {
     pub mode: DisplayMode,
     /// Instrument in use.
     pub instrument: Option<InstrumentPose>,
+    pub assistant: Option<AssistantTool>,
     /// Number of voxel edits, and of changes of colours, jaws and transfer functions.
     pub edit_count: u64,
     pub appearance_count: u64,
@@ -149,6 +151,7 @@ mod tests {
             orbit: Orbit::around(Vec3::ZERO, 9.0),
             mode: DisplayMode::Surface,
             instrument: Some(InstrumentPose { index: 0, tip, orientation: Quat::IDENTITY }),
+            assistant: None,
             edit_count: 0,
             appearance_count: 0,
             stereo: [None, None],

@@ -12,11 +12,12 @@
 
 mod batched;
 mod second_hand;
-mod suction_tip;
+mod assistant_tip;
 mod timing;
 mod tick_timer;
 
-pub use second_hand::{SecondHandEvent, SecondHandLink, SecondHandRole, SecondHandServo};
+use second_hand::AssistantDisplay;
+pub use second_hand::{AssistantTool, SecondHandEvent, SecondHandLink, SecondHandRole, SecondHandServo};
 pub use timing::{DurationHistogram, TimingStats, TimingSummary};
 
 use crate::realtime;
@@ -81,6 +82,7 @@ pub struct Servo {
     events: Receiver<ServoEvent>,
     edits: Receiver<Edit>,
     timing: Arc<SeqLock<9>>,
+    assistant: Option<AssistantDisplay>,
     runner: ServoRunner,
 }
 
@@ -195,6 +197,11 @@ impl Servo {
     /// Returns the timing summary, at most half a second old.
     pub fn timing(&self) -> Option<TimingSummary> {
         self.timing.read().map(|(_, words)| TimingSummary::decode(words))
+    }
+
+    /// Returns the tool of an assistant's hand; `None` without one.
+    pub fn assistant(&self) -> Option<AssistantTool> {
+        self.assistant.as_ref().and_then(AssistantDisplay::tool)
     }
 
     /// Returns whether the thread has ended by itself because the device is lost.
@@ -312,6 +319,7 @@ impl ServoLoop {
         if let Some(second) = &mut second {
             second.enter_world(&simulation);
         }
+        let assistant = second.as_ref().and_then(SecondHandLink::display);
         let (commands, inbox) = mailbox::channel(COMMAND_CAPACITY);
         let (event_sender, events) = mailbox::channel(EVENT_CAPACITY);
         let (edit_sender, edits) = mailbox::channel(EDIT_CAPACITY);
@@ -329,7 +337,7 @@ impl ServoLoop {
             awaited: None,
             is_hand_trusted: false,
         };
-        (servo, Servo { commands, events, edits, timing: summary, runner: ServoRunner::Stopped })
+        (servo, Servo { commands, events, edits, timing: summary, assistant, runner: ServoRunner::Stopped })
     }
 
     /// Runs the servo until it is stopped or its device fails.

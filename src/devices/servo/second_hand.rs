@@ -1,11 +1,11 @@
 //! A second hand: that of an instructor, which follows the first one, feels the same, and leads it on demand; or that
-//! of an assistant, which holds the suction.
+//! of an assistant, which holds the suction or irrigates.
 //!
 //! Takes the devices or links of both hands. Gives the force on each. [`SecondHandLink`] is the first hand's end,
 //! stepped by that hand's servo. [`SecondHandServo`] is the second hand's own servo, here or on another machine: it
 //! never has a simulation, only the coupling of the two hands.
 
-use crate::servo::suction_tip::SuctionTip;
+use crate::servo::assistant_tip::{AssistantTip, NOZZLE_RADIUS, SUCTION_RADIUS};
 use crate::servo::tick_timer::TickTimer;
 use crate::servo::timing::{TimingStats, TimingSummary};
 use crate::{Coupling, CouplingParams, HandLink, LinkedHand, realtime};
@@ -29,6 +29,51 @@ pub enum SecondHandRole {
     Instructor,
     /// Moves freely with a suction tip, and feels the tooth with it.
     Suction,
+    /// The same with a syringe, which sprays water while button 0 is held.
+    Irrigation,
+}
+
+impl SecondHandRole {
+    /// Radius of the tool's rounded end, mm; `None` for an instructor, who has none.
+    fn tool_radius(self) -> Option<f32> {
+        match self {
+            SecondHandRole::Instructor => None,
+            SecondHandRole::Suction => Some(SUCTION_RADIUS),
+            SecondHandRole::Irrigation => Some(NOZZLE_RADIUS),
+        }
+    }
+}
+
+/// Tool of an assistant, as the first hand's picture shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AssistantTool {
+    pub role: SecondHandRole,
+    /// Middle of its rounded end, world space, mm.
+    pub tip: Vec3,
+    /// True while button 0 is held.
+    pub is_pressed: bool,
+}
+
+/// Place at which the servo leaves an assistant's tool for the picture.
+#[derive(Clone, Debug)]
+pub(super) struct AssistantDisplay {
+    role: SecondHandRole,
+    /// Position of the tip, and whether the button is held; not a number while there is no hand.
+    words: Arc<SeqLock<4>>,
+}
+
+impl AssistantDisplay {
+    /// Returns the tool; `None` while its hand is absent.
+    pub fn tool(&self) -> Option<AssistantTool> {
+        let (_, [x, y, z, is_pressed]) = self.words.read()?;
+        let tip = Vec3::from_array([x, y, z].map(f32::from_bits));
+        tip.is_finite().then_some(AssistantTool { role: self.role, tip, is_pressed: is_pressed != 0 })
+    }
+
+    fn show(&self, tip: Vec3, is_pressed: bool) {
+        let [x, y, z] = tip.to_array().map(f32::to_bits);
+        self.words.write([x, y, z, u32::from(is_pressed)]);
+    }
 }
 
 /// The first hand's end of the link to a second one.
@@ -36,8 +81,10 @@ pub struct SecondHandLink {
     link: HandLink,
     coupling: Coupling,
     role: SecondHandRole,
-    /// The suction tip in the first hand's simulation, once the second hand has entered it.
-    suction_tip: Option<SuctionTip>,
+    /// The tool in the first hand's simulation, once the second hand has entered it.
+    tool: Option<AssistantTip>,
+    /// `None` for an instructor.
+    display: Option<AssistantDisplay>,
 }
 
 impl SecondHandLink {
@@ -47,27 +94,39 @@ impl SecondHandLink {
             link,
             coupling: Coupling::new(CouplingParams::for_damping(max_damping)),
             role,
-            suction_tip: None,
+            tool: None,
+            display: role.tool_radius().map(|_| AssistantDisplay { role, words: Arc::new(SeqLock::new()) }),
         }
     }
 
     /// Enters a simulation, before its first tick.
     pub(super) fn enter_world(&mut self, world: &Simulation) {
-        self.suction_tip = (self.role == SecondHandRole::Suction).then(|| SuctionTip::new(world.scene()));
+        self.tool = self.role.tool_radius().map(|radius| AssistantTip::new(world.scene(), radius));
+    }
+
+    /// The place at which this hand's tool is left for the picture; `None` for an instructor.
+    pub(super) fn display(&self) -> Option<AssistantDisplay> {
+        self.display.clone()
     }
 
     /// Steps the second hand, before the first one; returns its force on the first hand, N, world space.
     pub(super) fn step(&mut self, reading: &Reading, world: &Simulation) -> Vec3 {
-        let Some(suction_tip) = &mut self.suction_tip else { return self.leading_force(reading) };
+        let (Some(tool), Some(display)) = (&mut self.tool, &self.display) else {
+            return self.leading_force(reading);
+        };
         match self.link.latest().filter(|(_, delay)| *delay < SILENCE_TIMEOUT_S) {
             Some((hand, _)) if hand.position.is_finite() => {
                 let (matter, materials) = (world.scene(), world.materials());
-                let tip = suction_tip.follow(matter, materials, world.world_from_tooth(), hand.position);
+                let tip = tool.follow(matter, materials, world.world_from_tooth(), hand.position);
                 // The coupling that pulls an instructor's hand to the trainee's pulls an assistant's hand to its own
                 // tip.
                 self.link.publish(&LinkedHand { position: tip, is_leading: false, ..hand });
+                display.show(tip, hand.buttons & LEAD_BUTTON != 0);
             }
-            _ => suction_tip.reset(),
+            _ => {
+                tool.reset();
+                display.show(Vec3::NAN, false);
+            }
         }
         Vec3::ZERO
     }
@@ -86,7 +145,7 @@ impl SecondHandLink {
     /// Publishes the position of a first hand that waits for its first movement. Returns true if an instructor's hand asks to
     /// lead it.
     pub(super) fn await_lead(&mut self, reading: &Reading) -> bool {
-        if self.suction_tip.is_some() || !reading.pose.is_valid() {
+        if self.tool.is_some() || !reading.pose.is_valid() {
             return false;
         }
         let (position, orientation) = (reading.pose.position, reading.pose.orientation);

@@ -8,10 +8,12 @@ mod xorshift;
 mod dust;
 mod collision;
 mod suction;
+mod syringe;
 mod water;
 
 pub use collision::CollisionWorld;
-pub use suction::saliva_ejector;
+pub use suction::{saliva_ejector, suction_tube};
+pub use syringe::syringe;
 
 use self::dust::Dust;
 use self::suction::Suction;
@@ -69,6 +71,15 @@ pub struct RunningBur {
     pub height: f32,
 }
 
+/// Effect of an assistant's tool on dust and water, world space, mm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AssistantAction {
+    /// Draws them in, in place of the saliva ejector.
+    Draw { inlet: Vec3 },
+    /// Sprays water toward a place.
+    Spray { nozzle: Vec3, aim: Vec3 },
+}
+
 impl ParticleField {
     /// An empty field. `suction_inlet` is the position of a suction tip, if there is one, world space, mm.
     ///
@@ -103,9 +114,21 @@ impl ParticleField {
         }
     }
 
-    /// Advances the field by a time, s. `bur` is the running bur, if there is one. Chips take the colours of `palette`.
-    pub fn advance(&mut self, seconds: f32, bur: Option<&RunningBur>, world: &CollisionWorld, palette: &LabelPalette) {
+    /// Advances the field by a time, s. `bur` is the running bur, if there is one, and `assistant` what an assistant does. Chips
+    /// take the colours of `palette`.
+    pub fn advance(
+        &mut self,
+        seconds: f32,
+        (bur, assistant): (Option<&RunningBur>, Option<AssistantAction>),
+        world: &CollisionWorld,
+        palette: &LabelPalette,
+    ) {
         let ParticleField { options, suction, dust, water, rng, pending_time, .. } = self;
+        let held = match assistant {
+            Some(AssistantAction::Draw { inlet }) => Some(Suction::new(inlet)),
+            _ => None,
+        };
+        let suction = held.as_ref().or(suction.as_ref());
         let is_wet = options.water_spray && bur.is_some();
         dust.emit(bur, is_wet, world, palette, rng);
         *pending_time += if seconds.is_finite() { seconds.clamp(0.0, MAX_ELAPSED) } else { 0.0 };
@@ -114,9 +137,12 @@ impl ParticleField {
             if let Some(bur) = bur.filter(|_| is_wet) {
                 water.spray(bur, rng);
             }
-            water.step_flying(world, suction.as_ref(), dust, rng);
-            water.step_lying(world, suction.as_ref());
-            dust.step(world, suction.as_ref());
+            if let Some(AssistantAction::Spray { nozzle, aim }) = assistant {
+                water.jet(nozzle, aim, rng);
+            }
+            water.step_flying(world, suction, dust, rng);
+            water.step_lying(world, suction);
+            dust.step(world, suction);
             if let Some(bur) = bur {
                 dust.disturb(bur, rng);
             }
@@ -244,10 +270,10 @@ mod tests {
             let bur = field.bur(0, upright(AT_WORK + aside)).unwrap();
             carve(volume, field, AT_WORK + aside, 1.0);
             field.dust.emit(Some(&bur), false, &ground(volume), &palette(), &mut field.rng);
-            field.advance(0.05, None, &ground(volume), &palette());
+            field.advance(0.05, (None, None), &ground(volume), &palette());
         }
         for _ in 0..10 {
-            field.advance(0.1, None, &ground(volume), &palette());
+            field.advance(0.1, (None, None), &ground(volume), &palette());
         }
     }
 
@@ -258,7 +284,7 @@ mod tests {
         let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
         let bur = field.bur(0, upright(Vec3::new(5.0, 0.2, 0.0))).unwrap();
         carve(&mut volume, &mut field, Vec3::new(5.7, -0.2, 0.0), 0.5);
-        field.advance(0.0, Some(&bur), &ground(&volume), &palette());
+        field.advance(0.0, (Some(&bur), None), &ground(&volume), &palette());
         let mean = field.dust.mean_velocity();
         assert!(mean.z > 100.0 && mean.z > 2.0 * mean.x.abs() && mean.y > 50.0, "{mean}");
     }
@@ -270,7 +296,7 @@ mod tests {
         let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
         let bur = field.bur(0, upright(AT_WORK)).unwrap();
         carve(&mut volume, &mut field, AT_WORK, 1.0);
-        field.advance(0.0, Some(&bur), &ground(&volume), &palette());
+        field.advance(0.0, (Some(&bur), None), &ground(&volume), &palette());
         let seen = visible(&field);
         assert!(seen.opaque().len() > 20);
         let shown = palette().appearance(Label(1)).colour;
@@ -296,9 +322,33 @@ mod tests {
             volume.set(index, Voxel::AIR);
         }
         for _ in 0..20 {
-            field.advance(0.1, None, &ground(&volume), &palette());
+            field.advance(0.1, (None, None), &ground(&volume), &palette());
         }
         assert_eq!(field.dust.resting_positions().count(), 0, "without a tooth all of it has fallen out of the mouth");
+    }
+
+    #[test]
+    fn a_syringe_washes_away_the_dust_that_hides_the_work() {
+        // Aim: an assistant's water is matter: it clears what rests on the tooth, and nothing does without it. Method: dust of
+        // dry grinding; half a second without water, then a syringe over it for a second, and two more in which it runs off.
+        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
+        grind(&mut volume, &mut field);
+        let lying = |field: &ParticleField| {
+            field.dust.resting_positions().filter(|place| place.distance(AT_WORK) < 3.0).count()
+        };
+        let before = lying(&field);
+        let spray = AssistantAction::Spray { nozzle: AT_WORK + Vec3::new(2.0, 8.0, 0.0), aim: AT_WORK };
+        for _ in 0..5 {
+            field.advance(0.1, (None, None), &ground(&volume), &palette());
+        }
+        let waited = lying(&field);
+        for round in 0..30 {
+            let assistant = (round < 10).then_some(spray);
+            field.advance(0.1, (None, assistant), &ground(&volume), &palette());
+        }
+        let washed = lying(&field);
+        assert!(before > 20 && waited * 10 > before * 9, "{before} chips, {waited} after waiting");
+        assert!(washed * 4 < before, "{washed} of {before} chips are left under the jet");
     }
 
     #[test]
@@ -322,7 +372,7 @@ mod tests {
                         let index = over[(round * 104_729 + n * 7919) % over.len()] as u32;
                         field.record_removal(&Edit { index, before, after: Voxel::AIR }, &grid);
                     }
-                    field.advance(0.1, Some(&bur), &ground(&volume), &palette);
+                    field.advance(0.1, (Some(&bur), None), &ground(&volume), &palette);
                     seen.update(field, &viewpoint);
                 }
             }
@@ -347,11 +397,11 @@ mod tests {
             let before = in_pit(&field);
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             for _ in 0..30 {
-                field.advance(0.1, Some(&bur), &ground(&volume), &palette());
+                field.advance(0.1, (Some(&bur), None), &ground(&volume), &palette());
             }
             let (after, wet) = (in_pit(&field), field.water.lying_mm3());
             for _ in 0..30 {
-                field.advance(0.1, None, &ground(&volume), &palette());
+                field.advance(0.1, (None, None), &ground(&volume), &palette());
             }
             (before, after, wet, field.water.lying_mm3())
         };
@@ -385,7 +435,7 @@ mod tests {
             let (mut volume, mut field) = (slab(), ParticleField::new(ALL, &tray(), Some(Vec3::new(9.0, 3.0, 0.0))));
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             carve(&mut volume, &mut field, AT_WORK, 1.0);
-            times.iter().for_each(|s| field.advance(*s, Some(&bur), &ground(&volume), &palette()));
+            times.iter().for_each(|s| field.advance(*s, (Some(&bur), None), &ground(&volume), &palette()));
             let seen = visible(&field);
             (seen.opaque().to_vec(), seen.translucent().to_vec())
         };

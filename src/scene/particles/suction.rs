@@ -14,6 +14,9 @@ const FLOW: f32 = 1.0e6;
 /// Radius of the tip, within which particles are removed, mm: tubes are 6 mm wide.
 const RADIUS: f32 = 3.0;
 
+/// Direction of the tube out of the mouth, world space: to the front, up and away from the trainee.
+const TUBE_DIRECTION: Vec3 = Vec3::new(0.80, 0.42, -0.42);
+
 /// A suction tip.
 #[derive(Clone, Copy, Debug)]
 pub struct Suction {
@@ -47,15 +50,19 @@ pub fn saliva_ejector(workpiece: &Workpiece) -> (MeshInstance, Vec3) {
     /// From the crown toward the cheek, and over the neck, mm.
     const ASIDE: f32 = 4.6;
     const OVER: f32 = 0.5;
-    const LENGTH: f32 = 90.0;
-    /// Direction of the tube out of the mouth, world space: to the front, up and away from the trainee.
-    const TUBE_DIRECTION: Vec3 = Vec3::new(0.80, 0.42, -0.42);
-    const PLASTIC: Appearance = Appearance { colour: [0.84, 0.89, 0.90], gloss: 0.35 };
     let Aabb { low, high } = workpiece.crown_bounds();
     let in_tooth = Vec3::new(high.x + ASIDE, 0.5 * (low.y + high.y), low.z + OVER);
     let inlet = workpiece.world_from_tooth * in_tooth;
+    (suction_tube(inlet), inlet)
+}
+
+/// A suction tube with its inlet at a place, world space, mm.
+pub fn suction_tube(inlet: Vec3) -> MeshInstance {
+    /// Length of the tube, mm.
+    const LENGTH: f32 = 90.0;
+    const PLASTIC: Appearance = Appearance { colour: [0.84, 0.89, 0.90], gloss: 0.35 };
     // A rounded tip, open in its middle.
     let tip = [[1.6, 1.0], [1.6, 0.0], [2.4, -0.3], [RADIUS, 0.6], [RADIUS, 6.0], [2.6, 6.6], [2.6, LENGTH]];
     let orientation = Quat::from_rotation_arc(Vec3::Z, TUBE_DIRECTION.normalize());
-    (MeshInstance::plain(Arc::new(revolve(&tip)), Pose { position: inlet, orientation }, PLASTIC), inlet)
+    MeshInstance::plain(Arc::new(revolve(&tip)), Pose { position: inlet, orientation }, PLASTIC)
 }

@@ -165,6 +165,22 @@ impl Water {
         }
     }
 
+    /// Water that leaves a syringe in one step, toward a place.
+    pub fn jet(&mut self, nozzle: Vec3, aim: Vec3, rng: &mut Xorshift32) {
+        /// Droplets in a step, and their speed, mm/s, and spread: water and air together make a spray.
+        const DROPLETS: usize = 12;
+        const SPEED: f32 = 600.0;
+        const SPREAD: f32 = 0.3;
+        let toward = (aim - nozzle).normalize_or(Vec3::NEG_Y);
+        for _ in 0..DROPLETS {
+            let velocity = (toward + rng.in_cube() * SPREAD) * (SPEED * rng.in_range(0.8, 1.2));
+            let place = nozzle + velocity * (STEP * rng.next_f32());
+            let radius = rng.in_range(RADII[0], RADII[1]);
+            let drop = Droplet { place, velocity, radius, kind: DropletKind::Jet, age: 0.0 };
+            push_bounded(&mut self.flying, MAX_FLYING, drop);
+        }
+    }
+
     /// One step of all flying droplets. Droplets that land wash dust away, splash, and leave water.
     pub fn step_flying(
         &mut self,

@@ -1,4 +1,4 @@
-//! Suction tip of a second hand that assists instead of leading; it also removes the irrigation water.
+//! Working end of a second hand that assists instead of leading: of a suction tube, or of the syringe that irrigates.
 //!
 //! Takes the position of the second hand and the tissue as the first hand's bur has left it. Gives the allowed
 //! position of the tip. Touches, never cuts; nothing in the first hand's session depends on it.
@@ -7,23 +7,26 @@ use typodont_core::frame::{Pose, Vec3};
 use typodont_core::touch::{CollisionScene, Instrument, Materials, Proxy, WorkingEnd};
 
 /// Radius of the rounded end of a saliva ejector, mm: tubes have an outer width of 6 mm, their ends 5 to 8.
-const TIP_RADIUS: f32 = 3.0;
+pub(super) const SUCTION_RADIUS: f32 = 3.0;
 
-/// A suction tip in the second hand.
+/// Radius of the nozzle of a three-way syringe, mm.
+pub(super) const NOZZLE_RADIUS: f32 = 1.5;
+
+/// A tool in the second hand.
 #[derive(Clone, Debug)]
-pub(super) struct SuctionTip {
+pub(super) struct AssistantTip {
     instrument: Instrument,
     proxy: Proxy,
     /// The tip has been outside tissue since the hand was last lost.
     is_engaged: bool,
 }
 
-impl SuctionTip {
-    /// Creates a tip for the given scene. Allocates; all later calls do not.
-    pub fn new(matter: &CollisionScene) -> SuctionTip {
-        let instrument = Instrument::new(WorkingEnd::Ball { radius: TIP_RADIUS }, false);
+impl AssistantTip {
+    /// Creates a tip with a rounded end, radius in mm, for the given scene. Allocates; all later calls do not.
+    pub fn new(matter: &CollisionScene, radius: f32) -> AssistantTip {
+        let instrument = Instrument::new(WorkingEnd::Ball { radius }, false);
         let proxy = Proxy::new(matter, std::slice::from_ref(&instrument), Vec3::ZERO);
-        SuctionTip { instrument, proxy, is_engaged: false }
+        AssistantTip { instrument, proxy, is_engaged: false }
     }
 
     /// Returns the position of the tip while the hand is at `hand`; both in world space, mm.
