@@ -169,6 +169,10 @@ type Nonce = [u8; 16];
 /// Stands for the number of an end from which nothing was received yet.
 const NO_NONCE: Nonce = [0; 16];
 
+/// Hand of an end that has published none yet.
+const NO_HAND: LinkedHand =
+    LinkedHand { position: Vec3::NAN, orientation: Quat::IDENTITY, buttons: 0, is_leading: false };
+
 fn random_nonce() -> io::Result<Nonce> {
     let mut nonce = NO_NONCE;
     getrandom::fill(&mut nonce)
@@ -267,10 +271,13 @@ impl UdpWorker {
     }
 
     fn send_to(&mut self, peer: SocketAddr, peer_nonce: Nonce) {
-        let Some((_, words)) = self.ours.read() else { return };
-        let (hand, at) = decode_words(words);
         // A hand that is not published any more, because its servo is paused or its device is lost, grows old at the other
-        // end, too, and leads no longer.
+        // end, too, and leads no longer. Before the first one, the datagram holds none: an assistant's tool is published only
+        // when the assistant's hand is known, and that hand arrives only after an answer.
+        let (hand, at) = match self.ours.read() {
+            Some((_, words)) => decode_words(words),
+            None => (NO_HAND, self.epoch.elapsed()),
+        };
         let age_ms = self.epoch.elapsed().saturating_sub(at).as_millis().min(u128::from(u8::MAX)) as u8;
         // At a thousand per second it does not overflow.
         self.sequence += 1;
@@ -336,6 +343,9 @@ impl UdpWorker {
             buttons: word(36),
             is_leading: bytes[5] & 1 == 1,
         };
+        if hand.position.is_nan() {
+            return Some(());
+        }
         if !hand.position.is_finite() || !hand.orientation.is_finite() {
             return None;
         }
@@ -433,6 +443,21 @@ mod tests {
             publish();
             here.latest().is_some_and(|(_, delay)| delay < 0.02)
         }));
+    }
+
+    #[test]
+    fn an_end_that_has_published_nothing_yet_receives() {
+        // Aim: an assistant can join over the network; the first hand's end publishes nothing before it knows the assistant's
+        // hand. Method: only the joining end publishes; what it receives meanwhile is no hand.
+        let (here, at) = HandLink::listen("127.0.0.1:0", "a key of ours").unwrap();
+        let there = HandLink::connect(at, "a key of ours").unwrap();
+        let arrived = eventually(|| {
+            there.publish(&hand(3.0, false));
+            here.latest().is_some_and(|(hand, delay)| hand.position.x == 3.0 && delay < 0.1)
+        });
+        assert!(arrived);
+        assert_eq!(there.latest(), None);
+        assert_eq!((here.rejected_count(), there.rejected_count()), (0, 0));
     }
 
     #[test]

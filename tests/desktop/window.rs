@@ -188,6 +188,47 @@ fn a_scanned_tooth_is_worked_on_and_an_instructor_joins_from_another_machine() {
     assert!(output.status.success(), "{}", complained(&output));
 }
 
+/// An assistant's hand over the tooth, its button held.
+struct Spraying(DeviceSpec);
+
+impl Device for Spraying {
+    fn spec(&self) -> &DeviceSpec {
+        &self.0
+    }
+
+    fn exchange(&mut self, _: &Wrench) -> Result<Reading, DeviceError> {
+        Ok(Reading { buttons: 1, ..Reading::at(Vec3::new(-6.0, 8.0, 5.0)) })
+    }
+}
+
+#[test]
+fn an_assistant_joins_from_another_machine_with_the_syringe() {
+    // Aim: over the network, too, an assistant's hand is taken up by the lesson, feels its tool there, and is drawn. Method: the
+    // program waits for a second device; it learns where its tool is as soon as the trainee has begun.
+    let Some(display) = Display::open() else { return };
+    let place = folder("syringe_window");
+    let exercise = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/7-spray.json");
+    let begun = ["run", exercise, "--seed", "1", "--begin", "--out", "bundles"];
+    let second = ["--second-at", "127.0.0.1:0", "--second-key", "a key of ours", "--second-role", "irrigation"];
+    let mut desk = Desk::sit_down(display, &place, &[&begun[..], &second].concat());
+    desk.until("tooth", |tooth| tooth == "drawn");
+    let address = desk.until("may_join", |_| true);
+    let link = HandLink::connect(&address, "a key of ours").unwrap();
+    let mut assistant = SecondHandServo::start(Box::new(Spraying(DeviceSpec::phantom_omni())), link).unwrap();
+    desk.press("o", "pointer", "held");
+    let (begun, mut n) = (Instant::now(), 0);
+    let joined = SecondHandEvent::FirstHand { is_present: true };
+    while !std::iter::from_fn(|| assistant.next_event()).any(|news| news == joined) {
+        assert!(begun.elapsed() < PATIENCE, "the lesson at {address} does not take up the hand");
+        // The clock starts with the trainee's first movement.
+        n += 1;
+        desk.move_to([600 + 3 * (n % 20), 400]);
+        std::thread::sleep(LOOK_EVERY);
+    }
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    desk.picture("syringe");
+}
+
 #[test]
 fn what_the_window_does_is_heard_at_a_real_server() {
     // Aim: sound follows the lesson, not only the synthesiser's test. Method: a private server's null sink, recorded: the
