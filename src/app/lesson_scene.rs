@@ -21,7 +21,7 @@ pub struct LessonScene {
     pub workpiece: Arc<Workpiece>,
     /// The window's own copy of the volume, with all edits received so far.
     pub volume: Volume,
-    /// The same by grey values, if the workpiece is from a CT scan.
+    /// The same by grey values, if the workpiece is from a CT scan and decay is shown: otherwise nothing looks into the tooth.
     grey_volume: Option<GreyVolume>,
     pub palette: LabelPalette,
     /// The jaws around the tooth, if the exercise has a mouth.
@@ -73,7 +73,7 @@ impl LessonScene {
             true => Some(particles::saliva_ejector(&workpiece)).unzip(),
             false => (None, None),
         };
-        let grey_volume = GreyVolume::new(&workpiece, &volume, tissues, is_decay_shown);
+        let grey_volume = grey_volume(&workpiece, &volume, tissues, is_decay_shown);
         let built = LessonScene {
             histogram: OnceCell::new(),
             enamel_depth: OnceCell::new(),
@@ -134,7 +134,10 @@ impl LessonScene {
     /// Sets the colours of the tissues anew, with or without visible decay.
     pub fn colour(&mut self, tissues: &TissueTable, is_decay_shown: bool) {
         self.palette = scene::tissue_palette(tissues, is_decay_shown);
-        self.grey_volume = GreyVolume::new(&self.workpiece, &self.volume, tissues, is_decay_shown);
+        if self.grey_volume.is_some() != is_decay_shown {
+            self.grey_volume = grey_volume(&self.workpiece, &self.volume, tissues, is_decay_shown);
+            self.histogram = OnceCell::new();
+        }
         self.presets = TransferFunctionPresets::new(tissues, &self.palette, is_decay_shown, self.grey_volume.is_some());
         self.appearance_count += 1;
     }
@@ -156,7 +159,7 @@ impl LessonScene {
     /// Histogram of the grey values, or else of the densities, at the first call. It is computed on demand: few users need it,
     /// and counting the voxels of a fine tooth takes a while.
     pub fn histogram(&self) -> &DensityHistogram {
-        self.histogram.get_or_init(|| DensityHistogram::new(self.volume_of(VolumeSource::GreyValues)))
+        self.histogram.get_or_init(|| DensityHistogram::new(self.volume_of(VolumeSource::GreyValues), &self.volume))
     }
 
     /// Translucent tissue in its own colours, as a beginning for a transfer function that is drawn by hand.
@@ -202,6 +205,11 @@ impl LessonScene {
     }
 }
 
+/// Grey values of a workpiece where its inside may be looked at.
+fn grey_volume(workpiece: &Workpiece, now: &Volume, tissues: &TissueTable, is_decay_shown: bool) -> Option<GreyVolume> {
+    is_decay_shown.then(|| GreyVolume::new(workpiece, now, tissues)).flatten()
+}
+
 /// The preset transfer functions; rebuilt with the palette, not with each frame.
 struct TransferFunctionPresets {
     tissue: Arc<TransferFunction>,
@@ -221,7 +229,7 @@ impl TransferFunctionPresets {
         TransferFunctionPresets {
             tissue: Arc::new(TransferFunction::tissue(palette)),
             x_ray: Arc::new(match has_grey_values {
-                true => GreyVolume::radiograph(tissues, is_decay_shown),
+                true => GreyVolume::radiograph(tissues),
                 false => TransferFunction::radiograph(|label| scene::x_ray_attenuation(tissues, label, is_decay_shown)),
             }),
             decay: Arc::new(TransferFunction::highlighting(&decay, palette)),

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::{Density, Label, Volume};
 use typodont_render::{LabelPalette, TransferFunction, TransferTable};
 
 /// A transfer function drawn by the user, starting from a preset.
@@ -66,38 +66,53 @@ impl TransferFunctionDraft {
     }
 }
 
-/// Number of voxels of each density, by label.
-pub struct DensityHistogram(Vec<[u32; 256]>);
+/// Number of voxels of each density or grey value, by label.
+pub struct DensityHistogram {
+    counts: Vec<[u32; 256]>,
+    /// The same for voxels that are full of matter.
+    full: Vec<[u32; 256]>,
+}
 
 impl DensityHistogram {
-    /// Counts everything but air.
-    pub fn new(volume: &Volume) -> DensityHistogram {
-        let mut counts = vec![[0; 256]; 256];
-        for (density, label) in volume.densities().iter().zip(volume.labels()) {
-            counts[usize::from(label.0)][usize::from(density.bits())] += u32::from(density.bits() > 0);
+    /// Counts everything but air. `matter`: the densities, where `volume` holds grey values.
+    pub fn new(volume: &Volume, matter: &Volume) -> DensityHistogram {
+        let [mut counts, mut full] = [vec![[0; 256]; 256], vec![[0; 256]; 256]];
+        for ((density, label), filled) in volume.densities().iter().zip(volume.labels()).zip(matter.densities()) {
+            let (row, column) = (usize::from(label.0), usize::from(density.bits()));
+            counts[row][column] += u32::from(density.bits() > 0);
+            full[row][column] += u32::from(*filled == Density::FULL);
         }
-        DensityHistogram(counts)
+        DensityHistogram { counts, full }
     }
 
     /// Heights from 0 to 1 of a tissue, or of all for air. Logarithms: borders are few beside what they enclose.
     pub fn heights(&self, tissue: Label) -> [f32; 256] {
         let count = |density: usize| match tissue {
-            Label::AIR => self.0.iter().map(|counts| counts[density]).sum(),
-            tissue => self.0[usize::from(tissue.0)][density],
+            Label::AIR => self.counts.iter().map(|counts| counts[density]).sum(),
+            tissue => self.counts[usize::from(tissue.0)][density],
         };
         let logs: [f32; 256] = std::array::from_fn(|d| libm::log1pf(count(d) as f32));
         let most = logs.iter().fold(1.0, |most: f32, &log| most.max(log));
         logs.map(|log| log / most)
     }
 
-    /// The density that most voxels of each tissue have, in the order of the labels; tissues without voxels have none.
+    /// The value that most full voxels of each tissue have, smoothed over neighbouring values, in the order of the labels; tissues
+    /// without full voxels have none.
     pub fn peaks(&self) -> Vec<TissuePeak> {
+        /// Values on either side that are added up: the noise of a scan spreads a tissue over tens of values.
+        const REACH: usize = 4;
         let peak = |(label, counts): (usize, &[u32; 256])| {
-            let most = counts.iter().copied().max().filter(|most| *most > 0)?;
-            let density = counts.iter().position(|count| *count == most)?;
-            Some(TissuePeak { tissue: Label(label as u8), density: density as u8 })
+            let around = |value: usize| -> u32 {
+                counts[value.saturating_sub(REACH)..(value + REACH + 1).min(256)].iter().sum()
+            };
+            let most = (0..256).map(around).max().filter(|most| *most > 0)?;
+            // The middle of the values that are equally frequent.
+            let best: Vec<usize> = (0..256).filter(|&value| around(value) == most).collect();
+            let value = best[best.len() / 2];
+            let value = if counts[255] == most { 255 } else { value };
+            Some(TissuePeak { tissue: Label(label as u8), density: value as u8 })
         };
-        self.0.iter().enumerate().filter_map(peak).collect()
+        self.full.iter().enumerate().filter_map(peak).collect()
     }
 }
 

@@ -170,12 +170,10 @@ pub fn run(arguments: &Arguments) -> Result<(), CliError> {
     let made = make_tooth(arguments, &table);
     bar.finish_and_clear();
     let ImportResult { tooth: ImportedTooth { volume, grey_values }, notes } = made?;
-    if let Some(path) = &arguments.grey_values {
-        let missing =
-            || CliError::misuse("--grey-values: only a CT volume has grey values; label maps and surfaces have none");
-        write_file(path, grey_value_map(&volume, grey_values.as_ref().ok_or_else(missing)?).map_err(CliError::Wrong)?)?;
-    }
     write_file(&arguments.output, tissue_map(&volume, &table).map_err(CliError::Wrong)?)?;
+    if let (Some(path), Some(values)) = (&arguments.grey_values, &grey_values) {
+        write_file(path, grey_value_map(&volume, values).map_err(CliError::Wrong)?)?;
+    }
     if let Some(preview) = &arguments.preview {
         write_file(preview, sections_png(&volume, &table))?;
     }
@@ -195,11 +193,19 @@ fn check_outputs(arguments: &Arguments) -> Result<(), CliError> {
     if let Some(written) = grey_values.as_ref().filter(|p| !p.to_string_lossy().ends_with(".nrrd")) {
         return Err(CliError::misuse(format!("{}: the name of the grey values must end in .nrrd", written.display())));
     }
-    if grey_values.as_ref() == Some(output) {
+    let is_one_file = |a: &Path, b: &Path| {
+        let folder = |path: &Path| path.parent().map(|parent| Path::new(".").join(parent).canonicalize().ok());
+        a.file_name() == b.file_name() && folder(a) == folder(b)
+    };
+    if grey_values.as_ref().is_some_and(|path| is_one_file(path, output)) {
         return Err(CliError::misuse(format!(
             "{}: the label map and the grey values need two names",
             output.display()
         )));
+    }
+    let is_surface = arguments.scan.as_ref().is_none_or(|path| surfaces::is_surface(path));
+    if grey_values.is_some() && (is_surface || !arguments.labels.is_empty()) {
+        return Err(no_grey_values());
     }
     let inputs = arguments.scan.iter().chain(arguments.tissue.iter().map(|(_, file)| file));
     let is_same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
@@ -215,6 +221,10 @@ fn check_outputs(arguments: &Arguments) -> Result<(), CliError> {
         }
     }
     Ok(())
+}
+
+fn no_grey_values() -> CliError {
+    CliError::misuse("--grey-values: only a CT volume has grey values; label maps and surfaces have none")
 }
 
 fn make_tooth(arguments: &Arguments, table: &TissueTable) -> Result<ImportResult, CliError> {
@@ -302,6 +312,9 @@ fn from_scan(path: &Path, arguments: &Arguments, table: &TissueTable) -> Result<
         respace(&mut image, spacing);
     }
     let names = label_names(&image, arguments, table).map_err(|what| volume_error(path, &what))?;
+    if names.is_some() && arguments.grey_values.is_some() {
+        return Err(no_grey_values());
+    }
     let wanted = CropOptions {
         crop: crop_box(arguments).map(|crop| [crop.low.as_dvec3(), crop.high.as_dvec3()]),
         resample: arguments.resample.map(as_typed_f64),

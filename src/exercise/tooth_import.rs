@@ -50,7 +50,7 @@ pub fn segmented(
 }
 
 /// Segments a CT scan of one tooth for a label map: large scans are segmented from coarse to fine, and the density is
-/// not smoothed. Grey values are kept if `keeps_grey_values`.
+/// not smoothed; grey values of large scans are kept only if `keeps_grey_values`.
 ///
 /// # Errors
 /// Returns a message if the voxel spacing is unknown, or if the tooth cannot be segmented.
@@ -64,31 +64,42 @@ pub fn segmented_labels(
     segment::labels(&grid, values, tissues, keeps_grey_values).map_err(|unclear| unclear.to_string())
 }
 
-/// Returns the grey values of a tooth that was drawn as a label map, from the CT scan on which it was drawn.
+/// Returns the grey values of a tooth that was drawn as a label map, from the CT scan on which it was drawn, voxel by voxel.
 ///
-/// `spacing` (mm, along x, y and z) replaces the scan's own spacing.
+/// `map`: where the label map's voxels lie, as its file says. `spacing` (mm, along x, y and z) replaces that of both files.
 ///
 /// # Errors
-/// Returns a message if the scan does not lie on the grid of the volume, or if its enamel is not brighter than the air.
+/// Returns a message if the scan has not the voxels of the map, or if its enamel is not brighter than what surrounds the
+/// tooth.
 pub fn grey_values_of(
     scan: &VoxelImage,
+    map: &Geometry,
     spacing: Option<[f32; 3]>,
     volume: &Volume,
     enamel: Label,
 ) -> Result<GreyValues, String> {
-    let (grid, values) = axis_aligned(scan, spacing)?;
-    let own = volume.grid();
-    let is_same =
-        |a: Vec3, b: Vec3, tolerance: f32| (a - b).abs().max_element() <= tolerance * own.spacing.min_element();
-    let from_first = (own.origin - grid.origin) / grid.spacing;
-    if !is_same(own.spacing, grid.spacing, 0.001) || (from_first - from_first.round()).abs().max_element() > 0.01 {
+    if !is_same_place(&scan.geometry, map) {
         return Err("the voxels of the scan are not those of the label map; save the map on the scan's own grid".into());
     }
+    // The map's geometry for both: the files may state it with different precision.
+    let on_map = VoxelImage { geometry: map.clone(), samples: scan.samples.clone(), keys: Vec::new() };
+    let (grid, values) = axis_aligned(&on_map, spacing)?;
     // The volume is larger than the map where its tooth lies at the border.
+    let own = volume.grid();
     let at = |cell: [u32; 3]| grid.nearest(own.centre(cell)).map(|cell| values[grid.index(cell)]);
     let scanned: Vec<f32> = own.cells().map(|cell| at(cell).unwrap_or(f32::NAN)).collect();
-    GreyValues::of_labelled(&scanned, volume, enamel)
-        .ok_or_else(|| "the enamel of the label map is not brighter in the scan than the air around the tooth".into())
+    GreyValues::of_labelled(&scanned, volume, enamel).ok_or_else(|| {
+        "the enamel of the label map is not brighter in the scan than what surrounds the tooth, or there is none".into()
+    })
+}
+
+/// True if the corners of two images are less than a tenth of a voxel apart, in the same space.
+fn is_same_place(a: &Geometry, b: &Geometry) -> bool {
+    let last = a.dims.map(|n| n.saturating_sub(1));
+    let corners = [0, 1, 2, 3].map(|i| std::array::from_fn(|axis| if axis + 1 == i { last[axis] } else { 0 }));
+    let tolerance = 0.1 * a.spacing().min_element();
+    let is_near = |corner: [u32; 3]| a.position(corner).distance(b.position(corner)) <= tolerance;
+    a.dims == b.dims && a.space == b.space && corners.into_iter().all(is_near)
 }
 
 /// Returns the grid and the values of an image along +x, +y and +z of its space.

@@ -126,7 +126,7 @@ pub struct MeshInstance {
     pub vertex_colours: Arc<Vec<Rgb>>,
     pub world_from_solid: Pose,
     pub appearance: Appearance,
-    /// False for what stands in the way of the lamp only because nobody has aimed it.
+    /// False for what would block the lamp only because the lamp is not aimed as a dentist would aim it.
     pub casts_shadow: bool,
 }
 

@@ -49,9 +49,8 @@ pub(super) const ENAMEL_ATTENUATION: f32 = 0.276;
 /// 11.5 g/cm³ of mercury, silver, tin and copper (50, 33, 13 and 4 %). A radiopaque composite attenuates as enamel, and
 /// calculus as dentine that has lost a fifth of its mineral; both are estimates.
 pub fn x_ray_attenuation(tissues: &TissueTable, label: Label, is_decay_shown: bool) -> f32 {
-    const ENAMEL: f32 = ENAMEL_ATTENUATION;
     const DENTINE: f32 = 0.164;
-    const HARD_TISSUE: f32 = 0.5 * (ENAMEL + DENTINE);
+    const HARD_TISSUE: f32 = 0.5 * (ENAMEL_ATTENUATION + DENTINE);
     const SOFT: f32 = 0.0277;
     const SOFT_DECAY: f32 = 0.098;
     const FIRM_DECAY: f32 = 0.138;
@@ -62,7 +61,7 @@ pub fn x_ray_attenuation(tissues: &TissueTable, label: Label, is_decay_shown: bo
     match entry.name.as_str() {
         "amalgam" | "fresh_amalgam" => return AMALGAM,
         "bone" => return BONE,
-        "enamel" | "stain" if is_decay_shown => return ENAMEL,
+        "enamel" | "stain" if is_decay_shown => return ENAMEL_ATTENUATION,
         "firm_caries" if is_decay_shown => return FIRM_DECAY,
         _ => {}
     }
@@ -71,7 +70,7 @@ pub fn x_ray_attenuation(tissues: &TissueTable, label: Label, is_decay_shown: bo
         TissueRole::Sound if is_decay_shown => DENTINE,
         TissueRole::Decay | TissueRole::Sound => HARD_TISSUE,
         TissueRole::Vulnerable | TissueRole::Soft => SOFT,
-        TissueRole::Neighbour | TissueRole::Material => ENAMEL,
+        TissueRole::Neighbour | TissueRole::Material => ENAMEL_ATTENUATION,
         TissueRole::Deposit => CALCULUS,
     }
 }

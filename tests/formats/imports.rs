@@ -438,6 +438,9 @@ fn the_grey_values_of_a_scan_go_with_its_label_map() {
     let (status, _, err) = import(&[map, "-o", folder.join("other.seg.nrrd").to_str().unwrap(), "--grey-values", grey]);
     assert_eq!(status, 2);
     assert!(err.contains("only a CT volume has grey values"), "{err}");
+    let same = folder.join(".").join("36.seg.nrrd");
+    let (status, _, err) = import(&[scan, "-o", map, "--grey-values", same.to_str().unwrap()]);
+    assert!(status == 2 && err.contains("need two names"), "{err}");
     assert!(!folder.join("other.seg.nrrd").exists());
 }
 

@@ -12,7 +12,7 @@ use typodont_exercise::scenario::{self, ResolveMode, Scenario, ToothSource, Work
 use typodont_exercise::tooth_import;
 use typodont_formats::Library;
 use typodont_formats::diagnostic::SourceText;
-use typodont_formats::import::ENAMEL_GREY;
+use typodont_formats::import::{ENAMEL_GREY, GreyValues};
 use typodont_formats::nrrd;
 use typodont_formats::nrrd::{CoordinateSystem, Geometry, Samples, VoxelImage};
 use typodont_render::*;
@@ -219,7 +219,7 @@ fn the_radiograph_of_a_scan_is_the_projection_of_its_grey_values() {
         // From so far that rays are parallel.
         let from = middle + 2000.0 * Vec3::Y;
         let viewpoint = Viewpoint { field_of_view: 0.018, ..Viewpoint::look_at(from, middle, Vec3::Z) };
-        let by_grey = GreyVolume::new(&workpiece, &workpiece.volume, tissues, true).unwrap();
+        let by_grey = GreyVolume::new(&workpiece, &workpiece.volume, tissues).unwrap();
         let by_tissue = TransferFunction::radiograph(|label| x_ray_attenuation(tissues, label, true));
         for mut painter in painters() {
             let mut correlation_of = |volume: &Volume, function: TransferFunction| {
@@ -232,7 +232,7 @@ fn the_radiograph_of_a_scan_is_the_projection_of_its_grey_values() {
                 assert!(pairs.len() * 10 > columns.len() * 8, "{} of {} columns", pairs.len(), columns.len());
                 correlation(&pairs)
             };
-            let found = correlation_of(by_grey.volume(), GreyVolume::radiograph(tissues, true));
+            let found = correlation_of(by_grey.volume(), GreyVolume::radiograph(tissues));
             let flat = correlation_of(&workpiece.volume, by_tissue.clone());
             println!("{}: by grey values {found:.5}, by tissues {flat:.5}", painter.adapter());
             assert!(found >= 0.99 && found > flat, "{found}, by tissues {flat}");
@@ -248,7 +248,7 @@ fn what_is_cut_is_gone_from_the_grey_values() {
     let tissues = &scenario.tissues;
     let (enamel, amalgam) = (tissues.label_of("enamel").unwrap(), tissues.label_of("amalgam").unwrap());
     let mut volume = Volume::clone(&workpiece.volume);
-    let mut grey = GreyVolume::new(&workpiece, &volume, tissues, true).unwrap();
+    let mut grey = GreyVolume::new(&workpiece, &volume, tissues).unwrap();
     let is_full = |index: &usize| volume.voxel(*index) == Voxel { density: Density::FULL, label: enamel };
     let places: Vec<usize> = (0..volume.grid().len()).filter(is_full).skip(1000).step_by(1000).take(3).collect();
     let before: Vec<u8> = places.iter().map(|&at| grey.volume().densities()[at].bits()).collect();
@@ -260,9 +260,42 @@ fn what_is_cut_is_gone_from_the_grey_values() {
     let after: Vec<u8> = places.iter().map(|&at| grey.volume().densities()[at].bits()).collect();
     assert!((120..=200).contains(&before[0]), "enamel is about {ENAMEL_GREY}: {before:?}");
     assert_eq!(after, [before[0].div_ceil(2), 0, 255]);
-    let anew = GreyVolume::new(&workpiece, &volume, tissues, true).unwrap();
+    let anew = GreyVolume::new(&workpiece, &volume, tissues).unwrap();
     assert_eq!(anew.volume().densities(), grey.volume().densities());
     assert_eq!(anew.volume().labels(), grey.volume().labels());
+}
+
+#[test]
+fn placed_decay_is_as_bright_as_its_tissue_and_scanned_tissue_as_it_was_scanned() {
+    // Aim: an exercise's caries is darker than the tooth around it, though the scan knows nothing of it. Method: half of a
+    // scanned tooth is relabelled as caries, as placing decay does; and a map in which the same is drawn before the import.
+    let scan = uneven_molar();
+    let (scenario, workpiece) = on_scan(&scan);
+    let tissues = &scenario.tissues;
+    let caries = tissues.label_of("caries").unwrap();
+    let ToothSource::Given(imported) = &scenario.scene.teeth[0].source else { panic!("a scan") };
+    let mut decayed = imported.volume.clone();
+    let grid = *decayed.grid();
+    decayed.relabel(|index, label| if grid.cell(index)[0] * 2 < grid.dims[0] { caries } else { label });
+    let values = imported.grey_values.as_ref().unwrap();
+    let shown = |values: GreyValues| {
+        let grey_values = Some(Arc::new(values));
+        let made = Workpiece { grey_values, volume: Arc::new(decayed.clone()), ..workpiece.clone() };
+        GreyVolume::new(&made, &decayed, tissues).unwrap().volume().clone()
+    };
+    let placed = shown(values.only_where(&imported.volume, &decayed));
+    let drawn = shown(values.only_where(&decayed, &decayed));
+    let grey = (x_ray_attenuation(tissues, caries, true)
+        / x_ray_attenuation(tissues, tissues.label_of("enamel").unwrap(), true)
+        * f32::from(ENAMEL_GREY))
+    .round() as u8;
+    let full = |index: &usize| decayed.densities()[*index] == Density::FULL;
+    for index in (0..grid.len()).filter(full) {
+        let is_decayed = decayed.labels()[index] == caries;
+        let as_scanned = values.values()[index].max(1);
+        assert_eq!(drawn.densities()[index].bits(), as_scanned);
+        assert_eq!(placed.densities()[index].bits(), if is_decayed { grey } else { as_scanned });
+    }
 }
 
 /// Pearson's correlation coefficient.

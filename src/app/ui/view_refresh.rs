@@ -106,7 +106,7 @@ impl ViewRefresh {
         now - self.changed_at >= SETTLING_TIME
     }
 
-    /// True once images have been so slow that the resolution fell: from then on it is drawn what costs least.
+    /// True once images have been so slow that the resolution fell: from then on only the cheapest effects are drawn.
     pub fn has_been_slow(&self) -> bool {
         self.has_been_slow
     }

@@ -30,7 +30,7 @@ use typodont_formats::limits::WORKPIECE_VOXELS_MAX;
 pub struct Workpiece {
     pub volume: Arc<Volume>,
     /// Grey values of the CT scan, one per voxel of `volume`; `None` unless all teeth of the volume are from CT scans. A whole
-    /// arch has none.
+    /// arch and a workpiece from a recording have none.
     pub grey_values: Option<Arc<GreyValues>>,
     /// The volume before its cavities were cut, with its decay: the original contour. `None` without a cavity.
     pub original: Option<Arc<Volume>>,
@@ -351,16 +351,19 @@ fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, Work
 /// Returns the grey values of a workpiece, if all its teeth are from CT scans and it is not a whole arch. `whole`: the teeth
 /// before their cavities were cut.
 fn grey_values(scenario: &Scenario, whole: &[Volume]) -> Result<Option<GreyValues>, WorkpieceError> {
-    let scanned = scenario.scene.teeth.iter().map(|tooth| match &tooth.source {
-        ToothSource::Given(tooth) => tooth.grey_values.as_ref(),
+    let scanned = scenario.scene.teeth.iter().zip(whole).map(|(tooth, now)| match &tooth.source {
+        ToothSource::Given(tooth) => Some(tooth.grey_values.as_ref()?.only_where(&tooth.volume, now)),
         ToothSource::Procedural { .. } | ToothSource::Recorded => None,
     });
-    let Some(scanned) = scanned.collect::<Option<Vec<&GreyValues>>>() else { return Ok(None) };
+    if let SceneLayout::Arch { .. } = scenario.scene.layout {
+        return Ok(None);
+    }
+    let Some(mut scanned) = scanned.collect::<Option<Vec<GreyValues>>>() else { return Ok(None) };
     match scenario.scene.layout {
-        SceneLayout::Single | SceneLayout::Jaw => Ok(scanned.first().map(|&values| values.clone())),
+        SceneLayout::Single | SceneLayout::Jaw => Ok(scanned.pop()),
         SceneLayout::Pair { gap } => {
             // The values take the place of the densities and go where the teeth go.
-            let as_volume = |(tooth, values): (&Volume, &&GreyValues)| {
+            let as_volume = |(tooth, values): (&Volume, &GreyValues)| {
                 let value = |(&value, &label): (&u8, &Label)| {
                     Density::from_bits(if label == Label::AIR { 0 } else { value.max(1) })
                 };

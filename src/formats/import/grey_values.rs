@@ -9,7 +9,8 @@ pub const ENAMEL_GREY: u8 = 160;
 /// Grey value of the matter in each voxel of a volume, as a CT scan measured it.
 ///
 /// In a voxel that is only partly filled, the scan measured matter and background together; the value here is that of the
-/// matter alone. What is left after carving is thus measured by value times density ([`GreyValues::of_voxel`]).
+/// matter alone, at least 1. What is left after carving is thus measured by value times density ([`GreyValues::of_voxel`]). 0
+/// stands for what the scanner has not measured.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GreyValues(Vec<u8>);
 
@@ -19,28 +20,30 @@ impl GreyValues {
     pub fn of_matter(measured: &[u8], density: &[Density]) -> GreyValues {
         let of_matter = |(&value, &density): (&u8, &Density)| match density {
             Density::EMPTY => 0,
-            _ => (f32::from(value) / density.unit() + 0.5).min(255.0) as u8,
+            _ => (f32::from(value) / density.unit() + 0.5).clamp(1.0, 255.0) as u8,
         };
         GreyValues(measured.iter().zip(density).map(of_matter).collect())
     }
 
     /// `scanned`: the values of a scan on which the tissues of a volume were drawn, in any scale; NaN where it has none.
-    /// Background and enamel are the medians of the empty voxels and of the full ones of enamel. Returns `None` unless enamel is
-    /// brighter than the background.
+    /// Enamel is the median of its full voxels. The background is darker than most empty voxels: in a mouth, soft tissue and bone
+    /// surround a tooth as well as air. Returns `None` unless enamel is brighter.
     ///
     /// # Panics
     /// If there is not one value per voxel.
     pub fn of_labelled(scanned: &[f32], volume: &Volume, enamel: Label) -> Option<GreyValues> {
         assert_eq!(scanned.len(), volume.grid().len(), "one value per voxel");
-        let median_of = |density: Density, label: Label| {
+        /// Share of the empty voxels that are darker than what counts as background.
+        const DARKEST: f32 = 0.05;
+        let level_of = |density: Density, label: Label, share: f32| {
             let is_meant =
                 |index: &usize| volume.voxel(*index) == Voxel { density, label } && !scanned[*index].is_nan();
             let mut values: Vec<f32> = (0..scanned.len()).filter(is_meant).map(|index| scanned[index]).collect();
-            let middle = values.len() / 2;
-            (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
+            let place = (values.len() as f32 * share) as usize;
+            (!values.is_empty()).then(|| *values.select_nth_unstable_by(place, f32::total_cmp).1)
         };
-        let background = median_of(Density::EMPTY, Label::AIR)?;
-        let scale = f32::from(ENAMEL_GREY) / (median_of(Density::FULL, enamel)? - background);
+        let background = level_of(Density::EMPTY, Label::AIR, DARKEST)?;
+        let scale = f32::from(ENAMEL_GREY) / (level_of(Density::FULL, enamel, 0.5)? - background);
         // Written so that infinity is rejected.
         if !(scale > 0.0 && scale < f32::INFINITY) {
             return None;
@@ -50,9 +53,19 @@ impl GreyValues {
         Some(GreyValues::of_matter(&measured, volume.densities()))
     }
 
-    /// Values of full voxels, 0 to 255, in the order of the volume's voxels.
+    /// Keeps values of full voxels, 0 to 255, in the order of a volume's voxels.
     pub fn from_values(values: Vec<u8>) -> GreyValues {
         GreyValues(values)
+    }
+
+    /// The same without the voxels whose tissue has been changed since the import, as where decay was placed.
+    ///
+    /// # Panics
+    /// If one of the volumes has fewer voxels.
+    pub fn only_where(&self, imported: &Volume, now: &Volume) -> GreyValues {
+        let (imported, now) = (imported.labels(), now.labels());
+        let kept = |(index, &value): (usize, &u8)| if imported[index] == now[index] { value } else { 0 };
+        GreyValues(self.0.iter().enumerate().map(kept).collect())
     }
 
     /// Values of full voxels, 0 to 255, in the order of the volume's voxels.

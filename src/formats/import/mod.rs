@@ -17,6 +17,7 @@ use typodont_core::volume::Volume;
 #[derive(Clone, Debug)]
 pub struct ImportedTooth {
     pub volume: Volume,
-    /// Grey values of the CT scan, one per voxel of the volume; `None` for a label map, which has none.
+    /// Grey values of the CT scan, one per voxel of the volume; `None` for a label map without its scan, or where nobody asked
+    /// for them.
     pub grey_values: Option<GreyValues>,
 }

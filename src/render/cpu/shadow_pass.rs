@@ -49,7 +49,7 @@ impl ShadowReceiver {
 }
 
 impl LampDepths {
-    /// The map of a scene; `None` if nothing in it casts shadows.
+    /// The map of a scene; `None` if the scene has no region for shadows, or its lamp is off or too near.
     pub(super) fn draw(scene: &RenderScene, known: Option<&CachedVolume>) -> Option<LampDepths> {
         let eye = shadow::chair_eye(scene)?;
         let (width, height) = (shadow::MAP_SIZE, shadow::MAP_SIZE);

@@ -305,13 +305,13 @@ impl Resolver<'_> {
             file::ToothSourceFile::Labels(map) => {
                 let numbers = self.numbers(&map.tissues, &format!("{path}/form/labels/tissues"));
                 let spacing = map.spacing_mm.map(|s| s.map(|s| s.0));
-                let volume = self.read_scan(&map.file, &format!("{path}/form/labels/file"), |image, _| {
-                    tooth_import::labelled(image, spacing, &numbers)
+                let (volume, place) = self.read_scan(&map.file, &format!("{path}/form/labels/file"), |image, _| {
+                    Ok((tooth_import::labelled(image, spacing, &numbers)?, image.geometry.clone()))
                 })?;
                 let grey_values = match &map.scan {
                     Some(scan) => {
                         Some(self.read_scan(scan, &format!("{path}/form/labels/scan"), |image, tissues| {
-                            tooth_import::grey_values_of(image, spacing, &volume, tissues.enamel)
+                            tooth_import::grey_values_of(image, &place, spacing, &volume, tissues.enamel)
                         })?)
                     }
                     None => None,

@@ -24,7 +24,7 @@ const COARSE: f64 = 2_000_000.0;
 
 /// Labels the tissues of a tooth, upright as [`segment`](crate::import::segment::segment) sets it. Above 6 million
 /// voxels density is either full or empty: sufficient for writing, viewing and counting, but too steep for haptic
-/// contact. Grey values are kept if `keeps_grey_values`.
+/// contact, and grey values are kept only if `keeps_grey_values`.
 ///
 /// # Errors
 /// Fails when no tooth is found, or when its tissues cannot be told apart.
