@@ -2,9 +2,9 @@
 
 use super::surroundings::SMOOTHING;
 use std::sync::Arc;
-use typodont_core::frame::{Pose, Vec3};
+use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
-use typodont_core::touch::{Collider, ColliderGeometry, SdfGrid};
+use typodont_core::touch::{Collider, ColliderGeometry};
 use typodont_core::volume::{Grid, Label, Volume, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario::Workpiece;
@@ -28,7 +28,8 @@ const DENT_WIDTH_PER_MM: f32 = 0.5;
 #[derive(Clone, Debug)]
 pub struct YieldingSurface {
     at_rest: MeshInstance,
-    field: Arc<SdfGrid>,
+    /// The same surface as it is felt.
+    felt: Collider,
     is_cheek: bool,
 }
 
@@ -39,18 +40,17 @@ impl YieldingSurface {
         let entry = tissues.by_label(shape.label).filter(|entry| [CHEEK, TONGUE].contains(&entry.name.as_str()))?;
         let extent = field.extent();
         let grid = Grid::covering(extent.low, extent.high, Vec3::splat(SPACING), 1);
-        let sampled = Volume::from_distance(grid, 2.0 * SPACING, |place| (field.distance(place), Label(1)));
+        let sampled = Volume::from_distance(grid, 2.0 * SPACING, |place| (shape.distance(place), Label(1)));
         let mut mesh = surface::extract(&sampled);
         mesh.smooth_normals(SMOOTHING);
         let tints = mesh.positions.iter().map(|place| tint(*place)).collect();
-        let world_from_solid = workpiece.world_from_tooth * shape.tooth_from_collider;
-        let plain =
-            MeshInstance::plain(Arc::new(mesh), world_from_solid, Appearance { colour: entry.rgb(), gloss: GLOSS });
+        let appearance = Appearance { colour: entry.rgb(), gloss: GLOSS };
+        let plain = MeshInstance::plain(Arc::new(mesh), workpiece.world_from_tooth, appearance);
         let at_rest = MeshInstance { vertex_colours: Arc::new(tints), ..plain };
-        Some(YieldingSurface { at_rest, field: field.clone(), is_cheek: entry.name == CHEEK })
+        Some(YieldingSurface { at_rest, felt: shape.clone(), is_cheek: entry.name == CHEEK })
     }
 
-    fn in_solid(&self, place_in_world: Vec3) -> Vec3 {
+    fn in_tooth(&self, place_in_world: Vec3) -> Vec3 {
         self.at_rest.world_from_solid.inverse() * place_in_world
     }
 
@@ -70,22 +70,17 @@ impl YieldingSurface {
             return true;
         }
         let steps = (way.length() / STEP).ceil().max(1.0);
-        (0..=steps as u32).any(|step| self.field.distance(self.in_solid(eye + way * (step as f32 / steps))) < 0.0)
+        (0..=steps as u32).any(|step| self.felt.distance(self.in_tooth(eye + way * (step as f32 / steps))) < 0.0)
     }
 
     /// The surface with the dent of a ball, world space, mm; `None` if the ball does not press on it.
     pub fn pressed(&self, middle_in_world: Vec3, radius: f32) -> Option<MeshInstance> {
-        let middle = self.in_solid(middle_in_world);
-        let depth = radius - self.field.distance(middle);
+        let middle = self.in_tooth(middle_in_world);
+        let depth = radius - self.felt.distance(middle);
         if depth <= 0.0 {
             return None;
         }
-        let shape = Collider {
-            label: Label::AIR,
-            tooth_from_collider: Pose::IDENTITY,
-            geometry: ColliderGeometry::Sdf(self.field.clone()),
-        };
-        let (distance, out) = shape.distance_and_normal(middle);
+        let (distance, out) = self.felt.distance_and_normal(middle);
         let place = middle - out * distance;
         let width = DENT_WIDTH + DENT_WIDTH_PER_MM * depth;
         let mut mesh = Mesh::clone(&self.at_rest.mesh);
@@ -138,15 +133,15 @@ mod tests {
         let crown = workpiece.teeth[0].crown;
         let toward = |x: f32| workpiece.world_from_tooth * Vec3::new(x, crown.centre().y, crown.high.z + 2.0);
         let surface = (0..300).map(|i| crown.high.x + 0.1 * i as f32);
-        let surface = surface.into_iter().find(|x| cheek.field.distance(cheek.in_solid(toward(*x))) < 0.0).unwrap();
+        let surface = surface.into_iter().find(|x| cheek.felt.distance(cheek.in_tooth(toward(*x))) < 0.0).unwrap();
         assert!(cheek.pressed(toward(surface - 1.0), 0.7).is_none());
         for deep in [0.0, 2.0, 4.0] {
             let middle = toward(surface + deep);
             let pressed = cheek.pressed(middle, 0.7).unwrap();
             for (before, after) in cheek.at_rest.mesh.positions.iter().zip(&pressed.mesh.positions) {
-                let away = after.distance(cheek.in_solid(middle));
+                let away = after.distance(cheek.in_tooth(middle));
                 assert!(away > 0.6, "{deep} mm deep: a corner is {away} mm from the middle");
-                assert!(before.distance(cheek.in_solid(middle)) < 20.0 || before == after);
+                assert!(before.distance(cheek.in_tooth(middle)) < 20.0 || before == after);
             }
         }
         // From the tongue's side the cheek is behind the tooth; from the other side it is before it.

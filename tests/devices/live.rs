@@ -10,7 +10,7 @@ use typodont_core::device::DeviceSpec;
 use typodont_core::frame::Vec3;
 use typodont_core::sim::{Command, Simulation, Step};
 use typodont_devices::HandLink;
-use typodont_devices::servo::{AssistantTool, SecondHandLink, SecondHandRole, SecondHandServo};
+use typodont_devices::servo::{SecondHandLink, SecondHandRole, SecondHandServo};
 use typodont_exercise::record::{Recorder, Recording, RecordingEndFile, RecordingHeadFile, ReplayCheck, replay};
 use typodont_exercise::scenario;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
@@ -258,50 +258,73 @@ fn an_instructor_leads_the_trainee_and_feels_them() {
     })
 }
 
-#[test]
-fn an_assistants_syringe_is_seen_where_it_is_and_sprays_while_its_button_is_held() {
-    crate::support::peace::in_real_time(|| {
-        // Aim: the trainee's window knows the tool of the second hand. Method: two simulated wires; a second hand in free space,
-        // its button held and let go; then it goes onto the tooth, and the tool stays outside.
+/// A lesson with an assistant's hand, both on simulated wires; the trainee's is above the tooth, the assistant's aside.
+struct AssistedLesson {
+    live: LiveSession,
+    session: Session,
+    recorder: Recorder,
+    file: PathBuf,
+    workpiece: Workpiece,
+    trainee: SharedHand,
+    assistant: SharedHand,
+    _assist: SecondHandServo,
+}
+
+impl AssistedLesson {
+    fn begin(name: &str, role: SecondHandRole) -> AssistedLesson {
         let (mut first, mut second) = (Simulated::new(), Simulated::new());
         let (trainee, assistant) = (first.hand(), second.hand());
         trainee.reach(Vec3::Y * 12.0);
         assistant.reach(Vec3::new(9.0, 12.0, 0.0));
         let device = first.open().unwrap();
-        let Begun { workpiece, mut recorder, mut session, simulation, .. } = begun("irrigated", device.spec());
+        let Begun { workpiece, file, mut recorder, mut session, simulation } = begun(name, device.spec());
         let (here, there) = HandLink::pair();
-        let end = SecondHandLink::new(here, device.spec().max_damping, SecondHandRole::Irrigation);
-        let (mut live, _) = LiveSession::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();
+        let end = SecondHandLink::new(here, device.spec().max_damping, role);
+        let (live, _) = LiveSession::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();
         let _assist = SecondHandServo::start(second.open().unwrap(), there).unwrap();
-        let mut turn_until = |holds: &mut dyn FnMut(Option<AssistantTool>) -> bool, what: &str| {
-            let start = Instant::now();
-            while !holds(live.assistant()) {
-                live.poll(&mut session, &mut recorder).unwrap();
-                assert!(start.elapsed() < Duration::from_secs(20), "{what}: {:?}", live.assistant());
-                std::thread::sleep(Duration::from_millis(2));
-            }
-        };
+        AssistedLesson { live, session, recorder, file, workpiece, trainee, assistant, _assist }
+    }
+
+    fn turn_until(&mut self, mut holds: impl FnMut(&LiveSession) -> bool, what: &str) {
+        let start = Instant::now();
+        while !holds(&self.live) {
+            self.live.poll(&mut self.session, &mut self.recorder).unwrap();
+            assert!(start.elapsed() < Duration::from_secs(20), "{what}: {:?}", self.live.assistant());
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+}
+
+#[test]
+fn an_assistants_syringe_is_seen_where_it_is_and_sprays_while_its_button_is_held() {
+    crate::support::peace::in_real_time(|| {
+        // Aim: the trainee's window knows the tool of the second hand. Method: two simulated wires; a second hand in free space,
+        // its button held and let go; then it goes onto the tooth, and the tool stays outside.
+        let mut lesson = AssistedLesson::begin("irrigated", SecondHandRole::Irrigation);
+        let assistant = lesson.assistant.clone();
         let place = Vec3::new(2.0, 12.0, 1.0);
         assistant.reach(place);
-        let is_there = |tool: Option<AssistantTool>| {
-            tool.filter(|tool| tool.role == SecondHandRole::Irrigation && tool.tip.distance(place) < 0.5)
+        let is_pressed_there = |live: &LiveSession| {
+            let tool = live.assistant();
+            let there = tool.filter(|tool| tool.role == SecondHandRole::Irrigation && tool.tip.distance(place) < 0.5);
+            there.map(|tool| tool.is_pressed)
         };
-        turn_until(&mut |tool| is_there(tool).is_some_and(|tool| !tool.is_pressed), "the syringe is not seen");
+        lesson.turn_until(|live| is_pressed_there(live) == Some(false), "the syringe is not seen");
         assistant.press_buttons(1);
-        turn_until(&mut |tool| is_there(tool).is_some_and(|tool| tool.is_pressed), "it does not spray");
+        lesson.turn_until(|live| is_pressed_there(live) == Some(true), "it does not spray");
         assistant.press_buttons(0);
-        turn_until(&mut |tool| is_there(tool).is_some_and(|tool| !tool.is_pressed), "it does not stop");
-        let crown = workpiece.world_from_tooth * workpiece.lesions[0].centre;
+        lesson.turn_until(|live| is_pressed_there(live) == Some(false), "it does not stop");
+        let crown = lesson.workpiece.world_from_tooth * lesson.workpiece.lesions[0].centre;
         assistant.reach(crown + Vec3::Y * 12.0);
-        turn_until(
-            &mut |tool| tool.is_some_and(|tool| tool.tip.distance(crown + Vec3::Y * 12.0) < 0.5),
+        lesson.turn_until(
+            |live| live.assistant().is_some_and(|tool| tool.tip.distance(crown + Vec3::Y * 12.0) < 0.5),
             "it does not come over the tooth",
         );
         assistant.reach(crown - Vec3::Y * 6.0);
-        turn_until(&mut |_| assistant.felt().force.y > 0.1, "the tooth is not felt");
-        let tip = live.assistant().unwrap().tip;
+        lesson.turn_until(|_| assistant.felt().force.y > 0.1, "the tooth is not felt");
+        let tip = lesson.live.assistant().unwrap().tip;
         assert!(tip.y > crown.y, "the nozzle is inside the tooth: {tip}, {crown}");
-        live.end::<Recorder>().unwrap();
+        lesson.live.end::<Recorder>().unwrap();
     });
 }
 
@@ -310,35 +333,20 @@ fn an_assistants_suction_rests_on_the_tooth_and_leaves_the_trainee_alone() {
     crate::support::peace::in_real_time(|| {
         // Aim: a second hand with the suction moves freely, feels the tooth, and neither pushes the first hand nor enters the
         // recording. Method: two simulated wires; the second hand goes aside, then down onto the crown.
-        let (mut first, mut second) = (Simulated::new(), Simulated::new());
-        let (trainee, assistant) = (first.hand(), second.hand());
-        trainee.reach(Vec3::Y * 12.0);
-        assistant.reach(Vec3::new(9.0, 12.0, 0.0));
-        let device = first.open().unwrap();
-        let Begun { workpiece, file, mut recorder, mut session, simulation } = begun("assisted", device.spec());
-        let (here, there) = HandLink::pair();
-        let end = SecondHandLink::new(here, device.spec().max_damping, SecondHandRole::Suction);
-        let (mut live, _) = LiveSession::begin(&mut session, simulation, device, Some(end), &mut recorder).unwrap();
-        let _assist = SecondHandServo::start(second.open().unwrap(), there).unwrap();
-        let mut turn_until = |holds: &mut dyn FnMut() -> bool, what: &str| {
-            let start = Instant::now();
-            while !holds() {
-                live.poll(&mut session, &mut recorder).unwrap();
-                assert!(start.elapsed() < Duration::from_secs(20), "{what}");
-                std::thread::sleep(Duration::from_millis(2));
-            }
-        };
+        let mut lesson = AssistedLesson::begin("assisted", SecondHandRole::Suction);
+        let assistant = lesson.assistant.clone();
         let place = Vec3::new(2.0, 12.0, 1.0);
         assistant.reach(place);
-        turn_until(&mut || assistant.position().distance(place) < 0.3, "the second hand is held back in the air");
-        let crown = workpiece.world_from_tooth * workpiece.lesions[0].centre;
+        lesson.turn_until(|_| assistant.position().distance(place) < 0.3, "the second hand is held back in the air");
+        let crown = lesson.workpiece.world_from_tooth * lesson.workpiece.lesions[0].centre;
         assistant.reach(crown + Vec3::Y * 12.0);
-        turn_until(
-            &mut || assistant.position().distance(crown + Vec3::Y * 12.0) < 0.5,
+        lesson.turn_until(
+            |_| assistant.position().distance(crown + Vec3::Y * 12.0) < 0.5,
             "it does not come over the tooth",
         );
         assistant.reach(crown - Vec3::Y * 6.0);
-        turn_until(&mut || assistant.felt().force.y > 0.1, "the tooth is not felt");
+        lesson.turn_until(|_| assistant.felt().force.y > 0.1, "the tooth is not felt");
+        let AssistedLesson { mut live, mut session, mut recorder, file, trainee, .. } = lesson;
         assert_eq!(trainee.felt().force, Vec3::ZERO);
         live.submit(&Input::Confirm, &mut session, &mut recorder).unwrap();
         let kept = live.end::<Recorder>().unwrap();
