@@ -3,6 +3,7 @@
 use crate::form::ToothForm;
 use crate::tooth_sdf::ToothSdf;
 use std::f32::consts::TAU;
+use std::ops::Range;
 use typodont_core::frame::Vec3;
 
 /// Number of heights and of directions at which the contour is sampled; interpolation between them is accurate to a few
@@ -27,8 +28,13 @@ pub struct CrownContour {
 impl CrownContour {
     /// Samples the contour of a form; for a mirrored tooth, the contour is that of its unmirrored form.
     pub fn of(form: &ToothForm) -> CrownContour {
+        CrownContour::of_part(form, FROM..TO)
+    }
+
+    /// Samples another part of the contour: from one height above the neck to another, as shares of the crown.
+    pub fn of_part(form: &ToothForm, part: Range<f32>) -> CrownContour {
         let shape = ToothSdf::new(form, 0.0);
-        let (low, high) = (FROM * form.sizes.crown, TO * form.sizes.crown);
+        let (low, high) = (part.start * form.sizes.crown, part.end * form.sizes.crown);
         let bounds = shape.bounds();
         let reach = bounds.low.abs().max(bounds.high.abs()).max_element() * 1.5;
         let ring = |i: usize| {

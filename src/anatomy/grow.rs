@@ -59,8 +59,14 @@ pub fn grid_fitting(form: &ToothForm, dims: [u32; 3]) -> Grid {
 
 /// Generates a tooth on a grid in tooth space; parts outside the grid are omitted.
 pub fn grow(form: &ToothForm, grid: Grid, tissues: &TissueLabels) -> Volume {
+    grow_with_ramp(form, grid, tissues, HALF_BAND_VOXELS)
+}
+
+/// [`grow`] with a density ramp of another half-width, voxels: a wide one gives smooth normals on a coarse grid.
+pub fn grow_with_ramp(form: &ToothForm, grid: Grid, tissues: &TissueLabels, half_band_voxels: f32) -> Volume {
     let shape = ToothSdf::new(form, THINNEST * grid.spacing.max_element());
-    let voxelizer = ToothVoxelizer::new(if form.is_mirrored { mirrored(grid) } else { grid }, tissues);
+    let own_grid = if form.is_mirrored { mirrored(grid) } else { grid };
+    let voxelizer = ToothVoxelizer::new(own_grid, tissues, half_band_voxels);
     let band = voxelizer.half_band;
     let (mut density, mut label) = voxelizer.fill(&shape);
     if form.is_mirrored {
@@ -186,8 +192,8 @@ struct BlockDistances {
 }
 
 impl ToothVoxelizer {
-    fn new(grid: Grid, tissues: &TissueLabels) -> ToothVoxelizer {
-        let half_band = HALF_BAND_VOXELS * grid.spacing.max_element();
+    fn new(grid: Grid, tissues: &TissueLabels, half_band_voxels: f32) -> ToothVoxelizer {
+        let half_band = half_band_voxels * grid.spacing.max_element();
         ToothVoxelizer {
             nodes: NodeGrid::over(&grid),
             half_band,
@@ -389,7 +395,8 @@ mod tests {
             let grid = Grid { origin: centred.origin - Vec3::new(0.0, 0.0, 3.4), ..centred };
             let form = &teeth::tooth(fdi).unwrap();
             let volume = grow(form, grid, &TISSUES);
-            let asked = ToothVoxelizer { reach: f32::INFINITY, ..ToothVoxelizer::new(grid, &TISSUES) };
+            let asked =
+                ToothVoxelizer { reach: f32::INFINITY, ..ToothVoxelizer::new(grid, &TISSUES, HALF_BAND_VOXELS) };
             let (density, label) = asked.fill(&ToothSdf::new(form, THINNEST * spacing));
             let asked = Volume::new(grid, volume.half_band(), density, label, TISSUES.dentine);
             let differing = (0..grid.len()).filter(|&i| asked.voxel(i) != volume.voxel(i)).count();

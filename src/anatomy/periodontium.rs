@@ -79,6 +79,19 @@ pub const PROBING_GAP: f32 = 0.75;
 /// Visible width of the sulcus, mm.
 const VISUAL_GAP: f32 = 0.1;
 
+/// Profile of the free gingiva at its margin.
+#[derive(Clone, Copy, Debug)]
+struct MarginEdge {
+    /// Thickness before it descends, mm.
+    thickness: f32,
+    /// Descent where it begins, mm per mm.
+    slope: f32,
+}
+
+/// Visible gingiva ends on the tooth in a thin edge. A probe displaces it by a little less than the thickness here.
+const VISUAL_EDGE: MarginEdge = MarginEdge { thickness: 0.0, slope: 0.6 };
+const PROBING_EDGE: MarginEdge = MarginEdge { thickness: 0.7, slope: 0.0 };
+
 /// Ratio of the distance from the top of the gingiva to the height above it, from the typical slope of the top.
 const SLOPE: f32 = 0.85;
 
@@ -211,22 +224,22 @@ impl Periodontium {
     /// Returns the signed distance from the gingiva for a probe, mm, up to its outer border: the gingiva is displaced
     /// from the tooth by [`PROBING_GAP`].
     pub fn gum_sdf_probing(&self, point: Vec3) -> f32 {
-        self.gum_sdf(point, PROBING_GAP)
+        self.gum_sdf(point, PROBING_GAP, PROBING_EDGE)
     }
 
     /// Returns the signed distance from the visible gingiva, mm, which lies on the tooth.
     pub fn gum_sdf_visual(&self, point: Vec3) -> f32 {
-        self.gum_sdf(point, VISUAL_GAP)
+        self.gum_sdf(point, VISUAL_GAP, VISUAL_EDGE)
     }
 
     /// Returns the signed distance from the gingiva as if the tooth were gingiva too, mm: its top continues through the
     /// tooth at the height of the margin. The displayed surface of the gingiva is derived from this.
     pub fn gum_sdf_filled(&self, point: Vec3) -> f32 {
-        ((point.z - self.gum_height(point)) * SLOPE).max(self.alveolar_ridge_sdf(point))
+        ((point.z - self.gum_height(point, VISUAL_EDGE)) * SLOPE).max(self.alveolar_ridge_sdf(point))
     }
 
-    fn gum_sdf(&self, point: Vec3, open: f32) -> f32 {
-        let below = (point.z - self.gum_height(point)) * SLOPE;
+    fn gum_sdf(&self, point: Vec3, open: f32, edge: MarginEdge) -> f32 {
+        let below = (point.z - self.gum_height(point, edge)) * SLOPE;
         below.max(open - self.distance_to_tooth(point)).max(self.alveolar_ridge_sdf(point))
     }
 
@@ -248,23 +261,28 @@ impl Periodontium {
 
     /// Returns the height of the top of the gingiva at a point: a rounded margin that descends toward buccal and
     /// lingual, and a papilla that rises toward the contacts.
-    fn gum_height(&self, point: Vec3) -> f32 {
-        /// Thickness of the free gingiva before it descends, and radius of the descent, mm.
-        const THICK: f32 = 0.7;
+    fn gum_height(&self, point: Vec3, edge: MarginEdge) -> f32 {
+        /// Radius of the descent, mm.
         const ROUND: f32 = 2.2;
         /// Height of a papilla above the margin, and the distance over which it rises, mm.
         const PAPILLA: f32 = 0.9;
         const RISE: f32 = 1.2;
+        /// Half-width of a papilla's ridge, as a share of the crown's, and radius of its descent to cheek and tongue, mm.
+        const RIDGE: f32 = 0.6;
+        const PAPILLA_ROUND: f32 = 1.5;
         let azimuth = self.azimuth(point);
         let margin = self.margin(azimuth);
         let aside = (self.distance_to_tooth(point.with_z(margin)) - VISUAL_GAP).max(0.0);
         let (cheekward, mesiodistal) = (libm::cosf(azimuth), libm::sinf(azimuth));
-        let falls = (aside - THICK).max(0.0);
-        let falls = falls * falls / ROUND;
+        let falls = (aside - edge.thickness).max(0.0);
+        let falls = edge.slope * falls + falls * falls / ROUND;
         let share = (aside / RISE).clamp(0.0, 1.0);
         let papilla = PAPILLA * share * share * (3.0 - 2.0 * share);
         // A papilla exists only between two teeth.
         let between = mesiodistal * mesiodistal * mesiodistal * mesiodistal;
+        let (middle, half) = self.middle_and_half();
+        let beyond_ridge = ((point.x - middle.x).abs() - RIDGE * half.x).max(0.0);
+        let papilla = papilla - (beyond_ridge * beyond_ridge / PAPILLA_ROUND).min(6.0);
         margin - falls.min(6.0) * cheekward * cheekward + papilla * between
     }
 

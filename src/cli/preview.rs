@@ -7,7 +7,7 @@ use std::time::Duration;
 use typodont_author as author;
 use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
 use typodont_lesson as lesson;
-use typodont_render::{Changes, Lamp, Lights, OffscreenRenderer, RenderMode, RenderScene, RgbaImage, VolumeInstance};
+use typodont_render::{Changes, Lights, OffscreenRenderer, RenderMode, RenderScene, RgbaImage, VolumeInstance};
 use typodont_report::{PREVIEW_SIZE, preview_png};
 use typodont_scene::{self as scene, Mouth};
 
@@ -102,7 +102,7 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
             mode: RenderMode::Iso,
         }),
         solids: mouth.map_or_else(around, |mouth| mouth.solids(scene::WORKING_OPENING_DEG)),
-        lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+        lights: Lights::along(&viewpoint),
         shadows: Some(scene::shadow_region(workpiece, &orbit)),
         ..RenderScene::empty()
     };

@@ -53,8 +53,7 @@
 #[cfg(feature = "gpu")]
 mod brick_surfaces;
 mod camera;
-#[cfg(feature = "gpu")]
-mod downsampled;
+mod drawn_volume;
 mod empty_space;
 mod enamel_depth;
 mod error;

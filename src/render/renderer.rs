@@ -2,7 +2,7 @@
 
 use super::brick_surfaces::BrickSurfaces;
 use super::camera::Viewpoint;
-use super::downsampled::DownsampledVolume;
+use super::drawn_volume::DrawnVolume;
 use super::error::RenderError;
 use super::eye::Eye;
 use super::fxaa_pass::FxaaPass;
@@ -46,7 +46,7 @@ pub struct Renderer {
     view_layout: wgpu::BindGroupLayout,
     tooth: Option<ToothTextures>,
     /// Replaces a volume that is larger than this device's textures.
-    downsampled: Option<DownsampledVolume>,
+    drawn: Option<DrawnVolume>,
     surfaces: Option<BrickSurfaces>,
     eye_targets: [Option<EyeTarget>; 2],
 }
@@ -123,7 +123,7 @@ impl Renderer {
             views: [left, right],
             view_layout,
             tooth: None,
-            downsampled: None,
+            drawn: None,
             surfaces: None,
             eye_targets: [None, None],
         }
@@ -229,32 +229,26 @@ impl Renderer {
         self.particle_pass.prepare(&self.device, &self.queue, scene.opaque_particles, scene.translucent_particles);
         let Some(tooth) = &scene.tooth else { return Uploads::default() };
         let limit = self.device.limits().max_texture_dimension_3d;
-        let factor = DownsampledVolume::required_factor(tooth.volume.grid().dims, limit);
-        let mut uploads = match factor {
-            1 => self.prepare_textures(tooth),
-            _ => self.prepare_downsampled(tooth, factor),
+        let factor = DrawnVolume::required_factor(tooth.volume.grid().dims, limit);
+        // Moved out of `self` while textures and triangles are updated from it.
+        let known = self.drawn.take().filter(|drawn| drawn.matches(tooth.volume, factor));
+        let (drawn, changed) = match (known, tooth.changes) {
+            (Some(mut drawn), Changes::Bricks(bricks)) => {
+                let changed = drawn.update(tooth.volume, bricks);
+                (drawn, Some(changed))
+            }
+            _ => (DrawnVolume::new(tooth.volume, factor), None),
         };
+        let changes = changed.as_deref().map_or(Changes::All, Changes::Bricks);
+        let drawn_tooth = VolumeInstance { volume: &drawn.volume, changes, ..tooth.clone() };
+        let mut uploads = self.prepare_textures(&drawn_tooth);
         uploads.downsampling = factor;
         if uploads.is_full_volume {
             self.surfaces = None;
         }
-        uploads.surfaces = self.prepare_surfaces(tooth);
-        uploads
-    }
-
-    fn prepare_downsampled(&mut self, tooth: &VolumeInstance, factor: u32) -> Uploads {
-        // Moved out of `self` while the textures are updated from it.
-        let known = self.downsampled.take().filter(|volume| volume.matches(tooth.volume, factor));
-        let (coarse, changed) = match (known, tooth.changes) {
-            (Some(mut coarse), Changes::Bricks(bricks)) => {
-                let changed = coarse.update(tooth.volume, bricks);
-                (coarse, Some(changed))
-            }
-            _ => (DownsampledVolume::new(tooth.volume, factor), None),
-        };
-        let changes = changed.as_deref().map_or(Changes::All, Changes::Bricks);
-        let uploads = self.prepare_textures(&VolumeInstance { volume: &coarse.volume, changes, ..tooth.clone() });
-        self.downsampled = Some(coarse);
+        // Triangles keep the original's resolution.
+        uploads.surfaces = self.prepare_surfaces(if factor == 1 { &drawn_tooth } else { tooth });
+        self.drawn = Some(drawn);
         uploads
     }
 

@@ -1,10 +1,11 @@
 //! A scene as plain data: the carved tooth, other meshes, particles, lamps and a background.
 
+use super::camera::Viewpoint;
 use super::enamel_depth::EnamelDepth;
 use super::mirror::PlaneMirror;
 use super::transfer_function::TransferFunction;
 use std::sync::Arc;
-use typodont_core::frame::{Pose, Vec3};
+use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
 use typodont_core::volume::{Label, Volume};
 
@@ -209,9 +210,29 @@ impl Lamp {
         Lamp { position, strength: 0.72, colour: [1.0, 0.98, 0.94], wrap: 0.15, radius: 80.0 }
     }
 
+    /// Returns the operating light aimed along a line of sight: where it would come from too far aside, it is swung toward the eye.
+    pub fn chair_toward(eye: Vec3, focus: Vec3) -> Lamp {
+        /// Greatest angle between the light and the line of sight, rad: wide enough to give form.
+        const WIDEST: f32 = 0.87;
+        let lamp = Lamp::chair();
+        let (to_lamp, to_eye) = (lamp.position - focus, (eye - focus).normalize_or(Vec3::Z));
+        let angle = to_lamp.angle_between(to_eye);
+        let axis = to_lamp.cross(to_eye).try_normalize();
+        let Some(axis) = axis.filter(|_| angle > WIDEST) else { return lamp };
+        Lamp { position: focus + Quat::from_axis_angle(axis, angle - WIDEST) * to_lamp, ..lamp }
+    }
+
     /// Returns a head lamp at the position of an eye, world space.
     pub fn head(eye: Vec3) -> Lamp {
         Lamp { position: eye, strength: 0.30, colour: [0.96, 0.98, 1.0], wrap: 0.15, radius: 0.0 }
+    }
+}
+
+impl Lights {
+    /// The operating light aimed along a line of sight, and a lamp at the eye.
+    pub fn along(viewpoint: &Viewpoint) -> Lights {
+        let chair = Lamp::chair_toward(viewpoint.position, viewpoint.focus);
+        Lights { chair, head: Lamp::head(viewpoint.position), ..Lights::default() }
     }
 }
 

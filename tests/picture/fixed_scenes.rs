@@ -81,7 +81,7 @@ impl FixedCase {
                 mode,
             }),
             solids: mouth.solids(WORKING_OPENING_DEG),
-            lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            lights: Lights::along(&viewpoint),
             shadows: has_shadows.then(|| shadow_region(&self.workpiece, &orbit)),
             is_antialiased: true,
             ..RenderScene::empty()

@@ -80,7 +80,7 @@ fn the_mouth_is_seen_from_everywhere() {
     let mut painter = OffscreenRenderer::cpu();
     for (name, orbit, solids) in views {
         let viewpoint = orbit.viewpoint();
-        let lights = Lights { head: Lamp::head(viewpoint.position), ..Lights::default() };
+        let lights = Lights::along(&viewpoint);
         let scene = RenderScene { tooth: Some(tooth(&workpiece, &palette)), solids, lights, ..RenderScene::empty() };
         let image = painter.draw(&scene, &viewpoint, None, [780, 690]).unwrap();
         keep(name, &image);
@@ -142,7 +142,7 @@ fn a_mouth_mirror_shows_the_far_side_of_the_tooth() {
         assert!(complaint.is_none());
         let mut solids = mouth.one_jaw();
         solids.push(MeshInstance { world_from_solid: world_from_tip, ..held });
-        let lights = Lights { head: Lamp::head(viewpoint.position), ..Lights::default() };
+        let lights = Lights::along(&viewpoint);
         let mirror = mirror_face(&entry, world_from_tip);
         let scene =
             RenderScene { tooth: Some(tooth(&workpiece, &palette)), solids, mirror, lights, ..RenderScene::empty() };

@@ -2,7 +2,8 @@
 
 use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
 use super::tooth_model::{ToothKind, ToothModel};
-use crate::{TissueLabels, grid_of_spacing, grow};
+use crate::grow::grow_with_ramp;
+use crate::{TissueLabels, grid_of_spacing};
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Grid, Label, Volume, surface};
 
@@ -17,18 +18,24 @@ const ROOT_LENGTH: f32 = 4.5;
 /// cusp.
 const SAMPLE_DISTANCE: f32 = 0.9;
 
+/// Half-width, voxels, of the ramp from nothing to matter where the matter around a place is measured.
+const RAMP_VOXELS: f32 = 1.5;
+
 /// Share of matter around a place that is flat, and above it until a groove is as dark as can be.
 const FLAT: f32 = 0.53;
 const DEEPER: f32 = 0.17;
+
+/// Half the width of the density ramp, voxels: wide, so that the normals between so coarse samples are those of the form.
+const HALF_BAND_VOXELS: f32 = 3.0;
 
 /// Labels used while a crown is made. They are independent of the exercise's tissues, since a crown is only drawn.
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm.
 pub fn crown(model: &ToothModel) -> TintedMesh {
-    let volume = grow(&model.form, cropped_above(grid_of_spacing(&model.form, SPACING), -ROOT_LENGTH), &TISSUES);
-    let mut mesh = surface::extract(&volume);
-    mesh.smooth_normals(1);
+    let grid = cropped_above(grid_of_spacing(&model.form, SPACING), -ROOT_LENGTH);
+    let volume = grow_with_ramp(&model.form, grid, &TISSUES, HALF_BAND_VOXELS);
+    let mesh = surface::extract(&volume);
     let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
     TintedMesh { mesh, tints }
 }
@@ -42,12 +49,12 @@ fn cropped_above(grid: Grid, height: f32) -> Grid {
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
-const NECK: Tint = [0.98, 0.93, 0.84];
+const NECK: Tint = [0.97, 0.915, 0.81];
 const ROOT: Tint = [0.93, 0.83, 0.66];
-const EDGE: Tint = [0.93, 0.95, 0.99];
-const DEEP: Tint = [0.84, 0.75, 0.62];
-const CANINE: Tint = [0.99, 0.975, 0.94];
-const PLAIN: Tint = [1.0; 3];
+const EDGE: Tint = [0.945, 0.95, 0.965];
+const DEEP: Tint = [0.88, 0.80, 0.69];
+const CANINE: Tint = [0.99, 0.98, 0.95];
+const PLAIN: Tint = [1.0, 0.995, 0.985];
 
 fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
     let sizes = &model.form.sizes;
@@ -58,7 +65,7 @@ fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
     let height = (place.z - neckline) / sizes.crown;
     let on_enamel = mixed_tint(NECK, body, height / 0.45);
     let enamel = match model.kind {
-        ToothKind::Incisor => mixed_tint(on_enamel, EDGE, (height - 0.65) / 0.3),
+        ToothKind::Incisor => mixed_tint(on_enamel, EDGE, (height - 0.75) / 0.25),
         ToothKind::Canine => on_enamel,
         ToothKind::Premolar | ToothKind::Molar if height > 0.3 => {
             mixed_tint(on_enamel, DEEP, groove_depth(volume, place))
@@ -77,7 +84,8 @@ fn groove_depth(volume: &Volume, place: Vec3) -> f32 {
     };
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
     let directions = axes.into_iter().chain(CORNERS.map(Vec3::from));
-    let matter: f32 = directions.map(|way| volume.density_at(place + way * SAMPLE_DISTANCE)).sum();
+    let share = |density: f32| (0.5 + (density - 0.5) * HALF_BAND_VOXELS / RAMP_VOXELS).clamp(0.0, 1.0);
+    let matter: f32 = directions.map(|way| share(volume.density_at(place + way * SAMPLE_DISTANCE))).sum();
     ((matter / 14.0 - FLAT) / DEEPER).clamp(0.0, 1.0)
 }
 

@@ -7,12 +7,16 @@ use super::Jaw;
 use super::half_arch::{HalfArch, ToothSeat};
 use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
 use super::tooth_model::ToothModel;
+use crate::crown_contour::CrownContour;
+use crate::form::ToothForm;
 use crate::periodontium::{ProbingSite, SiteLengths};
-use typodont_core::frame::{Vec3, smooth_step};
+use std::ops::Range;
+use typodont_core::frame::{Pose, Vec3, smooth_step};
 use typodont_core::mesh::Mesh;
+use typodont_core::parallel::par_map;
 
-/// Distance between columns along the arch, mm: a papilla is some 3 mm wide.
-const COLUMN: f32 = 0.9;
+/// Distance between columns along the arch, mm: a papilla is some 3 mm wide, and its tip is round.
+const COLUMN: f32 = 0.5;
 
 /// Means of normals over neighbouring places: creases between columns fade, the margin stays.
 const SMOOTHING: usize = 4;
@@ -28,6 +32,12 @@ const BASE: f32 = -27.0;
 const MARGIN: f32 = 0.6;
 const PAPILLA: f32 = 0.42;
 
+/// Part of a tooth on which margins and papillae lie, recession included, as shares of the crown above the neck.
+const NECK_PART: Range<f32> = -0.45..0.6;
+
+/// Half the width of a papilla that fills the space between two teeth, as a share of half the necks' width.
+const BETWEEN_TEETH: f32 = 0.7;
+
 /// Rows from the ridge's inner foot to the midline.
 const INNER: usize = 12;
 
@@ -38,6 +48,8 @@ const VAULT: f32 = -20.5;
 pub struct HalfJaw<'a> {
     pub half: &'a HalfArch,
     pub models: &'a [ToothModel],
+    /// Contours of the teeth where gingiva lies on them.
+    pub necks: Vec<CrownContour>,
     /// Recession of the margin, mm.
     pub recession: SiteLengths,
     /// 1, or −1 to mirror this half to the other side.
@@ -55,6 +67,14 @@ pub enum MucosaRegion {
 
 /// Depth of a solid below the jaw's base, mm.
 const SOLID_BASE: f32 = BASE - 1.0;
+
+/// Contours of teeth at the height of the gingival margin.
+pub fn necks(models: &[ToothModel]) -> Vec<CrownContour> {
+    par_map(models.len(), |i| {
+        let form = ToothForm { sizes: models[i].sizes, ..models[i].form };
+        CrownContour::of_part(&form, NECK_PART)
+    })
+}
 
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.
 pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
@@ -183,7 +203,13 @@ impl HalfJaw<'_> {
             self.section(arc_length);
         let middle = place + out * offset;
         let shrink = 1.0 - 0.45 * pad * pad;
-        let (wide, narrow) = (half * shrink, half * (1.0 - 0.3 * between) * shrink);
+        let wide = half * shrink;
+        // Out to the cheek and in to the tongue: the margin lies on the tooth, and the papilla bridges the space between two.
+        let edge = |out: Vec3, height: f32| {
+            let on_tooth = self.distance_to_teeth(arc_length, middle.with_z(height), out, wide + 2.5);
+            smooth_max(on_tooth, BETWEEN_TEETH * wide)
+        };
+        let (outer, inner) = (edge(out, margin), edge(-out, inner_margin));
         let front = 1.0 - smooth_step((arc_length - 12.0) / 16.0);
         let crest = margin.max(inner_margin) - 0.25 * between;
         let mut rows = vec![
@@ -193,13 +219,17 @@ impl HalfJaw<'_> {
             (wide + 3.1 + 0.4 * root, neck - 8.5, MUCOSA),
             (wide + 2.2 + 0.8 * root, neck - 6.0, LINE),
             (wide + 1.5 + root, neck - 3.6, ATTACHED),
-            (narrow + 0.95 + 0.5 * root, margin - 1.3, ATTACHED),
-            (narrow + 0.42, margin - 0.25, FREE),
-            (narrow - 0.35, margin + 0.05, FREE),
+            (outer + 0.85 + 0.5 * root, margin - 1.6, ATTACHED),
+            (outer + 0.55, margin - 0.8, FREE),
+            (outer + 0.30, margin - 0.3, FREE),
+            (outer + 0.04, margin, FREE),
+            (outer - 0.40, margin + 0.15, FREE),
             (0.0, crest, FREE),
-            (-narrow + 0.35, inner_margin + 0.05, FREE),
-            (-narrow - 0.42, inner_margin - 0.25, FREE),
-            (-narrow - 1.0, inner_margin - 1.3, ATTACHED),
+            (0.40 - inner, inner_margin + 0.15, FREE),
+            (-inner - 0.04, inner_margin, FREE),
+            (-inner - 0.30, inner_margin - 0.3, FREE),
+            (-inner - 0.55, inner_margin - 0.8, FREE),
+            (-inner - 0.95, inner_margin - 1.6, ATTACHED),
         ];
         // Behind the front teeth the palate rises gently, beside the molars steeply; below, the ridge falls to the floor.
         let gentle = |steep: [f32; 2], gentle: [f32; 2]| {
@@ -222,6 +252,31 @@ impl HalfJaw<'_> {
         rows.into_iter().map(|(aside, z, tint)| (middle + out * aside + Vec3::Z * (z - middle.z), tint)).collect()
     }
 
+    /// Distance from a point between the teeth's sides out to the side of the tooth here, mm, level and at most `reach`;
+    /// 0 between two teeth.
+    fn distance_to_teeth(&self, arc_length: f32, from: Vec3, out: Vec3, reach: f32) -> f32 {
+        const STEP: f32 = 0.15;
+        let seats = &self.half.seats;
+        let here = seats.iter().position(|s| arc_length < s.to).unwrap_or(seats.len() - 1);
+        let around = here.saturating_sub(1)..(here + 2).min(seats.len());
+        let tooth_from_arch: Vec<Pose> = around.clone().map(|i| seats[i].arch_from_tooth().inverse()).collect();
+        let distance = |way: f32| {
+            let place = from + out * way;
+            let of_tooth = |(i, pose): (usize, &Pose)| self.necks[i].distance_outside(*pose * place);
+            around.clone().zip(&tooth_from_arch).map(of_tooth).fold(f32::INFINITY, f32::min)
+        };
+        let steps = (reach / STEP) as u32;
+        let Some(first) = (0..steps).map(|i| reach - STEP * i as f32).find(|way| distance(*way) < 0.0) else {
+            return 0.0;
+        };
+        let (mut inside, mut outside) = (first, first + STEP);
+        for _ in 0..6 {
+            let middle = 0.5 * (inside + outside);
+            if distance(middle) < 0.0 { inside = middle } else { outside = middle }
+        }
+        outside
+    }
+
     fn section(&self, arc_length: f32) -> RidgeSection {
         let seats = &self.half.seats;
         let neck_of = |seat: &ToothSeat| seat.neck().z;
@@ -237,7 +292,8 @@ impl HalfJaw<'_> {
         let here = seats.iter().position(|s| arc_length < s.to).unwrap_or(last);
         let seat = &seats[here];
         let from_middle = ((arc_length - seat.middle()) / (0.5 * (seat.to - seat.from))).clamp(-1.0, 1.0);
-        let between = libm::powf(from_middle.abs(), 2.4);
+        // A scallop around each tooth, and a round tip between two.
+        let between = smooth_step(libm::powf(from_middle.abs(), 1.5));
         let beside = if from_middle < 0.0 { here.saturating_sub(1) } else { (here + 1).min(last) };
         let papilla = if here == last && from_middle > 0.0 {
             neck_of(seat) + 1.2
@@ -260,6 +316,12 @@ impl HalfJaw<'_> {
             pad,
         }
     }
+}
+
+/// The greater of two lengths, mm, with a round transition.
+fn smooth_max(a: f32, b: f32) -> f32 {
+    const ROUNDING: f32 = 0.3;
+    0.5 * (a + b + ((a - b) * (a - b) + ROUNDING * ROUNDING).sqrt())
 }
 
 /// Section of the ridge at one point of the arch; lengths in mm.

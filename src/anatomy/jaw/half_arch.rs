@@ -61,6 +61,14 @@ impl ToothSeat {
         Pose { position: self.top - orientation * (Vec3::Z * self.crown), orientation }
     }
 
+    /// Moves the tooth to a pose in which it stands upright.
+    pub fn place(&mut self, arch_from_tooth: Pose) {
+        self.buccal = arch_from_tooth.rotate(Vec3::X);
+        self.distal = arch_from_tooth.rotate(Vec3::Y);
+        (self.lean, self.tip) = (0.0, 0.0);
+        self.top = arch_from_tooth * (Vec3::Z * self.crown);
+    }
+
     pub fn middle(&self) -> f32 {
         0.5 * (self.from + self.to)
     }

@@ -141,6 +141,15 @@ impl DentalArch {
         DentalArch { jaw, age: plan.age, sign, fitted: row(models, sign), plain: row(plain, -sign) }
     }
 
+    /// Puts a tooth where it stands in an exercise: upright, in its own axes (`arch_from_tooth`). `index`: its place from the
+    /// midline, 0 to 7, on a side of x.
+    pub fn place(&mut self, side: f32, index: usize, arch_from_tooth: Pose) {
+        let row = if side == self.sign { &mut self.fitted } else { &mut self.plain };
+        if let Some(seat) = row.half.seats.get_mut(index) {
+            seat.place(mirrored_pose(arch_from_tooth, side));
+        }
+    }
+
     pub fn jaw(&self) -> Jaw {
         self.jaw
     }
@@ -201,6 +210,7 @@ impl DentalArch {
         [(rows[0], -1.0), (rows[1], 1.0)].map(|(row, sign)| HalfJaw {
             half: &row.half,
             models: &row.models,
+            necks: gum::necks(&row.models),
             recession,
             sign,
         })

@@ -11,9 +11,7 @@ use crate::ui::viewport::{EyeWindow, Viewport};
 use eframe::egui;
 use typodont_core::frame::{Pose, Vec3};
 use typodont_devices::servo::SecondHandRole;
-use typodont_render::{
-    Background, Changes, Lamp, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance,
-};
+use typodont_render::{Background, Changes, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance};
 use typodont_scene as scene;
 use typodont_scene::particles;
 use typodont_scene::particles::{ParticleField, VisibleParticles};
@@ -140,7 +138,7 @@ impl LessonView {
             opaque_particles: self.particles.opaque(),
             translucent_particles: self.particles.translucent(),
             mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
-            lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            lights: Lights::along(&viewpoint),
             shadows: self
                 .has_shadows(settings, viewport)
                 .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),

@@ -3,7 +3,7 @@
 use crate::editor::{EditorState, PreviewMode};
 use crate::ui::viewport::{EyeWindow, Viewport};
 use eframe::egui;
-use typodont_render::{Changes, Lamp, Lights, Orbit, RenderError, RenderScene, VolumeInstance};
+use typodont_render::{Changes, Lights, Orbit, RenderError, RenderScene, VolumeInstance};
 
 /// The last pictures of the author's screen.
 #[derive(Default)]
@@ -67,7 +67,7 @@ impl PreviewView {
                 mode: preview.render_mode(),
             }),
             solids: if preview.shows_surroundings { preview.surroundings.clone() } else { Vec::new() },
-            lights: Lights { head: Lamp::head(viewpoint.position), ..Lights::default() },
+            lights: Lights::along(&viewpoint),
             ..RenderScene::empty()
         };
         let id = viewport.draw(EyeWindow::Main, &scene, &viewpoint, None, size)?;

@@ -140,6 +140,7 @@ impl Workpiece {
             lesions: Vec::new(),
             drawn: Vec::new(),
             surroundings: Vec::new(),
+            neighbours: Vec::new(),
             periodontium: None,
             arch: Default::default(),
             tooth_from_arch: None,

@@ -48,7 +48,7 @@ pub use schema::schema_text;
 pub use tooth_bounds::{ToothBounds, anatomy_tissues};
 pub use typodont_anatomy::jaw::Jaw;
 pub use typodont_anatomy::periodontium::{Periodontium, Pockets, ProbingSite};
-pub use workpiece::{Workpiece, WorkpieceError};
+pub use workpiece::{NeighbourTooth, Workpiece, WorkpieceError};
 
 use crate::catalog::{InstrumentEntry, TissueTable};
 use crate::local_text::LocalTexts;

@@ -40,6 +40,8 @@ pub struct Workpiece {
     pub drawn: Vec<Option<usize>>,
     /// Gingiva and neighbouring teeth.
     pub surroundings: Vec<Collider>,
+    /// Those neighbouring teeth among them that have the form of their kind.
+    pub neighbours: Vec<NeighbourTooth>,
     /// Gingiva with a sulcus; `None` without pockets.
     pub periodontium: Option<Arc<Periodontium>>,
     /// Positions of the teeth in both jaws.
@@ -48,6 +50,14 @@ pub struct Workpiece {
     /// volume.
     pub tooth_from_arch: Option<Pose>,
     pub world_from_tooth: Pose,
+}
+
+/// A tooth beside the one that is worked on, of average form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NeighbourTooth {
+    pub fdi: u8,
+    /// Pose of its own axes.
+    pub tooth_from_neighbour: Pose,
 }
 
 /// Reason for which a workpiece cannot be made.
@@ -230,9 +240,14 @@ impl Workpiece {
                 return Err(WorkpieceError::PocketTooDeep { tenths: (10.0 * beyond).ceil() as u32 });
             }
         }
+        let mut neighbours = Vec::new();
         let mut around = match (scenario.scene.layout, &scenario.scene.surroundings) {
             (SceneLayout::Jaw, Some(meshes)) => meshes.clone(),
-            (SceneLayout::Jaw, None) => surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues),
+            (SceneLayout::Jaw, None) => {
+                let around = surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues);
+                neighbours = around.neighbours;
+                around.colliders
+            }
             (SceneLayout::Single | SceneLayout::Pair { .. }, _) => Vec::new(),
             (SceneLayout::Arch { .. }, _) => {
                 seats.as_ref().map_or_else(Vec::new, |seats| seats.mucosa(&scenario.scene, &scenario.tissues))
@@ -255,6 +270,7 @@ impl Workpiece {
             lesions,
             drawn,
             surroundings: around,
+            neighbours,
             periodontium,
             arch,
             tooth_from_arch,
@@ -486,13 +502,20 @@ fn side_by_side(teeth: &[Volume], whole: &[Volume], gap: f32) -> Result<Volume, 
 /// Distance between neighbouring crowns, mm: in contact, except for the clearance that the run-out of a bur needs.
 const CONTACT_GAP: f32 = 0.05;
 
-/// Returns the gingiva and two neighbouring teeth around a tooth, as simple shapes of average size.
+/// Colliders around a tooth.
+struct Surroundings {
+    colliders: Vec<Collider>,
+    neighbours: Vec<NeighbourTooth>,
+}
+
+/// Returns the gingiva and two neighbouring teeth around a tooth, as simple shapes of average size; beside gingiva with a
+/// sulcus the teeth have their form.
 fn surroundings(
     tooth: &ToothBounds,
     periodontium: Option<&Periodontium>,
     arch: &DentalArches,
     tissues: &TissueTable,
-) -> Vec<Collider> {
+) -> Surroundings {
     /// Rounding of a crown, mm.
     const ROUNDING: f32 = 1.8;
     let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
@@ -524,13 +547,19 @@ fn surroundings(
         tooth_from_collider: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gone - gum_half.z)),
         geometry: touch::ColliderGeometry::RoundBox { half: gum_half, rounding: 4.0 },
     };
-    let mesial = mesial.and_then(|fdi| neighbour(fdi, -tooth.distal()));
-    let distal = distal.and_then(|fdi| neighbour(fdi, tooth.distal()));
+    let beside = [(mesial, -tooth.distal()), (distal, tooth.distal())]
+        .into_iter()
+        .filter_map(|(fdi, toward)| Some((fdi?, neighbour(fdi?, toward)?)));
+    let beside: Vec<(u8, Collider)> = beside.collect();
+    let has_form = |(_, collider): &&(u8, Collider)| matches!(collider.geometry, touch::ColliderGeometry::Mesh(_));
+    let neighbours = beside.iter().filter(has_form);
+    let neighbours =
+        neighbours.map(|(fdi, c)| NeighbourTooth { fdi: *fdi, tooth_from_neighbour: c.tooth_from_collider }).collect();
     let gum = match periodontium {
         Some(periodontium) => gum_with_pockets(tooth, periodontium, gum, label("attachment")),
         None => vec![gum],
     };
-    mesial.into_iter().chain(distal).chain(gum).collect()
+    Surroundings { colliders: beside.into_iter().map(|(_, collider)| collider).chain(gum).collect(), neighbours }
 }
 
 /// Returns a neighbouring tooth with its anatomical form, so that a probe finds the same space beside it as in a mouth.

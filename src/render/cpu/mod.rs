@@ -17,6 +17,7 @@ mod volume_pass;
 
 pub use stereo_pass::stereo_pass;
 
+use super::drawn_volume::DrawnVolume;
 use super::eye::Eye;
 use super::mirror::{self, PlaneMirror};
 use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
@@ -27,7 +28,6 @@ use std::sync::{Arc, OnceLock};
 use surface_pass::SurfaceTriangles;
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
-use typodont_core::volume::Volume;
 use volume_sampler::VolumeSampler;
 
 /// CPU renderer, with the data that it keeps between pictures of the same volume.
@@ -37,7 +37,7 @@ pub struct CpuRenderer {
 }
 
 struct CachedVolume {
-    dims: [u32; 3],
+    drawn: DrawnVolume,
     empty_space: EmptySpaceMap,
     occlusion: OcclusionVolume,
     colours: SurfaceColours,
@@ -47,21 +47,24 @@ struct CachedVolume {
 
 impl CachedVolume {
     fn new(tooth: &VolumeInstance) -> CachedVolume {
-        let VolumeInstance { volume, mode, .. } = tooth;
+        let drawn = DrawnVolume::new(tooth.volume, 1);
+        let volume = &drawn.volume;
         CachedVolume {
-            dims: volume.grid().dims,
-            empty_space: EmptySpaceMap::new(volume, mode),
+            empty_space: EmptySpaceMap::new(volume, &tooth.mode),
             occlusion: OcclusionVolume::new(volume),
-            colours: SurfaceColours::new(tooth),
+            colours: SurfaceColours::new(&VolumeInstance { volume, ..tooth.clone() }),
             surface: OnceLock::new(),
+            drawn,
         }
     }
 
-    fn surface(&self, volume: &Volume) -> &SurfaceTriangles {
-        self.surface.get_or_init(|| SurfaceTriangles::extract(volume))
+    fn surface(&self) -> &SurfaceTriangles {
+        self.surface.get_or_init(|| SurfaceTriangles::extract(&self.drawn.volume))
     }
 
     fn update(&mut self, tooth: &VolumeInstance, changed: &[usize]) {
+        let changed = &self.drawn.update(tooth.volume, changed)[..];
+        let tooth = &VolumeInstance { volume: &self.drawn.volume, ..tooth.clone() };
         let VolumeInstance { volume, mode, palette, .. } = tooth;
         self.empty_space.set_mode(mode);
         self.empty_space.update(volume, changed);
@@ -82,7 +85,7 @@ impl CpuRenderer {
     pub fn prepare(&mut self, scene: &RenderScene) {
         let Some(tooth) = &scene.tooth else { return };
         match (&mut self.cached, tooth.changes) {
-            (Some(known), Changes::Bricks(changed)) if known.dims == tooth.volume.grid().dims => {
+            (Some(known), Changes::Bricks(changed)) if known.drawn.matches(tooth.volume, 1) => {
                 known.update(tooth, changed);
             }
             _ => self.cached = Some(CachedVolume::new(tooth)),
@@ -131,7 +134,7 @@ impl CpuRenderer {
             let sampler = VolumeSampler::new(tooth, known);
             match &tooth.mode {
                 RenderMode::Surface => {
-                    surface_pass::tooth(known.surface(tooth.volume), &sampler, &view, &mut framebuffer);
+                    surface_pass::tooth(known.surface(), &sampler, &view, &mut framebuffer);
                 }
                 RenderMode::Iso => iso_pass::iso_pass(&sampler, &view, &mut framebuffer),
                 RenderMode::Volume(function) => volume_pass::volume_pass(&sampler, function, &view, &mut framebuffer),

@@ -40,9 +40,9 @@ impl Ray {
 }
 
 impl<'a> VolumeSampler<'a> {
-    pub fn new(tooth: &VolumeInstance<'a>, cached: &'a CachedVolume) -> VolumeSampler<'a> {
-        let VolumeInstance { volume, world_from_tooth, .. } = *tooth;
-        let CachedVolume { empty_space, occlusion, colours, .. } = cached;
+    pub fn new(tooth: &VolumeInstance, cached: &'a CachedVolume) -> VolumeSampler<'a> {
+        let CachedVolume { drawn, empty_space, occlusion, colours, .. } = cached;
+        let (volume, world_from_tooth) = (&drawn.volume, tooth.world_from_tooth);
         let Aabb { low, high } = bounds_of_matter(volume);
         VolumeSampler { volume, world_from_tooth, empty_space, occlusion, colours, low, high }
     }

@@ -46,6 +46,8 @@ const TOOTH_GLOSS: f32 = 0.22;
 /// distances are shorter there.
 const TOUCH_BLEND: [f32; 2] = [6.0, 13.0];
 const TOUCH_BLEND_IN_FRONT: [f32; 2] = [2.0, 5.0];
+/// The same for gingiva with a modelled margin: beyond the papillae the jaw's own margins follow the teeth better.
+const TOUCH_BLEND_WITH_MARGIN: [f32; 2] = [1.5, 4.5];
 
 /// Colours of enamel and gingiva where the table of tissues has none.
 const IVORY: Rgb = [0.93, 0.91, 0.86];
@@ -151,13 +153,17 @@ impl Mouth {
         let jaw = Jaw::of(tooth.fdi);
         let plan = &workpiece.arch;
         let fitted = FittedTooth { fdi: tooth.fdi, crown: tooth.crown.size() };
-        let near = DentalArch::new(jaw, 7, Some(fitted), &plan.plan(jaw));
+        let mut near = DentalArch::new(jaw, 7, Some(fitted), &plan.plan(jaw));
         let other = plan.of_jaw(jaw.other(), []);
         let sign = distal_sign(tooth.fdi);
         let seat = near.seat(sign, number - 1)?;
         let top = tooth.crown.centre();
         let anchor = Vec3::new(top.x, top.y, tooth.crown.low.z);
         let near_from_tooth = mirrored_pose(seat.arch_from_tooth(), sign) * Pose::at(-anchor);
+        for neighbour in &workpiece.neighbours {
+            let index = usize::from(neighbour.fdi % 10) - 1;
+            near.place(distal_sign(neighbour.fdi), index, near_from_tooth * neighbour.tooth_from_neighbour);
+        }
         let gums = tissues.by_name("gingiva").map(|e| e.label());
         let periodontium = workpiece.periodontium.as_deref();
         let geometry = TouchedGeometry {
@@ -168,14 +174,18 @@ impl Mouth {
             gum_label: gums,
             near_from_tooth,
         };
+        let is_neighbour = |fdi: u8| workpiece.neighbours.iter().any(|neighbour| neighbour.fdi == fdi);
         let is_left_out = |side: f32, index: usize, seat: &ToothSeat| {
             plan.missing.contains(&jaw.fdi(side, index))
                 || (side == sign && index + 1 == number)
-                || geometry.occupies(seat, side)
+                || (!is_neighbour(jaw.fdi(side, index)) && geometry.occupies(seat, side))
         };
         let is_drawn = |shape: &&Collider| {
             let is_soft = tissues.role(shape.label) == Some(TissueRole::Soft);
-            surroundings::is_visible(shape, tissues) && (!is_soft || has_own_surface(shape))
+            // Neighbours with the form of their kind are drawn with the jaw's teeth.
+            let is_neighbour = workpiece.neighbours.iter().any(|n| n.tooth_from_neighbour == shape.tooth_from_collider);
+            let is_drawn_with_jaw = is_neighbour && !is_soft;
+            surroundings::is_visible(shape, tissues) && !is_drawn_with_jaw && (!is_soft || has_own_surface(shape))
         };
         let touched = workpiece.surroundings.iter().filter(is_drawn);
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
@@ -336,7 +346,11 @@ impl TouchedGeometry<'_> {
         let mut point = self.near_from_tooth.inverse() * point_in_arch;
         let aside = (point - point.clamp(crown.low, crown.high)) * Vec3::new(1.0, 1.0, 0.0);
         let deep = crown.low.z - point.z;
-        let as_felt = if self.tooth.fdi % 10 <= 3 { TOUCH_BLEND_IN_FRONT } else { TOUCH_BLEND };
+        let as_felt = match self.periodontium {
+            Some(_) => TOUCH_BLEND_WITH_MARGIN,
+            None if self.tooth.fdi % 10 <= 3 => TOUCH_BLEND_IN_FRONT,
+            None => TOUCH_BLEND,
+        };
         let near = (1.0 - rise(aside.length(), as_felt)) * (1.0 - rise(deep, DEEP));
         // Distance queries to a mesh are slow.
         let away = |p: Vec3| self.periodontium.map_or_else(|| gum.distance(p), |own| own.gum_sdf_filled(p));
