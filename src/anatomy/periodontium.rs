@@ -86,11 +86,13 @@ struct MarginEdge {
     thickness: f32,
     /// Descent where it begins, mm per mm.
     slope: f32,
+    /// True if papillae descend toward cheek and tongue.
+    has_round_papillae: bool,
 }
 
-/// Visible gingiva ends on the tooth in a thin edge. A probe displaces it by a little less than the thickness here.
-const VISUAL_EDGE: MarginEdge = MarginEdge { thickness: 0.0, slope: 0.6 };
-const PROBING_EDGE: MarginEdge = MarginEdge { thickness: 0.7, slope: 0.0 };
+/// Visible gingiva ends on the tooth in a thin edge. What is felt is blunter; recordings are replayed in it, so it never changes.
+const VISUAL_EDGE: MarginEdge = MarginEdge { thickness: 0.0, slope: 0.6, has_round_papillae: true };
+const PROBING_EDGE: MarginEdge = MarginEdge { thickness: 0.7, slope: 0.0, has_round_papillae: false };
 
 /// Ratio of the distance from the top of the gingiva to the height above it, from the typical slope of the top.
 const SLOPE: f32 = 0.85;
@@ -281,8 +283,12 @@ impl Periodontium {
         // A papilla exists only between two teeth.
         let between = mesiodistal * mesiodistal * mesiodistal * mesiodistal;
         let (middle, half) = self.middle_and_half();
-        let beyond_ridge = ((point.x - middle.x).abs() - RIDGE * half.x).max(0.0);
-        let papilla = papilla - (beyond_ridge * beyond_ridge / PAPILLA_ROUND).min(6.0);
+        let papilla = if edge.has_round_papillae {
+            let beyond_ridge = ((point.x - middle.x).abs() - RIDGE * half.x).max(0.0);
+            papilla - share * (beyond_ridge * beyond_ridge / PAPILLA_ROUND).min(6.0)
+        } else {
+            papilla
+        };
         margin - falls.min(6.0) * cheekward * cheekward + papilla * between
     }
 

@@ -45,7 +45,7 @@ pub struct Renderer {
     mirror_targets: [Option<MirrorTarget>; 2],
     view_layout: wgpu::BindGroupLayout,
     tooth: Option<ToothTextures>,
-    /// Replaces a volume that is larger than this device's textures.
+    /// The volume as textures and triangles show it.
     drawn: Option<DrawnVolume>,
     surfaces: Option<BrickSurfaces>,
     eye_targets: [Option<EyeTarget>; 2],

@@ -217,8 +217,11 @@ impl Lamp {
         let lamp = Lamp::chair();
         let (to_lamp, to_eye) = (lamp.position - focus, (eye - focus).normalize_or(Vec3::Z));
         let angle = to_lamp.angle_between(to_eye);
-        let axis = to_lamp.cross(to_eye).try_normalize();
-        let Some(axis) = axis.filter(|_| angle > WIDEST) else { return lamp };
+        if angle <= WIDEST {
+            return lamp;
+        }
+        // Any way around leads from the far side to the eye.
+        let axis = to_lamp.cross(to_eye).try_normalize().unwrap_or_else(|| to_eye.any_orthonormal_vector());
         Lamp { position: focus + Quat::from_axis_angle(axis, angle - WIDEST) * to_lamp, ..lamp }
     }
 

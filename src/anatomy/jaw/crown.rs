@@ -11,30 +11,30 @@ use typodont_core::volume::{Grid, Label, Volume, surface};
 /// a mouth takes longer to draw than it gains.
 const SPACING: f32 = 0.36;
 
-/// Length of root below a crown, mm: it ends within the gingiva, out of sight.
-const ROOT_LENGTH: f32 = 4.5;
+/// Length of root in the gingiva below a crown, mm: farther down a leaning root would leave it.
+const ROOT_LENGTH: f32 = 2.5;
 
 /// Distance from a point of the surface at which the density is sampled, mm: a groove has more matter around it than a
 /// cusp.
 const SAMPLE_DISTANCE: f32 = 0.9;
 
 /// Half-width, voxels, of the ramp from nothing to matter where the matter around a place is measured.
-const RAMP_VOXELS: f32 = 1.5;
+const MEASURED_HALF_BAND: f32 = 1.5;
 
 /// Share of matter around a place that is flat, and above it until a groove is as dark as can be.
 const FLAT: f32 = 0.53;
 const DEEPER: f32 = 0.17;
 
 /// Half the width of the density ramp, voxels: wide, so that the normals between so coarse samples are those of the form.
-const HALF_BAND_VOXELS: f32 = 3.0;
+const DRAWN_HALF_BAND: f32 = 3.0;
 
 /// Labels used while a crown is made. They are independent of the exercise's tissues, since a crown is only drawn.
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
-/// A tooth's crown and the beginning of its root, closed, in tooth space; mm.
-pub fn crown(model: &ToothModel) -> TintedMesh {
-    let grid = cropped_above(grid_of_spacing(&model.form, SPACING), -ROOT_LENGTH);
-    let volume = grow_with_ramp(&model.form, grid, &TISSUES, HALF_BAND_VOXELS);
+/// A tooth's crown and the beginning of its root, closed, in tooth space; mm. `recession`: length of root above the gingiva.
+pub fn crown(model: &ToothModel, recession: f32) -> TintedMesh {
+    let grid = cropped_above(grid_of_spacing(&model.form, SPACING), -recession - ROOT_LENGTH);
+    let volume = grow_with_ramp(&model.form, grid, &TISSUES, DRAWN_HALF_BAND);
     let mesh = surface::extract(&volume);
     let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
     TintedMesh { mesh, tints }
@@ -84,7 +84,7 @@ fn groove_depth(volume: &Volume, place: Vec3) -> f32 {
     };
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
     let directions = axes.into_iter().chain(CORNERS.map(Vec3::from));
-    let share = |density: f32| (0.5 + (density - 0.5) * HALF_BAND_VOXELS / RAMP_VOXELS).clamp(0.0, 1.0);
+    let share = |density: f32| (0.5 + (density - 0.5) * DRAWN_HALF_BAND / MEASURED_HALF_BAND).clamp(0.0, 1.0);
     let matter: f32 = directions.map(|way| share(volume.density_at(place + way * SAMPLE_DISTANCE))).sum();
     ((matter / 14.0 - FLAT) / DEEPER).clamp(0.0, 1.0)
 }
@@ -99,7 +99,7 @@ mod tests {
     fn every_crown_is_closed_and_as_large_as_the_table_says() {
         // Aim: a closed surface facing outward, of the table's widths and length to a sample's distance.
         for model in UPPER.iter().chain(&LOWER) {
-            let TintedMesh { mesh, tints } = crown(model);
+            let TintedMesh { mesh, tints } = crown(model, 0.0);
             let sizes = &model.sizes;
             assert!(ClosedMesh::new(&mesh).is_some(), "{sizes:?} is closed");
             assert!(mesh.volume_mm3() > 50.0, "{sizes:?}");

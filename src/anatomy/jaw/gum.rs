@@ -15,8 +15,24 @@ use typodont_core::frame::{Pose, Vec3, smooth_step};
 use typodont_core::mesh::Mesh;
 use typodont_core::parallel::par_map;
 
-/// Distance between columns along the arch, mm: a papilla is some 3 mm wide, and its tip is round.
-const COLUMN: f32 = 0.5;
+/// Form of the gingiva around the teeth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GumForm {
+    /// As it is touched in an arch: by the widths of the teeth. Recordings are replayed in it, so it never changes.
+    Touched,
+    /// As it is drawn: margins lie on the teeth, and papillae have round tips.
+    Drawn,
+}
+
+impl GumForm {
+    /// Distance between columns along the arch, mm: a papilla is some 3 mm wide.
+    fn column(self) -> f32 {
+        match self {
+            GumForm::Touched => 0.9,
+            GumForm::Drawn => 0.5,
+        }
+    }
+}
 
 /// Means of normals over neighbouring places: creases between columns fade, the margin stays.
 const SMOOTHING: usize = 4;
@@ -37,6 +53,9 @@ const NECK_PART: Range<f32> = -0.45..0.6;
 
 /// Half the width of a papilla that fills the space between two teeth, as a share of half the necks' width.
 const BETWEEN_TEETH: f32 = 0.7;
+
+/// Least distance of a column's places from the midline, as a share of its own.
+const LEAST_INNER_X: f32 = 0.25;
 
 /// Rows from the ridge's inner foot to the midline.
 const INNER: usize = 12;
@@ -77,8 +96,8 @@ pub fn necks(models: &[ToothModel]) -> Vec<CrownContour> {
 }
 
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.
-pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
-    let [left, right] = halves(jaw, &sides);
+pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], form: GumForm, fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
+    let [left, right] = halves(jaw, &sides, form);
     // From behind to the midline, then from there back; the midline once.
     let mut columns: Vec<Vec<(Vec3, Tint)>> = left.into_iter().skip(1).rev().chain(right).collect();
     for (place, _) in columns.iter_mut().flatten() {
@@ -87,7 +106,7 @@ pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], fit: impl Fn(Vec3) -> Vec3) -> TintedM
     closed_sheet(&columns)
 }
 
-/// The same surface as closed solids that meet without overlap, arch space, mm: of each half its ridge, and its palate or
+/// The touched surface as closed solids that meet without overlap, arch space, mm: of each half its ridge, and its palate or
 /// its floor.
 pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
     let inner = match jaw {
@@ -95,7 +114,7 @@ pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
         Jaw::Lower => MucosaRegion::FloorOfMouth,
     };
     let mut solids = Vec::new();
-    for (columns, side) in halves(jaw, &sides).iter().zip(&sides) {
+    for (columns, side) in halves(jaw, &sides, GumForm::Touched).iter().zip(&sides) {
         let rows = columns.first().map_or(0, Vec::len);
         // Palate and floor begin at the last place but one of the ridge's section; between two places there is another.
         let border = rows - INNER - 3;
@@ -109,14 +128,15 @@ pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
 }
 
 /// Columns of places from the midline back, for each half.
-fn halves(jaw: Jaw, sides: &[HalfJaw; 2]) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
+fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: GumForm) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
     // Both sides end equally far back, also where one tooth is larger than its twin.
     let ends = sides.each_ref().map(|side| side.half.frame_at(side.half.length() + PAD).0.y);
     std::array::from_fn(|number| {
         let side = &sides[number];
         let end = side.half.length() + PAD + ends[0].max(ends[1]) - ends[number];
-        let count = (end / COLUMN).ceil() as usize;
-        (0..=count).map(|i| side.column(jaw, end * i as f32 / count as f32)).collect()
+        let count = (end / form.column()).ceil() as usize;
+        let front = side.ridge(jaw, form, 0.0).pop().map_or(Vec3::ZERO, |row| row.0);
+        (0..=count).map(|i| side.column(jaw, form, front, end * i as f32 / count as f32)).collect()
     })
 }
 
@@ -176,11 +196,11 @@ fn solid_under(columns: &[Vec<Vec3>], is_mirrored: bool) -> Mesh {
 }
 
 impl HalfJaw<'_> {
-    /// Places from the base's outer edge over the ridge to the midline, so far along the arch.
-    fn column(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Tint)> {
-        let mut rows = subdivide(&self.ridge(jaw, arc_length));
+    /// Places from the base's outer edge over the ridge to the midline, so far along the arch. `front`: the ridge's inner foot on
+    /// the midline.
+    fn column(&self, jaw: Jaw, form: GumForm, front: Vec3, arc_length: f32) -> Vec<(Vec3, Tint)> {
+        let mut rows = subdivide(&self.ridge(jaw, form, arc_length));
         let (foot, tint) = rows[rows.len() - 1];
-        let front = self.ridge(jaw, 0.0).pop().map_or(foot, |row| row.0);
         for i in 1..=INNER {
             let share = i as f32 / INNER as f32;
             let bend = libm::sinf(share * std::f32::consts::FRAC_PI_2);
@@ -196,20 +216,14 @@ impl HalfJaw<'_> {
     }
 
     /// The ridge's section, from cheek to tongue.
-    fn ridge(&self, jaw: Jaw, arc_length: f32) -> Vec<(Vec3, Tint)> {
+    fn ridge(&self, jaw: Jaw, form: GumForm, arc_length: f32) -> Vec<(Vec3, Tint)> {
         let (place, distal) = self.half.frame_at(arc_length);
         let out = distal.cross(Vec3::Z);
         let RidgeSection { neck, offset, half, margin, inner_margin, between_teeth: between, root, pad } =
-            self.section(arc_length);
+            self.section(form, arc_length);
         let middle = place + out * offset;
         let shrink = 1.0 - 0.45 * pad * pad;
-        let wide = half * shrink;
-        // Out to the cheek and in to the tongue: the margin lies on the tooth, and the papilla bridges the space between two.
-        let edge = |out: Vec3, height: f32| {
-            let on_tooth = self.distance_to_teeth(arc_length, middle.with_z(height), out, wide + 2.5);
-            smooth_max(on_tooth, BETWEEN_TEETH * wide)
-        };
-        let (outer, inner) = (edge(out, margin), edge(-out, inner_margin));
+        let (wide, narrow) = (half * shrink, half * (1.0 - 0.3 * between) * shrink);
         let front = 1.0 - smooth_step((arc_length - 12.0) / 16.0);
         let crest = margin.max(inner_margin) - 0.25 * between;
         let mut rows = vec![
@@ -219,18 +233,41 @@ impl HalfJaw<'_> {
             (wide + 3.1 + 0.4 * root, neck - 8.5, MUCOSA),
             (wide + 2.2 + 0.8 * root, neck - 6.0, LINE),
             (wide + 1.5 + root, neck - 3.6, ATTACHED),
-            (outer + 0.85 + 0.5 * root, margin - 1.6, ATTACHED),
-            (outer + 0.55, margin - 0.8, FREE),
-            (outer + 0.30, margin - 0.3, FREE),
-            (outer + 0.04, margin, FREE),
-            (outer - 0.40, margin + 0.15, FREE),
-            (0.0, crest, FREE),
-            (0.40 - inner, inner_margin + 0.15, FREE),
-            (-inner - 0.04, inner_margin, FREE),
-            (-inner - 0.30, inner_margin - 0.3, FREE),
-            (-inner - 0.55, inner_margin - 0.8, FREE),
-            (-inner - 0.95, inner_margin - 1.6, ATTACHED),
         ];
+        rows.extend(match form {
+            GumForm::Touched => vec![
+                (narrow + 0.95 + 0.5 * root, margin - 1.3, ATTACHED),
+                (narrow + 0.42, margin - 0.25, FREE),
+                (narrow - 0.35, margin + 0.05, FREE),
+                (0.0, crest, FREE),
+                (-narrow + 0.35, inner_margin + 0.05, FREE),
+                (-narrow - 0.42, inner_margin - 0.25, FREE),
+                (-narrow - 1.0, inner_margin - 1.3, ATTACHED),
+            ],
+            GumForm::Drawn => {
+                // The margin lies on the tooth, and the papilla bridges the space between two.
+                let edge = |out: Vec3, height: f32| {
+                    let on_tooth = self.distance_to_teeth(arc_length, middle.with_z(height), out, wide + 2.5);
+                    smooth_max(on_tooth, BETWEEN_TEETH * wide)
+                };
+                let (outer, inner) = (edge(out, margin), edge(-out, inner_margin));
+                // Above the next row, however far the margin has receded.
+                let attached = |margin: f32| (margin - 1.6).max(neck - 2.9);
+                vec![
+                    (outer + 0.85 + 0.5 * root, attached(margin), ATTACHED),
+                    (outer + 0.55, margin - 0.8, FREE),
+                    (outer + 0.30, margin - 0.3, FREE),
+                    (outer + 0.04, margin, FREE),
+                    (outer - 0.40, margin + 0.15, FREE),
+                    (0.0, crest, FREE),
+                    (0.40 - inner, inner_margin + 0.15, FREE),
+                    (-inner - 0.04, inner_margin, FREE),
+                    (-inner - 0.30, inner_margin - 0.3, FREE),
+                    (-inner - 0.55, inner_margin - 0.8, FREE),
+                    (-inner - 0.95, attached(inner_margin), ATTACHED),
+                ]
+            }
+        });
         // Behind the front teeth the palate rises gently, beside the molars steeply; below, the ridge falls to the floor.
         let gentle = |steep: [f32; 2], gentle: [f32; 2]| {
             let [a, z] = [0, 1].map(|i| steep[i] + (gentle[i] - steep[i]) * front);
@@ -249,11 +286,19 @@ impl HalfJaw<'_> {
             Jaw::Lower => [ATTACHED, LINE, FLOOR],
         };
         rows.extend(inner.iter().zip(tints).map(|(&(aside, z), tint)| (aside, z, tint)));
-        rows.into_iter().map(|(aside, z, tint)| (middle + out * aside + Vec3::Z * (z - middle.z), tint)).collect()
+        let place = |aside: f32, z: f32| {
+            let point = middle + out * aside + Vec3::Z * (z - middle.z);
+            match form {
+                GumForm::Touched => point,
+                // Around the bend in front, columns come together on the inner side, and must not cross.
+                GumForm::Drawn => point.with_x(point.x.max(LEAST_INNER_X * middle.x)),
+            }
+        };
+        rows.into_iter().map(|(aside, z, tint)| (place(aside, z), tint)).collect()
     }
 
-    /// Distance from a point between the teeth's sides out to the side of the tooth here, mm, level and at most `reach`;
-    /// 0 between two teeth.
+    /// Distance from a point between the teeth's sides out to the side of the tooth here, mm, level; 0 between two teeth. Looked for
+    /// from `reach` inward.
     fn distance_to_teeth(&self, arc_length: f32, from: Vec3, out: Vec3, reach: f32) -> f32 {
         const STEP: f32 = 0.15;
         let seats = &self.half.seats;
@@ -277,7 +322,7 @@ impl HalfJaw<'_> {
         outside
     }
 
-    fn section(&self, arc_length: f32) -> RidgeSection {
+    fn section(&self, form: GumForm, arc_length: f32) -> RidgeSection {
         let seats = &self.half.seats;
         let neck_of = |seat: &ToothSeat| seat.neck().z;
         let offset_of = |seat: &ToothSeat| (seat.neck() - self.half.frame_at(seat.middle()).0).dot(seat.buccal);
@@ -292,8 +337,11 @@ impl HalfJaw<'_> {
         let here = seats.iter().position(|s| arc_length < s.to).unwrap_or(last);
         let seat = &seats[here];
         let from_middle = ((arc_length - seat.middle()) / (0.5 * (seat.to - seat.from))).clamp(-1.0, 1.0);
-        // A scallop around each tooth, and a round tip between two.
-        let between = smooth_step(libm::powf(from_middle.abs(), 1.5));
+        let between = match form {
+            GumForm::Touched => libm::powf(from_middle.abs(), 2.4),
+            // A scallop around each tooth, and a round tip between two.
+            GumForm::Drawn => smooth_step(libm::powf(from_middle.abs(), 1.5)),
+        };
         let beside = if from_middle < 0.0 { here.saturating_sub(1) } else { (here + 1).min(last) };
         let papilla = if here == last && from_middle > 0.0 {
             neck_of(seat) + 1.2
@@ -460,7 +508,7 @@ mod tests {
                 assert!(mesh.volume_mm3() > 500.0, "{jaw:?} {region:?}: {} mm³", mesh.volume_mm3());
                 closed.push(ClosedMesh::new(mesh).unwrap_or_else(|| panic!("{jaw:?} {region:?} is open")));
             }
-            let drawn = arch.gum(&|p| p).mesh;
+            let drawn = arch.gum(GumForm::Touched, &|p| p).mesh;
             let top = drawn.positions.iter().filter(|p| p.z > BASE + 0.1);
             let worst = top
                 .clone()

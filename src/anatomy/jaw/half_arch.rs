@@ -260,7 +260,7 @@ mod tests {
 
     /// Each crown's surface, arch space.
     fn crowns(half: &HalfArch, models: &[ToothModel]) -> Vec<(Mesh, Pose)> {
-        let crown = |(model, seat): (&ToothModel, &ToothSeat)| (crown::crown(model).mesh, seat.arch_from_tooth());
+        let crown = |(model, seat): (&ToothModel, &ToothSeat)| (crown::crown(model, 0.0).mesh, seat.arch_from_tooth());
         models.iter().zip(&half.seats).map(crown).collect()
     }
 

@@ -16,13 +16,15 @@ use self::tooth_model::{ToothKind, ToothModel};
 use crate::age;
 use crate::age::AgeEffects;
 use crate::form::Sizes;
+use crate::periodontium::SiteLengths;
 use crate::teeth::distal_sign;
 use glam::Mat3;
+use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
 use typodont_core::parallel;
 
-pub use self::gum::MucosaRegion;
+pub use self::gum::{GumForm, MucosaRegion};
 pub use self::half_arch::ToothSeat;
 pub use self::tinted_mesh::{Tint, TintedMesh};
 
@@ -141,8 +143,16 @@ impl DentalArch {
         DentalArch { jaw, age: plan.age, sign, fitted: row(models, sign), plain: row(plain, -sign) }
     }
 
-    /// Puts a tooth where it stands in an exercise: upright, in its own axes (`arch_from_tooth`). `index`: its place from the
-    /// midline, 0 to 7, on a side of x.
+    /// Pose of the arch in which a fitted tooth's crown, a box in tooth space, stands in its seat: `arch_from_tooth`. `None` for a
+    /// tooth that the arch has no seat for.
+    pub fn arch_from_fitted(&self, fdi: u8, crown: &Aabb) -> Option<Pose> {
+        let side = distal_sign(fdi);
+        let seat = self.seat(side, usize::from(fdi % 10).checked_sub(1)?)?;
+        let anchor = crown.centre().with_z(crown.low.z);
+        Some(mirrored_pose(seat.arch_from_tooth(), side) * Pose::at(-anchor))
+    }
+
+    /// Puts a tooth where it stands upright in an exercise (`arch_from_tooth`). `index`: its place from the midline, 0 to 7, on a side of x.
     pub fn place(&mut self, side: f32, index: usize, arch_from_tooth: Pose) {
         let row = if side == self.sign { &mut self.fitted } else { &mut self.plain };
         if let Some(seat) = row.half.seats.get_mut(index) {
@@ -178,7 +188,9 @@ impl DentalArch {
 
     /// All crowns but those that are left out, by side of x and place from the midline.
     pub fn crowns(&self, is_left_out: &dyn Fn(f32, usize, &ToothSeat) -> bool) -> TintedMesh {
-        let crowns = parallel::par_map(self.plain.models.len(), |index| crown::crown(&self.plain.models[index]));
+        let recession = self.recession().into_iter().fold(0.0, f32::max);
+        let model = |index: usize| &self.plain.models[index];
+        let crowns = parallel::par_map(self.plain.models.len(), |index| crown::crown(model(index), recession));
         let mut all = TintedMesh::default();
         for (index, crown) in crowns.iter().enumerate() {
             for (row, sign) in [(&self.fitted, self.sign), (&self.plain, -self.sign)] {
@@ -195,18 +207,22 @@ impl DentalArch {
     }
 
     /// The gingiva with the palate or the floor of the mouth. `fit` may move each point.
-    pub fn gum(&self, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
-        gum::gum(self.jaw, self.sides(), fit)
+    pub fn gum(&self, form: GumForm, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
+        gum::gum(self.jaw, self.sides(), form, fit)
     }
 
-    /// The same surface as closed solids that do not overlap, each of one region of the mucosa.
+    /// The gingiva that is touched as closed solids that do not overlap, each of one region of the mucosa.
     pub fn gum_solids(&self) -> Vec<(MucosaRegion, Mesh)> {
         gum::gum_solids(self.jaw, self.sides())
     }
 
+    fn recession(&self) -> SiteLengths {
+        self.age.map_or([0.0; 6], age::recession)
+    }
+
     fn sides(&self) -> [HalfJaw<'_>; 2] {
         let rows = if self.sign > 0.0 { [&self.plain, &self.fitted] } else { [&self.fitted, &self.plain] };
-        let recession = self.age.map_or([0.0; 6], age::recession);
+        let recession = self.recession();
         [(rows[0], -1.0), (rows[1], 1.0)].map(|(row, sign)| HalfJaw {
             half: &row.half,
             models: &row.models,

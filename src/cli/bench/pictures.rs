@@ -119,7 +119,7 @@ pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<St
                 mode: mode.clone(),
             }),
             solids: solids.clone(),
-            lights: Lights { head: Lamp::head(eye), ..Lights::default() },
+            lights: Lights { chair: Lamp::chair_toward(eye, orbit.middle), head: Lamp::head(eye), ..Lights::default() },
             shadows,
             is_antialiased: true,
             ..RenderScene::empty()

@@ -58,6 +58,8 @@ pub struct NeighbourTooth {
     pub fdi: u8,
     /// Pose of its own axes.
     pub tooth_from_neighbour: Pose,
+    /// Its place among the workpiece's surroundings.
+    pub collider: usize,
 }
 
 /// Reason for which a workpiece cannot be made.
@@ -551,10 +553,13 @@ fn surroundings(
         .into_iter()
         .filter_map(|(fdi, toward)| Some((fdi?, neighbour(fdi?, toward)?)));
     let beside: Vec<(u8, Collider)> = beside.collect();
-    let has_form = |(_, collider): &&(u8, Collider)| matches!(collider.geometry, touch::ColliderGeometry::Mesh(_));
-    let neighbours = beside.iter().filter(has_form);
-    let neighbours =
-        neighbours.map(|(fdi, c)| NeighbourTooth { fdi: *fdi, tooth_from_neighbour: c.tooth_from_collider }).collect();
+    let neighbours = beside.iter().enumerate().filter(|_| periodontium.is_some());
+    let neighbours = neighbours.map(|(collider, (fdi, shape))| NeighbourTooth {
+        fdi: *fdi,
+        tooth_from_neighbour: shape.tooth_from_collider,
+        collider,
+    });
+    let neighbours = neighbours.collect();
     let gum = match periodontium {
         Some(periodontium) => gum_with_pockets(tooth, periodontium, gum, label("attachment")),
         None => vec![gum],

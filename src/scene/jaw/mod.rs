@@ -7,7 +7,7 @@
 use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
-use typodont_anatomy::jaw::{ArchPlan, DentalArch, FittedTooth, Jaw, TintedMesh, ToothSeat, mirrored_pose};
+use typodont_anatomy::jaw::{ArchPlan, DentalArch, FittedTooth, GumForm, Jaw, TintedMesh, ToothSeat};
 use typodont_anatomy::periodontium::Periodontium;
 use typodont_anatomy::teeth::distal_sign;
 use typodont_core::frame::{Pose, Quat, Vec3, smooth_step};
@@ -48,6 +48,10 @@ const TOUCH_BLEND: [f32; 2] = [6.0, 13.0];
 const TOUCH_BLEND_IN_FRONT: [f32; 2] = [2.0, 5.0];
 /// The same for gingiva with a modelled margin: beyond the papillae the jaw's own margins follow the teeth better.
 const TOUCH_BLEND_WITH_MARGIN: [f32; 2] = [1.5, 4.5];
+
+/// The last tooth from the midline around which the arch bends away from the straight row in which neighbours are touched. There
+/// the drawn gingiva keeps to the touched one's form, and neighbours are drawn as they are touched.
+const LAST_IN_BEND: u8 = 4;
 
 /// Colours of enamel and gingiva where the table of tissues has none.
 const IVORY: Rgb = [0.93, 0.91, 0.86];
@@ -135,7 +139,7 @@ impl Mouth {
         let near = workpiece.arch.of_jaw(jaw, workpiece.teeth.iter().map(|tooth| tooth.fdi));
         let other = workpiece.arch.of_jaw(jaw.other(), []);
         Mouth {
-            near: JawMeshes::new(TintedMesh::default(), near.gum(&|p| p), tissues),
+            near: JawMeshes::new(TintedMesh::default(), near.gum(GumForm::Touched, &|p| p), tissues),
             opposite: None,
             jaw,
             world_from_near: workpiece.world_from_tooth * tooth_from_arch,
@@ -156,11 +160,10 @@ impl Mouth {
         let mut near = DentalArch::new(jaw, 7, Some(fitted), &plan.plan(jaw));
         let other = plan.of_jaw(jaw.other(), []);
         let sign = distal_sign(tooth.fdi);
-        let seat = near.seat(sign, number - 1)?;
-        let top = tooth.crown.centre();
-        let anchor = Vec3::new(top.x, top.y, tooth.crown.low.z);
-        let near_from_tooth = mirrored_pose(seat.arch_from_tooth(), sign) * Pose::at(-anchor);
-        for neighbour in &workpiece.neighbours {
+        let near_from_tooth = near.arch_from_fitted(tooth.fdi, &tooth.crown)?;
+        let is_in_bend = tooth.fdi % 10 <= LAST_IN_BEND;
+        let neighbours = if is_in_bend { &[][..] } else { &workpiece.neighbours[..] };
+        for neighbour in neighbours {
             let index = usize::from(neighbour.fdi % 10) - 1;
             near.place(distal_sign(neighbour.fdi), index, near_from_tooth * neighbour.tooth_from_neighbour);
         }
@@ -174,23 +177,23 @@ impl Mouth {
             gum_label: gums,
             near_from_tooth,
         };
-        let is_neighbour = |fdi: u8| workpiece.neighbours.iter().any(|neighbour| neighbour.fdi == fdi);
+        let is_neighbour = |fdi: u8| neighbours.iter().any(|neighbour| neighbour.fdi == fdi);
         let is_left_out = |side: f32, index: usize, seat: &ToothSeat| {
             plan.missing.contains(&jaw.fdi(side, index))
                 || (side == sign && index + 1 == number)
                 || (!is_neighbour(jaw.fdi(side, index)) && geometry.occupies(seat, side))
         };
-        let is_drawn = |shape: &&Collider| {
+        let is_drawn = |(index, shape): &(usize, &Collider)| {
             let is_soft = tissues.role(shape.label) == Some(TissueRole::Soft);
             // Neighbours with the form of their kind are drawn with the jaw's teeth.
-            let is_neighbour = workpiece.neighbours.iter().any(|n| n.tooth_from_neighbour == shape.tooth_from_collider);
-            let is_drawn_with_jaw = is_neighbour && !is_soft;
+            let is_drawn_with_jaw = neighbours.iter().any(|neighbour| neighbour.collider == *index);
             surroundings::is_visible(shape, tissues) && !is_drawn_with_jaw && (!is_soft || has_own_surface(shape))
         };
-        let touched = workpiece.surroundings.iter().filter(is_drawn);
+        let touched = workpiece.surroundings.iter().enumerate().filter(is_drawn).map(|(_, shape)| shape);
+        let form = if is_in_bend { GumForm::Touched } else { GumForm::Drawn };
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         Some(Mouth {
-            near: JawMeshes::new(near.crowns(&is_left_out), near.gum(&|p| geometry.fit_to_gum(p)), tissues),
+            near: JawMeshes::new(near.crowns(&is_left_out), near.gum(form, &|p| geometry.fit_to_gum(p)), tissues),
             opposite: Some(opposite_jaw(workpiece, &other, tissues)),
             jaw,
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
@@ -275,7 +278,7 @@ impl StandaloneJaw {
     /// As written, or at an age in years.
     pub fn new(jaw: Jaw, age: Option<f32>, tissues: &TissueTable) -> StandaloneJaw {
         let arch = DentalArch::new(jaw, 7, None, &ArchPlan { age, ..ArchPlan::default() });
-        let TintedMesh { mesh, tints } = arch.gum(&|p| p);
+        let TintedMesh { mesh, tints } = arch.gum(GumForm::Drawn, &|p| p);
         let pink = tissues.by_name("gingiva").map_or(PINK, |e| e.rgb());
         let gum_colours = tints.iter().map(|tint| std::array::from_fn(|c| pink[c] * tint[c])).collect();
         StandaloneJaw { gum: mesh, gum_colours, teeth: arch.teeth() }
@@ -286,7 +289,7 @@ impl StandaloneJaw {
 fn opposite_jaw(workpiece: &Workpiece, arch: &DentalArch, tissues: &TissueTable) -> JawMeshes {
     let missing = &workpiece.arch.missing;
     let crowns = arch.crowns(&|side, index, _| missing.contains(&arch.jaw().fdi(side, index)));
-    JawMeshes::new(crowns, arch.gum(&|p| p), tissues)
+    JawMeshes::new(crowns, arch.gum(GumForm::Drawn, &|p| p), tissues)
 }
 
 /// The opposite jaw's arch space in the near one's when the jaws are closed.
@@ -347,9 +350,9 @@ impl TouchedGeometry<'_> {
         let aside = (point - point.clamp(crown.low, crown.high)) * Vec3::new(1.0, 1.0, 0.0);
         let deep = crown.low.z - point.z;
         let as_felt = match self.periodontium {
-            Some(_) => TOUCH_BLEND_WITH_MARGIN,
-            None if self.tooth.fdi % 10 <= 3 => TOUCH_BLEND_IN_FRONT,
-            None => TOUCH_BLEND,
+            _ if self.tooth.fdi % 10 <= 3 => TOUCH_BLEND_IN_FRONT,
+            Some(_) if self.tooth.fdi % 10 > LAST_IN_BEND => TOUCH_BLEND_WITH_MARGIN,
+            _ => TOUCH_BLEND,
         };
         let near = (1.0 - rise(aside.length(), as_felt)) * (1.0 - rise(deep, DEEP));
         // Distance queries to a mesh are slow.
