@@ -4,7 +4,7 @@ use crate::rig::{Abilities, Misbehaviour, Rig, SharedHand};
 use crate::suite;
 use std::net::UdpSocket;
 use std::process::Command;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -34,9 +34,12 @@ impl Stream {
     }
 }
 
-/// A port that nobody had a moment ago.
+/// A port that nobody had a moment ago, below those that systems give to whoever asks for any.
 fn free_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    let first = 20_000 + (std::process::id() % 100) as u16 * 100;
+    let ports = std::iter::repeat_with(|| first + NEXT.fetch_add(1, Ordering::Relaxed) % 100).take(100);
+    ports.into_iter().find(|port| UdpSocket::bind(("127.0.0.1", *port)).is_ok()).unwrap()
 }
 
 fn send(port: u16, hand: &SharedHand, misbehaviour: &Mutex<Option<Misbehaviour>>, stop: &AtomicBool) {
