@@ -18,6 +18,7 @@ pub struct DrawnVolume {
 impl DrawnVolume {
     /// Returns the smallest factor by which a volume must be downsampled to fit within a limit; 1 when it fits
     /// already.
+    #[cfg(feature = "gpu")]
     pub fn required_factor(dims: [u32; 3], limit: u32) -> u32 {
         dims.into_iter().map(|n| n.div_ceil(limit.max(1))).max().unwrap_or(1)
     }
@@ -248,6 +249,7 @@ mod tests {
         assert_eq!(drawn.update(&volume, &[brick]), []);
     }
 
+    #[cfg(feature = "gpu")]
     #[test]
     fn the_smallest_sufficient_factor_is_chosen() {
         assert_eq!(DrawnVolume::required_factor([512, 512, 322], 2048), 1);
