@@ -8,7 +8,6 @@ use super::half_arch::{HalfArch, ToothSeat};
 use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
 use super::tooth_model::ToothModel;
 use crate::crown_contour::CrownContour;
-use crate::form::ToothForm;
 use crate::periodontium::{ProbingSite, SiteLengths};
 use std::ops::Range;
 use typodont_core::frame::{Pose, Vec3, smooth_step};
@@ -67,7 +66,7 @@ const VAULT: f32 = -20.5;
 pub struct HalfJaw<'a> {
     pub half: &'a HalfArch,
     pub models: &'a [ToothModel],
-    /// Contours of the teeth where gingiva lies on them.
+    /// Contours of the teeth where drawn gingiva lies on them; none for touched gingiva.
     pub necks: Vec<CrownContour>,
     /// Recession of the margin, mm.
     pub recession: SiteLengths,
@@ -89,10 +88,7 @@ const SOLID_BASE: f32 = BASE - 1.0;
 
 /// Contours of teeth at the height of the gingival margin.
 pub fn necks(models: &[ToothModel]) -> Vec<CrownContour> {
-    par_map(models.len(), |i| {
-        let form = ToothForm { sizes: models[i].sizes, ..models[i].form };
-        CrownContour::of_part(&form, NECK_PART)
-    })
+    par_map(models.len(), |i| CrownContour::of_part(&models[i].form_in_place(), NECK_PART))
 }
 
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.

@@ -4,7 +4,6 @@
 
 use super::tooth_model::ToothModel;
 use crate::crown_contour::CrownContour;
-use crate::form::ToothForm;
 use typodont_core::frame::{Pose, Quat, Vec3};
 
 /// A jaw's shape.
@@ -96,7 +95,7 @@ impl HalfArch {
         let line = with_arc_length(&beta_curve(shape.width, depth));
         let mut half = HalfArch { seats: Vec::new(), line };
         let girths: Vec<CrownContour> =
-            teeth.iter().map(|(model, _)| CrownContour::of(&ToothForm { sizes: model.sizes, ..model.form })).collect();
+            teeth.iter().map(|(model, _)| CrownContour::of(&model.form_in_place())).collect();
         let mut middles: Vec<f32> = Vec::new();
         for (i, (model, width)) in teeth.iter().enumerate() {
             // Each tooth goes back until it just touches the one before it, the first until it touches its twin.

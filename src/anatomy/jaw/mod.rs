@@ -208,25 +208,28 @@ impl DentalArch {
 
     /// The gingiva with the palate or the floor of the mouth. `fit` may move each point.
     pub fn gum(&self, form: GumForm, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
-        gum::gum(self.jaw, self.sides(), form, fit)
+        gum::gum(self.jaw, self.sides(form), form, fit)
     }
 
     /// The gingiva that is touched as closed solids that do not overlap, each of one region of the mucosa.
     pub fn gum_solids(&self) -> Vec<(MucosaRegion, Mesh)> {
-        gum::gum_solids(self.jaw, self.sides())
+        gum::gum_solids(self.jaw, self.sides(GumForm::Touched))
     }
 
     fn recession(&self) -> SiteLengths {
         self.age.map_or([0.0; 6], age::recession)
     }
 
-    fn sides(&self) -> [HalfJaw<'_>; 2] {
+    fn sides(&self, form: GumForm) -> [HalfJaw<'_>; 2] {
         let rows = if self.sign > 0.0 { [&self.plain, &self.fitted] } else { [&self.fitted, &self.plain] };
         let recession = self.recession();
         [(rows[0], -1.0), (rows[1], 1.0)].map(|(row, sign)| HalfJaw {
             half: &row.half,
             models: &row.models,
-            necks: gum::necks(&row.models),
+            necks: match form {
+                GumForm::Touched => Vec::new(),
+                GumForm::Drawn => gum::necks(&row.models),
+            },
             recession,
             sign,
         })

@@ -35,6 +35,13 @@ pub enum ToothKind {
     Molar,
 }
 
+impl ToothModel {
+    /// The form in the sizes of its place.
+    pub fn form_in_place(&self) -> ToothForm {
+        ToothForm { sizes: self.sizes, ..self.form }
+    }
+}
+
 /// Upper teeth from the midline outward.
 pub const UPPER: [ToothModel; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::UPPER;
