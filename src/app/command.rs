@@ -136,6 +136,10 @@ pub enum PracticeCommand {
     },
     /// Presses the clutch of an arm, with which the hand moves while the instrument stays, or releases it.
     PressClutch(bool),
+    /// Begins the registration of an arm's hand with the picture, or ends it without one.
+    RegisterHand(bool),
+    /// Takes over that the tip is seen at the cross that is shown.
+    TouchCross,
     /// Opens the mouth further by this angle, degrees; negative closes it.
     AdjustMouthOpening(f32),
     SetCamera(CameraPreset),

@@ -12,10 +12,17 @@ use typodont_render::Orbit;
 /// because the hand is free while it is placed anew.
 const SETTLING_TIME: f64 = 0.2;
 
-/// Returns the frame that fits a view: its right, its up, and out of the picture.
+/// Time in which a hand arrives in a frame at the latest, s: the force may have to fade out first.
+const ARRIVAL_TIME: f64 = 1.0;
+
+/// Returns the frame that fits a view: its right, its up, and out of the picture; or, for a hand that is registered with
+/// the picture, the frame in which the tip is where the hand is seen.
 pub fn frame_of(orbit: &Orbit, settings: &Settings) -> HandFrame {
+    if let Some(registration) = &settings.hand_registration {
+        return registration.frame(orbit);
+    }
     let orientation = if settings.hand_follows_view { orbit.world_from_view() } else { Quat::IDENTITY };
-    HandFrame { orientation, scale: settings.hand_scale }
+    HandFrame { orientation, scale: settings.hand_scale, middle: None }
 }
 
 /// Frame in which a hand moves, and the one that it is to move in.
@@ -26,11 +33,13 @@ pub struct HandPlacement {
     wanted: HandFrame,
     /// Time of the last change of the wanted frame, s.
     changed_at: f64,
+    /// Time at which the lesson was told, s.
+    placed_at: f64,
 }
 
 impl Default for HandPlacement {
     fn default() -> HandPlacement {
-        HandPlacement { placed: HandFrame::DEVICE, wanted: HandFrame::DEVICE, changed_at: 0.0 }
+        HandPlacement { placed: HandFrame::DEVICE, wanted: HandFrame::DEVICE, changed_at: 0.0, placed_at: 0.0 }
     }
 }
 
@@ -42,6 +51,16 @@ impl HandPlacement {
             (self.wanted, self.changed_at) = (wanted, now);
         }
         self.is_pending() && now - self.changed_at >= SETTLING_TIME
+    }
+
+    /// Takes over that the lesson was told of a frame at `now`, s.
+    pub fn place(&mut self, frame: HandFrame, now: f64) {
+        (self.placed, self.placed_at) = (frame, now);
+    }
+
+    /// True if the hand moves in a frame, and has done so long enough to have arrived.
+    pub fn has_arrived(&self, frame: HandFrame, now: f64) -> bool {
+        self.placed == frame && now - self.placed_at >= ARRIVAL_TIME
     }
 
     /// True if the hand does not move in the wanted frame yet.
@@ -73,13 +92,13 @@ mod tests {
     fn the_hand_follows_once_the_view_has_settled() {
         // Aim: the hand is not free all the while that somebody rotates the view. Method: a key that repeats, then a drag.
         let mut placement = HandPlacement::default();
-        let frame = |angle: f32| HandFrame { orientation: Quat::from_rotation_y(angle), scale: 1.0 };
+        let frame = |angle: f32| HandFrame { orientation: Quat::from_rotation_y(angle), scale: 1.0, middle: None };
         for repeat in 1..=10u8 {
             assert!(!placement.is_due(frame(0.1 * f32::from(repeat)), false, 0.03 * f64::from(repeat)));
         }
         assert!(!placement.is_due(frame(1.0), false, 0.45) && placement.is_pending());
         assert!(placement.is_due(frame(1.0), false, 0.51));
-        placement.placed = frame(1.0);
+        placement.place(frame(1.0), 0.51);
         assert!(!placement.is_due(frame(1.0), false, 9.0) && !placement.is_pending());
         assert!(!placement.is_due(frame(2.0), true, 9.1) && !placement.is_due(frame(2.0), true, 9.9));
         assert!(placement.is_due(frame(2.0), false, 10.2), "0.2 s after the button was let go");

@@ -512,7 +512,11 @@ mod tests {
             word(AnswerValue::Quadrant(3)),
             word(AnswerValue::Number(0.1)),
             Input::Chart(ChartInput::Calculus),
-            Input::PlaceHand(HandFrame { orientation: Quat::from_rotation_y(0.3), scale: 1.7 }),
+            Input::PlaceHand(HandFrame {
+                orientation: Quat::from_rotation_y(0.3),
+                scale: 1.7,
+                middle: Some(Vec3::new(1.0, -2.5, 0.25)),
+            }),
             Input::Abort,
         ];
         for input in inputs {

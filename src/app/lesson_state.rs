@@ -4,6 +4,7 @@ use crate::answer_draft::parse_draft;
 use crate::completion::CompletionState;
 use crate::controls_progress::{ControlsProgress, LessonProgress};
 use crate::hand_placement::HandPlacement;
+use crate::hand_registration::{HandRegistration, REGISTERING_FRAME, RegistrationDraft};
 use crate::lesson_backend::{LessonBackend, LessonClient, LessonCommand, LessonConfig, LessonEvent};
 #[cfg(not(target_family = "wasm"))]
 use crate::lesson_run::LessonRun;
@@ -78,6 +79,10 @@ pub struct LessonState {
     /// Placement of an arm's hand; `None` if the hand cannot be placed.
     hand_placement: Option<HandPlacement>,
     pub is_clutch_pressed: bool,
+    /// The registration of the hand with the picture, while it is made.
+    pub registration: Option<RegistrationDraft>,
+    /// True while the hand moves in the frame in which it is registered.
+    pub can_touch_cross: bool,
     /// Actions done in the running stage, for a stage that teaches the controls.
     pub controls: ControlsProgress,
     pub is_confirming_abort: bool,
@@ -157,6 +162,8 @@ impl LessonState {
             pointer_hand: PointerHand::default(),
             hand_placement,
             is_clutch_pressed: false,
+            registration: None,
+            can_touch_cross: false,
             controls: ControlsProgress::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
@@ -236,10 +243,29 @@ impl LessonState {
     /// Places the hand of an arm in a frame once that has settled, if a stage runs. For `is_dragging` and `now` see
     /// [`HandPlacement::is_due`].
     pub fn place_hand(&mut self, frame: HandFrame, is_dragging: bool, now: f64) {
-        let LessonState { stage: Some(_), hand_placement: Some(placement), client, .. } = self else { return };
+        let LessonState { stage: Some(_), hand_placement: Some(placement), client, registration, .. } = self else {
+            return;
+        };
+        let frame = if registration.is_some() { REGISTERING_FRAME } else { frame };
         if placement.is_due(frame, is_dragging, now) && client.send(LessonCommand::Input(Input::PlaceHand(frame))) {
-            placement.placed = frame;
+            placement.place(frame, now);
         }
+        self.can_touch_cross = placement.has_arrived(REGISTERING_FRAME, now);
+    }
+
+    /// Begins the registration of an arm's hand with the picture, or ends it without one.
+    pub fn register_hand(&mut self, begins: bool) {
+        let can_begin = self.has_placeable_hand() && self.stage.is_some();
+        self.registration = (begins && can_begin).then(RegistrationDraft::default);
+        self.can_touch_cross = false;
+    }
+
+    /// Takes over that the tip is seen at the cross that is shown; returns the registration after the last one.
+    pub fn touch_cross(&mut self) -> Option<HandRegistration> {
+        let hand = self.snapshot.filter(|_| self.can_touch_cross)?.hand;
+        let registration = self.registration.as_mut()?.touch(hand)?;
+        self.registration = None;
+        Some(registration)
     }
 
     /// Presses the clutch of an arm, if a stage runs, or releases it.

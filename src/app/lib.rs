@@ -54,6 +54,7 @@ mod lesson_state;
 mod lesson_scene;
 mod pointer_hand;
 mod hand_placement;
+mod hand_registration;
 mod lesson_sound;
 mod messages;
 mod transfer_function_draft;

@@ -1,5 +1,6 @@
 //! The user's settings, kept where the platform keeps them: in a file, or in the page's own storage.
 
+use crate::hand_registration::HandRegistration;
 use crate::i18n::{self, Translations};
 use crate::platform;
 use crate::user_folder::UserFolder;
@@ -31,6 +32,9 @@ pub struct Settings {
     pub hand_scale: f32,
     /// True if the handpiece of a mouse leads to the left.
     pub left_handed: bool,
+    /// Place of the picture in the space of the arm, if the hand is seen through a half-mirror.
+    pub hand_registration: Option<HandRegistration>,
+    pub mirrored: MirroredWindow,
     pub stereo: StereoMode,
     pub eye_distance_mm: f32,
     /// True to smooth edges; without a value edges are smoothed if a graphics processor draws.
@@ -63,6 +67,16 @@ pub enum StereoMode {
     FrameSequential,
 }
 
+/// Flip of the window for those who see it in a mirror.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MirroredWindow {
+    #[default]
+    No,
+    LeftRight,
+    TopBottom,
+}
+
 impl Default for Settings {
     fn default() -> Settings {
         Settings {
@@ -71,6 +85,8 @@ impl Default for Settings {
             hand_follows_view: true,
             hand_scale: 1.0,
             left_handed: false,
+            hand_registration: None,
+            mirrored: MirroredWindow::No,
             stereo: StereoMode::Off,
             eye_distance_mm: EYE_DISTANCE,
             smooth_edges: None,
@@ -120,6 +136,7 @@ impl Settings {
         let [least, most] = HandFrame::SCALES;
         self.hand_scale = self.hand_scale.clamp(least, most);
         self.eye_distance_mm = self.eye_distance_mm.clamp(0.0, 80.0);
+        self.hand_registration = self.hand_registration.filter(HandRegistration::is_valid);
         self.volume = self.volume.clamp(0.0, 1.0);
         self.font_size = self.font_size.clamp(*FONT_SIZES.start(), *FONT_SIZES.end());
         self
@@ -134,7 +151,14 @@ impl Settings {
             StereoMode::Anaglyph => StereoLayout::Anaglyph,
             StereoMode::TwoWindows | StereoMode::FrameSequential => StereoLayout::Left,
         };
-        Some(Stereo { layout, eye_distance: self.eye_distance_mm })
+        // Where the mirror exchanges the eyes' parts of the picture, they are exchanged before.
+        let exchanges = matches!(
+            (self.mirrored, layout),
+            (MirroredWindow::LeftRight, StereoLayout::SideBySide)
+                | (MirroredWindow::TopBottom, StereoLayout::TopBottom | StereoLayout::Rows)
+        );
+        let eye_distance = if exchanges { -self.eye_distance_mm } else { self.eye_distance_mm };
+        Some(Stereo { layout, eye_distance })
     }
 
     /// True if edges are smoothed. Without a choice of the user they are smoothed only if a graphics processor draws;

@@ -3,8 +3,7 @@
 //! Takes and gives millimetres and unit quaternions. Never scales: a millimetre of hand motion is a millimetre on the
 //! tooth.
 
-use glam::Mat3;
-pub use glam::{Quat, Vec2, Vec3};
+pub use glam::{Mat3, Quat, Vec2, Vec3};
 
 /// Rigid transform, also used as a position with an orientation.
 ///

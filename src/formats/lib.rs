@@ -29,6 +29,7 @@ pub mod nrrd;
 pub mod imaging;
 pub mod surfaces;
 pub mod obj;
+pub mod solid_mesh;
 pub mod picture;
 pub mod visual_mesh;
 pub mod csv_tables;

@@ -99,8 +99,13 @@ impl Orbit {
     /// mouse.
     pub fn panned(self, right: f32, up: f32) -> Orbit {
         let eye = self.viewpoint().eye(1.0);
-        let high = 2.0 * self.distance * eye.window.top;
+        let high = self.height_at_middle();
         Orbit { middle: self.middle - (eye.right * right + eye.up * up) * high, ..self }
+    }
+
+    /// Returns the height of the image in the plane through the centre, mm.
+    pub fn height_at_middle(&self) -> f32 {
+        2.0 * self.distance * self.viewpoint().eye(1.0).window.top
     }
 
     /// Returns the orientation of the image in the world: its right, its up, and out of it toward the eye.

@@ -66,8 +66,11 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
         ColliderGeometry::Sdf(field) => field.extent(),
         ColliderGeometry::Mesh(_) => workpiece.bounds().grown(Vec3::splat(REACH)),
     };
-    if let (ColliderGeometry::Mesh(obstacle), Some(_)) = (&shape.geometry, &workpiece.periodontium) {
-        // A neighbour that was grown is as fine as it needs to be.
+    let is_drawn_whole = workpiece.own_jaw || workpiece.periodontium.is_some();
+    if let ColliderGeometry::Mesh(obstacle) = &shape.geometry
+        && is_drawn_whole
+    {
+        // A jaw of one's own, or a neighbour that was grown: it is as fine as it needs to be.
         let mut mesh = obstacle.mesh();
         mesh.positions.iter_mut().for_each(|p| *p = shape.tooth_from_collider * *p);
         mesh.compute_normals();

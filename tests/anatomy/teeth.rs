@@ -296,7 +296,9 @@ fn the_program_writes_teeth_that_others_can_read() {
         let (document, _, _) = gltf::import(folder.join(format!("{name}.glb"))).unwrap();
         let parts: Vec<&str> = document.nodes().filter_map(|n| n.name()).collect();
         assert_eq!(parts, ["enamel", "dentine", "pulp"]);
-        let mesh = typodont_formats::obj::parse(&std::fs::read(folder.join(format!("{name}.obj"))).unwrap()).unwrap();
+        let bytes = std::fs::read(folder.join(format!("{name}.obj"))).unwrap();
+        let no_others = |_: &str| unreachable!("an OBJ file names no other");
+        let mesh = typodont_formats::solid_mesh::parse(&bytes, "obj", no_others).unwrap();
         assert!(mesh.volume_mm3() > 100.0);
     }
     let refused = program().args(["anatomy", "--fdi", "19", "-o"]).arg(&folder).output().unwrap();

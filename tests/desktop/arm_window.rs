@@ -218,3 +218,46 @@ fn the_clutch_moves_the_arm_alone_and_two_presses_recentre_it() {
     assert_eq!(desk.latest("clutch").as_deref(), Some("free"));
     verify(&place, &mut desk);
 }
+
+#[test]
+fn an_arm_behind_a_half_mirror_is_where_it_is_seen() {
+    // Aim: once the four crosses have been touched, the instrument is drawn where the hand is, in any view. Method: a picture 300 mm high that is inclined by 40 degrees and turned by 20 in the arm's space; the hand goes
+    // to the crosses in it, then to places of it; the recording holds.
+    const HEIGHT: f32 = 300.0;
+    let device_from_picture = Quat::from_rotation_y(0.35) * Quat::from_rotation_x(-0.7);
+    let middle = Vec3::new(15.0, -20.0, 40.0);
+    let hand_at = |x: f32, y: f32| middle + device_from_picture * Vec3::new(x, y, 0.0) * HEIGHT;
+    let place = folder("arm_half_mirror");
+    let arm = Arm::plug_in(Vec3::Z * FAR);
+    let Some(mut desk) = begun(&place, &arm) else { return };
+    desk.click_button("Register hand with picture …");
+    for (number, [x, y]) in [(1, [-0.35, 0.35]), (2, [0.35, 0.35]), (3, [0.35, -0.35]), (4, [-0.35, -0.35])] {
+        let ready = format!("{number} ready");
+        desk.until("cross", |cross| cross == ready);
+        arm.move_by(hand_at(x, y) - arm.position(), &mut desk);
+        desk.wait(Duration::from_millis(200));
+        if number == 2 {
+            desk.picture("arm-registration");
+        }
+        desk.send_key("Space");
+    }
+    desk.until("cross", |cross| cross == "none");
+    for view in ["Working area", "Occlusal", "Frontal"] {
+        desk.choose_from("View", view);
+        let world_from_view = world_from_view(&desk);
+        for [x, y] in [[0.3, 0.4], [-0.4, 0.2]] {
+            arm.move_by(hand_at(x, y) - arm.position(), &mut desk);
+            // From the middle of the picture to the right and upward, by the picture's height at the tooth.
+            desk.wait(Duration::from_millis(1200));
+            let seen = vector(&desk.latest("seen").unwrap());
+            // The hand, since matter may be in the way of the tip.
+            let hand = vector(&desk.latest("hand").unwrap());
+            let drawn = world_from_view.conjugate() * (hand - seen);
+            let high = desk.latest("high").unwrap().parse::<f32>().unwrap();
+            let expected = Vec3::new(x, y, 0.0) * high;
+            assert!(drawn.distance(expected) < 0.15, "{view}: {drawn} instead of {expected}");
+        }
+    }
+    desk.picture("arm-half-mirror");
+    verify(&place, &mut desk);
+}

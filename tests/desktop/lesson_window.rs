@@ -256,3 +256,34 @@ fn pictures_of_the_case_are_seen_before_the_work_and_beside_it() {
     assert!(shown(&mut desk) > 3 * small, "it is beside the tooth");
     desk.picture("case-practice");
 }
+
+#[test]
+fn a_window_seen_in_a_mirror_is_drawn_flipped() {
+    // Aim: who sees the screen in a mirror sees the window as everybody does, text and picture. Method: the same exercise at
+    // rest in three windows; the flipped pixels are those of the ordinary window, except along some edges.
+    let [width, height] = SCREEN_SIZE.map(|pixels| pixels as usize);
+    let draw = |mirrored: &str| {
+        let place = folder(&format!("mirrored_{mirrored}"));
+        harness::keep_settings(&place, &format!(r#"{{ "language": "en", "mirrored": "{mirrored}" }}"#));
+        let options = AppOptions { begins_at_once: true, ..exercise_options(&place, "scenarios/5-grinding.json") };
+        let mut desk = Window::open(&place, options)?;
+        desk.until("screen", |screen| screen == "practice");
+        desk.until("tooth", |tooth| tooth == "drawn");
+        desk.wait(Duration::from_secs(1));
+        desk.picture(&format!("mirrored-{mirrored}"));
+        Some(desk.pixels())
+    };
+    let Some(ordinary) = draw("no") else { return };
+    for (mirrored, flip) in [("left_right", [true, false]), ("top_bottom", [false, true])] {
+        let flipped = draw(mirrored).unwrap();
+        let is_equal = |i: &usize| {
+            let (x, y) = (i % width, i / width);
+            let x = if flip[0] { width - 1 - x } else { x };
+            let y = if flip[1] { height - 1 - y } else { y };
+            let (a, b) = (&ordinary[4 * i..4 * i + 3], &flipped[4 * (y * width + x)..][..3]);
+            a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) < 24)
+        };
+        let share = (0..width * height).filter(is_equal).count() as f32 / (width * height) as f32;
+        assert!(share > 0.99, "{mirrored}: {share} of the pixels are the same");
+    }
+}

@@ -13,13 +13,14 @@ use typodont_app::AppOptions;
 struct Task {
     exercise: &'static str,
     points: f64,
-    /// True if a warning is passed over while the section shows caries at the bur, as a fissure is opened through sound enamel,
-    /// and the bur is lifted where it shows the pulp under the bur.
+    /// True if warnings are passed over, as a fissure is opened through sound enamel, and the bur is lifted where the section
+    /// shows the pulp near the bur.
     looks_at_section: bool,
+    views: &'static [View],
 }
 
-const GRINDING: Task = Task { exercise: "5-grinding", points: 80.0, looks_at_section: false };
-const FISSURE: Task = Task { exercise: "8-fissure", points: 70.0, looks_at_section: true };
+const GRINDING: Task = Task { exercise: "5-grinding", points: 80.0, looks_at_section: false, views: &VIEWS };
+const FISSURE: Task = Task { exercise: "8-fissure", points: 70.0, looks_at_section: true, views: &VIEWS_INTO_FISSURE };
 
 /// Spacing of the pixels that are looked at, in each direction.
 const STRIDE: usize = 4;
@@ -42,19 +43,38 @@ const WARNING_PIXELS: usize = 30;
 /// Width and height of the lower right corner of the view with the section, which shows caries, too; pixels.
 const SECTION: [usize; 2] = [215, 260];
 
-/// The part of the section in which a millimetre of tissue is seen beside and under the bur: its left, top, right and bottom, by
-/// the distance from the lower right corner of the view, pixels.
-const AROUND_BUR: [usize; 4] = [127, 143, 87, 118];
-
-/// The part in which a millimetre of tissue is seen under the bur, in the same way.
+/// The part of the section in which a millimetre of tissue is seen under the bur: its left, top, right and bottom, by the
+/// distance from the lower right corner of the view, pixels.
 const UNDER_BUR: [usize; 4] = [117, 133, 97, 108];
 
 /// Time after which the trainee finishes, which leaves a minute of the ten.
 const TIME: Duration = Duration::from_secs(540);
 
-/// Views in turn, as chosen from the list, and presses of the key that turns to the right from there; negative to the left.
-const VIEWS: [(&str, i32); 5] =
-    [("Working area", 0), ("Occlusal", 0), ("Working area", 12), ("Working area", -12), ("Working area", 26)];
+/// A view as chosen from the list, and presses of the keys that turn it from there: to the right and up; negative to the left and
+/// down.
+type View = (&'static str, [i32; 2]);
+
+/// Views in turn.
+const VIEWS: [View; 5] = [
+    ("Working area", [0, 0]),
+    ("Occlusal", [0, 0]),
+    ("Working area", [12, 0]),
+    ("Working area", [-12, 0]),
+    ("Working area", [26, 0]),
+];
+
+/// The same, and four that look steeply under the enamel around the opening.
+const VIEWS_INTO_FISSURE: [View; 9] = [
+    VIEWS[0],
+    VIEWS[1],
+    VIEWS[2],
+    VIEWS[3],
+    VIEWS[4],
+    ("Occlusal", [0, -5]),
+    ("Occlusal", [16, -5]),
+    ("Occlusal", [31, -5]),
+    ("Occlusal", [-16, -5]),
+];
 
 /// One trial at a time: a trainee must see in time when to let go.
 static TRIAL: Mutex<()> = Mutex::new(());
@@ -79,9 +99,7 @@ struct Seen {
     is_brown: Vec<bool>,
     /// True while a warning stands below the view.
     is_warned: bool,
-    /// True if the section shows caries beside or under the bur.
-    is_brown_near_bur: bool,
-    /// True if it shows the pulp under the bur.
+    /// True if the section shows the pulp under the bur.
     is_pulp_under_bur: bool,
 }
 
@@ -108,9 +126,10 @@ fn is_brown(red: u8, green: u8, blue: u8) -> bool {
     red > 55.0 && red < 200.0 && red > 1.28 * green && green > 1.22 * blue
 }
 
-/// True for the colour of warnings, and of the pulp in the section.
+/// True for the colour of warnings, and of the pulp in the section; not for one between two browns.
 fn is_red(red: u8, green: u8, blue: u8) -> bool {
-    red > 120 && green < 90 && blue < 90
+    let [red, green, blue] = [red, green, blue].map(u32::from);
+    red > 120 && red > 2 * green.max(blue)
 }
 
 struct Trial {
@@ -120,6 +139,7 @@ struct Trial {
     view: [usize; 4],
     is_touching: bool,
     looks_at_section: bool,
+    views: &'static [View],
     begun: Instant,
 }
 
@@ -142,9 +162,9 @@ impl Trial {
                 .flat_map(|y| (right - left_by..right - right_by).map(move |x| pixel(x, y)))
                 .any(|seen| is_sought(seen[0], seen[1], seen[2]))
         };
-        let (is_brown_near_bur, is_pulp_under_bur) = (shows(AROUND_BUR, is_brown), shows(UNDER_BUR, is_red));
+        let is_pulp_under_bur = shows(UNDER_BUR, is_red);
         let is_brown = (0..columns * rows).map(is_brown_at).collect();
-        Seen { columns, rows, is_brown, is_warned, is_brown_near_bur, is_pulp_under_bur }
+        Seen { columns, rows, is_brown, is_warned, is_pulp_under_bur }
     }
 
     fn place(&self, [x, y]: Spot) -> [i32; 2] {
@@ -183,7 +203,7 @@ impl Trial {
     }
 
     /// Presses on what is brown in this view until nothing is, or all that is stays brown. Returns the number of spots that
-    /// became less brown.
+    /// became clearly less brown.
     fn clear_view(&mut self) -> usize {
         let (mut stuck, mut cleared) = (Vec::new(), 0);
         while !self.is_over() {
@@ -201,7 +221,7 @@ impl Trial {
                     (least, since) = (brown, Instant::now());
                 }
                 let is_enough = match self.looks_at_section {
-                    true => seen.is_pulp_under_bur || seen.is_warned && !seen.is_brown_near_bur,
+                    true => seen.is_pulp_under_bur,
                     false => seen.is_warned,
                 };
                 if brown == 0 || is_enough {
@@ -209,7 +229,7 @@ impl Trial {
                 }
             }
             self.press(spot, false);
-            cleared += usize::from(least < before);
+            cleared += usize::from(least + SPECK <= before);
             if least > 0 {
                 stuck.push(spot);
             }
@@ -218,11 +238,14 @@ impl Trial {
         cleared
     }
 
-    fn show(&mut self, (view, turns): (&str, i32)) {
+    fn show(&mut self, (view, turns): View) {
         self.desk.choose_from("View", view);
-        let key = if turns < 0 { "ctrl+ArrowLeft" } else { "ctrl+ArrowRight" };
-        for _ in 0..turns.abs() {
-            self.desk.send_key(key);
+        for (turns, keys) in
+            turns.into_iter().zip([["ctrl+ArrowLeft", "ctrl+ArrowRight"], ["ctrl+ArrowDown", "ctrl+ArrowUp"]])
+        {
+            for _ in 0..turns.abs() {
+                self.desk.send_key(keys[usize::from(turns > 0)]);
+            }
         }
         // The picture is drawn sharply once it stands still.
         self.desk.wait(Duration::from_millis(700));
@@ -232,9 +255,9 @@ impl Trial {
     fn work(&mut self) {
         loop {
             let mut cleared = 0;
-            for view in VIEWS {
+            for view in self.views {
                 if !self.is_over() {
-                    self.show(view);
+                    self.show(*view);
                     cleared += self.clear_view();
                 }
             }
@@ -254,7 +277,7 @@ struct Outcome {
 
 /// Performs the exercise by looking at the window; `None` where nothing can draw it.
 fn perform(task: &Task, seed: u64, pointer: Pointer) -> Option<Outcome> {
-    let Task { exercise, looks_at_section, .. } = *task;
+    let Task { exercise, looks_at_section, views, .. } = *task;
     let place = folder(&format!("pointer_window_{exercise}_{pointer:?}_{seed}"));
     harness::keep_settings(&place, r#"{ "language": "en", "introduction_first": false }"#);
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{exercise}.json"));
@@ -265,7 +288,7 @@ fn perform(task: &Task, seed: u64, pointer: Pointer) -> Option<Outcome> {
     desk.until("hand", |_| true);
     desk.press("o", "pointer", "held");
     let view = desk.view_of("The tooth");
-    let mut trial = Trial { desk, pointer, view, is_touching: false, looks_at_section, begun: Instant::now() };
+    let mut trial = Trial { desk, pointer, view, is_touching: false, looks_at_section, views, begun: Instant::now() };
     trial.work();
     let Trial { mut desk, begun, .. } = trial;
     let seconds = begun.elapsed().as_secs();

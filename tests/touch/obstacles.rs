@@ -18,7 +18,7 @@ use typodont_core::touch::{ClosedMesh, Collider, ColliderGeometry, WorkingEnd};
 use typodont_exercise::scenario;
 use typodont_exercise::scenario::ResolveMode;
 use typodont_formats::diagnostic::SourceText;
-use typodont_formats::{Library, obj};
+use typodont_formats::{Library, solid_mesh};
 
 /// A ball as an OBJ file: rings and slices of triangles.
 fn ball_obj(radius: f32, rings: usize, slices: usize) -> String {
@@ -70,7 +70,8 @@ fn groove_obj(half_angle: f32, deep: f32) -> String {
 
 /// A world of one mesh, placed as given, and no voxels near.
 fn around(text: &str, tooth_from_shape: Pose, end: WorkingEnd) -> Setup {
-    let obstacle = ClosedMesh::new(&obj::parse(text.as_bytes()).unwrap()).unwrap();
+    let mesh = solid_mesh::parse(text.as_bytes(), "obj", |_| unreachable!("an OBJ file names no other")).unwrap();
+    let obstacle = ClosedMesh::new(&mesh).unwrap();
     let empty = volume([4, 4, 4], 0.1, |_| (9.0, HARD));
     let mut setup = setup(empty, end, false);
     setup.scene.colliders = vec![Collider {
@@ -210,4 +211,63 @@ fn meshes_that_cannot_be_touched_are_complained_about() {
     check(&folder, &ball_obj(6000.0, 10, 20), &[("wrong-size", at)]);
     check(&folder, &ball_obj(6.0, 400, 400), &[("too-large", at)]);
     check(&folder, "no mesh at all", &[("empty-mesh", at)]);
+}
+
+/// A closed surface in OBJ as ASCII STL.
+fn stl(obj: &str) -> String {
+    let mesh = solid_mesh::parse(obj.as_bytes(), "obj", |_| unreachable!("an OBJ file names no other")).unwrap();
+    let facet = |triangle: &[u32; 3]| {
+        let corner = |i: &u32| {
+            let Vec3 { x, y, z } = mesh.positions[*i as usize];
+            format!("vertex {x} {y} {z}\n")
+        };
+        format!(
+            "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n",
+            triangle.iter().map(corner).collect::<String>()
+        )
+    };
+    format!("solid tooth\n{}endsolid tooth\n", mesh.triangles.iter().map(facet).collect::<String>())
+}
+
+#[test]
+fn a_jaw_of_ones_own_stands_in_place_of_ours_and_its_pockets_are_probed() {
+    // Aim: a school's own jaw, with the gingiva of a periodontium next to the tooth. Method: the charting exercise among two
+    // teeth from STL over a ridge from OBJ; whoever probes carefully charts as well as in the generated jaw, nothing of
+    // that is drawn, and the recording holds without the files.
+    let folder = folder("own_jaw");
+    let shipped = std::fs::read_to_string("scenarios/15-charting.json").unwrap();
+    let mut scenario: Value = serde_json::from_str(&shipped).unwrap();
+    let jaw = &mut scenario["scene"]["jaw"];
+    let tooth = |y: f32| json!({ "mesh": "tooth.stl", "tissue": "neighbour", "position_mm": [0, y, 4] });
+    let ridge = json!({ "mesh": "ridge.obj", "tissue": "gingiva", "position_mm": [0, 0, -10] });
+    jaw["around"] = json!([ridge, tooth(-10.5), tooth(10.5)]);
+    std::fs::write(folder.join("ridge.obj"), groove_obj(0.5, 1.0)).unwrap();
+    std::fs::write(folder.join("tooth.stl"), stl(&ball_obj(4.5, 20, 40))).unwrap();
+    let file = folder.join("own-jaw.json");
+    std::fs::write(&file, scenario.to_string()).unwrap();
+    let refused = typodont(&["check", file.to_str().unwrap()]);
+    assert!(complained(&refused).contains("two-gums"), "{}", complained(&refused));
+    scenario["scene"]["jaw"]["own_jaw"] = json!(true);
+    std::fs::write(&file, scenario.to_string()).unwrap();
+
+    let library = Library::shipped().with_folder(&folder);
+    let source = SourceText::new("own-jaw.json", scenario.to_string());
+    let resolved = scenario::resolve(source, &library, ResolveMode::MakeWorkpiece).unwrap();
+    let workpiece = scenario::Workpiece::make(&resolved, 1).unwrap();
+    let mouth = typodont_scene::Mouth::around(&workpiece, &resolved.tissues).unwrap();
+    let drawn: Vec<usize> =
+        mouth.solids(20.0).iter().map(|solid| solid.mesh.triangles.len()).filter(|&n| n > 0).collect();
+    assert_eq!(drawn.len(), 4, "the ridge, two teeth, and the gingiva with its sulcus: {drawn:?} triangles");
+
+    let points = |file: &str| {
+        let bundle = run(file, "careful", &folder, &["--seed", "3"]);
+        (session(&bundle)["grade"]["points"].as_f64().unwrap(), bundle)
+    };
+    let (ours, _) = points("scenarios/15-charting.json");
+    let (own, bundle) = points(file.to_str().unwrap());
+    assert!((own - ours).abs() < 3.0 && own > 60.0, "{own} points in the own jaw, {ours} in ours");
+    std::fs::remove_file(folder.join("ridge.obj")).unwrap();
+    std::fs::remove_file(folder.join("tooth.stl")).unwrap();
+    let verified = typodont(&["verify", bundle.to_str().unwrap()]);
+    assert!(verified.status.success(), "{}", complained(&verified));
 }

@@ -175,6 +175,7 @@ impl App {
             AppCommand::LeaveKiosk => self.leave_kiosk(ctx),
             AppCommand::CloseWindow(is_closing) => self.confirm_close(is_closing, ctx),
             AppCommand::ApplySettings(settings) => self.apply_settings(*settings, ctx),
+            AppCommand::Practice(PracticeCommand::TouchCross) => self.touch_cross(ctx),
             AppCommand::Practice(command) => {
                 if let Screen::Lesson(lesson) = &mut self.screen {
                     execute_in_lesson(lesson, command);
@@ -463,6 +464,16 @@ impl App {
         };
     }
 
+    /// Takes over that an arm's tip is seen at a cross of the picture; after the last one the hand is registered.
+    fn touch_cross(&mut self, ctx: &egui::Context) {
+        if let Screen::Lesson(lesson) = &mut self.screen
+            && let Some(registration) = lesson.touch_cross()
+        {
+            let settings = Settings { hand_registration: Some(registration), ..self.settings.clone() };
+            self.apply_settings(settings, ctx);
+        }
+    }
+
     pub(super) fn apply_settings(&mut self, settings: Settings, ctx: &egui::Context) {
         self.words = i18n::select_language(&self.languages, &settings.language);
         if settings.font_size == self.settings.font_size {
@@ -511,6 +522,9 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),
         PracticeCommand::PressClutch(is_pressed) => lesson.press_clutch(is_pressed),
+        PracticeCommand::RegisterHand(begins) => lesson.register_hand(begins),
+        // The settings keep what the last cross gives: `App::touch_cross`.
+        PracticeCommand::TouchCross => {}
         PracticeCommand::AdjustMouthOpening(by) => {
             if let Some(scene) = &mut lesson.scene {
                 scene.open_mouth(by);

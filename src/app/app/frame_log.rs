@@ -98,7 +98,15 @@ fn log_lesson(log: &mut StateLog, lesson: &LessonState, view: &LessonView) {
         log.record("may_join", address);
     }
     log.record("hand_frame", if lesson.is_hand_placement_pending() { "pending" } else { "placed" });
+    let cross = lesson.registration.as_ref().map(|draft| (draft.next_cross() + 1, lesson.can_touch_cross));
+    log.record(
+        "cross",
+        cross.map_or("none".into(), |(n, is_ready)| format!("{n}{}", if is_ready { " ready" } else { "" })),
+    );
     log.record("clutch", if lesson.is_clutch_pressed { "pressed" } else { "free" });
+    let [x, y, z] = lesson.orbit.middle.to_array();
+    log.record("seen", format!("{x:.2} {y:.2} {z:.2}"));
+    log.record("high", format!("{:.2}", lesson.orbit.height_at_middle()));
     log.record("view", format!("{:.4} {:.4}", lesson.orbit.azimuth, lesson.orbit.elevation));
     if let Some(scene) = &lesson.scene {
         log.record("open", scene.mouth_opening);

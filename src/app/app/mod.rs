@@ -24,6 +24,7 @@ use crate::screen::Screen;
 use crate::session_history::SessionHistory;
 use crate::settings::{self, Settings};
 use crate::state_log::StateLog;
+use crate::ui::mirrored_window::MirrorPlugin;
 use crate::ui::views::Views;
 use crate::ui::{shortcuts, theme, ui_anchors, viewport};
 use crate::user_folder::UserFolder;
@@ -119,6 +120,7 @@ impl App {
         let (replacements, broken) = read_sounds(&folder);
         complaints.extend((!broken.is_empty()).then(|| headlines(&broken)));
         theme::apply(ctx, &settings);
+        ctx.add_plugin(MirrorPlugin::default());
         let (exercise_list, screen) = first_screen(&mut options, &settings);
         let begins = options.begins_at_once;
         let state_log = StateLog::new(options.state_log.take());
@@ -245,7 +247,9 @@ impl eframe::App for App {
         let (pointer, screen) = (ctx.pointer_latest_pos(), ctx.content_rect());
         let seconds = input.time.map_or(input.predicted_dt, |now| (now - ctx.input(|before| before.time)) as f32);
         let (events, camera) = self.gamepad.update(pad, pointer, screen, seconds);
-        input.events.extend(events);
+        // They are in the window as it is drawn, and are flipped with those of a mouse.
+        let mirrored = self.settings.mirrored;
+        input.events.extend(events.into_iter().map(|event| mirrored.event(event, screen)));
         self.gamepad_camera = camera;
     }
 
@@ -254,6 +258,7 @@ impl eframe::App for App {
         self.handle_close_request(ctx);
         self.save_settings(ctx);
         self.fill_screen_for_glasses(ctx);
+        ctx.plugin::<MirrorPlugin>().lock().mirrored = self.settings.mirrored;
         platform::set_unsaved_work(self.has_unsaved_work());
         // A hidden window has no frame that would ask for the next one.
         if events::is_hidden(ctx) {

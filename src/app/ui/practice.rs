@@ -11,8 +11,8 @@ use crate::ui::lesson_view::PictureFrame;
 use crate::ui::viewport::Viewport;
 use crate::ui::views::Views;
 use crate::ui::{
-    case_pictures, controls_guide, periodontal_chart, questions, section_view, shutter_glasses, theme, tools_panel,
-    viewport_input,
+    case_pictures, controls_guide, periodontal_chart, questions, registration_view, section_view, shutter_glasses,
+    theme, tools_panel, viewport_input,
 };
 use eframe::egui::{self, Color32, Pos2, Rect, Sense, Stroke};
 use typodont_core::frame::Vec3;
@@ -293,7 +293,7 @@ fn view_ui(
             let right = viewport.as_ref().and_then(Viewport::second_eye_texture).filter(|_| takes_turn);
             ui.painter().image(right.unwrap_or(id), rect, whole, Color32::WHITE);
             if settings.is_frame_sequential() {
-                shutter_glasses::eye_mark_ui(ui.ctx());
+                shutter_glasses::eye_mark_ui(ui.ctx(), settings.mirrored);
             }
             if settings.stereo().is_none() {
                 pointer_ring(ui, lesson, rect);
@@ -301,7 +301,12 @@ fn view_ui(
             if is_section_allowed(lesson) {
                 section_view::section_ui(ui, rect, lesson, &mut view.section, words);
             }
-            controls_guide::controls_guide_ui(ui, lesson, rect, words);
+            match &lesson.registration {
+                Some(draft) => {
+                    registration_view::registration_ui(ui, rect, draft, lesson.can_touch_cross, words, commands);
+                }
+                None => controls_guide::controls_guide_ui(ui, lesson, rect, words),
+            }
         }
         Some(Ok(None)) => {
             ui.painter().rect_filled(rect, 0, Color32::from_rgb(0xd5, 0xdc, 0xe0));

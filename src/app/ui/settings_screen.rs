@@ -4,7 +4,7 @@ use crate::command::AppCommand;
 use crate::i18n::Translations;
 use crate::platform;
 use crate::platform::DeviceAnswer;
-use crate::settings::{FONT_SIZES, Settings, StereoMode};
+use crate::settings::{FONT_SIZES, MirroredWindow, Settings, StereoMode};
 use crate::ui::{theme, ui_anchors};
 use eframe::egui;
 use std::path::Path;
@@ -19,6 +19,12 @@ const STEREO_MODES: [(StereoMode, &str); 7] = [
     (StereoMode::Anaglyph, "settings.stereo_anaglyph"),
     (StereoMode::TwoWindows, "settings.stereo_two"),
     (StereoMode::FrameSequential, "settings.stereo_shutter"),
+];
+
+const MIRRORED_WINDOWS: [(MirroredWindow, &str); 3] = [
+    (MirroredWindow::No, "settings.mirrored_no"),
+    (MirroredWindow::LeftRight, "settings.mirrored_left_right"),
+    (MirroredWindow::TopBottom, "settings.mirrored_top_bottom"),
 ];
 
 /// Everything beside the settings that their screen shows.
@@ -49,6 +55,7 @@ pub fn settings_ui(
         }
         left_handed_row(ui, &mut new, words);
         hand_rows(ui, &mut new, words);
+        mirrored_row(ui, &mut new, words);
         stereo_row(ui, &mut new, words);
         row(ui, words.get("settings.eyes"), |ui| {
             let slider = egui::Slider::new(&mut new.eye_distance_mm, 0.0..=80.0).suffix(" mm").fixed_decimals(0);
@@ -195,6 +202,17 @@ fn left_handed_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translati
 /// Draws how the hand of an arm moves; a mouse works in the picture anyway.
 fn hand_rows(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
     let is_arm = settings.device != "mouse";
+    if let Some(registration) = &settings.hand_registration {
+        let error = format!("{:.1} mm", registration.error_mm);
+        ui.label(words.get("settings.registered"));
+        let is_kept = ui.horizontal(|ui| {
+            ui.label(words.format("settings.registered_error", error));
+            !ui.button(words.get("settings.forget_registration")).clicked()
+        });
+        settings.hand_registration = settings.hand_registration.filter(|_| is_kept.inner);
+        ui.end_row();
+        return;
+    }
     ui.label("");
     let follows = egui::Checkbox::new(&mut settings.hand_follows_view, words.get("settings.hand_follows_view"));
     ui.add_enabled(is_arm, follows);
@@ -204,6 +222,20 @@ fn hand_rows(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
         let slider =
             egui::Slider::new(&mut settings.hand_scale, least..=most).step_by(0.1).fixed_decimals(1).suffix(" ×");
         ui.add_enabled(is_arm, slider)
+    });
+}
+
+/// Draws how the window is flipped for those who see it in a mirror.
+fn mirrored_row(ui: &mut egui::Ui, settings: &mut Settings, words: &Translations) {
+    row(ui, words.get("settings.mirrored"), |ui| {
+        let current =
+            MIRRORED_WINDOWS.iter().find(|(way, _)| *way == settings.mirrored).map_or("", |(_, key)| words.get(key));
+        let choice = egui::ComboBox::from_id_salt("mirrored").selected_text(current).show_ui(ui, |ui| {
+            for (way, key) in MIRRORED_WINDOWS {
+                ui.selectable_value(&mut settings.mirrored, way, words.get(key));
+            }
+        });
+        choice.response.on_hover_text(words.get("settings.mirrored_about"))
     });
 }
 

@@ -215,6 +215,15 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
         }
         return;
     }
+    if lesson.registration.is_some() {
+        if pressed(Key::Space) || pressed(Key::Enter) {
+            commands.push(AppCommand::Practice(PracticeCommand::TouchCross));
+        }
+        if pressed(Key::Escape) {
+            commands.push(AppCommand::Practice(PracticeCommand::RegisterHand(false)));
+        }
+        return;
+    }
     if is_done && lesson.stage().is_some_and(|stage| stage.ends.confirmed) {
         commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
     }

@@ -4,6 +4,7 @@
 //! eye, over the left three quarters in frames of the right eye, black beside it. It is the line code that emitters for
 //! CrystalEyes glasses read from the picture's last rows (as Psychtoolbox draws it, `SetStereoBlueLineSyncParameters`).
 
+use crate::settings::MirroredWindow;
 use eframe::egui::{Color32, Context, Id, LayerId, Order, Rect, Vec2};
 
 /// Share of the screen's width that is white in frames of the left and of the right eye.
@@ -17,12 +18,13 @@ pub fn is_right_eye(ctx: &Context) -> bool {
     ctx.cumulative_frame_nr() % 2 == 1
 }
 
-/// Draws the mark of this frame's eye over everything else.
-pub fn eye_mark_ui(ctx: &Context) {
+/// Draws the mark of this frame's eye over everything else, where the emitter reads it, also in a window that is flipped.
+pub fn eye_mark_ui(ctx: &Context, mirrored: MirroredWindow) {
     let screen = ctx.viewport_rect();
     let row = Rect::from_min_max(screen.left_bottom() - Vec2::Y * (HEIGHT / ctx.pixels_per_point()), screen.max);
     let marked = MARKED[usize::from(is_right_eye(ctx))] * row.width();
     let painter = ctx.layer_painter(LayerId::new(Order::Debug, Id::unique("eye mark")));
-    painter.rect_filled(row, 0, Color32::BLACK);
-    painter.rect_filled(Rect::from_min_size(row.min, Vec2::new(marked, row.height())), 0, Color32::WHITE);
+    let white = Rect::from_min_size(row.min, Vec2::new(marked, row.height()));
+    painter.rect_filled(mirrored.rect(row, screen), 0, Color32::BLACK);
+    painter.rect_filled(mirrored.rect(white, screen), 0, Color32::WHITE);
 }

@@ -13,22 +13,34 @@ use crate::tick::Tick;
 pub struct HandFrame {
     /// `world_from_device`.
     pub orientation: Quat,
-    /// Distance in the world per distance of the hand, within [`HandFrame::SCALES`].
+    /// Distance in the world per distance of the hand, [`HandFrame::LEAST_SCALE`] to the end of [`HandFrame::SCALES`].
     pub scale: f32,
+    /// Point of the world at which the middle of the device's workspace is, mm, where the hand is to be seen at a certain
+    /// place; `None` leaves it where the tip's path brings it.
+    pub middle: Option<Vec3>,
 }
 
 impl HandFrame {
     /// The space of the device is the world.
-    pub const DEVICE: HandFrame = HandFrame { orientation: Quat::IDENTITY, scale: 1.0 };
+    pub const DEVICE: HandFrame = HandFrame { orientation: Quat::IDENTITY, scale: 1.0, middle: None };
 
-    /// Scales of a hand. A hand at 0.5 moves half as far on the tooth, for fine work; at 4, a small device reaches all
-    /// teeth of a jaw.
+    /// Scales of a hand that are offered. A hand at 0.5 moves half as far on the tooth, for fine work; at 4, a small device
+    /// reaches all teeth of a jaw.
     pub const SCALES: [f32; 2] = [0.5, 4.0];
 
-    /// Returns true for a rotation and a scale within [`HandFrame::SCALES`].
+    /// Least scale: that of a hand in a picture in which a tooth fills a large screen.
+    pub const LEAST_SCALE: f32 = 0.02;
+
+    /// Farthest middle of a workspace along each axis, mm: beyond the view of any camera.
+    const FARTHEST_MIDDLE: f32 = 10_000.0;
+
+    /// Returns true for a rotation, a scale from [`HandFrame::LEAST_SCALE`] and a finite middle.
     pub fn is_valid(&self) -> bool {
-        let [least, most] = HandFrame::SCALES;
-        Pose { orientation: self.orientation, ..Pose::IDENTITY }.is_valid() && (least..=most).contains(&self.scale)
+        let scales = HandFrame::LEAST_SCALE..=HandFrame::SCALES[1];
+        let is_near = |middle: Vec3| middle.is_finite() && middle.abs().max_element() <= HandFrame::FARTHEST_MIDDLE;
+        Pose { orientation: self.orientation, ..Pose::IDENTITY }.is_valid()
+            && scales.contains(&self.scale)
+            && self.middle.is_none_or(is_near)
     }
 
     /// Returns a movement of the hand as a movement in the world, mm.
@@ -41,6 +53,7 @@ impl HandFrame {
         HandFrame {
             orientation: self.orientation.lerp(to.orientation, share),
             scale: self.scale + (to.scale - self.scale) * share,
+            middle: to.middle,
         }
     }
 }
@@ -68,7 +81,8 @@ pub(super) enum TipPath {
     Stay(Vec3),
     /// The tip keeps its place in the workspace of the device, which turns about the origin of the world.
     Turn,
-    /// The tip moves from a point to where the hand is once the middle of its workspace is at the origin again.
+    /// The tip moves from a point to where the hand is once the middle of its workspace is at the frame's middle, or at the
+    /// origin again.
     Centre(Vec3),
 }
 
@@ -179,6 +193,11 @@ impl HandMapping {
         self.change.is_some()
     }
 
+    /// True if the middle of the workspace is at a certain point, or on its way there: the hand is where it is seen.
+    pub fn is_registered(&self) -> bool {
+        self.change.map_or(self.frame, |change| change.to).middle.is_some()
+    }
+
     /// True while the tip stays at a point.
     pub fn is_tip_held(&self) -> bool {
         self.change.is_some_and(|change| matches!(change.path, TipPath::Stay(_)))
@@ -211,7 +230,7 @@ impl HandMapping {
             return false;
         }
         if !self.has_hand {
-            self.frame = to;
+            (self.frame, self.middle) = (to, to.middle.unwrap_or_default());
             self.is_device_space = self.frame == HandFrame::DEVICE;
             return false;
         }
@@ -226,6 +245,10 @@ impl HandMapping {
             return false;
         }
         let to = self.change.map_or(self.frame, |change| change.to);
+        if is_pressed && to.middle.is_some() {
+            // The tip would no longer be where the hand is seen.
+            return false;
+        }
         if is_pressed {
             self.clutch.press(now);
             self.begin(to, TipPath::Stay(tip), rendered);
@@ -273,7 +296,8 @@ impl HandMapping {
                 self.middle + moved
             }
             TipPath::Centre(tip) => {
-                self.middle = (tip - moved) * (1.0 - share);
+                let to = change.to.middle.unwrap_or_default();
+                self.middle = to + (tip - moved - to) * (1.0 - share);
                 self.middle + moved
             }
         };
@@ -313,7 +337,7 @@ mod tests {
         // and the tip has not moved meanwhile. Method: turn with the tip held, then move by 2 mm at half scale.
         let mut mapping = HandMapping::new();
         let tip = mapping.world_pose(&hand(10.0, 5.0, -3.0)).position;
-        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 0.5 };
+        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 0.5, middle: None };
         assert!(mapping.place(frame, TipPath::Stay(tip), Wrench::ZERO));
         let (ticks, after) = finish(&mut mapping, &hand(10.0, 5.0, -3.0));
         assert_eq!((ticks, after, mapping.is_changing()), (MOVE_TICKS, tip, false));
@@ -327,13 +351,40 @@ mod tests {
         // Aim: a hand far from the tooth is not displaced in its workspace. Method: there and back.
         let mut mapping = HandMapping::new();
         mapping.world_pose(&hand(0.0, 0.0, 60.0));
-        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 1.0 };
+        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 1.0, middle: None };
         mapping.place(frame, TipPath::Turn, Wrench::ZERO);
         let (_, tip) = finish(&mut mapping, &hand(0.0, 0.0, 60.0));
         assert!(tip.distance(Vec3::X * 60.0) < 1e-4, "{tip}");
         mapping.place(HandFrame::DEVICE, TipPath::Turn, Wrench::ZERO);
         finish(&mut mapping, &hand(0.0, 0.0, 60.0));
         assert_eq!(mapping.world_pose(&hand(1.0, 2.0, 3.0)).position, Vec3::new(1.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn a_frame_with_a_middle_brings_the_hand_to_its_place_in_the_world() {
+        // Aim: where a hand is registered with the picture, its tip arrives where the hand is seen, without a jump, the clutch
+        // cannot move it away, and a frame without a middle brings it back. Method: half the scale, a quarter turn and a
+        // shifted middle; the greatest step of the tip of a hand that rests.
+        let mut mapping = HandMapping::new();
+        let rest = hand(20.0, 0.0, 0.0);
+        let from = mapping.world_pose(&rest).position;
+        let orientation = Quat::from_rotation_z(FRAC_PI_2);
+        let frame = HandFrame { orientation, scale: 0.5, middle: Some(Vec3::new(1.0, -4.0, 3.0)) };
+        assert!(mapping.place(frame, TipPath::Centre(from), Wrench::ZERO));
+        let (mut tip, mut step) = (from, 0.0_f32);
+        while let Some(free) = mapping.advance(&rest) {
+            step = step.max(tip.distance(free.world_from_handle.position));
+            tip = free.world_from_handle.position;
+        }
+        assert!(step < 0.3, "{step} mm in a tick");
+        let there = Vec3::new(1.0, 6.0, 3.0);
+        assert!(tip.distance(there) < 1e-4, "{tip}");
+        assert!(mapping.world_pose(&rest).position.distance(there) < 1e-4);
+        assert!(mapping.is_registered() && !mapping.press_clutch(true, Tick(9), there, Wrench::ZERO));
+        assert!(!mapping.press_clutch(false, Tick(99), there, Wrench::ZERO) && !mapping.is_changing());
+        assert!(mapping.place(HandFrame::DEVICE, TipPath::Centre(there), Wrench::ZERO));
+        let (_, end) = finish(&mut mapping, &rest);
+        assert!(end.distance(rest.position) < 1e-4 && !mapping.is_registered(), "{end}");
     }
 
     #[test]
@@ -385,10 +436,13 @@ mod tests {
 
     #[test]
     fn only_rotations_and_scales_in_range_are_frames() {
-        let turned = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 4.0 };
+        let turned = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 4.0, middle: None };
         assert!(turned.is_valid() && HandFrame::DEVICE.is_valid());
-        for scale in [0.49, 4.1, f32::NAN] {
+        for scale in [0.019, 4.1, f32::NAN] {
             assert!(!HandFrame { scale, ..turned }.is_valid(), "{scale}");
+        }
+        for x in [10_001.0, f32::NAN] {
+            assert!(!HandFrame { middle: Some(Vec3::new(x, 0.0, 0.0)), ..turned }.is_valid(), "{x}");
         }
         for orientation in [Quat::from_xyzw(0.0, 0.0, 0.0, 0.0), Quat::NAN] {
             assert!(!HandFrame { orientation, ..turned }.is_valid(), "{orientation}");

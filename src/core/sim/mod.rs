@@ -62,9 +62,10 @@ pub enum Command {
     /// Selects the filling that carriers place, or none.
     SetFilling { label: Option<Label> },
     /// Moves the space of the hand to a frame. Meanwhile the hand is free; the tip stays if it is at the tooth or touches
-    /// anything, and otherwise keeps its place in the workspace of the device.
+    /// anything, and otherwise keeps its place in the workspace of the device. A frame with a middle moves the tip to where
+    /// the hand is in it, and the one after that brings the middle back to the origin of the world.
     PlaceHand { frame: HandFrame },
-    /// Presses or releases the clutch: while it is pressed, the hand is free and the tip stays. The second of two short
+    /// Presses or releases the clutch, unless the frame has a middle: while it is pressed, the hand is free and the tip stays. The second of two short
     /// presses brings the middle of the device's workspace back to the origin of the world.
     PressClutch { is_pressed: bool },
 }
@@ -528,7 +529,7 @@ impl Simulation {
         let is_at_work =
             tip.length() < STAY_DISTANCE || self.proxy.contact().is_some() || self.hand_mapping.is_tip_held();
         let tip = self.world_from_tooth * tip;
-        let path = if self.hand_mapping.is_centring() {
+        let path = if self.hand_mapping.is_centring() || frame.middle.is_some() || self.hand_mapping.is_registered() {
             TipPath::Centre(tip)
         } else if is_at_work {
             TipPath::Stay(tip)
@@ -664,7 +665,7 @@ mod tests {
         let pressed = Vec3::Z * -0.3;
         go(&mut sim, Vec3::Z * 2.0, pressed, 1_500);
         let orientation = Quat::from_rotation_y(core::f32::consts::FRAC_PI_2);
-        sim.apply(&Command::PlaceHand { frame: HandFrame { orientation, scale: 1.0 } });
+        sim.apply(&Command::PlaceHand { frame: HandFrame { orientation, scale: 1.0, middle: None } });
         let mut lost = sim.clone();
         assert!(lost.step(&Reading::at(pressed)).force != Vec3::ZERO);
         assert_eq!(lost.step(&Reading::ABSENT).force, Vec3::ZERO);

@@ -343,8 +343,9 @@ impl Carver {
         steps: Range<u32>,
     ) {
         let start = volume.grid().index(row);
-        let run = volume.densities().get(start + steps.start as usize..start + steps.end as usize);
-        if run.is_none_or(|run| run.iter().all(|&d| d == Density::EMPTY)) {
+        let end = start + steps.end as usize;
+        let mut next = next_matter(volume, start + steps.start as usize..end);
+        if next.is_none() {
             return;
         }
         self.examined += steps.len();
@@ -356,11 +357,9 @@ impl Carver {
         let per_density = 2.0 * band / f32::from(u8::MAX);
         let of_empty = increment.run_out - band + per_density;
         let (mut label, mut share) = (Label::AIR, 0.0);
-        for step in steps {
-            let before = volume.voxel(start + step as usize);
-            if before.density == Density::EMPTY {
-                continue;
-            }
+        while let Some(index) = next {
+            next = next_matter(volume, index + 1..end);
+            let (step, before) = ((index - start) as u32, volume.voxel(index));
             if before.label != label {
                 label = before.label;
                 share = self.advance[usize::from(label.0)] / increment.deepest;
@@ -493,6 +492,21 @@ impl PlacedIncrement<'_> {
             feed_length: increment.feed.length(),
         }
     }
+}
+
+/// Index of the first voxel of a range that is not empty; `None` if there is none, or no such range. Most voxels of a row
+/// within a bur are empty: it has cut them.
+#[inline]
+fn next_matter(volume: &Volume, range: Range<usize>) -> Option<usize> {
+    let (chunks, rest) = volume.densities().get(range.clone())?.as_chunks::<8>();
+    for (number, chunk) in chunks.iter().enumerate() {
+        let bits = u64::from_le_bytes(chunk.map(Density::bits));
+        if bits != 0 {
+            return Some(range.start + 8 * number + bits.trailing_zeros() as usize / 8);
+        }
+    }
+    let at = rest.iter().position(|&density| density != Density::EMPTY)?;
+    Some(range.start + 8 * chunks.len() + at)
 }
 
 /// Part of an increment that is done: whole phases, and rows of the next one.

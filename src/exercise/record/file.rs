@@ -296,17 +296,28 @@ pub enum InputFile {
 pub struct HandFrameFile {
     pub world_from_device_xyzw: [f32; 4],
     pub scale: f32,
+    /// Absent unless the hand is registered with the picture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub middle_mm: Option<[f32; 3]>,
 }
 
 impl From<&HandFrame> for HandFrameFile {
     fn from(frame: &HandFrame) -> HandFrameFile {
-        HandFrameFile { world_from_device_xyzw: frame.orientation.to_array(), scale: frame.scale }
+        HandFrameFile {
+            world_from_device_xyzw: frame.orientation.to_array(),
+            scale: frame.scale,
+            middle_mm: frame.middle.map(|middle| middle.to_array()),
+        }
     }
 }
 
 impl From<&HandFrameFile> for HandFrame {
     fn from(file: &HandFrameFile) -> HandFrame {
-        HandFrame { orientation: Quat::from_array(file.world_from_device_xyzw), scale: file.scale }
+        HandFrame {
+            orientation: Quat::from_array(file.world_from_device_xyzw),
+            scale: file.scale,
+            middle: file.middle_mm.map(Vec3::from_array),
+        }
     }
 }
 

@@ -140,6 +140,7 @@ impl Workpiece {
             lesions: Vec::new(),
             drawn: Vec::new(),
             surroundings: Vec::new(),
+            own_jaw: false,
             neighbours: Vec::new(),
             periodontium: None,
             arch: Default::default(),

@@ -213,6 +213,10 @@ pub struct JawFile {
     #[serde(default)]
     #[schemars(length(max = 20))]
     pub around: Option<Vec<ObstacleFile>>,
+    /// True if the objects of `around` are a jaw of the school's own, with its teeth and its gingiva: it is drawn and felt in
+    /// place of the generated jaw. A `periodontium` is then the gingiva next to the treated tooth only.
+    #[serde(default)]
+    pub own_jaw: bool,
     /// Gingiva around the tooth with a sulcus or pockets that can be probed. If omitted, the gingiva is simple and has
     /// no sulcus.
     #[serde(default)]
@@ -232,7 +236,7 @@ pub struct JawFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ObstacleFile {
-    /// Wavefront OBJ file of a closed surface in millimetres, relative to the scenario's folder.
+    /// File of a closed surface in millimetres (.obj, .glb, .gltf, .stl or .ply), relative to the scenario's folder.
     #[schemars(length(min = 1, max = 500))]
     pub mesh: String,
     /// Tissue whose tactile properties the object has.

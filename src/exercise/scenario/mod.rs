@@ -137,6 +137,8 @@ pub struct Scene {
     pub teeth: Vec<ToothSpec>,
     /// Objects around a tooth in its jaw, tooth space; `None` for simple shapes of average size.
     pub surroundings: Option<Vec<Collider>>,
+    /// True if these are a jaw of the exercise's own, in place of the generated one.
+    pub own_jaw: bool,
     /// Gingiva with pockets; `None` outside a jaw.
     pub pockets: Option<Pockets>,
     pub arch: DentalArches,

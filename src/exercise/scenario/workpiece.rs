@@ -40,6 +40,8 @@ pub struct Workpiece {
     pub drawn: Vec<Option<usize>>,
     /// Gingiva and neighbouring teeth.
     pub surroundings: Vec<Collider>,
+    /// True if they are a jaw of the exercise's own, in place of the generated one.
+    pub own_jaw: bool,
     /// Those neighbouring teeth among them that have the form of their kind.
     pub neighbours: Vec<NeighbourTooth>,
     /// Gingiva with a sulcus; `None` without pockets.
@@ -244,7 +246,10 @@ impl Workpiece {
         }
         let mut neighbours = Vec::new();
         let mut around = match (scenario.scene.layout, &scenario.scene.surroundings) {
-            (SceneLayout::Jaw, Some(meshes)) => meshes.clone(),
+            (SceneLayout::Jaw, Some(meshes)) => {
+                let own = gum.iter().flat_map(|gum| gum_beside_tooth(&teeth[0], gum, &scenario.tissues));
+                meshes.iter().cloned().chain(own).collect()
+            }
             (SceneLayout::Jaw, None) => {
                 let around = surroundings(&teeth[0], gum.as_ref(), &scenario.scene.arch, &scenario.tissues);
                 neighbours = around.neighbours;
@@ -272,6 +277,7 @@ impl Workpiece {
             lesions,
             drawn,
             surroundings: around,
+            own_jaw: scenario.scene.own_jaw,
             neighbours,
             periodontium,
             arch,
@@ -561,7 +567,7 @@ fn surroundings(
     });
     let neighbours = neighbours.collect();
     let gum = match periodontium {
-        Some(periodontium) => gum_with_pockets(tooth, periodontium, gum, label("attachment")),
+        Some(periodontium) => gum_with_pockets(tooth, periodontium, gum, tissues),
         None => vec![gum],
     };
     Surroundings { colliders: beside.into_iter().map(|(_, collider)| collider).chain(gum).collect(), neighbours }
@@ -598,21 +604,17 @@ fn anatomical_neighbour(
     Some(Collider { label, tooth_from_collider: Pose::at(place), geometry: form })
 }
 
-/// Returns the gingiva next to the tooth by [`Periodontium`], simple gingiva beyond it, and the attachment that closes
-/// the sulcus.
-fn gum_with_pockets(
-    tooth: &ToothBounds,
-    periodontium: &Periodontium,
-    plain: Collider,
-    attachment: Label,
-) -> Vec<Collider> {
-    /// Extent of the gingiva next to the tooth beyond its crown, along the arch and across it, mm.
-    const ALONG: f32 = 2.5;
-    const ACROSS: f32 = 2.0;
+/// Extent of the gingiva next to the tooth beyond its crown, along the arch and across it, mm.
+const GUM_ALONG: f32 = 2.5;
+const GUM_ACROSS: f32 = 2.0;
+
+/// Returns the gingiva next to the tooth by [`Periodontium`], and the attachment that closes the sulcus.
+fn gum_beside_tooth(tooth: &ToothBounds, periodontium: &Periodontium, tissues: &TissueTable) -> [Collider; 2] {
     /// Distance between samples, mm: a margin is rounded by half a millimetre.
     const SPACING: f32 = 0.2;
     let (low, high) = (tooth.crown.low, tooth.crown.high);
-    let beside = Vec3::new(ACROSS, ALONG, 0.0);
+    let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
+    let beside = Vec3::new(GUM_ACROSS, GUM_ALONG, 0.0);
     let (from, to) =
         ((low - beside).with_z(periodontium.lowest_floor() - 2.5), (high + beside).with_z(low.z + GUM_HIGH));
     let grid = Grid::covering(from, to, Vec3::splat(SPACING), 1);
@@ -620,18 +622,30 @@ fn gum_with_pockets(
         touch::ColliderGeometry::Sdf(Arc::new(SdfGrid::from_fn(grid, yields, at)))
     };
     let near = Collider {
-        label: plain.label,
+        label: label("gingiva"),
         tooth_from_collider: Pose::IDENTITY,
         geometry: field(Compliance::default(), &|p| periodontium.gum_sdf_probing(p)),
     };
     let floor = Collider {
-        label: attachment,
+        label: label("attachment"),
         tooth_from_collider: Pose::IDENTITY,
         geometry: field(ATTACHMENT_COMPLIANCE, &|p| periodontium.attachment_sdf(p)),
     };
+    [near, floor]
+}
+
+/// Returns the gingiva next to the tooth, and simple gingiva beyond it.
+fn gum_with_pockets(
+    tooth: &ToothBounds,
+    periodontium: &Periodontium,
+    plain: Collider,
+    tissues: &TissueTable,
+) -> Vec<Collider> {
+    let (low, high) = (tooth.crown.low, tooth.crown.high);
+    let [near, floor] = gum_beside_tooth(tooth, periodontium, tissues);
     let touch::ColliderGeometry::RoundBox { half, rounding } = plain.geometry else { return vec![near, floor] };
     let beyond = |toward: f32| {
-        let edge = if toward < 0.0 { low.y - ALONG } else { high.y + ALONG };
+        let edge = if toward < 0.0 { low.y - GUM_ALONG } else { high.y + GUM_ALONG };
         let far = plain.tooth_from_collider.position.y + toward * half.y;
         let half = Vec3::new(half.x, 0.5 * (far - edge).abs(), half.z);
         let position = plain.tooth_from_collider.position.with_y(0.5 * (far + edge));

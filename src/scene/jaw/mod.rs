@@ -129,6 +129,7 @@ impl Mouth {
             (Some(tooth_from_arch), [first, ..]) => {
                 Some(Mouth::around_arch(workpiece, Jaw::of(first.fdi), tooth_from_arch, tissues))
             }
+            (None, [tooth]) if workpiece.own_jaw => Mouth::of_own_jaw(workpiece, tooth, tissues),
             (None, [tooth]) => Mouth::around_tooth(workpiece, tooth, tissues),
             _ => None,
         }
@@ -147,6 +148,30 @@ impl Mouth {
             touched: Vec::new(),
             yielding: Vec::new(),
         }
+    }
+
+    /// The jaw that an exercise brings along. Its bite is not known: nothing is drawn opposite to it.
+    fn of_own_jaw(workpiece: &Workpiece, tooth: &ToothBounds, tissues: &TissueTable) -> Option<Mouth> {
+        // Views look along the arch of average form.
+        let jaw = Jaw::of(tooth.fdi);
+        let plan = &workpiece.arch;
+        let fitted = FittedTooth { fdi: tooth.fdi, crown: tooth.crown.size() };
+        let near = DentalArch::new(jaw, 7, Some(fitted), &plan.plan(jaw));
+        let near_from_tooth = near.arch_from_fitted(tooth.fdi, &tooth.crown)?;
+        let nothing = || JawMeshes::new(TintedMesh::default(), TintedMesh::default(), tissues);
+        let touched = workpiece.surroundings.iter().filter(|shape| {
+            surroundings::is_visible(shape, tissues) && YieldingSurface::of(shape, workpiece, tissues).is_none()
+        });
+        let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
+        Some(Mouth {
+            near: nothing(),
+            opposite: None,
+            jaw,
+            world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
+            near_from_opposite: closed_pose(&near, &plan.of_jaw(jaw.other(), []), plan.angle_class),
+            touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
+            yielding: yielding.collect(),
+        })
     }
 
     fn around_tooth(workpiece: &Workpiece, tooth: &ToothBounds, tissues: &TissueTable) -> Option<Mouth> {

@@ -27,6 +27,7 @@ const LABELS: &[(&str, &str)] = &[
     ("spacing_mm", "label.spacing"),
     ("around", "label.around"),
     ("cheek", "label.cheek"),
+    ("own_jaw", "label.own_jaw"),
     ("tongue", "label.tongue"),
     ("decay", "label.decay"),
     ("stains", "label.stains"),

@@ -20,8 +20,10 @@ use typodont_core::frame::{Pose, Vec3, rotation_about_axes};
 use typodont_core::touch;
 use typodont_core::touch::{ClosedMesh, Collider};
 use typodont_core::volume::Label;
+use typodont_formats::diagnostic::Diagnostic;
 use typodont_formats::import::ImportedTooth;
 use typodont_formats::pointer;
+use typodont_formats::solid_mesh::{self, SolidMeshError};
 
 /// Minimum half-width of a cavity's opening, mm, so that a carrier can place material through it.
 const NARROWEST: f32 = 0.25;
@@ -71,10 +73,16 @@ impl Resolver<'_> {
             file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(|gum| pockets(gum, age)),
             _ => None,
         };
-        if pockets.is_some() && around.is_some() {
-            let help = "remove \"around\": a jaw with \"periodontium\" has its own adjacent teeth";
+        let own_jaw = matches!(written, file::SceneFile::Jaw(jaw) if jaw.own_jaw);
+        if pockets.is_some() && around.is_some() && !own_jaw {
+            let help = "remove \"around\": a jaw with \"periodontium\" has its own adjacent teeth; or set \"own_jaw\" to true if \
+                        \"around\" has a whole jaw";
             let message = "gingiva with pockets cannot be combined with meshes in \"around\"";
             self.complain("/scene/jaw/periodontium", "two-gums", message, help);
+        }
+        if own_jaw && around.as_ref().is_none_or(Vec::is_empty) {
+            let help = "list the surfaces of the jaw in \"around\", or remove \"own_jaw\"";
+            self.complain("/scene/jaw/own_jaw", "no-own-jaw", "a jaw of one's own has no surfaces", help);
         }
         let arch = match written {
             file::SceneFile::Jaw(jaw) => {
@@ -101,7 +109,7 @@ impl Resolver<'_> {
             _ => Vec::new(),
         };
         let teeth = teeth.into_iter().collect::<Option<_>>()?;
-        Some(Scene { layout, teeth, surroundings: around, pockets, arch, soft_neighbours })
+        Some(Scene { layout, teeth, surroundings: around, own_jaw, pockets, arch, soft_neighbours })
     }
 
     /// Returns the cheek and the tongue of a jaw, and reports those that are not beside the tooth or have no tissue.
@@ -238,13 +246,19 @@ impl Resolver<'_> {
 
     /// Reads a mesh and keeps its bytes for the recording.
     fn mesh(&mut self, name: &str, path: &str) -> Option<touch::ColliderGeometry> {
-        let open_mesh_error = typodont_formats::obj::ObjError::Open { edges: 0 };
+        let open_mesh_error = SolidMeshError::Open { edges: 0 };
+        let ending = name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+        // A recording has the files that the exercise names; a glTF file that names others would lack them.
+        let alone = |other: &str| {
+            let help = "export it as one file (.glb, or .gltf with embedded data)".to_string();
+            Err(Diagnostic::about_file(other, "not-embedded", format!("its data are in \"{other}\""), Some(help)))
+        };
         let read = self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
-            let mesh = typodont_formats::obj::parse(&bytes).map_err(describe)?;
+            let mesh = solid_mesh::parse(&bytes, &ending, alone).map_err(describe)?;
             let obstacle = ClosedMesh::new(&mesh).ok_or_else(|| describe(open_mesh_error))?;
             Ok((bytes, obstacle))
         });
-        fn describe(error: typodont_formats::obj::ObjError) -> (&'static str, String, Option<String>) {
+        fn describe(error: SolidMeshError) -> (&'static str, String, Option<String>) {
             (error.code(), error.to_string(), Some(error.help().into()))
         }
         match read {
