@@ -22,7 +22,7 @@ pub fn frame_of(orbit: &Orbit, settings: &Settings) -> HandFrame {
         return registration.frame(orbit);
     }
     let orientation = if settings.hand_follows_view { orbit.world_from_view() } else { Quat::IDENTITY };
-    HandFrame { orientation, scale: settings.hand_scale, middle: None }
+    HandFrame { orientation, scale: settings.hand_scale, ..HandFrame::DEVICE }
 }
 
 /// Frame in which a hand moves, and the one that it is to move in.
@@ -56,6 +56,11 @@ impl HandPlacement {
     /// Takes over that the lesson was told of a frame at `now`, s.
     pub fn place(&mut self, frame: HandFrame, now: f64) {
         (self.placed, self.placed_at) = (frame, now);
+    }
+
+    /// Takes over at `now`, s, that the lesson stands still, in which no hand arrives.
+    pub fn wait(&mut self, now: f64) {
+        self.placed_at = now;
     }
 
     /// True if the hand moves in a frame, and has done so long enough to have arrived.
@@ -92,7 +97,8 @@ mod tests {
     fn the_hand_follows_once_the_view_has_settled() {
         // Aim: the hand is not free all the while that somebody rotates the view. Method: a key that repeats, then a drag.
         let mut placement = HandPlacement::default();
-        let frame = |angle: f32| HandFrame { orientation: Quat::from_rotation_y(angle), scale: 1.0, middle: None };
+        let frame =
+            |angle: f32| HandFrame { orientation: Quat::from_rotation_y(angle), scale: 1.0, ..HandFrame::DEVICE };
         for repeat in 1..=10u8 {
             assert!(!placement.is_due(frame(0.1 * f32::from(repeat)), false, 0.03 * f64::from(repeat)));
         }

@@ -18,9 +18,8 @@ const LEAST_HEIGHT: f32 = 40.0;
 /// Maximum root mean square distance of the touched points from the crosses, as a share of the distance of two crosses.
 const MOST_ERROR: f32 = 0.08;
 
-/// The frame in which a hand is registered: the device's own, moved so far away that nothing is felt there.
-pub const REGISTERING_FRAME: HandFrame =
-    HandFrame { orientation: Quat::IDENTITY, scale: 1.0, middle: Some(Vec3::new(0.0, 1000.0, 0.0)) };
+/// The frame in which a hand is registered: the device's own, in which it is free.
+pub const REGISTERING_FRAME: HandFrame = HandFrame { middle: Some(Vec3::ZERO), is_free: true, ..HandFrame::DEVICE };
 
 /// Place of the view in the space of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +41,8 @@ pub enum RegistrationRefusal {
     TooSmall(f32),
     /// The points do not form the crosses' square: their root mean square distance from it, mm.
     DoesNotFit(f32),
+    /// The picture would show its back to the hand: the crosses were seen in a mirror whose window is not flipped.
+    Mirrored,
 }
 
 impl HandRegistration {
@@ -76,7 +77,12 @@ impl HandRegistration {
         if error > MOST_ERROR * height * (CROSSES[1][0] - CROSSES[0][0]) {
             return Err(RegistrationRefusal::DoesNotFit(error));
         }
-        let axes = Mat3::from_cols(right, up, right.cross(up));
+        // Devices have +z toward the user, and so does a picture, whichever way it is inclined.
+        let out = right.cross(up);
+        if out.z <= 0.0 {
+            return Err(RegistrationRefusal::Mirrored);
+        }
+        let axes = Mat3::from_cols(right, up, out);
         Ok(HandRegistration {
             device_from_view_xyzw: Quat::from_mat3(&axes).normalize().to_array(),
             middle_mm: middle.to_array(),
@@ -91,14 +97,16 @@ impl HandRegistration {
         let orientation = orbit.world_from_view() * Quat::from_array(self.device_from_view_xyzw).conjugate();
         let scale = (orbit.height_at_middle() / self.height_mm).clamp(HandFrame::LEAST_SCALE, HandFrame::SCALES[1]);
         let middle = orbit.middle - orientation * Vec3::from_array(self.middle_mm) * scale;
-        HandFrame { orientation, scale, middle: Some(middle) }
+        HandFrame { orientation, scale, middle: Some(middle), is_free: false }
     }
 
     /// True for values that can have been measured.
     pub fn is_valid(&self) -> bool {
+        /// Farthest point of a screen and greatest height, mm.
+        const FAR: f32 = 2000.0;
         let numbers = [self.height_mm, self.error_mm];
         let is_rotation = (Quat::from_array(self.device_from_view_xyzw).length() - 1.0).abs() < 1e-3;
-        is_rotation && numbers.iter().chain(&self.middle_mm).all(|n| n.abs() < 1e4) && self.height_mm >= LEAST_HEIGHT
+        is_rotation && numbers.iter().chain(&self.middle_mm).all(|n| n.abs() < FAR) && self.height_mm >= LEAST_HEIGHT
     }
 }
 
@@ -117,10 +125,10 @@ impl RegistrationDraft {
         self.touched.len()
     }
 
-    /// Takes over that the hand, in the world of [`REGISTERING_FRAME`], touches the next cross. Returns the registration
+    /// Takes over where the hand is, in [`REGISTERING_FRAME`], while it touches the next cross. Returns the registration
     /// after the last one; if that is refused, it begins again.
     pub fn touch(&mut self, hand: Vec3) -> Option<HandRegistration> {
-        self.touched.push(hand - REGISTERING_FRAME.middle.unwrap_or_default());
+        self.touched.push(hand);
         let points = <[Vec3; 4]>::try_from(self.touched.as_slice()).ok()?;
         self.touched.clear();
         match HandRegistration::of_points(points) {
@@ -147,7 +155,7 @@ mod tests {
         // Aim: whichever way the screen stands to the arm. Method: a view 260 mm high, inclined and turned; the hand at a
         // point of it is at the point of the world that is drawn there.
         let (height, middle) = (260.0, Vec3::new(12.0, -35.0, 60.0));
-        for angles in [[0.0, 0.0, 0.0], [-0.8, 0.3, 0.1], [0.4, 2.6, -1.0]] {
+        for angles in [[0.0, 0.0, 0.0], [-0.8, 0.3, 0.1], [0.4, -1.2, 1.0]] {
             let device_from_view =
                 Quat::from_rotation_y(angles[1]) * Quat::from_rotation_x(angles[0]) * Quat::from_rotation_z(angles[2]);
             let registration = HandRegistration::of_points(crosses(device_from_view, middle, height)).unwrap();
@@ -180,12 +188,12 @@ mod tests {
         let is_misfit = |points| matches!(HandRegistration::of_points(points), Err(RegistrationRefusal::DoesNotFit(_)));
         assert!(is_misfit([a, b, c, d + Vec3::Y * 90.0]));
         assert!(HandRegistration::of_points([a, c, b, d]).is_err());
+        assert_eq!(HandRegistration::of_points([b, a, d, c]), Err(RegistrationRefusal::Mirrored));
         assert_eq!(HandRegistration::of_points([a; 4]), Err(RegistrationRefusal::TooSmall(0.0)));
         let mut draft = RegistrationDraft::default();
-        let moved = |point: Vec3| point + REGISTERING_FRAME.middle.unwrap();
-        assert!([a, a, a, a].iter().all(|point| draft.touch(moved(*point)).is_none()));
+        assert!([a, a, a, a].iter().all(|point| draft.touch(*point).is_none()));
         assert!(draft.refused.is_some() && draft.next_cross() == 0);
-        let made = right.iter().map(|point| draft.touch(moved(*point))).collect::<Vec<_>>();
+        let made = right.iter().map(|point| draft.touch(*point)).collect::<Vec<_>>();
         assert!(made[..3].iter().all(Option::is_none) && made[3].is_some());
     }
 }

@@ -516,6 +516,7 @@ mod tests {
                 orientation: Quat::from_rotation_y(0.3),
                 scale: 1.7,
                 middle: Some(Vec3::new(1.0, -2.5, 0.25)),
+                is_free: true,
             }),
             Input::Abort,
         ];

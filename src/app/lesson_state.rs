@@ -83,6 +83,8 @@ pub struct LessonState {
     pub registration: Option<RegistrationDraft>,
     /// True while the hand moves in the frame in which it is registered.
     pub can_touch_cross: bool,
+    /// True where an arm may be registered: not in a kiosk, whose settings last as long as its participant.
+    pub can_register_hand: bool,
     /// Actions done in the running stage, for a stage that teaches the controls.
     pub controls: ControlsProgress,
     pub is_confirming_abort: bool,
@@ -164,6 +166,7 @@ impl LessonState {
             is_clutch_pressed: false,
             registration: None,
             can_touch_cross: false,
+            can_register_hand: false,
             controls: ControlsProgress::default(),
             is_confirming_abort: false,
             orbit: Orbit::around(Vec3::ZERO, FIRST_RADIUS),
@@ -247,6 +250,9 @@ impl LessonState {
             return;
         };
         let frame = if registration.is_some() { REGISTERING_FRAME } else { frame };
+        if self.is_paused || self.pause_reason.is_some() {
+            placement.wait(now);
+        }
         if placement.is_due(frame, is_dragging, now) && client.send(LessonCommand::Input(Input::PlaceHand(frame))) {
             placement.place(frame, now);
         }
@@ -255,7 +261,7 @@ impl LessonState {
 
     /// Begins the registration of an arm's hand with the picture, or ends it without one.
     pub fn register_hand(&mut self, begins: bool) {
-        let can_begin = self.has_placeable_hand() && self.stage.is_some();
+        let can_begin = self.can_register_hand && self.has_placeable_hand() && self.stage.is_some();
         self.registration = (begins && can_begin).then(RegistrationDraft::default);
         self.can_touch_cross = false;
     }
@@ -437,6 +443,7 @@ impl LessonState {
             }
             Effect::StagesOver => {
                 (self.stage, self.are_stages_over) = (None, true);
+                self.register_hand(false);
                 self.is_clutch_pressed = false;
                 self.is_confirming_finish = false;
                 self.ended = Some(Instant::now());
@@ -452,6 +459,7 @@ impl LessonState {
                 self.materials.set(*label, self.materials.get(*label).with(*coefficient, *value));
             }
             Effect::StageEnded { stage, by } => {
+                self.register_hand(false);
                 let is_timed_out = *by == EndedBy::Time && self.scenario.stages[*stage].draw.is_none();
                 self.timed_out_stage = is_timed_out.then(|| self.scenario.stages[*stage].title.clone());
                 if is_timed_out {

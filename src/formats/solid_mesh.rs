@@ -22,6 +22,7 @@ pub enum SolidMeshError {
     /// The file is not of its format.
     Unreadable {
         what: String,
+        help: String,
     },
     Empty,
     NotFinite,
@@ -64,9 +65,9 @@ impl SolidMeshError {
     }
 
     /// Returns the remedy.
-    pub fn help(&self) -> &'static str {
+    pub fn help(&self) -> &str {
         match self {
-            SolidMeshError::Unreadable { .. } => "export the surface as .obj (text), .glb, .gltf, .stl or .ply",
+            SolidMeshError::Unreadable { help, .. } => help,
             SolidMeshError::NotFinite => "every coordinate must be a finite number in millimetres",
             SolidMeshError::Empty => "the file needs faces; in an OBJ file they are the lines that begin with \"f\"",
             SolidMeshError::TooLarge { .. } => "reduce it in a mesh program to at most 300 000 triangles",
@@ -86,7 +87,7 @@ impl SolidMeshError {
 impl fmt::Display for SolidMeshError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            SolidMeshError::Unreadable { what } => f.write_str(what),
+            SolidMeshError::Unreadable { what, .. } => f.write_str(what),
             SolidMeshError::Empty => f.write_str("the mesh has no triangles"),
             SolidMeshError::NotFinite => f.write_str("a coordinate is not a finite number"),
             SolidMeshError::TooLarge { triangles } => write!(f, "the mesh has {triangles} triangles"),
@@ -114,9 +115,12 @@ pub fn parse(
     fetch: impl Fn(&str) -> Result<Vec<u8>, Diagnostic>,
 ) -> Result<Mesh, SolidMeshError> {
     let soup = match ending {
-        "obj" => obj::triangle_soup(bytes).map_err(|what| SolidMeshError::Unreadable { what })?,
+        "obj" => obj::triangle_soup(bytes).map_err(|what| SolidMeshError::Unreadable {
+            what,
+            help: "export the surface as Wavefront OBJ (.obj), as text".into(),
+        })?,
         _ => surfaces::parse(bytes, ending, fetch)
-            .map_err(|refused| SolidMeshError::Unreadable { what: refused.what.clone() })?,
+            .map_err(|refused| SolidMeshError::Unreadable { what: refused.what, help: refused.remedy })?,
     };
     if soup.len() > DISPLAY_TRIANGLES_MAX {
         return Err(SolidMeshError::TooLarge { triangles: soup.len() });

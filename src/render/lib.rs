@@ -197,8 +197,8 @@ fn validate(
     if !viewpoint.is_valid() {
         return impossible(format!("invalid viewpoint: {viewpoint:?}"));
     }
-    if let Some(Stereo { eye_distance, .. }) = stereo.filter(|s| !(0.0..=80.0).contains(&s.eye_distance)) {
-        return impossible(format!("eye distance {eye_distance} mm is out of range: 0 to 80 mm"));
+    if let Some(Stereo { eye_distance, .. }) = stereo.filter(|s| !(-80.0..=80.0).contains(&s.eye_distance)) {
+        return impossible(format!("eye distance {eye_distance} mm is out of range: -80 to 80 mm"));
     }
     if scene.tooth.as_ref().is_some_and(|tooth| !tooth.world_from_tooth.is_valid()) {
         return impossible("invalid pose of the tooth".into());

@@ -251,9 +251,10 @@ impl Trial {
         self.desk.wait(Duration::from_millis(700));
     }
 
-    /// Works in all views until nothing becomes less brown, or the time is over.
+    /// Works in all views until nothing becomes less brown for two rounds, or the time is over.
     fn work(&mut self) {
-        loop {
+        let mut idle_rounds = 0;
+        while idle_rounds < 2 && !self.is_over() {
             let mut cleared = 0;
             for view in self.views {
                 if !self.is_over() {
@@ -261,9 +262,7 @@ impl Trial {
                     cleared += self.clear_view();
                 }
             }
-            if cleared == 0 || self.is_over() {
-                return;
-            }
+            idle_rounds = if cleared == 0 { idle_rounds + 1 } else { 0 };
         }
     }
 }

@@ -35,7 +35,7 @@ fn a_step_never_allocates() {
     let rows = (0..100).map(|i| ForceRow { time: f64::from(i) * 0.01, force: Vec3::X * (i as f32 * 0.01) }).collect();
     let forces = ForceTable { rows, repeat: true, scale: 1.0, space: ForceSpace::Tooth };
     setup.guidances = vec![Guidance::Path(tube), Guidance::Path(follow), Guidance::Forces(forces)];
-    let frame = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 2.0, middle: None };
+    let frame = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 2.0, ..HandFrame::DEVICE };
     let mut sim = Simulation::new(setup);
     let mut cut = 0;
     let mut touched = 0;

@@ -459,7 +459,10 @@ impl App {
         let mode = if self.has_graphics { DisplayMode::Iso } else { DisplayMode::Surface };
         self.views.forget();
         self.screen = match LessonState::begin(config, library, output, mode) {
-            Ok(lesson) => Screen::Lesson(Box::new(lesson)),
+            Ok(mut lesson) => {
+                lesson.can_register_hand = self.options.kiosk().is_none();
+                Screen::Lesson(Box::new(lesson))
+            }
             Err(why) => Screen::Failed(why),
         };
     }
@@ -474,7 +477,11 @@ impl App {
         }
     }
 
-    pub(super) fn apply_settings(&mut self, settings: Settings, ctx: &egui::Context) {
+    pub(super) fn apply_settings(&mut self, mut settings: Settings, ctx: &egui::Context) {
+        if (&settings.device, settings.mirrored) != (&self.settings.device, self.settings.mirrored) {
+            // It held for that arm, and for what was seen then.
+            settings.hand_registration = None;
+        }
         self.words = i18n::select_language(&self.languages, &settings.language);
         if settings.font_size == self.settings.font_size {
             theme::apply(ctx, &settings);

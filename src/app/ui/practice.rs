@@ -5,7 +5,7 @@ use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
 use crate::messages;
 use crate::platform;
-use crate::settings::Settings;
+use crate::settings::{Settings, StereoMode};
 use crate::snapshot::LessonSnapshot;
 use crate::ui::lesson_view::PictureFrame;
 use crate::ui::viewport::Viewport;
@@ -273,6 +273,9 @@ fn view_ui(
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
+    // The crosses are in the picture of one eye.
+    let in_mono = Settings { stereo: StereoMode::Off, ..settings.clone() };
+    let settings = if lesson.registration.is_some() { &in_mono } else { settings };
     let rect = ui.available_rect_before_wrap();
     let view = ui.interact(rect, ui.scope_id().with("view"), Sense::click_and_drag());
     view.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, words.get("practice.view")));

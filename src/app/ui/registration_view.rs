@@ -36,11 +36,13 @@ pub fn registration_ui(
     inside.label(white(words.format("register.cross", number)).strong());
     match draft.refused {
         Some(why) if draft.next_cross() == 0 => {
-            let (key, length) = match why {
-                RegistrationRefusal::TooSmall(height) => ("register.too_small", height),
-                RegistrationRefusal::DoesNotFit(error) => ("register.does_not_fit", error),
+            let length = |length: f32| format!("{length:.0} mm");
+            let text = match why {
+                RegistrationRefusal::TooSmall(height) => words.format("register.too_small", length(height)),
+                RegistrationRefusal::DoesNotFit(error) => words.format("register.does_not_fit", length(error)),
+                RegistrationRefusal::Mirrored => words.get("register.mirrored").to_string(),
             };
-            inside.colored_label(theme::WARNING, words.format(key, format!("{length:.0} mm")));
+            inside.colored_label(theme::WARNING, text);
         }
         _ => _ = inside.label(white(words.get("register.how").to_string())),
     }

@@ -128,6 +128,7 @@ pub fn collect_commands(
         && !lesson.are_stages_over
         && !lesson.is_confirming_finish
         && !lesson.is_confirming_abort
+        && lesson.registration.is_none()
         && !ctx.text_edit_focused()
     {
         letter_shortcuts(ctx, lesson, commands);
@@ -215,15 +216,6 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
         }
         return;
     }
-    if lesson.registration.is_some() {
-        if pressed(Key::Space) || pressed(Key::Enter) {
-            commands.push(AppCommand::Practice(PracticeCommand::TouchCross));
-        }
-        if pressed(Key::Escape) {
-            commands.push(AppCommand::Practice(PracticeCommand::RegisterHand(false)));
-        }
-        return;
-    }
     if is_done && lesson.stage().is_some_and(|stage| stage.ends.confirmed) {
         commands.push(AppCommand::Practice(PracticeCommand::FinishStage));
     }
@@ -233,6 +225,15 @@ fn practice_shortcuts(ctx: &egui::Context, lesson: &LessonState, is_done: bool, 
         }
         if pressed(Key::Escape) {
             commands.push(AppCommand::Practice(PracticeCommand::ContinueStage));
+        }
+        return;
+    }
+    if lesson.registration.is_some() {
+        if pressed(Key::Space) || pressed(Key::Enter) {
+            commands.push(AppCommand::Practice(PracticeCommand::TouchCross));
+        }
+        if pressed(Key::Escape) {
+            commands.push(AppCommand::Practice(PracticeCommand::RegisterHand(false)));
         }
         return;
     }

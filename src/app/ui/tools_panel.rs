@@ -54,7 +54,7 @@ pub fn tools_panel_ui(
     if ui.checkbox(&mut is_on, words.get("menu.haptics_on")).on_hover_text(words.get("menu.haptics_about")).changed() {
         commands.push(AppCommand::Practice(PracticeCommand::Pause(!is_on)));
     }
-    if lesson.has_placeable_hand() && lesson.registration.is_none() {
+    if lesson.can_register_hand && lesson.has_placeable_hand() && lesson.registration.is_none() {
         let register = ui.button(words.get("menu.register_hand")).on_hover_text(words.get("menu.register_hand_about"));
         if register.clicked() {
             commands.push(AppCommand::Practice(PracticeCommand::RegisterHand(true)));

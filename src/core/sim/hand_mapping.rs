@@ -18,11 +18,13 @@ pub struct HandFrame {
     /// Point of the world at which the middle of the device's workspace is, mm, where the hand is to be seen at a certain
     /// place; `None` leaves it where the tip's path brings it.
     pub middle: Option<Vec3>,
+    /// True if the hand is free in this frame: the tip goes where the hand is, nothing is felt and nothing is cut.
+    pub is_free: bool,
 }
 
 impl HandFrame {
     /// The space of the device is the world.
-    pub const DEVICE: HandFrame = HandFrame { orientation: Quat::IDENTITY, scale: 1.0, middle: None };
+    pub const DEVICE: HandFrame = HandFrame { orientation: Quat::IDENTITY, scale: 1.0, middle: None, is_free: false };
 
     /// Scales of a hand that are offered. A hand at 0.5 moves half as far on the tooth, for fine work; at 4, a small device
     /// reaches all teeth of a jaw.
@@ -54,6 +56,7 @@ impl HandFrame {
             orientation: self.orientation.lerp(to.orientation, share),
             scale: self.scale + (to.scale - self.scale) * share,
             middle: to.middle,
+            is_free: to.is_free,
         }
     }
 }
@@ -296,14 +299,17 @@ impl HandMapping {
                 self.middle + moved
             }
             TipPath::Centre(tip) => {
-                let to = change.to.middle.unwrap_or_default();
-                self.middle = to + (tip - moved - to) * (1.0 - share);
+                self.middle = match change.to.middle {
+                    None => (tip - moved) * (1.0 - share),
+                    Some(to) => to + (tip - moved - to) * (1.0 - share),
+                };
                 self.middle + moved
             }
         };
         self.is_device_space = self.frame == HandFrame::DEVICE && self.middle == Vec3::ZERO;
         let wrench = change.fade.advance();
-        let is_over = change.ticks_left == 0 && change.fade.ticks_left == 0 && !self.clutch.is_pressed;
+        let is_over =
+            change.ticks_left == 0 && change.fade.ticks_left == 0 && !self.clutch.is_pressed && !change.to.is_free;
         self.change = (!is_over).then_some(change);
         Some(FreeHand { world_from_handle: self.placed(tip, in_device), wrench })
     }
@@ -337,7 +343,7 @@ mod tests {
         // and the tip has not moved meanwhile. Method: turn with the tip held, then move by 2 mm at half scale.
         let mut mapping = HandMapping::new();
         let tip = mapping.world_pose(&hand(10.0, 5.0, -3.0)).position;
-        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 0.5, middle: None };
+        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 0.5, ..HandFrame::DEVICE };
         assert!(mapping.place(frame, TipPath::Stay(tip), Wrench::ZERO));
         let (ticks, after) = finish(&mut mapping, &hand(10.0, 5.0, -3.0));
         assert_eq!((ticks, after, mapping.is_changing()), (MOVE_TICKS, tip, false));
@@ -351,7 +357,7 @@ mod tests {
         // Aim: a hand far from the tooth is not displaced in its workspace. Method: there and back.
         let mut mapping = HandMapping::new();
         mapping.world_pose(&hand(0.0, 0.0, 60.0));
-        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 1.0, middle: None };
+        let frame = HandFrame { orientation: Quat::from_rotation_y(FRAC_PI_2), scale: 1.0, ..HandFrame::DEVICE };
         mapping.place(frame, TipPath::Turn, Wrench::ZERO);
         let (_, tip) = finish(&mut mapping, &hand(0.0, 0.0, 60.0));
         assert!(tip.distance(Vec3::X * 60.0) < 1e-4, "{tip}");
@@ -369,7 +375,7 @@ mod tests {
         let rest = hand(20.0, 0.0, 0.0);
         let from = mapping.world_pose(&rest).position;
         let orientation = Quat::from_rotation_z(FRAC_PI_2);
-        let frame = HandFrame { orientation, scale: 0.5, middle: Some(Vec3::new(1.0, -4.0, 3.0)) };
+        let frame = HandFrame { orientation, scale: 0.5, middle: Some(Vec3::new(1.0, -4.0, 3.0)), is_free: false };
         assert!(mapping.place(frame, TipPath::Centre(from), Wrench::ZERO));
         let (mut tip, mut step) = (from, 0.0_f32);
         while let Some(free) = mapping.advance(&rest) {
@@ -380,6 +386,16 @@ mod tests {
         let there = Vec3::new(1.0, 6.0, 3.0);
         assert!(tip.distance(there) < 1e-4, "{tip}");
         assert!(mapping.world_pose(&rest).position.distance(there) < 1e-4);
+        // Free, it goes where the hand goes in the device's own space.
+        let free = HandFrame { middle: Some(Vec3::ZERO), is_free: true, ..HandFrame::DEVICE };
+        assert!(mapping.place(free, TipPath::Centre(there), Wrench::ZERO));
+        let moved: Vec<Vec3> = (0..2 * MOVE_TICKS)
+            .map(|tick| mapping.advance(&hand(20.0 + 0.01 * tick as f32, 1.0, 0.0)).expect("it stays free"))
+            .map(|free| free.world_from_handle.position)
+            .collect();
+        assert!(moved.last().unwrap().distance(Vec3::new(25.99, 1.0, 0.0)) < 1e-3, "{:?}", moved.last());
+        assert!(mapping.place(frame, TipPath::Centre(there), Wrench::ZERO));
+        finish(&mut mapping, &rest);
         assert!(mapping.is_registered() && !mapping.press_clutch(true, Tick(9), there, Wrench::ZERO));
         assert!(!mapping.press_clutch(false, Tick(99), there, Wrench::ZERO) && !mapping.is_changing());
         assert!(mapping.place(HandFrame::DEVICE, TipPath::Centre(there), Wrench::ZERO));
@@ -436,7 +452,7 @@ mod tests {
 
     #[test]
     fn only_rotations_and_scales_in_range_are_frames() {
-        let turned = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 4.0, middle: None };
+        let turned = HandFrame { orientation: Quat::from_rotation_y(1.0), scale: 4.0, ..HandFrame::DEVICE };
         assert!(turned.is_valid() && HandFrame::DEVICE.is_valid());
         for scale in [0.019, 4.1, f32::NAN] {
             assert!(!HandFrame { scale, ..turned }.is_valid(), "{scale}");

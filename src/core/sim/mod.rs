@@ -665,7 +665,7 @@ mod tests {
         let pressed = Vec3::Z * -0.3;
         go(&mut sim, Vec3::Z * 2.0, pressed, 1_500);
         let orientation = Quat::from_rotation_y(core::f32::consts::FRAC_PI_2);
-        sim.apply(&Command::PlaceHand { frame: HandFrame { orientation, scale: 1.0, middle: None } });
+        sim.apply(&Command::PlaceHand { frame: HandFrame { orientation, scale: 1.0, ..HandFrame::DEVICE } });
         let mut lost = sim.clone();
         assert!(lost.step(&Reading::at(pressed)).force != Vec3::ZERO);
         assert_eq!(lost.step(&Reading::ABSENT).force, Vec3::ZERO);

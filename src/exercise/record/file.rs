@@ -299,6 +299,9 @@ pub struct HandFrameFile {
     /// Absent unless the hand is registered with the picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub middle_mm: Option<[f32; 3]>,
+    /// Absent unless it is being registered.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub free: bool,
 }
 
 impl From<&HandFrame> for HandFrameFile {
@@ -307,6 +310,7 @@ impl From<&HandFrame> for HandFrameFile {
             world_from_device_xyzw: frame.orientation.to_array(),
             scale: frame.scale,
             middle_mm: frame.middle.map(|middle| middle.to_array()),
+            free: frame.is_free,
         }
     }
 }
@@ -317,6 +321,7 @@ impl From<&HandFrameFile> for HandFrame {
             orientation: Quat::from_array(file.world_from_device_xyzw),
             scale: file.scale,
             middle: file.middle_mm.map(Vec3::from_array),
+            is_free: file.free,
         }
     }
 }

@@ -80,7 +80,8 @@ impl Resolver<'_> {
             let message = "gingiva with pockets cannot be combined with meshes in \"around\"";
             self.complain("/scene/jaw/periodontium", "two-gums", message, help);
         }
-        if own_jaw && around.as_ref().is_none_or(Vec::is_empty) {
+        let has_surfaces = |jaw: &file::JawFile| jaw.around.as_ref().is_some_and(|around| !around.is_empty());
+        if matches!(written, file::SceneFile::Jaw(jaw) if jaw.own_jaw && !has_surfaces(jaw)) {
             let help = "list the surfaces of the jaw in \"around\", or remove \"own_jaw\"";
             self.complain("/scene/jaw/own_jaw", "no-own-jaw", "a jaw of one's own has no surfaces", help);
         }
@@ -250,8 +251,9 @@ impl Resolver<'_> {
         let ending = name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
         // A recording has the files that the exercise names; a glTF file that names others would lack them.
         let alone = |other: &str| {
-            let help = "export it as one file (.glb, or .gltf with embedded data)".to_string();
-            Err(Diagnostic::about_file(other, "not-embedded", format!("its data are in \"{other}\""), Some(help)))
+            let what =
+                format!("its data are in \"{other}\": export it as one file (.glb, or .gltf with embedded data)");
+            Err(Diagnostic::about_file(other, "not-embedded", what, None))
         };
         let read = self.library.bytes(name).map_err(|e| (e.code, e.message, e.help)).and_then(|bytes| {
             let mesh = solid_mesh::parse(&bytes, &ending, alone).map_err(describe)?;
