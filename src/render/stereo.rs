@@ -9,7 +9,7 @@ use super::scene::Rgb;
 pub struct Stereo {
     pub layout: StereoLayout,
     /// Distance between the eyes, mm, 0 to 80. People's is about 63; less is easier on the eyes where the scene is
-    /// near, because a mouth on a screen is larger than life.
+    /// near, because a mouth on a screen is larger than life. A negative distance exchanges the eyes' pictures.
     pub eye_distance: f32,
 }
 

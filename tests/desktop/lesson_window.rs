@@ -287,3 +287,38 @@ fn a_window_seen_in_a_mirror_is_drawn_flipped() {
         assert!(share > 0.99, "{mirrored}: {share} of the pixels are the same");
     }
 }
+
+#[test]
+fn stereo_in_a_mirror_keeps_each_eye_in_its_half() {
+    // Aim: a screen for side-by-side stereo gives its left half to the left eye, also where the window is flipped. Method: the
+    // left half of the flipped view is the mirror image of the left half of the ordinary one, and not of the right one.
+    let width = SCREEN_SIZE[0] as usize;
+    let draw = |mirrored: &str| {
+        let place = folder(&format!("mirrored_stereo_{mirrored}"));
+        let settings = format!(
+            r#"{{ "language": "en", "mirrored": "{mirrored}", "stereo": "side_by_side", "eye_distance_mm": 20.0 }}"#
+        );
+        harness::keep_settings(&place, &settings);
+        let options = AppOptions { begins_at_once: true, ..exercise_options(&place, "scenarios/5-grinding.json") };
+        let mut desk = Window::open(&place, options)?;
+        desk.until("screen", |screen| screen == "practice");
+        desk.until("tooth", |tooth| tooth == "drawn");
+        desk.wait(Duration::from_secs(1));
+        Some((desk.pixels(), desk.view_of("The tooth")))
+    };
+    let Some((ordinary, [left, top, right, bottom])) = draw("no") else { return };
+    let (flipped, _) = draw("left_right").unwrap();
+    let half = (right - left) / 2;
+    let share = |half_begins: usize| {
+        // Without the edges of the panels and the hint below.
+        let places = (top + 10..bottom - 80).flat_map(|y| (10..half - 10).map(move |x| [x, y]));
+        let is_equal = |&[x, y]: &[usize; 2]| {
+            let a = &ordinary[4 * (y * width + half_begins + half - 1 - x)..][..3];
+            let b = &flipped[4 * (y * width + width - right + x)..][..3];
+            a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) < 24)
+        };
+        places.clone().filter(is_equal).count() as f32 / places.count() as f32
+    };
+    let (same_eye, other_eye) = (share(left), share(left + half));
+    assert!(same_eye > 0.97 && other_eye < same_eye - 0.05, "{same_eye} of the same eye, {other_eye} of the other");
+}

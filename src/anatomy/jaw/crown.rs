@@ -49,12 +49,12 @@ fn cropped_above(grid: Grid, height: f32) -> Grid {
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
-const NECK: Tint = [0.97, 0.915, 0.81];
+const NECK: Tint = [0.98, 0.94, 0.86];
 const ROOT: Tint = [0.93, 0.83, 0.66];
 const EDGE: Tint = [0.945, 0.95, 0.965];
-const DEEP: Tint = [0.88, 0.80, 0.69];
+const DEEP: Tint = [0.93, 0.885, 0.81];
 const CANINE: Tint = [0.99, 0.98, 0.95];
-const PLAIN: Tint = [1.0, 0.995, 0.985];
+const PLAIN: Tint = [1.0, 1.0, 1.0];
 
 fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
     let sizes = &model.form.sizes;
@@ -63,7 +63,7 @@ fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
     let neckline = rise * place.y * place.y / (place.x * place.x + place.y * place.y + 0.01);
     let body = if model.kind == ToothKind::Canine { CANINE } else { PLAIN };
     let height = (place.z - neckline) / sizes.crown;
-    let on_enamel = mixed_tint(NECK, body, height / 0.45);
+    let on_enamel = mixed_tint(NECK, body, height / 0.35);
     let enamel = match model.kind {
         ToothKind::Incisor => mixed_tint(on_enamel, EDGE, (height - 0.75) / 0.25),
         ToothKind::Canine => on_enamel,
