@@ -13,8 +13,8 @@ use typodont_app::AppOptions;
 struct Task {
     exercise: &'static str,
     points: f64,
-    /// True if warnings are passed over, as a fissure is opened through sound enamel, and the bur is lifted where the section
-    /// shows the pulp near the bur.
+    /// True if a warning is passed over while the section shows caries at the bur, as a fissure is opened through sound enamel,
+    /// and the bur is lifted where it shows the pulp near the bur.
     looks_at_section: bool,
     views: &'static [View],
 }
@@ -43,9 +43,12 @@ const WARNING_PIXELS: usize = 30;
 /// Width and height of the lower right corner of the view with the section, which shows caries, too; pixels.
 const SECTION: [usize; 2] = [215, 260];
 
-/// The part of the section in which a millimetre of tissue is seen under the bur: its left, top, right and bottom, by the
-/// distance from the lower right corner of the view, pixels.
-const UNDER_BUR: [usize; 4] = [117, 133, 97, 108];
+/// The part of the section in which a millimetre of tissue is seen beside and under the bur: its left, top, right and bottom, by
+/// the distance from the lower right corner of the view, pixels.
+const AROUND_BUR: [usize; 4] = [127, 143, 87, 118];
+
+/// A part that reaches as far again below it.
+const BELOW_BUR: [usize; 4] = [127, 143, 87, 98];
 
 /// Time after which the trainee finishes, which leaves a minute of the ten.
 const TIME: Duration = Duration::from_secs(540);
@@ -99,8 +102,10 @@ struct Seen {
     is_brown: Vec<bool>,
     /// True while a warning stands below the view.
     is_warned: bool,
-    /// True if the section shows the pulp under the bur.
-    is_pulp_under_bur: bool,
+    /// True if the section shows caries beside or under the bur.
+    is_brown_near_bur: bool,
+    /// True if it shows the pulp beside or under the bur.
+    is_pulp_near_bur: bool,
 }
 
 impl Seen {
@@ -162,9 +167,9 @@ impl Trial {
                 .flat_map(|y| (right - left_by..right - right_by).map(move |x| pixel(x, y)))
                 .any(|seen| is_sought(seen[0], seen[1], seen[2]))
         };
-        let is_pulp_under_bur = shows(UNDER_BUR, is_red);
+        let (is_brown_near_bur, is_pulp_near_bur) = (shows(AROUND_BUR, is_brown), shows(BELOW_BUR, is_red));
         let is_brown = (0..columns * rows).map(is_brown_at).collect();
-        Seen { columns, rows, is_brown, is_warned, is_pulp_under_bur }
+        Seen { columns, rows, is_brown, is_warned, is_brown_near_bur, is_pulp_near_bur }
     }
 
     fn place(&self, [x, y]: Spot) -> [i32; 2] {
@@ -221,7 +226,7 @@ impl Trial {
                     (least, since) = (brown, Instant::now());
                 }
                 let is_enough = match self.looks_at_section {
-                    true => seen.is_pulp_under_bur,
+                    true => seen.is_pulp_near_bur || seen.is_warned && !seen.is_brown_near_bur,
                     false => seen.is_warned,
                 };
                 if brown == 0 || is_enough {
