@@ -246,11 +246,12 @@ impl LessonState {
     /// Places the hand of an arm in a frame once that has settled, if a stage runs. For `is_dragging` and `now` see
     /// [`HandPlacement::is_due`].
     pub fn place_hand(&mut self, frame: HandFrame, is_dragging: bool, now: f64) {
+        let is_standing_still = self.is_standing_still();
         let LessonState { stage: Some(_), hand_placement: Some(placement), client, registration, .. } = self else {
             return;
         };
         let frame = if registration.is_some() { REGISTERING_FRAME } else { frame };
-        if self.is_paused || self.pause_reason.is_some() {
+        if is_standing_still {
             placement.wait(now);
         }
         if placement.is_due(frame, is_dragging, now) && client.send(LessonCommand::Input(Input::PlaceHand(frame))) {

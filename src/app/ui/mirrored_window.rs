@@ -96,7 +96,7 @@ mod tests {
     use super::*;
     use eframe::egui::{Modifiers, PointerButton};
 
-    /// Runs two frames of a window with one button at the upper left, in which the mouse clicks at a place of the screen;
+    /// Runs frames of a window with one button at the upper left, in which the mouse clicks at a place of the screen;
     /// returns true if the button was clicked, and the middle of what was drawn.
     fn click(mirrored: MirroredWindow, at: Pos2) -> (bool, Pos2) {
         let ctx = Context::default();

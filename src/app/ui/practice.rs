@@ -274,8 +274,8 @@ fn view_ui(
     commands: &mut Vec<AppCommand>,
 ) {
     // The crosses are in the picture of one eye.
-    let in_mono = Settings { stereo: StereoMode::Off, ..settings.clone() };
-    let settings = if lesson.registration.is_some() { &in_mono } else { settings };
+    let in_mono = lesson.registration.as_ref().map(|_| Settings { stereo: StereoMode::Off, ..settings.clone() });
+    let settings = in_mono.as_ref().unwrap_or(settings);
     let rect = ui.available_rect_before_wrap();
     let view = ui.interact(rect, ui.scope_id().with("view"), Sense::click_and_drag());
     view.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Canvas, true, words.get("practice.view")));
