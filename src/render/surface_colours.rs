@@ -8,7 +8,7 @@ use super::enamel_depth::EnamelLayers;
 use super::scene::{Appearance, LabelPalette, VolumeInstance};
 use typodont_core::frame::{Vec3, smooth_step};
 use typodont_core::parallel::par_map;
-use typodont_core::volume::{BRICK, Label, Volume};
+use typodont_core::volume::{BRICK, Density, Label, Volume};
 
 /// Width of a cell, mm, that is not exceeded by averaging voxels: fine volumes need no colour for every voxel.
 const CELL_WIDTH: f32 = 0.12;
@@ -298,7 +298,7 @@ impl SurfaceColours {
                             let label = mixer.alike[usize::from(voxel.label.0)];
                             first_label = if first_label == Label::AIR { label } else { first_label };
                             is_sole &= label == first_label;
-                            cell.add(&mixer.matter[usize::from(label.0)], voxel.density.unit() * share);
+                            cell.add(&mixer.matter[usize::from(label.0)], seen_amount(voxel.density) * share);
                         }
                     }
                 }
@@ -308,6 +308,17 @@ impl SurfaceColours {
         let sole_label = (is_sole && first_label != Label::AIR).then_some(first_label);
         Window { cells, has_decay, sole_label }
     }
+}
+
+/// Amount of a voxel's matter that counts for colours: hardly any where the voxel's centre is clearly outside the surface. The
+/// rest that a bur leaves there of a voxel of decay would tint the sound tissue beneath.
+fn seen_amount(density: Density) -> f32 {
+    /// Density from which matter counts: somewhat less than that of the surface, so that decay that is scored is seen.
+    const FROM: f32 = 0.35;
+    /// Share that counts of a voxel outside: where there is no other matter, it has its own colour.
+    const OUTSIDE: f32 = 0.02;
+    let density = density.unit();
+    ((density - FROM) / (1.0 - FROM)).max(OUTSIDE * density)
 }
 
 /// Matter around the cells of a brick, [`WINDOW`] cells wide, x fastest.
@@ -576,6 +587,23 @@ mod tests {
         for plain in [without_depth, hidden] {
             assert!((plain.at(grid.from_tooth(Vec3::new(1.5, 0.0, 1.0))).colour[2] - 0.9).abs() < 0.005);
         }
+    }
+
+    #[test]
+    fn what_is_left_of_decay_outside_the_surface_is_not_seen() {
+        // Aim: a floor from which all decay was cut looks sound. Method: dentine up to a plane; the voxels above it hold the little
+        // matter that lies there, of decay or of dentine.
+        let spacing = 0.1;
+        let grid = Grid::centred([30, 30, 30], Vec3::splat(spacing));
+        let palette = palette();
+        let colour = |above: Label| {
+            let label = |p: Vec3| if p.z > 0.0 { above } else { DENTINE };
+            let volume = Volume::from_distance(grid, 1.5 * spacing, |p| (p.z - 0.02, label(p)));
+            let depth = EnamelDepth::of(&volume, |label| label == DENTINE);
+            SurfaceColours::new(&tooth(&volume, &palette, &depth)).at(grid.from_tooth(Vec3::new(0.0, 0.0, 0.02)))
+        };
+        let (cut, sound) = (Vec3::from(colour(DECAY).colour), Vec3::from(colour(DENTINE).colour));
+        assert!(cut.distance(sound) < 0.03, "{cut} beside {sound}");
     }
 
     #[test]
