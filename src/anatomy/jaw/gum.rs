@@ -247,17 +247,19 @@ impl HalfJaw<'_> {
                     smooth_max(on_tooth, BETWEEN_TEETH * wide)
                 };
                 let (outer, inner) = (edge(out, margin), edge(-out, inner_margin));
+                // On a papilla there is no sulcus.
+                let [edge_tint, sulcus_tint] = [EDGE, SULCUS].map(|tint| mixed_tint(tint, FREE, between));
                 // Above the next row, however far the margin has receded.
                 let attached = |margin: f32| (margin - 1.6).max(neck - 2.9);
                 vec![
                     (outer + 0.85 + 0.5 * root, attached(margin), ATTACHED),
                     (outer + 0.55, margin - 0.8, FREE),
                     (outer + 0.30, margin - 0.3, FREE),
-                    (outer + 0.04, margin, FREE),
-                    (outer - 0.40, margin + 0.15, FREE),
+                    (outer + 0.04, margin, edge_tint),
+                    (outer - 0.40, margin + 0.15, sulcus_tint),
                     (0.0, crest, FREE),
-                    (0.40 - inner, inner_margin + 0.15, FREE),
-                    (-inner - 0.04, inner_margin, FREE),
+                    (0.40 - inner, inner_margin + 0.15, sulcus_tint),
+                    (-inner - 0.04, inner_margin, edge_tint),
                     (-inner - 0.30, inner_margin - 0.3, FREE),
                     (-inner - 0.55, inner_margin - 0.8, FREE),
                     (-inner - 0.95, attached(inner_margin), ATTACHED),
@@ -387,9 +389,11 @@ struct RidgeSection {
     pad: f32,
 }
 
-/// Tints of the gingiva's colour: pale where it is attached to bone, redder where it is loose.
+/// Tints of the gingiva's colour: pale where it is attached to bone, redder where it is loose, dark in the sulcus around a tooth.
 const ATTACHED: Tint = [1.0, 1.0, 1.0];
 const FREE: Tint = [1.0, 0.94, 0.93];
+const EDGE: Tint = [0.96, 0.86, 0.85];
+const SULCUS: Tint = [0.84, 0.64, 0.63];
 const LINE: Tint = [0.97, 0.87, 0.86];
 const MUCOSA: Tint = [0.90, 0.70, 0.69];
 const PALATE: Tint = [0.98, 0.96, 0.94];

@@ -38,7 +38,7 @@ const MOLAR_RELATION: f32 = 0.9;
 const CUSP_WIDTH: f32 = 4.5;
 
 /// Gloss of wet gingiva and enamel, 0 to 1.
-const GUM_GLOSS: f32 = 0.28;
+const GUM_GLOSS: f32 = 0.19;
 const TOOTH_GLOSS: f32 = 0.22;
 
 /// Distances from the carved tooth's box, mm: up to the first, the gingiva is drawn as it is touched; from the second
@@ -367,6 +367,8 @@ impl TouchedGeometry<'_> {
         const DEEP: [f32; 2] = [6.0, 10.0];
         /// Distance below a mesh that is drawn separately, mm.
         const UNDER: f32 = 0.4;
+        /// Least share of a step's direction that is across the arch.
+        const ACROSS: f32 = 0.5;
         let Some(gum) = self.shapes.iter().find(|shape| Some(shape.label) == self.gum_label) else {
             return point_in_arch;
         };
@@ -393,7 +395,9 @@ impl TouchedGeometry<'_> {
                 Some(own) => (own.gum_sdf_filled(point), gradient_direction(&|p| own.gum_sdf_filled(p), point)),
                 None => gum.distance_and_normal(point),
             };
-            point -= out * (distance - wanted);
+            // Across the arch only: along it, columns of the gum's mesh would pass each other.
+            let across = out.with_y(0.0);
+            point -= across * ((distance - wanted) / across.length_squared().max(ACROSS * ACROSS));
         }
         self.near_from_tooth * start.lerp(point, share)
     }
