@@ -19,9 +19,9 @@ const PIXELS: u32 = 96;
 const SIDE: f32 = 190.0;
 const MARGIN: f32 = 12.0;
 
-/// Colours of the empty space and of whatever surrounds the tooth.
+/// Colour of the empty space, and share of their brightness in which the surroundings of the tooth are drawn.
 const BACKGROUND: [f32; 3] = [0.11, 0.14, 0.16];
-const SURROUNDINGS: [f32; 3] = [0.69, 0.42, 0.41];
+const SURROUNDINGS: f32 = 0.8;
 
 /// Image of a section, and what it depends on.
 pub struct SectionImage {
@@ -108,9 +108,6 @@ fn section_texture(
 
 /// The tooth in the section plane, in the colours of its tissues, and what surrounds it.
 fn section_picture(scene: &LessonScene, azimuth: f32, tip_in_world: Vec3) -> PixelBuffer {
-    /// Pixels along each side of a block that is within or outside the surroundings as a whole: distances to meshes are
-    /// slow.
-    const BLOCK: u32 = 4;
     let LessonScene { volume, workpiece, palette, .. } = scene;
     let tooth_from_world = workpiece.world_from_tooth.inverse();
     let middle = tooth_from_world * tip_in_world;
@@ -123,14 +120,32 @@ fn section_picture(scene: &LessonScene, azimuth: f32, tip_in_world: Vec3) -> Pix
     let plane = ImagePlane { camera, width: PIXELS, height: PIXELS };
     let mut picture = PixelBuffer::filled(PIXELS, PIXELS, BACKGROUND);
     let nearby: Vec<_> = workpiece.surroundings.iter().filter(|c| c.distance(middle) < SIDE_MM).collect();
-    for (x, y) in (0..PIXELS / BLOCK).flat_map(|y| (0..PIXELS / BLOCK).map(move |x| (x * BLOCK, y * BLOCK))) {
-        let centre = plane.unproject((x + BLOCK / 2) as f32, (y + BLOCK / 2) as f32);
-        if nearby.iter().any(|collider| collider.distance(centre) <= 0.0) {
-            for (x, y) in (y..y + BLOCK).flat_map(|y| (x..x + BLOCK).map(move |x| (x, y))) {
-                picture.blend_pixel(i64::from(x), i64::from(y), SURROUNDINGS, 1.0);
-            }
-        }
+    for collider in nearby {
+        let colour = palette.appearance(collider.label).colour.map(|part| SURROUNDINGS * part);
+        blend_solid(&mut picture, colour, |x, y| collider.distance(plane.unproject(x, y)));
     }
     picture.composite(&raycast::slice(volume, &plane, middle, |label, _| palette.appearance(label).colour));
     picture
+}
+
+/// Blends the part of a picture that is within a solid. `distance`: from a place of the picture, pixels, to the solid, mm.
+fn blend_solid(picture: &mut PixelBuffer, colour: [f32; 3], distance: impl Fn(f32, f32) -> f32) {
+    /// Pixels between places at which the distance is asked for: distances to meshes are slow.
+    const STEP: u32 = 4;
+    const PER_SIDE: u32 = PIXELS / STEP + 1;
+    const MM_PER_PIXEL: f32 = SIDE_MM / PIXELS as f32;
+    let places = (0..PER_SIDE).flat_map(|y| (0..PER_SIDE).map(move |x| (x * STEP, y * STEP)));
+    let known: Vec<f32> = places.map(|(x, y)| distance(x as f32, y as f32)).collect();
+    for (x, y) in (0..PIXELS).flat_map(|y| (0..PIXELS).map(move |x| (x, y))) {
+        let [(column, right), (row, below)] =
+            [x, y].map(|pixel| (pixel / STEP, ((pixel % STEP) as f32 + 0.5) / STEP as f32));
+        let at = |row: u32, column: u32| known[(row * PER_SIDE + column) as usize];
+        let [above, under] = [row, row + 1].map(|row| lerp(at(row, column), at(row, column + 1), right));
+        let share = (0.5 - lerp(above, under, below) / MM_PER_PIXEL).clamp(0.0, 1.0);
+        picture.blend_pixel(i64::from(x), i64::from(y), colour, share);
+    }
+}
+
+fn lerp(from: f32, to: f32, share: f32) -> f32 {
+    from + (to - from) * share
 }
