@@ -12,7 +12,7 @@ const PRESSED: f32 = 0.4;
 /// Rotation of the view that counts as deliberate, rad.
 const ROTATED: f32 = 0.15;
 
-/// Actions that the trainee has done in the stage.
+/// Actions that the trainee has done in the exercise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ControlsProgress {
     pub has_moved: bool,
@@ -25,6 +25,11 @@ pub struct ControlsProgress {
 }
 
 impl ControlsProgress {
+    /// Begins a stage, to which the hand and the view may have been moved; what was done stays done.
+    pub fn begin_stage(&mut self) {
+        self.start = None;
+    }
+
     /// Takes over what the trainee does at this moment.
     pub fn update(&mut self, lesson: &LessonProgress) {
         let LessonProgress { hand, is_touching, force, is_cutting, orbit } = *lesson;

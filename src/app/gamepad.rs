@@ -54,7 +54,7 @@ const KEY_BUTTONS: [(u32, Key); 10] = [
 const WHEEL_BUTTONS: [(u32, f32); 2] = [(4, -1.0), (5, 1.0)];
 
 /// Identifies the trigger among touches: no screen has this number.
-const TRIGGER: TouchDeviceId = TouchDeviceId(u64::MAX);
+pub const TRIGGER: TouchDeviceId = TouchDeviceId(u64::MAX);
 
 fn is_pressed(pad: &GamepadState, button: u32) -> bool {
     pad.buttons & (1 << button) != 0

@@ -85,7 +85,7 @@ pub struct LessonState {
     pub can_touch_cross: bool,
     /// True where an arm may be registered: not in a kiosk, whose settings last as long as its participant.
     pub can_register_hand: bool,
-    /// Actions done in the running stage, for a stage that teaches the controls.
+    /// Actions done so far, for a stage that teaches the controls.
     pub controls: ControlsProgress,
     pub is_confirming_abort: bool,
     pub orbit: Orbit,
@@ -416,7 +416,7 @@ impl LessonState {
                 self.submitted.clear();
                 self.chart.clear();
                 self.refusal_key = None;
-                self.controls = ControlsProgress::default();
+                self.controls.begin_stage();
                 self.is_confirming_finish = false;
                 self.materials = self.scenario.tissues.materials();
                 self.update_palette();

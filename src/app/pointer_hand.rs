@@ -38,9 +38,19 @@ pub struct PointedPlace {
     pub aspect: f32,
 }
 
+/// Kind of the pointer that a trainee works with, by which the hints speak of it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PointerKind {
+    #[default]
+    Mouse,
+    Pen,
+    Finger,
+}
+
 /// State of the pointer's hand.
 #[derive(Clone, Debug)]
 pub struct PointerHand {
+    pub kind: PointerKind,
     pub is_pressing: bool,
     /// Share of the strength with which it presses, 0 to 1; less than 1 for a pen that is pressed lightly.
     pub pressure: f32,
@@ -61,6 +71,7 @@ pub struct PointerHand {
 impl Default for PointerHand {
     fn default() -> PointerHand {
         PointerHand {
+            kind: PointerKind::default(),
             is_pressing: false,
             pressure: 1.0,
             lean: [0.0; 2],

@@ -5,6 +5,7 @@
 use crate::completion::Completion;
 use crate::platform;
 use eframe::egui;
+use typodont_exercise::score::Verdict;
 use typodont_lesson::Attempt;
 use typodont_report::FirstResult;
 use typodont_report::bundle::BundleFolder;
@@ -40,6 +41,13 @@ impl LessonResults {
         Attempt::of(&self.first.session).is_some_and(|attempt| attempt.is_passed())
     }
 
+    /// True if removing tissue can be right or wrong in the exercise: it is graded, or has tissue that is to be removed.
+    pub fn is_judged(&self) -> bool {
+        let is_target = |verdict| matches!(verdict, Verdict::RightlyRemoved | Verdict::Left);
+        let has_target = self.first.legend.iter().any(|entry| is_target(entry.verdict) && entry.volume > 0.0);
+        self.first.session.grade.is_some() || has_target
+    }
+
     /// True if most want to try again next.
     pub fn invites_retry(&self) -> bool {
         self.has_retry && !self.is_done()
@@ -63,7 +71,9 @@ impl LessonResults {
         completion.poll();
         match completion.state().outcome.clone() {
             Some(Ok(bundle)) => {
-                self.maps = MAPS.iter().filter_map(|name| load_map(&bundle, name, ctx)).collect();
+                // The first colours what was right and wrong.
+                let names = if self.is_judged() { &MAPS[..] } else { &MAPS[1..] };
+                self.maps = names.iter().filter_map(|name| load_map(&bundle, name, ctx)).collect();
                 self.state = BundleState::Finished(bundle);
             }
             Some(Err(why)) => self.state = BundleState::Failed(why),

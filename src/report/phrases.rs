@@ -15,6 +15,11 @@ pub fn value(metric: &str, value: Option<f64>) -> Message {
     value_text(display_format::measure(metric, value))
 }
 
+/// A value that an author wrote for a measure, with its unit.
+pub fn written(metric: &str, value: f64) -> Message {
+    value_text(display_format::written(metric, value))
+}
+
 /// Title of a measure, with the id of its zone or its tolerance where it has one.
 pub fn measure(metric: &Metric) -> Message {
     measure_of_zone(metric, |_| None)

@@ -442,7 +442,7 @@ impl ReportLocalizer<'_> {
     }
 
     fn item(&self, item: &super::ItemResultFile) -> ReportItem {
-        let written = |v: f64| self.html(&phrases::value_text(display_format::written(&item.metric, v)));
+        let written = |v: f64| self.html(&phrases::written(&item.metric, v));
         ReportItem {
             title: self.own(&item.title),
             formula: self.formula(&item.metric),

@@ -1,8 +1,8 @@
-// Works in an exercise of the page with a pen and with a gamepad.
+// Works in an exercise of the page with a pen, with fingers and with a gamepad.
 //
 //     node hands_page.js PLAYWRIGHT-CORE CHROMIUM PAGE PICTURES BUNDLE.zip
 //
-// The pen goes through the browser's own input, with its pressure and its tilt. The browser has no way to a gamepad without a real one:
+// The pen and the fingers go through the browser's own input, a pen with its pressure and its tilt. The browser has no way to a gamepad without a real one:
 // the page is given an object as `navigator.getGamepads` returns it. Prints what was measured as JSON. Exits with 1 and a line per claim
 // that does not hold.
 
@@ -66,6 +66,20 @@ main(async () => {
   await page.mouse.move(x, y);
   await until('handle', handle => numbers(handle)[1] > 0.98);
 
+  // A browser tells of a force for fingers, too, of which nothing is measured.
+  const touch = (type, touchPoints) => browser.send('Input.dispatchTouchEvent', { type, touchPoints });
+  const fingers = [{ x, y, id: 1, force: 1 }, { x: x + 150, y: y + 60, id: 2, force: 1 }];
+  await touch('touchStart', fingers.slice(0, 1));
+  const pointing = await greatestForce(2000);
+  await picture('finger');
+  await touch('touchStart', fingers);
+  const pressing = await greatestForce(3000);
+  await picture('fingers');
+  await touch('touchEnd', []);
+  claim(pointing < 0.3 * pressing && pressing > 0.2, `one finger presses with ${pointing} N, two with ${pressing} N`);
+  await page.mouse.move(x + 3, y);
+  await page.mouse.move(x, y);
+
   const hold = pad => page.evaluate(pad => { globalThis.pad = pad; }, pad);
   await hold({});
   const before = numbers(state.hand);
@@ -112,5 +126,5 @@ main(async () => {
   await finishLesson(opened);
   await saveBundle(opened, zip);
   await close();
-  console.log(JSON.stringify({ tilted, light, hard, pulled, whileHidden }));
+  console.log(JSON.stringify({ tilted, light, hard, pointing, pressing, pulled, whileHidden }));
 });

@@ -190,7 +190,10 @@ impl Trial {
         let place = self.place(spot);
         match (self.pointer, is_down) {
             (Pointer::Mouse, _) => self.desk.set_button(is_down),
-            (Pointer::Pen, true) => self.desk.touch(0, place, Some(1.0)),
+            (Pointer::Pen, true) => {
+                self.desk.touch(0, place, Some(0.6));
+                self.desk.slide(0, place, Some(1.0));
+            }
             (Pointer::Pen, false) => self.desk.lift(0, place),
             (Pointer::Fingers, true) => self.desk.touch(1, place.map(|at| at + 90), None),
             (Pointer::Fingers, false) => self.desk.lift(1, place.map(|at| at + 90)),
@@ -344,7 +347,7 @@ fn who_sees_only_the_picture_opens_a_fissure_with_a_mouse() {
 #[test]
 #[ignore = "scripts/test --long"]
 fn who_sees_only_the_picture_removes_the_caries_with_a_pen() {
-    // Aim and method: as above, by the events of a pen that touches with its full pressure.
+    // Aim and method: as above, by the events of a pen that is pressed down to its full pressure.
     assert_removes_caries(GRINDING, Pointer::Pen);
 }
 

@@ -8,7 +8,8 @@ use crate::screen::Screen;
 use crate::ui::briefing::BriefingFields;
 use crate::ui::case_pictures::picture_window;
 use crate::ui::exercise_list::{ListContext, exercise_list_ui};
-use crate::ui::results::{ResultTexts, results_ui};
+use crate::ui::report_texts::ReportTexts;
+use crate::ui::results::results_ui;
 use crate::ui::settings_screen::{SettingsContext, kiosk_settings_ui, settings_ui};
 use crate::ui::zip_verification::zip_verification_ui;
 use crate::ui::{briefing, kiosk_exit, practice, questionnaire, shortcuts, theme, ui_anchors};
@@ -47,7 +48,8 @@ impl App {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {
                     let is_code_required = options.kiosk().is_some();
                     let fields = BriefingFields { participant, is_code_required, examiner_code };
-                    briefing::briefing_ui(ui, scenario, fields, completion, &mut views.case_pictures, words, commands);
+                    let texts = ReportTexts { words, languages: options.templates.languages() };
+                    briefing::briefing_ui(ui, scenario, fields, completion, &mut views.case_pictures, &texts, commands);
                     if let Some(index) = *shown_picture {
                         let ctx = ui.ctx();
                         picture_window(
@@ -88,7 +90,7 @@ impl App {
                 }
             }
             Screen::Results(results) => {
-                let texts = ResultTexts { words, languages: options.templates.languages() };
+                let texts = ReportTexts { words, languages: options.templates.languages() };
                 results_ui(ui, results, is_test_run, &texts, commands);
             }
             Screen::Verification(verification) => {

@@ -4,13 +4,16 @@ use crate::command::{AppCommand, TextField};
 use crate::completion::CompletionProgress;
 use crate::i18n::Translations;
 use crate::ui::case_pictures::{CasePictures, thumbnails_ui};
+use crate::ui::report_texts::ReportTexts;
+use crate::ui::results::criterion_ui;
 use crate::ui::text_field::{field_id, participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;
-use typodont_exercise::scenario::{Rubric, Scenario, Stage};
+use typodont_exercise::scenario::{Metric, Rubric, Scenario, Stage};
 use typodont_lesson as lesson;
 use typodont_report::display_format::plain_number;
+use typodont_report::{Message, phrases};
 
 /// Texts typed before an exercise.
 pub struct BriefingFields<'a> {
@@ -33,9 +36,10 @@ pub fn briefing_ui(
     fields: BriefingFields,
     completion: Option<CompletionProgress>,
     pictures: &mut CasePictures,
-    words: &Translations,
+    texts: &ReportTexts,
     commands: &mut Vec<AppCommand>,
 ) {
+    let words = texts.words;
     let BriefingFields { participant, is_code_required, examiner_code } = fields;
     let examiner_code = examiner_code.filter(|_| lesson::is_sealable(scenario));
     theme::centered_column(ui, |ui| {
@@ -52,7 +56,7 @@ pub fn briefing_ui(
                 stage_ui(ui, scenario, stage, number + 1, words);
             }
             if let Some(rubric) = &scenario.rubric {
-                rubric_ui(ui, scenario, rubric, words);
+                rubric_ui(ui, scenario, rubric, texts);
             }
         });
         ui.add_space(16.0);
@@ -125,15 +129,28 @@ fn stage_ui(ui: &mut egui::Ui, scenario: &Scenario, stage: &Stage, number: usize
     ui.add_space(6.0);
 }
 
-/// Draws the marking scheme: each criterion with its points, the critical errors and the pass mark.
-fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, words: &Translations) {
+/// Draws the marking scheme: each criterion with its points and the values that give all and none of them, the critical
+/// errors and the pass mark.
+fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, texts: &ReportTexts) {
+    let words = texts.words;
     egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(8).inner_margin(14).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.label(egui::RichText::new(words.get("briefing.marking")).strong().size(18.0));
-        egui::Grid::new("rubric").num_columns(2).spacing([24.0, 4.0]).show(ui, |ui| {
+        egui::Grid::new("rubric").num_columns(4).spacing([24.0, 4.0]).show(ui, |ui| {
+            for key in ["results.item", "results.points", "label.full_at", "label.zero_at"] {
+                ui.weak(words.get(key));
+            }
+            ui.end_row();
             for item in &rubric.items {
-                ui.label(words.own(&scenario.texts, &item.title));
-                ui.label(words.format("briefing.points", plain_number(item.points)));
+                criterion_ui(
+                    ui,
+                    words.own(&scenario.texts, &item.title),
+                    &measure_title(scenario, &item.metric, texts),
+                );
+                ui.label(plain_number(item.points));
+                for value in [item.full_at, item.zero_at] {
+                    ui.label(texts.text(&phrases::written(&item.metric.to_string(), value)));
+                }
                 ui.end_row();
             }
         });
@@ -145,4 +162,13 @@ fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, words: &Tr
         ui.weak(words.format("results.pass_at", format!("{:.0}", rubric.pass_points)));
     });
     ui.add_space(6.0);
+}
+
+/// Title of a measure, with that of its zone.
+fn measure_title(scenario: &Scenario, metric: &Metric, texts: &ReportTexts) -> String {
+    let zone_title = |id: &str| {
+        let zone = scenario.zones.iter().find(|zone| zone.id == id)?;
+        Some(Message::plain(texts.words.own(&scenario.texts, &zone.title)))
+    };
+    texts.text(&phrases::measure_of_zone(metric, zone_title))
 }

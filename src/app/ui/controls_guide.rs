@@ -3,7 +3,7 @@
 
 use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
-use crate::platform;
+use crate::pointer_hand::PointerKind;
 use crate::ui::theme;
 use eframe::egui::{self, Color32, Pos2, Rect, Stroke, Vec2, vec2};
 
@@ -14,6 +14,8 @@ enum ActionPicture {
     Mouse(MousePart),
     /// A stylus over a surface: free, touching or pressed.
     Stylus(f32),
+    /// The places where this many fingers touch the screen.
+    Fingers(u8),
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -27,24 +29,29 @@ enum MousePart {
 pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, words: &Translations) {
     let Some(stage) = lesson.stage().filter(|stage| stage.shows_controls) else { return };
     let progress = lesson.controls;
-    let is_pointer = lesson.has_mouse();
-    let is_pen = is_pointer && platform::pen().is_some();
+    let pointer = lesson.has_mouse().then_some(lesson.pointer_hand.kind);
     let is_picked_up = lesson.is_pointer_captured || progress.has_moved;
     let has_followed = progress.has_moved && progress.has_touched;
-    let mut rows = match (is_pointer, is_pen) {
-        (true, true) => vec![
-            (ActionPicture::Stylus(0.0), "guide.pen_pick_up", is_picked_up),
+    let mut rows = match pointer {
+        Some(PointerKind::Pen) => vec![
+            (ActionPicture::Stylus(0.0), "guide.tap_pick_up", is_picked_up),
             (ActionPicture::Stylus(0.35), "guide.pen_move", has_followed),
             (ActionPicture::Stylus(-0.12), "guide.pen_press", progress.has_pressed),
             (ActionPicture::Stylus(0.0), "guide.pen_rotate", progress.has_rotated),
         ],
-        (true, false) => vec![
+        Some(PointerKind::Finger) => vec![
+            (ActionPicture::Fingers(1), "guide.tap_pick_up", is_picked_up),
+            (ActionPicture::Fingers(1), "guide.finger_move", has_followed),
+            (ActionPicture::Fingers(2), "guide.finger_press", progress.has_pressed),
+            (ActionPicture::Fingers(1), "guide.finger_rotate", progress.has_rotated),
+        ],
+        Some(PointerKind::Mouse) => vec![
             (ActionPicture::Mouse(MousePart::LeftButton), "guide.mouse_pick_up", is_picked_up),
             (ActionPicture::Mouse(MousePart::Whole), "guide.mouse_move", has_followed),
             (ActionPicture::Mouse(MousePart::LeftButton), "guide.mouse_press", progress.has_pressed),
             (ActionPicture::Mouse(MousePart::RightButton), "guide.mouse_rotate", progress.has_rotated),
         ],
-        (false, _) => vec![
+        None => vec![
             (ActionPicture::Stylus(0.35), "guide.arm_move", progress.has_moved),
             (ActionPicture::Stylus(0.0), "guide.arm_touch", progress.has_touched),
             (ActionPicture::Stylus(-0.12), "guide.arm_press", progress.has_pressed),
@@ -52,10 +59,10 @@ pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, wo
         ],
     };
     if stage.cutting {
-        let picture = if is_pointer && !is_pen {
-            ActionPicture::Mouse(MousePart::LeftButton)
-        } else {
-            ActionPicture::Stylus(-0.12)
+        let picture = match pointer {
+            Some(PointerKind::Mouse) => ActionPicture::Mouse(MousePart::LeftButton),
+            Some(PointerKind::Finger) => ActionPicture::Fingers(2),
+            Some(PointerKind::Pen) | None => ActionPicture::Stylus(-0.12),
         };
         rows.push((picture, "guide.cut", progress.has_cut));
     }
@@ -68,7 +75,7 @@ pub fn controls_guide_ui(ui: &mut egui::Ui, lesson: &LessonState, view: Rect, wo
         for (picture, key, is_done) in rows {
             row_ui(ui, picture, words.get(key), is_done);
         }
-        if is_pointer && !is_pen {
+        if pointer == Some(PointerKind::Mouse) {
             ui.add(egui::Label::new(egui::RichText::new(words.get("guide.keyboard")).size(14.0).weak()).wrap());
         }
     });
@@ -81,6 +88,7 @@ fn row_ui(ui: &mut egui::Ui, picture: ActionPicture, text: &str, is_done: bool) 
         match picture {
             ActionPicture::Mouse(part) => mouse_picture(ui.painter(), rect, part),
             ActionPicture::Stylus(height) => stylus_picture(ui.painter(), rect, height),
+            ActionPicture::Fingers(count) => fingers_picture(ui.painter(), rect, count),
         }
         let (mark, _) = ui.allocate_exact_size(vec2(18.0, 18.0), egui::Sense::hover());
         if is_done {
@@ -125,5 +133,15 @@ fn stylus_picture(painter: &egui::Painter, rect: Rect, height: f32) {
     painter.line_segment([tip, tip + vec2(16.0, -22.0)], Stroke::new(4.0, theme::ACCENT));
     if height < 0.0 {
         painter.circle_stroke(tip, 6.0, Stroke::new(2.0, theme::WARNING));
+    }
+}
+
+/// Fingertips on a screen, side by side.
+fn fingers_picture(painter: &egui::Painter, rect: Rect, count: u8) {
+    let screen = Rect::from_center_size(rect.center(), vec2(28.0, 24.0));
+    painter.rect_stroke(screen, 3, Stroke::new(1.5, Color32::from_gray(0x40)), egui::StrokeKind::Inside);
+    for finger in 0..count {
+        let share = f32::from(finger + 1) / f32::from(count + 1);
+        painter.circle_filled(screen.lerp_inside(vec2(share, 0.5)), 4.0, theme::ACCENT);
     }
 }

@@ -17,6 +17,7 @@ pub mod preview_view;
 pub mod questionnaire;
 pub mod questions;
 pub mod registration_view;
+pub mod report_texts;
 pub mod results;
 pub mod section_view;
 pub mod settings_screen;

@@ -4,7 +4,7 @@ use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
 use crate::lesson_state::LessonState;
 use crate::messages;
-use crate::platform;
+use crate::pointer_hand::PointerKind;
 use crate::settings::{Settings, StereoMode};
 use crate::snapshot::LessonSnapshot;
 use crate::ui::lesson_view::PictureFrame;
@@ -214,6 +214,7 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
             let x = rect.min.x + rect.width() * (strength / BAR_FULL).clamp(0.0, 1.0);
             painter.vline(x, rect.y_range(), Stroke::new(2.5, theme::ACCENT));
         }
+        response.on_hover_text(words.get("practice.force_about"));
         ui.monospace(format!("{force:4.1} N"));
         // There is no room for both in a narrow window.
         match (warning(lesson, &snapshot, words), lesson.press_strength()) {
@@ -333,7 +334,7 @@ fn view_ui(
         ui.ctx().request_repaint();
     }
     if lesson.has_mouse() && lesson.scene.is_some() {
-        pointer_hint_ui(ui, rect, lesson.is_pointer_captured, lesson.is_paused, words, commands);
+        pointer_hint_ui(ui, rect, lesson, words, commands);
     }
 }
 
@@ -342,13 +343,18 @@ fn view_ui(
 fn pointer_hint_ui(
     ui: &mut egui::Ui,
     view: Rect,
-    is_captured: bool,
-    is_paused: bool,
+    lesson: &LessonState,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
     /// Width of the button, points.
     const BUTTON: f32 = 136.0;
+    let is_captured = lesson.is_pointer_captured;
+    let [free, held, put_down] = match lesson.pointer_hand.kind {
+        PointerKind::Mouse => ["practice.free", "practice.held", "practice.put_down"],
+        PointerKind::Pen => ["practice.free_pen", "practice.held_pen", "practice.put_down_tap"],
+        PointerKind::Finger => ["practice.free_finger", "practice.held_finger", "practice.put_down_tap"],
+    };
     let at = view.center_bottom() - egui::vec2(0.0, 26.0);
     let width = (view.width() - 24.0).clamp(40.0, if is_captured { 680.0 } else { 620.0 });
     let place = Rect::from_center_size(at, egui::vec2(width, 36.0));
@@ -356,19 +362,13 @@ fn pointer_hint_ui(
     let text = |key| egui::RichText::new(words.get(key)).size(13.0);
     let hint = |key| egui::Label::new(text(key).color(Color32::WHITE)).selectable(false);
     if !is_captured {
-        ui.put(place, hint(if is_paused { "practice.free_paused" } else { "practice.free" }));
+        ui.put(place, hint(if lesson.is_paused { "practice.free_paused" } else { free }));
         return;
     }
     let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));
-    ui.put(
-        left.shrink2(egui::vec2(8.0, 0.0)),
-        hint(if platform::pen().is_some() { "practice.held_pen" } else { "practice.held" }),
-    );
+    ui.put(left.shrink2(egui::vec2(8.0, 0.0)), hint(held));
     if ui
-        .put(
-            right.shrink(4.0),
-            egui::Button::new(text("practice.put_down")).small().wrap_mode(egui::TextWrapMode::Extend),
-        )
+        .put(right.shrink(4.0), egui::Button::new(text(put_down)).small().wrap_mode(egui::TextWrapMode::Extend))
         .clicked()
     {
         commands.push(AppCommand::Practice(PracticeCommand::CapturePointer(false)));

@@ -4,35 +4,19 @@ use crate::command::AppCommand;
 use crate::i18n::Translations;
 use crate::platform;
 use crate::results::{BundleState, LessonResults};
+use crate::ui::report_texts::ReportTexts;
 use crate::ui::theme;
 use crate::ui::ui_anchors;
 use eframe::egui;
 use typodont_report::display_format::{item_points, plain_number, points};
-use typodont_report::{FeedbackFinding, FirstResult, GradeFile, Languages, LegendEntry, Message, phrases};
-
-/// Texts of the results: those of the window, and those of the report in the window's language.
-pub struct ResultTexts<'a> {
-    pub words: &'a Translations,
-    pub languages: &'a Languages,
-}
-
-impl ResultTexts<'_> {
-    /// A text of the exercise in the window's language.
-    fn own<'a>(&self, first: &'a FirstResult, text: &'a str) -> &'a str {
-        self.words.own(&first.texts, text)
-    }
-
-    fn text(&self, message: &Message) -> String {
-        self.languages.text_in(&self.words.code, message)
-    }
-}
+use typodont_report::{FeedbackFinding, FirstResult, GradeFile, LegendEntry, phrases};
 
 /// Draws the results. `is_test_run`: the lesson was a test run of an author, who returns to the exercise.
 pub fn results_ui(
     ui: &mut egui::Ui,
     results: &LessonResults,
     is_test_run: bool,
-    texts: &ResultTexts,
+    texts: &ReportTexts,
     commands: &mut Vec<AppCommand>,
 ) {
     let words = texts.words;
@@ -49,7 +33,7 @@ pub fn results_ui(
     let middle = egui::Frame::NONE.inner_margin(egui::Margin { left: 32, right: 16, top: 24, bottom: 8 });
     egui::CentralPanel::default().frame(middle).show(ui, |ui| {
         let session = &results.first.session;
-        ui.heading(texts.own(&results.first, &session.scenario.title));
+        ui.heading(own(texts, &results.first, &session.scenario.title));
         match &session.grade {
             Some(grade) => verdict_ui(ui, grade, &results.first, texts),
             None => {
@@ -62,7 +46,7 @@ pub fn results_ui(
             }
         }
         for stage in session.stages.iter().filter(|stage| stage.ended_by == "time") {
-            ui.colored_label(theme::WARNING, words.format("results.time_up", texts.own(&results.first, &stage.title)));
+            ui.colored_label(theme::WARNING, words.format("results.time_up", own(texts, &results.first, &stage.title)));
         }
         ui.add_space(6.0);
         // Every result begins at its top.
@@ -82,6 +66,11 @@ pub fn results_ui(
     });
 }
 
+/// A text of the exercise in the window's language.
+fn own<'a>(texts: &'a ReportTexts, first: &'a FirstResult, text: &'a str) -> &'a str {
+    texts.words.own(&first.texts, text)
+}
+
 /// Text key and colour of a grade's verdict.
 pub fn verdict(grade: &GradeFile) -> (&'static str, egui::Color32) {
     match (grade.finished, grade.passed) {
@@ -91,7 +80,7 @@ pub fn verdict(grade: &GradeFile) -> (&'static str, egui::Color32) {
     }
 }
 
-fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ResultTexts) {
+fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ReportTexts) {
     let words = texts.words;
     let (key, colour) = verdict(grade);
     ui.horizontal_wrapped(|ui| {
@@ -107,12 +96,12 @@ fn verdict_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: 
     });
     ui.weak(words.format("results.pass_at", format!("{:.0}", grade.pass_points)));
     for fail in &grade.hard_fails {
-        ui.colored_label(theme::ERROR, format!("× {}", texts.own(first, fail)));
+        ui.colored_label(theme::ERROR, format!("× {}", own(texts, first, fail)));
     }
 }
 
 /// The causes of lost points, the most costly first.
-fn feedback_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ResultTexts) {
+fn feedback_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ReportTexts) {
     if first.feedback.findings.is_empty() {
         return;
     }
@@ -123,7 +112,7 @@ fn feedback_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ResultTexts) {
     ui.add_space(10.0);
 }
 
-fn finding_ui(ui: &mut egui::Ui, finding: &FeedbackFinding, texts: &ResultTexts) {
+fn finding_ui(ui: &mut egui::Ui, finding: &FeedbackFinding, texts: &ReportTexts) {
     egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(6).inner_margin(10).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.horizontal_wrapped(|ui| {
@@ -142,14 +131,15 @@ fn finding_ui(ui: &mut egui::Ui, finding: &FeedbackFinding, texts: &ResultTexts)
     ui.add_space(4.0);
 }
 
-fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ResultTexts) {
+fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ReportTexts) {
     egui::Grid::new("items").num_columns(3).spacing([24.0, 8.0]).striped(true).show(ui, |ui| {
         for key in ["results.item", "results.value", "results.points"] {
             ui.strong(texts.words.get(key));
         }
         ui.end_row();
         for item in &grade.items {
-            ui.label(texts.own(first, &item.title));
+            let title = own(texts, first, &item.title);
+            criterion_ui(ui, title, &texts.text(&first.measure_title(&item.metric)));
             ui.label(texts.text(&phrases::value(&item.metric, item.value)));
             ui.label(format!("{} / {}", item_points(item.points, item.max_points), plain_number(item.max_points)));
             ui.end_row();
@@ -158,7 +148,18 @@ fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &R
     ui.add_space(10.0);
 }
 
-fn measures_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ResultTexts) {
+/// Draws the title of a criterion, and what is measured where the title does not say it.
+pub fn criterion_ui(ui: &mut egui::Ui, title: &str, measure: &str) {
+    ui.vertical(|ui| {
+        ui.spacing_mut().item_spacing.y = 0.0;
+        ui.label(title);
+        if measure != title {
+            ui.add(egui::Label::new(egui::RichText::new(measure).weak().small()));
+        }
+    });
+}
+
+fn measures_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ReportTexts) {
     egui::Grid::new("measures").num_columns(2).spacing([24.0, 6.0]).striped(true).show(ui, |ui| {
         for (name, value) in &first.session.metrics {
             ui.label(texts.text(&first.measure_title(name))).on_hover_text(name);
@@ -169,19 +170,21 @@ fn measures_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ResultTexts) {
 }
 
 /// The maps and the meaning of their colours.
-fn maps_ui(ui: &mut egui::Ui, results: &LessonResults, texts: &ResultTexts) {
+fn maps_ui(ui: &mut egui::Ui, results: &LessonResults, texts: &ReportTexts) {
     let words = texts.words;
     ui.strong(words.get("results.map"));
     let width = ui.available_width();
     for (number, map) in results.maps.iter().enumerate() {
         ui.add(egui::Image::new(map).max_width(width).alt_text(words.get("results.map")).corner_radius(8));
-        if number == 0 {
+        if number == 0 && results.is_judged() {
             legend_ui(ui, &results.first.legend, texts);
         }
         ui.add_space(8.0);
     }
     if results.maps.is_empty() {
-        legend_ui(ui, &results.first.legend, texts);
+        if results.is_judged() {
+            legend_ui(ui, &results.first.legend, texts);
+        }
         if results.is_pending() {
             ui.weak(words.get("results.map_pending"));
         }
@@ -189,7 +192,7 @@ fn maps_ui(ui: &mut egui::Ui, results: &LessonResults, texts: &ResultTexts) {
     ui.weak(words.get("results.map_about"));
 }
 
-fn legend_ui(ui: &mut egui::Ui, legend: &[LegendEntry], texts: &ResultTexts) {
+fn legend_ui(ui: &mut egui::Ui, legend: &[LegendEntry], texts: &ReportTexts) {
     const SIDE: f32 = 22.0;
     for entry in legend {
         ui.horizontal(|ui| {
