@@ -70,6 +70,9 @@ main(async () => {
   const touch = (type, touchPoints) => browser.send('Input.dispatchTouchEvent', { type, touchPoints });
   const fingers = [{ x, y, id: 1, force: 1 }, { x: x + 150, y: y + 60, id: 2, force: 1 }];
   await touch('touchStart', fingers.slice(0, 1));
+  // The tip drags while the handle returns from the pen's tilt.
+  await until('handle', handle => numbers(handle)[1] > 0.98);
+  await page.waitForTimeout(1000);
   const pointing = await greatestForce(2000);
   await picture('finger');
   await touch('touchStart', fingers);
