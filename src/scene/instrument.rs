@@ -1,5 +1,6 @@
 //! Meshes of the instruments.
 
+use super::bur_head::cutting_head;
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use typodont_core::frame::{Pose, Vec3};
@@ -11,6 +12,11 @@ use typodont_render::{Appearance, MeshInstance, PlaneMirror, Rgb};
 
 /// Polished steel: it mirrors two thirds of the light, and scatters little.
 const STEEL: Appearance = Appearance { colour: [0.52, 0.53, 0.55], gloss: 0.8 };
+
+/// Tints of steel: as it is, in a groove, and of the ring of a fast contra-angle.
+const PLAIN: Rgb = [1.0; 3];
+const GROOVE: Rgb = [0.3; 3];
+const RED: Rgb = [1.5, 0.22, 0.2];
 
 /// An instrument with its tip at the origin and +z along the shaft toward the handle: the mesh that its entry names, or
 /// else [`procedural_instrument`].
@@ -29,6 +35,7 @@ pub fn instrument_solid(entry: &InstrumentEntry, library: &Library) -> (MeshInst
 pub fn procedural_instrument(entry: &InstrumentEntry) -> MeshInstance {
     match &entry.end {
         WorkingEndEntry::Probe(probe) => probe_solid(probe),
+        end if entry.is_bur() && !bur_profile(end).is_empty() => tinted(bur(entry, &holder(end))),
         end => MeshInstance::plain(Arc::new(end_mesh(end)), Pose::IDENTITY, STEEL),
     }
 }
@@ -54,30 +61,83 @@ const HANDLE_DIRECTION: Vec3 = Vec3::new(0.423, -0.840, 0.342);
 /// Returns a bur in a contra-angle handpiece, as a pointer holds it; `None` for other instruments and for those with a
 /// mesh of their own.
 pub fn contra_angle(entry: &InstrumentEntry) -> Option<ContraAngle> {
-    /// Head: radius, and height over its lower rim, mm.
-    const HEAD_RADIUS: f32 = 4.4;
+    /// Height of the head, mm.
     const HEAD_HEIGHT: f32 = 12.5;
-    let profile = bur_profile(&entry.end);
-    if !entry.is_bur() || entry.mesh.is_some() || profile.is_empty() {
+    /// Outline of the head, radius and height, mm: chuck, rounded rim, wall with a groove, and push button.
+    const HEAD: [[f32; 2]; 20] = [
+        [0.0, 0.3],
+        [1.3, 0.3],
+        [1.3, 0.0],
+        [2.6, 0.05],
+        [3.4, 0.35],
+        [4.0, 0.9],
+        [4.3, 1.6],
+        [4.4, 2.4],
+        [4.4, 8.0],
+        [4.15, 8.1],
+        [4.15, 8.4],
+        [4.4, 8.5],
+        [4.4, 10.2],
+        [4.25, 10.8],
+        [3.8, 11.2],
+        [3.5, 11.2],
+        [3.5, 11.9],
+        [3.1, 12.3],
+        [1.8, 12.5],
+        [0.0, HEAD_HEIGHT],
+    ];
+    /// Stretches of it that lie in the dark: the hole around the shank, the groove, and the gap around the button.
+    const DARK: [usize; 5] = [0, 1, 9, 10, 14];
+    /// Neck and handle: distance along the handle from the middle of the head, mm, radius there, and tint. The red ring marks a
+    /// contra-angle that increases the speed.
+    const STATIONS: [(f32, f32, Rgb); 14] = [
+        (0.0, 3.4, PLAIN),
+        (7.0, 3.3, PLAIN),
+        (16.0, 3.7, PLAIN),
+        (20.0, 3.9, PLAIN),
+        (26.0, 5.6, PLAIN),
+        (29.0, 5.85, PLAIN),
+        (29.0, 5.95, RED),
+        (30.6, 6.05, RED),
+        (30.6, 5.95, PLAIN),
+        (40.0, 6.6, PLAIN),
+        (42.0, 6.7, PLAIN),
+        (42.0, 6.5, GROOVE),
+        (42.5, 6.5, GROOVE),
+        (95.0, 7.4, PLAIN),
+    ];
+    if !entry.is_bur() || entry.mesh.is_some() || bur_profile(&entry.end).is_empty() {
         return None;
     }
-    let plain = |mesh: Mesh| MeshInstance::plain(Arc::new(mesh), Pose::IDENTITY, STEEL);
     let head = head_height(&entry.end);
-    let bur = revolve(&[&profile[..], &shank(&profile)].concat());
-    let rims = [[0.0, 0.0], [3.2, 0.0], [HEAD_RADIUS, 1.2], [HEAD_RADIUS, HEAD_HEIGHT - 2.0]];
-    let cap = [[HEAD_RADIUS - 1.6, HEAD_HEIGHT - 0.4], [2.4, HEAD_HEIGHT], [0.0, HEAD_HEIGHT]];
-    let head_mesh = transformed(revolve(&[&rims[..], &cap].concat()), Pose::at(Vec3::Z * head));
-    // Neck and handle: distance along the handle from the middle of the head, and radius there.
-    const STATIONS: [[f32; 2]; 7] =
-        [[0.0, 3.4], [7.0, 3.3], [20.0, 3.9], [26.0, 5.6], [40.0, 6.6], [95.0, 7.4], [110.0, 6.2]];
+    let head_mesh = transformed(revolve(&HEAD), Pose::at(Vec3::Z * head));
+    let head_tints: Vec<Rgb> = (0..HEAD.len() - 1)
+        .flat_map(|stretch| [if DARK.contains(&stretch) { GROOVE } else { PLAIN }; 2 * (SIDES + 1)])
+        .collect();
     let middle = Vec3::Z * (head + 0.5 * HEAD_HEIGHT);
     let handpieces = [1.0, -1.0].map(|side| {
         let direction = HANDLE_DIRECTION * Vec3::new(side, 1.0, 1.0);
-        let mut mesh = head_mesh.clone();
-        mesh.append(tube(&STATIONS.map(|[along, radius]| (middle + direction * along, direction, radius))));
-        plain(mesh)
+        let (mut mesh, mut tints) = (head_mesh.clone(), head_tints.clone());
+        mesh.append(tube(&STATIONS.map(|(along, radius, _)| (middle + direction * along, direction, radius))));
+        tints.extend(STATIONS.iter().flat_map(|(_, _, tint)| [*tint; SIDES + 1]));
+        tinted((mesh, tints))
     });
-    Some(ContraAngle { bur: plain(bur), handpieces })
+    Some(ContraAngle { bur: tinted(bur(entry, &[])), handpieces })
+}
+
+/// A bur: its cutting head, its shank, and what holds it, an outline of radii and heights; with a tint for each vertex.
+fn bur(entry: &InstrumentEntry, holder: &[[f32; 2]]) -> (Mesh, Vec<Rgb>) {
+    let profile = bur_profile(&entry.end);
+    let (mut mesh, mut tints) = cutting_head(entry, &profile);
+    let end = profile.last().copied().unwrap_or_default();
+    mesh.append(revolve(&[&[end][..], &shank(&profile), holder].concat()));
+    tints.resize(mesh.positions.len(), PLAIN);
+    (mesh, tints)
+}
+
+/// A steel instrument with a tint for each vertex.
+fn tinted((mesh, tints): (Mesh, Vec<Rgb>)) -> MeshInstance {
+    MeshInstance { vertex_colours: Arc::new(tints), ..MeshInstance::plain(Arc::new(mesh), Pose::IDENTITY, STEEL) }
 }
 
 /// A periodontal probe with its marks and bands, so that a depth can be read; the middle of its end at the origin.
@@ -106,10 +166,7 @@ fn probe_solid(probe: &ProbeEntry) -> MeshInstance {
     };
     let tint = |pair: &[[f32; 2]]| [if is_dark(pair) { PAINT } else { [1.0; 3] }; 2 * (SIDES + 1)];
     let tints = outline.windows(2).flat_map(tint).collect();
-    MeshInstance {
-        vertex_colours: Arc::new(tints),
-        ..MeshInstance::plain(Arc::new(revolve(&outline)), Pose::IDENTITY, STEEL)
-    }
+    tinted((revolve(&outline), tints))
 }
 
 /// An explorer's bent wire with its handle.
@@ -225,9 +282,13 @@ fn end_mesh(end: &WorkingEndEntry) -> Mesh {
         _ => {}
     }
     let tip = bur_profile(end);
-    let [_, top] = tip.last().copied().unwrap_or_default();
-    let head = [[4.5, top + NECK], [5.2, top + 12.0], [5.2, top + 22.0], [0.0, top + 22.0]];
-    revolve(&[&tip[..], &shank(&tip), &head].concat())
+    revolve(&[&tip[..], &shank(&tip), &holder(end)].concat())
+}
+
+/// Outline of a straight holder behind the shank of what an arm holds.
+fn holder(end: &WorkingEndEntry) -> [[f32; 2]; 4] {
+    let head = head_height(end);
+    [[4.5, head], [5.2, head + 2.5], [5.2, head + 12.5], [0.0, head + 12.5]]
 }
 
 /// Neck and friction grip shank (ISO 1797: 1.6 mm) behind a bur's outline, up to the handpiece's head.
@@ -282,18 +343,31 @@ fn straight_profile(low: f32, high: f32, length: f32) -> Vec<[f32; 2]> {
     vec![[0.0, 0.0], [0.5 * low, 0.0], [0.5 * high, length]]
 }
 
-/// An outline turned about z; each stretch has its own normals, so that edges stay edges.
+/// An outline turned about z. Two stretches that meet nearly straight have one normal there, so that round forms are smooth and
+/// edges stay edges.
 pub(super) fn revolve(outline: &[[f32; 2]]) -> Mesh {
+    /// Cosine of the bend up to which a form is round.
+    const ROUND: f32 = 0.8;
     let mut mesh = Mesh::default();
-    for pair in outline.windows(2) {
+    let normal = |pair: &[[f32; 2]]| {
         let [[r0, z0], [r1, z1]] = [pair[0], pair[1]];
-        let out = Vec3::new(z1 - z0, 0.0, r0 - r1).normalize_or(Vec3::Z);
+        Vec3::new(z1 - z0, 0.0, r0 - r1).normalize_or(Vec3::Z)
+    };
+    let outs: Vec<Vec3> = outline.windows(2).map(normal).collect();
+    let at_end = |stretch: usize, beside: Option<&Vec3>| match beside {
+        Some(beside) if beside.dot(outs[stretch]) > ROUND => (outs[stretch] + *beside).normalize(),
+        _ => outs[stretch],
+    };
+    for (stretch, pair) in outline.windows(2).enumerate() {
+        let [[r0, z0], [r1, z1]] = [pair[0], pair[1]];
+        let before = stretch.checked_sub(1).and_then(|before| outs.get(before));
+        let ends = [at_end(stretch, before), at_end(stretch, outs.get(stretch + 1))];
         let first = mesh.positions.len() as u32;
         for i in 0..=SIDES {
             let angle = TAU * i as f32 / SIDES as f32;
             let (sin, cos) = (libm::sinf(angle), libm::cosf(angle));
             mesh.positions.extend([Vec3::new(r0 * cos, r0 * sin, z0), Vec3::new(r1 * cos, r1 * sin, z1)]);
-            mesh.normals.extend([Vec3::new(out.x * cos, out.x * sin, out.z); 2]);
+            mesh.normals.extend(ends.map(|out| Vec3::new(out.x * cos, out.x * sin, out.z)));
         }
         for i in 0..SIDES as u32 {
             let [a, b, c, d] = [0, 1, 2, 3].map(|n| first + 2 * i + n);

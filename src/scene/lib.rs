@@ -19,6 +19,7 @@
 //! assert_eq!(colour("caries"), colour("enamel"));
 //! ```
 
+mod bur_head;
 mod grey_volume;
 mod surroundings;
 pub mod particles;

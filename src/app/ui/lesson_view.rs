@@ -9,7 +9,8 @@ use crate::ui::section_view::SectionImage;
 use crate::ui::view_refresh::{Redraw, ViewInputs, ViewRefresh};
 use crate::ui::viewport::{EyeWindow, Viewport};
 use eframe::egui;
-use typodont_core::frame::{Pose, Vec3};
+use std::f32::consts::TAU;
+use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_devices::servo::SecondHandRole;
 use typodont_render::{Background, Changes, Lights, MeshInstance, RenderError, RenderScene, Viewpoint, VolumeInstance};
 use typodont_scene as scene;
@@ -165,6 +166,9 @@ fn world_from_tip(seen: &LessonSnapshot) -> Pose {
     Pose { position: seen.tip, orientation: seen.orientation }
 }
 
+/// Turns per second of a bur that is drawn cutting: no eye and no screen follows the real ones.
+const DRAWN_TURNS_PER_SECOND: f32 = 3.3;
+
 /// Whatever stands around the tooth, and the instrument in use.
 fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
     // On a radiograph neither gingiva nor neighbours cover the tooth; the instrument stays.
@@ -181,14 +185,18 @@ fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpo
     let index = seen.instrument as usize;
     let world_from_tip = world_from_tip(seen);
     let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
+    let is_turning = seen.cutting && lesson.scenario.instruments.get(index).is_some_and(|entry| entry.is_bur());
+    let turn = if is_turning { seen.stage_seconds * DRAWN_TURNS_PER_SECOND } else { 0.0 };
+    let turn = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_z(TAU * turn.fract()) };
+    let turned = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip * turn, ..solid.clone() };
     match scene.contra_angles.get(index).and_then(Option::as_ref).filter(|_| lesson.has_mouse()) {
         Some(held) => {
-            solids.push(placed(&held.bur));
+            solids.push(turned(&held.bur));
             if !hides_tip(viewpoint, world_from_tip) {
                 solids.push(placed(held.handpiece(settings.left_handed)));
             }
         }
-        None => solids.extend(scene.instruments.get(index).map(placed)),
+        None => solids.extend(scene.instruments.get(index).map(turned)),
     }
     solids
 }

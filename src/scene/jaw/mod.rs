@@ -218,7 +218,7 @@ impl Mouth {
         let form = if is_in_bend { GumForm::Touched } else { GumForm::Drawn };
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         Some(Mouth {
-            near: JawMeshes::new(near.crowns(&is_left_out), near.gum(form, &|p| geometry.fit_to_gum(p)), tissues),
+            near: JawMeshes::new(near.crowns(&is_left_out), near.gum(form, &|p| geometry.fit_gum(p)), tissues),
             opposite: Some(opposite_jaw(workpiece, &other, tissues)),
             jaw,
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
@@ -356,6 +356,22 @@ impl TouchedGeometry<'_> {
             .iter()
             .filter(|shape| self.tissues.role(shape.label) != Some(TissueRole::Soft))
             .any(|shape| shape.distance(middle) < OCCUPIED_DISTANCE)
+    }
+
+    /// A place of the gum, arch space, as it is drawn: [`TouchedGeometry::fit_to_gum`] around the tooth, and deep within it, where a
+    /// cavity would show it, below its neck.
+    fn fit_gum(&self, point_in_arch: Vec3) -> Vec3 {
+        /// Depth in the tooth, mm, from which the gum is lowered, and at which it is lowered by as much as it is.
+        const WITHIN: [f32; 2] = [0.3, 0.9];
+        const LOWERED: f32 = 9.0;
+        /// Width of the neck, as a share of the crown's.
+        const NECK: f32 = 0.8;
+        let place = self.near_from_tooth.inverse() * point_in_arch;
+        let (half, middle) = (self.tooth.crown.half_size() * NECK, self.tooth.crown.centre());
+        let depth = (1.0 - ((place - middle) / half).truncate().length()) * half.x.min(half.y);
+        let lowered = LOWERED * rise(depth, WITHIN);
+        let fitted = self.fit_to_gum(point_in_arch);
+        if lowered > 0.0 { fitted - self.near_from_tooth.rotate(Vec3::Z) * lowered } else { fitted }
     }
 
     /// A place of the gum, arch space: near the tooth laid onto the gum that is felt, or just under it where that is a mesh
