@@ -3,7 +3,7 @@
 use crate::camera_preset::CameraPreset;
 use crate::editor::EditorCommand;
 use crate::lesson_scene::DisplayMode;
-use crate::pointer_hand::{PointedPlace, PointerKind};
+use crate::pointer_hand::PointedPlace;
 use crate::settings::Settings;
 use crate::transfer_function_draft::TransferFunctionDraft;
 use std::path::PathBuf;
@@ -119,8 +119,6 @@ pub enum PracticeCommand {
     PointAt(Option<PointedPlace>),
     /// Changes the strength of a press, steps of the mouse wheel.
     ChangeStrength(f32),
-    /// Sets the kind of the pointer in use.
-    SetPointerKind(PointerKind),
     /// Sets the share of the strength with which a pen presses, 0 to 1.
     SetPressure(f32),
     /// Leans the handle further to the right and toward the eye, as shares of its length.

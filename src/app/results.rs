@@ -41,10 +41,12 @@ impl LessonResults {
         Attempt::of(&self.first.session).is_some_and(|attempt| attempt.is_passed())
     }
 
-    /// True if removing tissue can be right or wrong in the exercise: it is graded, or has tissue that is to be removed.
+    /// True if work can be right or wrong in the exercise: it is graded, or has tissue to be removed or a cavity to be filled.
     pub fn is_judged(&self) -> bool {
-        let is_target = |verdict| matches!(verdict, Verdict::RightlyRemoved | Verdict::Left);
-        let has_target = self.first.legend.iter().any(|entry| is_target(entry.verdict) && entry.volume > 0.0);
+        let is_of_target = |verdict| {
+            matches!(verdict, Verdict::RightlyRemoved | Verdict::Left) || Verdict::OF_FILLINGS.contains(&verdict)
+        };
+        let has_target = self.first.legend.iter().any(|entry| is_of_target(entry.verdict));
         self.first.session.grade.is_some() || has_target
     }
 

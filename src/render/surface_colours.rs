@@ -591,8 +591,8 @@ mod tests {
 
     #[test]
     fn what_is_left_of_decay_outside_the_surface_is_not_seen() {
-        // Aim: a floor from which all decay was cut looks sound. Method: dentine up to a plane; the voxels above it hold the little
-        // matter that lies there, of decay or of dentine.
+        // Aim: a floor from which all decay was cut looks sound. Method: dentine up to a plane; the voxels above it hold the
+        // little matter that lies there, of decay or of dentine.
         let spacing = 0.1;
         let grid = Grid::centred([30, 30, 30], Vec3::splat(spacing));
         let palette = palette();

@@ -321,7 +321,8 @@ fn hostile_exercises_do_no_harm_in_the_page() {
 #[ignore = "long: needs the page that scripts/web builds"]
 fn a_pen_fingers_and_a_gamepad_work_in_the_page() {
     // Aim: a tablet's pen presses as hard as it is pressed and holds the instrument as it is held; one finger points and a
-    // second one presses; a gamepad does what a mouse does. Method: the browser's input with pressure and tilt; a gamepad as the browser shows one; the bundle holds.
+    // second one presses; a gamepad does what a mouse does. Method: the browser's input with pressure and tilt; a gamepad as
+    // the browser shows one; the bundle holds.
     let Some((mut node, _)) = page_script("hands_page.js", WEBGL) else { return };
     let out = folder("page_hands");
     let zip = out.join("bundle.zip");

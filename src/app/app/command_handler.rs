@@ -525,7 +525,6 @@ fn execute_in_lesson(lesson: &mut LessonState, command: PracticeCommand) {
         PracticeCommand::SetPressure(_) | PracticeCommand::SetDeviceButton { .. } if !lesson.is_pointer_captured => {}
         PracticeCommand::Lean { right, near } => lesson.pointer_hand.lean(right, near),
         PracticeCommand::HoldUpright => lesson.pointer_hand.hold_upright(),
-        PracticeCommand::SetPointerKind(kind) => lesson.pointer_hand.kind = kind,
         PracticeCommand::SetPenDirection(pen) => lesson.pointer_hand.pen = pen,
         PracticeCommand::SetPressure(share) => lesson.pointer_hand.pressure = share,
         PracticeCommand::SetDeviceButton { bit, is_down } => lesson.set_pointer_button(bit, is_down),

@@ -25,6 +25,7 @@ use crate::session_history::SessionHistory;
 use crate::settings::{self, Settings};
 use crate::state_log::StateLog;
 use crate::ui::mirrored_window::MirrorPlugin;
+use crate::ui::touches::PointerInUse;
 use crate::ui::views::Views;
 use crate::ui::{shortcuts, theme, ui_anchors, viewport};
 use crate::user_folder::UserFolder;
@@ -77,6 +78,7 @@ pub struct App {
     replacements: Replacements,
     /// Pictures of a tooth as they were last drawn.
     views: Views,
+    pointer: PointerInUse,
     /// True once the window was asked to fill the screen for shutter glasses, which read the screen's last rows.
     fills_screen: bool,
     frame_count: u64,
@@ -153,6 +155,7 @@ impl App {
             replacements,
             has_graphics: context.wgpu_render_state.as_ref().is_some_and(viewport::has_graphics),
             views: Views::default(),
+            pointer: PointerInUse::default(),
             fills_screen: false,
             frame_count: 0,
             last_input: 0.0,
@@ -269,6 +272,10 @@ impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         let mut commands = Vec::new();
+        let pointer = self.pointer.update(&ctx);
+        if let Screen::Lesson(lesson) = &mut self.screen {
+            lesson.pointer_hand.kind = pointer;
+        }
         shortcuts::collect_commands(&ctx, &self.screen, self.overlay, self.had_focus, &mut commands);
         self.frame_ui(ui, frame, &mut commands);
         commands.extend(self.gamepad_camera.take().map(AppCommand::Camera));

@@ -343,10 +343,15 @@ thread_local! {
 /// Listens to the pens over an element: browsers report them as pointers, of which the window system takes the position only.
 pub fn listen_to_pens(canvas: &web_sys::HtmlCanvasElement) {
     let listener = Closure::<dyn FnMut(web_sys::PointerEvent)>::new(|event: web_sys::PointerEvent| {
+        let is_of_pen = event.pointer_type() == "pen";
+        // The palm beside a pen.
+        if !is_of_pen && PEN.get().is_some_and(|pen| pen.pressure.is_some()) {
+            return;
+        }
         let tilt = [event.tilt_x() as f32, event.tilt_y() as f32];
         // A pen that does not measure its tilt always says 0.
         KNOWS_TILT.set(KNOWS_TILT.get() || tilt != [0.0; 2]);
-        let is_pen = event.pointer_type() == "pen" && !matches!(&*event.type_(), "pointercancel" | "pointerleave");
+        let is_pen = is_of_pen && !matches!(&*event.type_(), "pointercancel" | "pointerleave");
         PEN.set(is_pen.then(|| Pen {
             pressure: (event.buttons() != 0).then(|| event.pressure()),
             tilt: KNOWS_TILT.get().then_some(tilt),

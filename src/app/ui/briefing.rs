@@ -5,7 +5,7 @@ use crate::completion::CompletionProgress;
 use crate::i18n::Translations;
 use crate::ui::case_pictures::{CasePictures, thumbnails_ui};
 use crate::ui::report_texts::ReportTexts;
-use crate::ui::results::criterion_ui;
+use crate::ui::results::{CRITERIA_WIDTH, criterion_ui};
 use crate::ui::text_field::{field_id, participant_field, push_typed};
 use crate::ui::theme;
 use crate::ui::ui_anchors;
@@ -136,6 +136,7 @@ fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, texts: &Re
     egui::Frame::NONE.fill(egui::Color32::WHITE).corner_radius(8).inner_margin(14).show(ui, |ui| {
         ui.set_width(ui.available_width());
         ui.label(egui::RichText::new(words.get("briefing.marking")).strong().size(18.0));
+        let width = CRITERIA_WIDTH * ui.available_width();
         egui::Grid::new("rubric").num_columns(4).spacing([24.0, 4.0]).show(ui, |ui| {
             for key in ["results.item", "results.points", "label.full_at", "label.zero_at"] {
                 ui.weak(words.get(key));
@@ -144,6 +145,7 @@ fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, texts: &Re
             for item in &rubric.items {
                 criterion_ui(
                     ui,
+                    width,
                     words.own(&scenario.texts, &item.title),
                     &measure_title(scenario, &item.metric, texts),
                 );
@@ -154,6 +156,14 @@ fn rubric_ui(ui: &mut egui::Ui, scenario: &Scenario, rubric: &Rubric, texts: &Re
                 ui.end_row();
             }
         });
+        for (index, item) in rubric.items.iter().enumerate() {
+            let dependent = rubric.items.iter().filter(|other| other.counts_with == Some(index));
+            let titles: Vec<&str> = dependent.map(|other| words.own(&scenario.texts, &other.title)).collect();
+            if !titles.is_empty() {
+                let title = words.own(&scenario.texts, &item.title);
+                ui.weak(words.format_all("briefing.counts_with", &[&titles.join(", "), title]));
+            }
+        }
         if !rubric.hard_fails.is_empty() {
             let errors = rubric.hard_fails.iter().map(|fail| words.own(&scenario.texts, &fail.title));
             let errors = errors.collect::<Vec<_>>().join(", ");

@@ -350,10 +350,14 @@ fn pointer_hint_ui(
     /// Width of the button, points.
     const BUTTON: f32 = 136.0;
     let is_captured = lesson.is_pointer_captured;
-    let [free, held, put_down] = match lesson.pointer_hand.kind {
-        PointerKind::Mouse => ["practice.free", "practice.held", "practice.put_down"],
-        PointerKind::Pen => ["practice.free_pen", "practice.held_pen", "practice.put_down_tap"],
-        PointerKind::Finger => ["practice.free_finger", "practice.held_finger", "practice.put_down_tap"],
+    let [free, free_paused, held, put_down] = match lesson.pointer_hand.kind {
+        PointerKind::Mouse => ["practice.free", "practice.free_paused", "practice.held", "practice.put_down"],
+        PointerKind::Pen => {
+            ["practice.free_pen", "practice.free_paused_tap", "practice.held_pen", "practice.put_down_tap"]
+        }
+        PointerKind::Finger => {
+            ["practice.free_finger", "practice.free_paused_tap", "practice.held_finger", "practice.put_down_tap"]
+        }
     };
     let at = view.center_bottom() - egui::vec2(0.0, 26.0);
     let width = (view.width() - 24.0).clamp(40.0, if is_captured { 680.0 } else { 620.0 });
@@ -362,7 +366,7 @@ fn pointer_hint_ui(
     let text = |key| egui::RichText::new(words.get(key)).size(13.0);
     let hint = |key| egui::Label::new(text(key).color(Color32::WHITE)).selectable(false);
     if !is_captured {
-        ui.put(place, hint(if lesson.is_paused { "practice.free_paused" } else { free }));
+        ui.put(place, hint(if lesson.is_paused { free_paused } else { free }));
         return;
     }
     let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));

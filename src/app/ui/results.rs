@@ -132,6 +132,7 @@ fn finding_ui(ui: &mut egui::Ui, finding: &FeedbackFinding, texts: &ReportTexts)
 }
 
 fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &ReportTexts) {
+    let width = CRITERIA_WIDTH * ui.available_width();
     egui::Grid::new("items").num_columns(3).spacing([24.0, 8.0]).striped(true).show(ui, |ui| {
         for key in ["results.item", "results.value", "results.points"] {
             ui.strong(texts.words.get(key));
@@ -139,7 +140,7 @@ fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &R
         ui.end_row();
         for item in &grade.items {
             let title = own(texts, first, &item.title);
-            criterion_ui(ui, title, &texts.text(&first.measure_title(&item.metric)));
+            criterion_ui(ui, width, title, &texts.text(&first.measure_title(&item.metric)));
             ui.label(texts.text(&phrases::value(&item.metric, item.value)));
             ui.label(format!("{} / {}", item_points(item.points, item.max_points), plain_number(item.max_points)));
             ui.end_row();
@@ -148,9 +149,13 @@ fn items_ui(ui: &mut egui::Ui, grade: &GradeFile, first: &FirstResult, texts: &R
     ui.add_space(10.0);
 }
 
-/// Draws the title of a criterion, and what is measured where the title does not say it.
-pub fn criterion_ui(ui: &mut egui::Ui, title: &str, measure: &str) {
+/// Share of the room in a table that the criteria take.
+pub const CRITERIA_WIDTH: f32 = 0.5;
+
+/// Draws the title of a criterion, and what is measured where the title does not say it, in a column of a width, points.
+pub fn criterion_ui(ui: &mut egui::Ui, width: f32, title: &str, measure: &str) {
     ui.vertical(|ui| {
+        ui.set_width(width);
         ui.spacing_mut().item_spacing.y = 0.0;
         ui.label(title);
         if measure != title {
@@ -172,10 +177,11 @@ fn measures_ui(ui: &mut egui::Ui, first: &FirstResult, texts: &ReportTexts) {
 /// The maps and the meaning of their colours.
 fn maps_ui(ui: &mut egui::Ui, results: &LessonResults, texts: &ReportTexts) {
     let words = texts.words;
-    ui.strong(words.get("results.map"));
+    let heading = words.get(if results.is_judged() { "results.map" } else { "results.after" });
+    ui.strong(heading);
     let width = ui.available_width();
     for (number, map) in results.maps.iter().enumerate() {
-        ui.add(egui::Image::new(map).max_width(width).alt_text(words.get("results.map")).corner_radius(8));
+        ui.add(egui::Image::new(map).max_width(width).alt_text(heading).corner_radius(8));
         if number == 0 && results.is_judged() {
             legend_ui(ui, &results.first.legend, texts);
         }

@@ -10,7 +10,7 @@
 
 use crate::command::{AppCommand, CameraCommand, PracticeCommand};
 use crate::platform;
-use crate::pointer_hand::{PointedPlace, PointerKind};
+use crate::pointer_hand::PointedPlace;
 use crate::ui::touches::{Touches, pen_pressure};
 use eframe::egui::{self, Event, Key, MouseWheelUnit, PointerButton};
 
@@ -29,9 +29,6 @@ const POINTS_PER_STEP: f32 = 40.0;
 /// Collects the commands of the pointer over a view, captured or free.
 pub fn collect_commands(ui: &egui::Ui, view: &egui::Response, is_captured: bool, commands: &mut Vec<AppCommand>) {
     let mut contact = contact(ui, view);
-    if let Some(kind) = pointer_kind(ui, &contact) {
-        commands.push(AppCommand::Practice(PracticeCommand::SetPointerKind(kind)));
-    }
     match is_captured {
         true => captured_pointer(ui, view, &mut contact, commands),
         false => {
@@ -128,21 +125,6 @@ fn contact(ui: &egui::Ui, view: &egui::Response) -> PointerContact {
         contact.began_on_view = is_down && (contact.began_on_view || is_pressed && view.is_pointer_button_down_on());
         contact.clone()
     })
-}
-
-/// Kind of the pointer that moves or touches in this frame.
-fn pointer_kind(ui: &egui::Ui, contact: &PointerContact) -> Option<PointerKind> {
-    if platform::pen().is_some() {
-        return Some(PointerKind::Pen);
-    }
-    let is_moving = || ui.input(|input| input.pointer.is_moving());
-    // The window system moves the pointer with a finger, too, and once more as the finger leaves.
-    contact.touches.kind().or_else(|| (!ui.input(has_touch) && is_moving()).then_some(PointerKind::Mouse))
-}
-
-/// True for a frame in which a pen or a finger touches the screen or leaves it.
-fn has_touch(input: &egui::InputState) -> bool {
-    input.any_touches() || input.events.iter().any(|event| matches!(event, Event::Touch { .. }))
 }
 
 /// Ends a press, although the button is still held.
