@@ -30,7 +30,7 @@ const GRAIN_DEPTH: f32 = 0.05;
 /// Colour of a diamond's grains and of the nickel between them, as shares of that of steel.
 const GRAIN_TINTS: [Rgb; 2] = [[1.15, 1.1, 1.0], [0.62, 0.58, 0.5]];
 
-/// Mesh of a cutting head, with a tint for each vertex. `outline`: radius and height, from the tip upward, mm.
+/// Mesh of a cutting head, with a tint for each vertex: a bur without a kind has blades. `outline`: radius and height, from the tip upward, mm.
 pub fn cutting_head(entry: &InstrumentEntry, outline: &[[f32; 2]]) -> (Mesh, Vec<Rgb>) {
     let rows = with_rows(outline);
     match entry.kind {
@@ -126,17 +126,28 @@ mod tests {
 
     #[test]
     fn a_drawn_head_is_as_wide_as_the_felt_one_and_faces_outward() {
-        // Method: a cylinder of every kind; each vertex lies within its outline, some on it, and the surface encloses most of it.
+        // Method: a cylinder and a flame of every kind; each vertex lies within the outline, some on it, and the surface encloses
+        // most of it.
         let table = InstrumentTable::read(&Library::shipped()).unwrap();
-        let outline = [[0.0, 0.0], [0.6, 0.0], [0.6, 2.0], [0.0, 2.0]];
+        let cylinder = vec![[0.0, 0.0], [0.6, 0.0], [0.6, 2.0], [0.0, 2.0]];
+        let flame = vec![[0.0, 0.0], [0.4, 1.0], [0.6, 2.0], [0.0, 4.0]];
+        let volume = |outline: &[[f32; 2]]| -> f64 {
+            let cone = |p: &[[f32; 2]]| {
+                let [[r0, z0], [r1, z1]] = [p[0], p[1]];
+                f64::from((z1 - z0) * (r0 * r0 + r0 * r1 + r1 * r1) / 3.0)
+            };
+            std::f64::consts::PI * outline.windows(2).map(cone).sum::<f64>()
+        };
         for name in ["round_bur_014", "diamond_round_014", "carbide_round_014"] {
-            let (mesh, tints) = cutting_head(table.by_id(name).unwrap(), &outline);
-            assert_eq!(tints.len(), mesh.positions.len());
-            let radii = mesh.positions.iter().map(|p| p.truncate().length());
-            let widest = radii.fold(0.0, f32::max);
-            assert!((0.59..0.6001).contains(&widest), "{name}: {widest}");
-            let share = mesh.volume_mm3() / (std::f64::consts::PI * 0.36 * 2.0);
-            assert!((0.7..1.0).contains(&share), "{name}: {share}");
+            for outline in [&cylinder, &flame] {
+                let (mesh, tints) = cutting_head(table.by_id(name).unwrap(), outline);
+                assert_eq!(tints.len(), mesh.positions.len());
+                let radii = mesh.positions.iter().map(|p| p.truncate().length());
+                let widest = radii.fold(0.0, f32::max);
+                assert!((0.59..0.6001).contains(&widest), "{name}: {widest}");
+                let share = mesh.volume_mm3() / volume(outline);
+                assert!((0.7..1.0).contains(&share), "{name}: {share}");
+            }
         }
     }
 }

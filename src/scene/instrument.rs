@@ -128,8 +128,10 @@ pub fn contra_angle(entry: &InstrumentEntry) -> Option<ContraAngle> {
 /// A bur: its cutting head, its shank, and what holds it, an outline of radii and heights; with a tint for each vertex.
 fn bur(entry: &InstrumentEntry, holder: &[[f32; 2]]) -> (Mesh, Vec<Rgb>) {
     let profile = bur_profile(&entry.end);
-    let (mut mesh, mut tints) = cutting_head(entry, &profile);
     let end = profile.last().copied().unwrap_or_default();
+    // Closed above, where the flutes are open.
+    let head = [&profile[..], &[[0.0, end[1]]]].concat();
+    let (mut mesh, mut tints) = cutting_head(entry, &head);
     mesh.append(revolve(&[&[end][..], &shank(&profile), holder].concat()));
     tints.resize(mesh.positions.len(), PLAIN);
     (mesh, tints)

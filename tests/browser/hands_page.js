@@ -69,6 +69,9 @@ main(async () => {
   // A browser tells of a force for fingers, too, of which nothing is measured.
   const touch = (type, touchPoints) => browser.send('Input.dispatchTouchEvent', { type, touchPoints });
   const fingers = [{ x, y, id: 1, force: 1 }, { x: x + 150, y: y + 60, id: 2, force: 1 }];
+  // The pen leaves, as it does when a mouse is moved.
+  await page.mouse.move(x + 3, y);
+  await page.mouse.move(x, y);
   await touch('touchStart', fingers.slice(0, 1));
   // The tip drags while the handle returns from the pen's tilt.
   await until('handle', handle => numbers(handle)[1] > 0.98);

@@ -345,7 +345,7 @@ pub fn listen_to_pens(canvas: &web_sys::HtmlCanvasElement) {
     let listener = Closure::<dyn FnMut(web_sys::PointerEvent)>::new(|event: web_sys::PointerEvent| {
         let is_of_pen = event.pointer_type() == "pen";
         // The palm beside a pen.
-        if !is_of_pen && PEN.get().is_some_and(|pen| pen.pressure.is_some()) {
+        if event.pointer_type() == "touch" && PEN.get().is_some() {
             return;
         }
         let tilt = [event.tilt_x() as f32, event.tilt_y() as f32];

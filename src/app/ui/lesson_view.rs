@@ -24,8 +24,39 @@ pub struct LessonView {
     /// The values that the renderer has of the volume, but for the edits that the scene lists as not drawn.
     uploaded: Option<VolumeSource>,
     particles: VisibleParticles,
+    bur: BurRotation,
     /// Last image of the section through the working end.
     pub section: Option<SectionImage>,
+}
+
+/// Rotation of the bur that is drawn, which goes on while it cuts.
+#[derive(Clone, Copy, Debug, Default)]
+struct BurRotation {
+    /// Share of a turn.
+    turn: f32,
+    /// Time of the last frame, and time until which the bur turns, s.
+    now: f64,
+    turns_until: f64,
+}
+
+impl BurRotation {
+    /// Rotation in a frame, as a share of a turn.
+    fn at(&mut self, now: f64, is_cutting: bool) -> f32 {
+        /// Turns per second: so slow that the blades do not seem to turn backwards at 24 frames per second.
+        const RATE: f32 = 1.2;
+        /// Time after which a bur that does not cut any more stands still, s: some ticks between two that cut do not.
+        const RUN_ON: f64 = 0.1;
+        /// Longest frame, s.
+        const FRAME: f64 = 0.1;
+        if is_cutting {
+            self.turns_until = now + RUN_ON;
+        }
+        if now < self.turns_until {
+            self.turn = (self.turn + RATE * (now - self.now).clamp(0.0, FRAME) as f32).fract();
+        }
+        self.now = now;
+        self.turn
+    }
 }
 
 /// The picture that a frame asks for: its size, pixels, and the time of the frame, s.
@@ -71,6 +102,7 @@ impl LessonView {
         let Some(scene) = &lesson.scene else { return Ok(None) };
         let particle_count = scene.particles.as_ref().map_or(0, ParticleField::count);
         let stereo = [settings.stereo(), settings.second_eye()];
+        let bur_turn = self.bur.at(frame.now, lesson.snapshot.is_some_and(|seen| seen.cutting));
         let inputs = ViewInputs {
             size: frame.size,
             orbit: lesson.orbit,
@@ -85,6 +117,7 @@ impl LessonView {
             has_shadows: self.has_shadows(settings, viewport),
             is_left_handed: settings.left_handed,
             particle_count,
+            bur_turn,
         };
         let is_moving = particle_count > 0 && !lesson.is_standing_still();
         // In stereo each pixel may belong to one eye.
@@ -135,7 +168,7 @@ impl LessonView {
                 enamel_depth: lesson_scene.enamel_depth(&lesson.scenario.tissues),
                 mode: lesson_scene.render_mode(mode),
             }),
-            solids: solids(lesson, lesson_scene, settings, &viewpoint),
+            solids: solids(lesson, lesson_scene, settings, &viewpoint, self.bur.turn),
             opaque_particles: self.particles.opaque(),
             translucent_particles: self.particles.translucent(),
             mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
@@ -166,11 +199,14 @@ fn world_from_tip(seen: &LessonSnapshot) -> Pose {
     Pose { position: seen.tip, orientation: seen.orientation }
 }
 
-/// Turns per second of a bur that is drawn cutting: no eye and no screen follows the real ones.
-const DRAWN_TURNS_PER_SECOND: f32 = 3.3;
-
-/// Whatever stands around the tooth, and the instrument in use.
-fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
+/// Whatever stands around the tooth, and the instrument in use. `bur_turn`: rotation of a bur, as a share of a turn.
+fn solids(
+    lesson: &LessonState,
+    scene: &LessonScene,
+    settings: &Settings,
+    viewpoint: &Viewpoint,
+    bur_turn: f32,
+) -> Vec<MeshInstance> {
     // On a radiograph neither gingiva nor neighbours cover the tooth; the instrument stays.
     let mut solids = Vec::new();
     if lesson.display_mode != DisplayMode::Xray {
@@ -185,18 +221,18 @@ fn solids(lesson: &LessonState, scene: &LessonScene, settings: &Settings, viewpo
     let index = seen.instrument as usize;
     let world_from_tip = world_from_tip(seen);
     let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
-    let is_turning = seen.cutting && lesson.scenario.instruments.get(index).is_some_and(|entry| entry.is_bur());
-    let turn = if is_turning { seen.stage_seconds * DRAWN_TURNS_PER_SECOND } else { 0.0 };
-    let turn = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_z(TAU * turn.fract()) };
+    let turn = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_z(TAU * bur_turn) };
     let turned = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip * turn, ..solid.clone() };
-    match scene.contra_angles.get(index).and_then(Option::as_ref).filter(|_| lesson.has_mouse()) {
-        Some(held) => {
+    // A shape or a mesh from a file does not turn.
+    match scene.contra_angles.get(index).and_then(Option::as_ref) {
+        Some(held) if lesson.has_mouse() => {
             solids.push(turned(&held.bur));
             if !hides_tip(viewpoint, world_from_tip) {
                 solids.push(placed(held.handpiece(settings.left_handed)));
             }
         }
-        None => solids.extend(scene.instruments.get(index).map(turned)),
+        Some(_) => solids.extend(scene.instruments.get(index).map(turned)),
+        None => solids.extend(scene.instruments.get(index).map(placed)),
     }
     solids
 }

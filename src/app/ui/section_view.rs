@@ -128,8 +128,8 @@ fn section_picture(scene: &LessonScene, azimuth: f32, tip_in_world: Vec3) -> Pix
     picture
 }
 
-/// Blends the part of a picture that is within a solid. `distance`: from a place of the picture, pixels, to the solid, mm. Of what
-/// is thinner than the distance between two places at which it is asked for, parts may be missing.
+/// Blends the part of a picture that is within a solid. `distance`: from a place of the picture, pixels, to the solid, mm. Parts
+/// that are thinner than `STEP` pixels may be missing.
 fn blend_solid(picture: &mut PixelBuffer, colour: [f32; 3], distance: impl Fn(f32, f32) -> f32) {
     /// Pixels between places at which the distance is asked for: distances to meshes are slow.
     const STEP: u32 = 4;

@@ -218,7 +218,11 @@ impl Mouth {
         let form = if is_in_bend { GumForm::Touched } else { GumForm::Drawn };
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         Some(Mouth {
-            near: JawMeshes::new(near.crowns(&is_left_out), near.gum(form, &|p| geometry.fit_gum(p)), tissues),
+            near: JawMeshes::new(
+                near.crowns(&is_left_out),
+                near.gum(form, &|p| geometry.sink_within_tooth(p)),
+                tissues,
+            ),
             opposite: Some(opposite_jaw(workpiece, &other, tissues)),
             jaw,
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
@@ -360,12 +364,12 @@ impl TouchedGeometry<'_> {
 
     /// A place of the gum, arch space, as it is drawn: [`TouchedGeometry::fit_to_gum`] around the tooth, and deep within it, where a
     /// cavity would show it, below its neck.
-    fn fit_gum(&self, point_in_arch: Vec3) -> Vec3 {
-        /// Depth in the tooth, mm, from which the gum is lowered, and at which it is lowered by as much as it is.
-        const WITHIN: [f32; 2] = [0.3, 0.9];
+    fn sink_within_tooth(&self, point_in_arch: Vec3) -> Vec3 {
+        /// Depths in the tooth, mm, between which the lowering grows from nothing to the whole, and that, mm.
+        const WITHIN: [f32; 2] = [0.3, 0.8];
         const LOWERED: f32 = 9.0;
         /// Width of the neck, as a share of the crown's.
-        const NECK: f32 = 0.8;
+        const NECK: f32 = 0.7;
         let place = self.near_from_tooth.inverse() * point_in_arch;
         let (half, middle) = (self.tooth.crown.half_size() * NECK, self.tooth.crown.centre());
         let depth = (1.0 - ((place - middle) / half).truncate().length()) * half.x.min(half.y);
