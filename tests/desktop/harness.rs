@@ -8,7 +8,7 @@ use crate::support::window_driver::{SCREEN_SIZE, WindowDriver};
 use eframe::egui::accesskit::Role;
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Theme, TouchDeviceId, TouchId, TouchPhase, Vec2};
 use eframe::egui_wgpu::WgpuSetup;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use egui_kittest::{Harness, Node};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -34,13 +34,10 @@ pub struct Window {
     harness: Harness<'static, App>,
     lines: Rc<RefCell<Lines>>,
     opened: Instant,
+    /// Size of the screen, pixels.
+    size: Vec2,
     /// Position of the pointer, pixels.
     pointer: Pos2,
-}
-
-/// Size of the screen, pixels.
-fn screen() -> Vec2 {
-    Vec2::from(SCREEN_SIZE.map(|pixels| pixels as f32))
 }
 
 /// The press or the release of a key, without others.
@@ -69,6 +66,13 @@ pub fn options(place: &Path) -> AppOptions {
 impl Window {
     /// Opens the window; prints the reason and returns `None` where nothing can draw its pictures.
     pub fn open(place: &Path, options: AppOptions) -> Option<Window> {
+        Window::open_sized(place, options, SCREEN_SIZE)
+    }
+
+    /// The same on a screen of another size, pixels.
+    pub fn open_sized(place: &Path, options: AppOptions, size: [i32; 2]) -> Option<Window> {
+        let pixels = size;
+        let size = Vec2::from(pixels.map(|pixels| pixels as f32));
         // OpenGL would look for a display.
         let mut setup = egui_kittest::wgpu::default_wgpu_setup();
         if let WgpuSetup::CreateNew(new) = &mut setup {
@@ -97,13 +101,13 @@ impl Window {
         };
         let builder = Harness::builder()
             .with_theme(Theme::Light)
-            .with_size(screen())
+            .with_size(size)
             .with_step_dt(FRAME.as_secs_f32())
             .wgpu_setup(setup);
         let harness = builder.build_eframe(|context| App::new(context, options));
         let opened = Instant::now() - Duration::from_secs(1);
-        let mut window = Window { harness, lines, opened, pointer: Pos2::ZERO };
-        window.move_to(SCREEN_SIZE.map(|pixels| pixels / 2));
+        let mut window = Window { harness, lines, opened, size, pointer: Pos2::ZERO };
+        window.move_to(pixels.map(|pixels| pixels / 2));
         Some(window)
     }
 
@@ -129,6 +133,33 @@ impl Window {
     /// Opens a part that is folded, by the name that a screen reader says.
     pub fn unfold(&mut self, label: &str) {
         self.click_on_widget(Role::DisclosureTriangle, label);
+    }
+
+    /// Buttons, fields and texts that reach beyond the left or the right edge of the window, pictures and gauges that are not
+    /// wholly in it, and choices and gauges under a picture; by the names that a screen reader says.
+    pub fn cut_off(&self) -> Vec<String> {
+        /// Part of a point by which a position may be rounded.
+        const ROUNDED: f32 = 1.0;
+        let screen = self.size / self.harness.ctx.pixels_per_point();
+        let is_text =
+            |role| matches!(role, Role::Button | Role::TextInput | Role::Label | Role::RadioButton | Role::CheckBox);
+        // Texts may lie below, in an area that scrolls.
+        let is_whole = |role| matches!(role, Role::Canvas | Role::Meter);
+        let nodes = self.harness.query_all_by(|node| is_text(node.role()) || is_whole(node.role()));
+        let is_beyond = |node: &Node| {
+            let rect = node.rect();
+            let is_below = is_whole(node.accesskit_node().role()) && rect.bottom() > screen.y + ROUNDED;
+            rect.left() < -ROUNDED || rect.right() > screen.x + ROUNDED || is_below
+        };
+        let told = |node: Node| {
+            let known = node.accesskit_node();
+            format!("{:?} {:?} at {:?}", known.role(), known.label(), node.rect())
+        };
+        let found = |is_sought: fn(Role) -> bool| self.harness.query_all_by(move |node| is_sought(node.role()));
+        let pictures: Vec<_> = found(|role| role == Role::Canvas).map(|node| node.rect()).collect();
+        let is_covered = |node: &Node| pictures.iter().any(|picture| picture.shrink(ROUNDED).intersects(node.rect()));
+        let beside = found(|role| matches!(role, Role::RadioButton | Role::Meter)).filter(is_covered);
+        nodes.filter(is_beyond).chain(beside).map(told).collect()
     }
 
     /// Chooses a radio button, by the name that a screen reader says.
@@ -255,7 +286,7 @@ impl Window {
     }
 
     fn frame(&mut self) {
-        let size = screen() / self.harness.ctx.pixels_per_point();
+        let size = self.size / self.harness.ctx.pixels_per_point();
         self.harness.set_size(size);
         self.harness.input_mut().time = Some(self.opened.elapsed().as_secs_f64());
         self.harness.step();
@@ -266,6 +297,10 @@ impl Window {
 impl WindowDriver for Window {
     fn latest(&self, topic: &str) -> Option<String> {
         self.lines.borrow().latest.get(topic).cloned()
+    }
+
+    fn screen_size(&self) -> [i32; 2] {
+        [self.size.x as i32, self.size.y as i32]
     }
 
     fn proceed(&mut self) {

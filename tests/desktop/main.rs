@@ -7,6 +7,7 @@ mod author_window;
 mod harness;
 mod lesson_window;
 mod pointer_window;
+mod screens;
 mod trainee;
 #[cfg(all(unix, not(target_os = "macos")))]
 mod kiosk;

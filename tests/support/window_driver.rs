@@ -69,6 +69,11 @@ pub trait WindowDriver {
         }
     }
 
+    /// Width and height of the screen, pixels.
+    fn screen_size(&self) -> [i32; 2] {
+        SCREEN_SIZE
+    }
+
     /// Presses a key, and waits until a topic is as wanted.
     fn press(&mut self, key: &str, topic: &str, wanted: &str) {
         self.send_key(key);
@@ -85,11 +90,12 @@ pub trait WindowDriver {
     /// first frame may be laid out before the window has its size.
     fn place_of(&mut self, name: &str) -> [i32; 2] {
         let start = format!("{name}=");
+        let size = self.screen_size();
         let position = |marks: &str| -> Option<[i32; 2]> {
             let mark = marks.split(' ').find_map(|mark| mark.strip_prefix(&start))?;
             let (x, y) = mark.split_once(',')?;
             let at = [x.parse().ok()?, y.parse().ok()?];
-            (0..2).all(|axis| (0..SCREEN_SIZE[axis]).contains(&at[axis])).then_some(at)
+            (0..2).all(|axis| (0..size[axis]).contains(&at[axis])).then_some(at)
         };
         let marks = self.until("marks", |marks| position(marks).is_some());
         position(&marks).unwrap()

@@ -24,6 +24,9 @@ use typodont_scene as scene;
 /// Full width of the force bar, N: the maximum force of a PHANTOM Omni.
 const BAR_FULL: f32 = 3.3;
 
+/// Width of the view under which it is narrow, points.
+const NARROW: f32 = 520.0;
+
 /// Formats a time, s, as minutes and seconds.
 pub fn format_time(seconds: f64) -> String {
     let whole = seconds.max(0.0) as u64;
@@ -44,20 +47,30 @@ pub fn practice_ui(
     let side = egui::Frame::side_top_panel(ui.style()).inner_margin(16).fill(Color32::TRANSPARENT);
     let width = ui.available_width();
     let frames_per_second = views.lesson.frames_per_second();
-    egui::Panel::left("task").exact_size(310.0f32.min(0.28 * width)).resizable(false).frame(side).show(ui, |ui| {
-        egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| task_ui(ui, lesson, words, commands));
+    let sides = [310.0f32.min(0.28 * width), 250.0f32.min(0.24 * width)];
+    // In a narrow middle the words stand under the bar.
+    let is_narrow = width - sides[0] - sides[1] < NARROW;
+    egui::Panel::left("task").exact_size(sides[0]).resizable(false).frame(side).show(ui, |ui| {
+        scroll_area(ui, |ui| task_ui(ui, lesson, words, commands));
     });
-    egui::Panel::right("menu").exact_size(250.0f32.min(0.24 * width)).resizable(false).frame(side).show(ui, |ui| {
-        egui::ScrollArea::vertical()
-            .auto_shrink([false, false])
-            .show(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, frames_per_second, words, commands));
+    egui::Panel::right("menu").exact_size(sides[1]).resizable(false).frame(side).show(ui, |ui| {
+        scroll_area(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, frames_per_second, words, commands));
     });
     egui::Panel::bottom("force")
-        .exact_size(64.0)
+        .exact_size(if is_narrow { 92.0 } else { 64.0 })
         .resizable(false)
         .frame(side)
-        .show(ui, |ui| force_ui(ui, lesson, words));
+        .show(ui, |ui| force_ui(ui, lesson, is_narrow, words));
     egui::CentralPanel::no_frame().show(ui, |ui| view_ui(ui, lesson, settings, views, words, commands));
+}
+
+/// An area as wide as its panel: what is wider is scrolled to, and moves no panel.
+fn scroll_area(ui: &mut egui::Ui, contents: impl FnOnce(&mut egui::Ui)) {
+    let width = ui.available_width();
+    egui::ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
+        ui.set_max_width(width);
+        contents(ui);
+    });
 }
 
 /// The stage, its time, its questions and its end.
@@ -197,12 +210,16 @@ fn confirm_abort_ui(ctx: &egui::Context, words: &Translations, commands: &mut Ve
 }
 
 /// Force applied by the trainee, as a bar, with a warning about tissue that should not be touched.
-fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
+fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, is_narrow: bool, words: &Translations) {
+    /// Width of the bar, and of the label and the number beside it, points.
+    const BAR: f32 = 260.0;
+    const BESIDE: f32 = 140.0;
     let snapshot = lesson.snapshot.unwrap_or_default();
     let force = snapshot.spring;
-    ui.horizontal_centered(|ui| {
+    let bar = |ui: &mut egui::Ui| {
+        let width = BAR.min(ui.available_width() - BESIDE).max(40.0);
         ui.strong(words.get("practice.force"));
-        let (rect, response) = ui.allocate_exact_size(egui::vec2(260.0, 22.0), Sense::hover());
+        let (rect, response) = ui.allocate_exact_size(egui::vec2(width, 22.0), Sense::hover());
         let label = words.get("practice.force").to_string();
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Meter, true, format!("{label} {force:.1} N")));
         let painter = ui.painter();
@@ -216,24 +233,33 @@ fn force_ui(ui: &mut egui::Ui, lesson: &LessonState, words: &Translations) {
         }
         response.on_hover_text(words.get("practice.force_about"));
         ui.monospace(format!("{force:4.1} N"));
-        // There is no room for both in a narrow window.
-        match (warning(lesson, &snapshot, words), lesson.press_strength()) {
-            (Some(text), _) => {
-                let text = egui::RichText::new(format!("! {text}")).strong().color(theme::ERROR);
-                ui.add(egui::Label::new(text).wrap());
-            }
-            (None, Some(strength)) => {
-                let mut text = words.format("practice.strength", format!("{strength:.1}"));
-                let tilt = lesson.pointer_hand.tilt().to_degrees().round();
-                if tilt > 0.0 {
-                    text = format!("{text} · {}", words.format("practice.tilt", tilt));
-                }
-                let text = egui::RichText::new(text).weak();
-                ui.add(egui::Label::new(text).wrap());
-            }
-            (None, None) => {}
+    };
+    // There is no room for both.
+    let text = |ui: &mut egui::Ui| match (warning(lesson, &snapshot, words), lesson.press_strength()) {
+        (Some(text), _) => {
+            let text = egui::RichText::new(format!("! {text}")).strong().color(theme::ERROR);
+            ui.add(egui::Label::new(text).wrap());
         }
-    });
+        (None, Some(strength)) => {
+            let mut text = words.format("practice.strength", format!("{strength:.1}"));
+            let tilt = lesson.pointer_hand.tilt().to_degrees().round();
+            if tilt > 0.0 {
+                text = format!("{text} · {}", words.format("practice.tilt", tilt));
+            }
+            let text = egui::RichText::new(text).weak();
+            ui.add(egui::Label::new(text).wrap());
+        }
+        (None, None) => {}
+    };
+    if is_narrow {
+        ui.horizontal(bar);
+        text(ui);
+    } else {
+        ui.horizontal_centered(|ui| {
+            bar(ui);
+            text(ui);
+        });
+    }
 }
 
 /// Warning about the trainee's present action, if there is one: of tissue that a bur must not touch, of a limit of the
@@ -359,9 +385,11 @@ fn pointer_hint_ui(
             ["practice.free_finger", "practice.free_paused_tap", "practice.held_finger", "practice.put_down_tap"]
         }
     };
-    let at = view.center_bottom() - egui::vec2(0.0, 26.0);
     let width = (view.width() - 24.0).clamp(40.0, if is_captured { 680.0 } else { 620.0 });
-    let place = Rect::from_center_size(at, egui::vec2(width, 36.0));
+    // The hint takes more lines in a narrow view.
+    let height = if width < NARROW { 60.0 } else { 36.0 };
+    let at = view.center_bottom() - egui::vec2(0.0, 8.0 + 0.5 * height);
+    let place = Rect::from_center_size(at, egui::vec2(width, height));
     ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
     let text = |key| egui::RichText::new(words.get(key)).size(13.0);
     let hint = |key| egui::Label::new(text(key).color(Color32::WHITE)).selectable(false);

@@ -53,9 +53,11 @@ const MOUTH_STEP: f32 = 2.5;
 
 /// The page that lists the shortcuts.
 pub fn shortcuts_ui(ui: &mut egui::Ui, words: &Translations, commands: &mut Vec<AppCommand>) {
-    // Two columns, so that the whole list is visible at once.
-    let (left, right) = SHORTCUTS.split_at(SHORTCUTS.len().div_ceil(2));
-    egui::Grid::new("keys").num_columns(4).spacing([20.0, 6.0]).striped(true).show(ui, |ui| {
+    /// Width of the window from which there is room for two columns, so that the whole list is visible at once; points.
+    const TWO_COLUMNS: f32 = 1150.0;
+    let columns = if ui.ctx().content_rect().width() >= TWO_COLUMNS { 2 } else { 1 };
+    let (left, right) = SHORTCUTS.split_at(SHORTCUTS.len().div_ceil(columns));
+    egui::Grid::new("keys").num_columns(2 * columns).spacing([20.0, 6.0]).striped(true).show(ui, |ui| {
         for place in 0..left.len() {
             for (key, about) in [left.get(place), right.get(place)].into_iter().flatten() {
                 ui.strong(words.get(key));

@@ -36,6 +36,13 @@ pub fn apply(context: &egui::Context, settings: &Settings) {
     visuals.selection.bg_fill = ACCENT.gamma_multiply(0.30);
     visuals.selection.stroke = egui::Stroke::new(if settings.high_contrast { 3.0 } else { 2.0 }, ACCENT);
     visuals.hyperlink_color = ACCENT;
+    if settings.high_contrast {
+        // Fields and buttons have edges.
+        let widgets = &mut visuals.widgets;
+        for state in [&mut widgets.noninteractive, &mut widgets.inactive, &mut widgets.hovered, &mut widgets.open] {
+            state.bg_stroke = egui::Stroke::new(1.5, Color32::BLACK);
+        }
+    }
     // So that one sees which of them has the keyboard focus.
     visuals.collapsing_header_frame = true;
     context.set_visuals_of(egui::Theme::Light, visuals);
