@@ -445,6 +445,19 @@ mod tests {
     }
 
     #[test]
+    fn a_burs_head_is_closed_above_its_flutes() {
+        // Aim: nobody looks into a bur from below. Method: at the top of its head there is a corner on the axis.
+        let table = InstrumentTable::read(&Library::shipped()).unwrap();
+        for name in ["pear_bur_330", "tapered_bur_169", "diamond_round_014", "flame_012"] {
+            let entry = table.by_id(name).unwrap();
+            let top = bur_profile(&entry.end).last().unwrap()[1];
+            let held = contra_angle(entry).unwrap();
+            let is_closed = |p: &Vec3| (p.z - top).abs() < 1e-4 && p.truncate().length() < 1e-4;
+            assert!(held.bur.mesh.positions.iter().any(is_closed), "{name}");
+        }
+    }
+
+    #[test]
     fn an_instruments_surface_faces_outward() {
         // Aim: lamps light the instrument, not its inside. Method: a closed surface that faces outward encloses a positive
         // volume; a straight one encloses that of a cylinder.

@@ -24,7 +24,7 @@ const LOOKS: [Look; 6] = [
 
 #[test]
 fn every_screen_fits_every_monitor_type_size_and_language() {
-    // Aim: nothing is cut off, however the window is shown. Method: a lesson from the list to its result, with the pages over it
+    // Aim: every screen can be used, however the window is shown. Method: a lesson from the list to its result, with the pages over it
     // and the author's screen; no button, field or text of a screen reaches beyond the window's sides. The pictures are for
     // `scripts/guide-pictures`.
     for Look { name, size, settings } in LOOKS {

@@ -334,7 +334,7 @@ fn storage() -> Option<web_sys::Storage> {
 }
 
 thread_local! {
-    /// The pen that touched the page last, until another pointer does.
+    /// The pen over the page, until it leaves or a mouse is used.
     static PEN: Cell<Option<Pen>> = const { Cell::new(None) };
     /// True once a pen has told of a tilt.
     static KNOWS_TILT: Cell<bool> = const { Cell::new(false) };

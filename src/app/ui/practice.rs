@@ -25,7 +25,7 @@ use typodont_scene as scene;
 const BAR_FULL: f32 = 3.3;
 
 /// Width of the view under which it is narrow, points.
-const NARROW: f32 = 520.0;
+const NARROW: f32 = 700.0;
 
 /// Formats a time, s, as minutes and seconds.
 pub fn format_time(seconds: f64) -> String {
@@ -57,7 +57,7 @@ pub fn practice_ui(
         scroll_area(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, frames_per_second, words, commands));
     });
     egui::Panel::bottom("force")
-        .exact_size(if is_narrow { 92.0 } else { 64.0 })
+        .exact_size(if is_narrow { 128.0 } else { 64.0 })
         .resizable(false)
         .frame(side)
         .show(ui, |ui| force_ui(ui, lesson, is_narrow, words));
@@ -386,8 +386,11 @@ fn pointer_hint_ui(
         }
     };
     let width = (view.width() - 24.0).clamp(40.0, if is_captured { 680.0 } else { 620.0 });
-    // The hint takes more lines in a narrow view.
-    let height = if width < NARROW { 60.0 } else { 36.0 };
+    let button = if is_captured { BUTTON.min(0.5 * width) } else { 0.0 };
+    let lines = words.get(if is_captured { held } else { free }).to_string();
+    let room = width - button - 16.0;
+    let lines = ui.painter().layout(lines, egui::FontId::proportional(13.0), Color32::WHITE, room);
+    let height = (lines.size().y + 12.0).max(36.0);
     let at = view.center_bottom() - egui::vec2(0.0, 8.0 + 0.5 * height);
     let place = Rect::from_center_size(at, egui::vec2(width, height));
     ui.painter().rect_filled(place, 8, Color32::from_black_alpha(150));
@@ -397,7 +400,7 @@ fn pointer_hint_ui(
         ui.put(place, hint(if lesson.is_paused { free_paused } else { free }));
         return;
     }
-    let (left, right) = place.split_left_right_at_x(place.max.x - BUTTON.min(0.5 * width));
+    let (left, right) = place.split_left_right_at_x(place.max.x - button);
     ui.put(left.shrink2(egui::vec2(8.0, 0.0)), hint(held));
     if ui
         .put(right.shrink(4.0), egui::Button::new(text(put_down)).small().wrap_mode(egui::TextWrapMode::Extend))

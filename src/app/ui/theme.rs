@@ -42,6 +42,8 @@ pub fn apply(context: &egui::Context, settings: &Settings) {
         for state in [&mut widgets.noninteractive, &mut widgets.inactive, &mut widgets.hovered, &mut widgets.open] {
             state.bg_stroke = egui::Stroke::new(1.5, Color32::BLACK);
         }
+        // The one with the keyboard focus has the widest.
+        widgets.active.bg_stroke = egui::Stroke::new(3.5, Color32::BLACK);
     }
     // So that one sees which of them has the keyboard focus.
     visuals.collapsing_header_frame = true;

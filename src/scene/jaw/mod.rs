@@ -365,8 +365,9 @@ impl TouchedGeometry<'_> {
     /// A place of the gum, arch space, as it is drawn: [`TouchedGeometry::fit_to_gum`] around the tooth, and deep within it, where a
     /// cavity would show it, below its neck.
     fn sink_within_tooth(&self, point_in_arch: Vec3) -> Vec3 {
-        /// Depths in the tooth, mm, between which the lowering grows from nothing to the whole, and that, mm.
+        /// Depths in the tooth, mm, between which the lowering grows from nothing to the whole.
         const WITHIN: [f32; 2] = [0.3, 0.8];
+        /// The whole lowering, mm.
         const LOWERED: f32 = 9.0;
         /// Width of the neck, as a share of the crown's.
         const NECK: f32 = 0.7;
