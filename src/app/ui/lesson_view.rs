@@ -40,8 +40,8 @@ struct BurRotation {
 }
 
 impl BurRotation {
-    /// Rotation in a frame, as a share of a turn.
-    fn at(&mut self, now: f64, is_cutting: bool) -> f32 {
+    /// Takes over the time of a frame.
+    fn advance(&mut self, now: f64, is_cutting: bool) {
         /// Turns per second: so slow that the blades do not seem to turn backwards at 24 frames per second.
         const RATE: f32 = 1.2;
         /// Time after which a bur that does not cut any more stands still, s: some ticks between two that cut do not.
@@ -55,7 +55,6 @@ impl BurRotation {
             self.turn = (self.turn + RATE * (now - self.now).clamp(0.0, FRAME) as f32).fract();
         }
         self.now = now;
-        self.turn
     }
 }
 
@@ -102,7 +101,8 @@ impl LessonView {
         let Some(scene) = &lesson.scene else { return Ok(None) };
         let particle_count = scene.particles.as_ref().map_or(0, ParticleField::count);
         let stereo = [settings.stereo(), settings.second_eye()];
-        let bur_turn = self.bur.at(frame.now, lesson.snapshot.is_some_and(|seen| seen.cutting));
+        // What cuts changes the picture anyhow: the rotation alone asks for none.
+        self.bur.advance(frame.now, lesson.snapshot.is_some_and(|seen| seen.cutting));
         let inputs = ViewInputs {
             size: frame.size,
             orbit: lesson.orbit,
@@ -117,7 +117,6 @@ impl LessonView {
             has_shadows: self.has_shadows(settings, viewport),
             is_left_handed: settings.left_handed,
             particle_count,
-            bur_turn,
         };
         let is_moving = particle_count > 0 && !lesson.is_standing_still();
         // In stereo each pixel may belong to one eye.

@@ -41,8 +41,6 @@ pub struct ViewInputs {
     pub is_left_handed: bool,
     /// Number of particles in sight.
     pub particle_count: usize,
-    /// Rotation of the bur, as a share of a turn.
-    pub bur_turn: f32,
 }
 
 /// Decision about one frame.
@@ -162,7 +160,6 @@ mod tests {
             has_shadows: false,
             is_left_handed: false,
             particle_count: 0,
-            bur_turn: 0.0,
         }
     }
 
