@@ -44,6 +44,13 @@ impl Aabb {
         Aabb { low: self.low - margin, high: self.high + margin }
     }
 
+    /// Returns the eight corners.
+    pub fn corners(self) -> [Vec3; 8] {
+        let Aabb { low, high } = self;
+        let end = |i: usize, bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
+        std::array::from_fn(|i| Vec3::new(end(i, 1, low.x, high.x), end(i, 2, low.y, high.y), end(i, 4, low.z, high.z)))
+    }
+
     /// Returns true for a box without any point.
     #[inline]
     pub fn is_empty(&self) -> bool {

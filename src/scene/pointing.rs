@@ -4,9 +4,9 @@
 //! and the target of the hand there. World space, mm.
 
 use super::particles::CollisionWorld;
-use typodont_core::frame::{Quat, Vec3};
-use typodont_core::touch::Collider;
-use typodont_core::volume::RAY_LENGTH_MAX;
+use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::touch::{Collider, ColliderGeometry};
+use typodont_core::volume::{RAY_LENGTH_MAX, Volume};
 use typodont_exercise::catalog::{InstrumentEntry, WorkingEndEntry};
 
 /// A point of a visible surface.
@@ -40,8 +40,12 @@ pub const REST_FORCE: f32 = 0.12;
 pub fn spot_under_ray(world: &CollisionWorld, from: Vec3, along: Vec3) -> Option<SurfaceSpot> {
     let tooth_from_world = world.world_from_tooth.inverse();
     let (from, along) = (tooth_from_world * from, tooth_from_world.rotate(along).normalize_or(Vec3::NEG_Z));
-    let on_tooth =
-        world.volume.raycast(from, along).map(|(place, normal)| (place, smooth_normal(world, place, normal)));
+    let on_voxels = voxels(world).filter_map(|(volume, tooth_from_volume)| {
+        let volume_from_tooth = tooth_from_volume.inverse();
+        let (place, normal) = volume.raycast(volume_from_tooth * from, volume_from_tooth.rotate(along))?;
+        Some((tooth_from_volume * place, tooth_from_volume.rotate(smooth_normal(volume, place, normal))))
+    });
+    let on_tooth = on_voxels.min_by(|a, b| a.0.distance(from).total_cmp(&b.0.distance(from)));
     let farthest = on_tooth.map_or(RAY_LENGTH_MAX, |(place, _)| place.distance(from));
     let (place, normal) = collider_on_ray(world.obstacles, from, along, farthest).or(on_tooth)?;
     // A surface that is seen faces the eye.
@@ -49,17 +53,26 @@ pub fn spot_under_ray(world: &CollisionWorld, from: Vec3, along: Vec3) -> Option
     Some(SurfaceSpot { place: world.world_from_tooth * place, normal: world.world_from_tooth.rotate(normal) })
 }
 
-/// Mean normal of the tooth around a point of its surface: that of the area on which a bur bears, not of single voxels.
-/// Tooth space.
-fn smooth_normal(world: &CollisionWorld, place: Vec3, normal: Vec3) -> Vec3 {
+/// The tooth that is worked on and all others of voxels, with their places in tooth space.
+fn voxels<'a>(world: &'a CollisionWorld) -> impl Iterator<Item = (&'a Volume, Pose)> {
+    let others = world.obstacles.iter().filter_map(|obstacle| match &obstacle.geometry {
+        ColliderGeometry::Voxels(volume) => Some((&**volume, obstacle.tooth_from_collider)),
+        _ => None,
+    });
+    std::iter::once((world.volume, Pose::IDENTITY)).chain(others)
+}
+
+/// Mean normal of a tooth around a point of its surface: that of the area on which a bur bears, not of single voxels. In the
+/// space of the volume.
+fn smooth_normal(volume: &Volume, place: Vec3, normal: Vec3) -> Vec3 {
     /// Distance of the samples, mm.
     const REACH: f32 = 0.35;
     let around = [Vec3::ZERO, Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
-    let slope = |offset: Vec3| world.volume.density_and_gradient_at(place + offset * REACH).1;
+    let slope = |offset: Vec3| volume.density_and_gradient_at(place + offset * REACH).1;
     (-around.into_iter().map(slope).sum::<Vec3>()).normalize_or(normal)
 }
 
-/// First surface of a collider nearer than `farthest`, and its normal; tooth space.
+/// First surface of a collider without voxels nearer than `farthest`, and its normal; tooth space.
 fn collider_on_ray(obstacles: &[Collider], from: Vec3, along: Vec3, farthest: f32) -> Option<(Vec3, Vec3)> {
     /// Distance at which a surface counts as reached, mm, and the maximum number of steps toward it.
     const REACHED: f32 = 0.02;
@@ -67,7 +80,8 @@ fn collider_on_ray(obstacles: &[Collider], from: Vec3, along: Vec3, farthest: f3
     let mut way = 0.0;
     for _ in 0..STEPS {
         let place = from + along * way;
-        let nearest = obstacles.iter().map(|o| (o.distance(place), o)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let solid = obstacles.iter().filter(|o| !matches!(o.geometry, ColliderGeometry::Voxels(_)));
+        let nearest = solid.map(|o| (o.distance(place), o)).min_by(|a, b| a.0.total_cmp(&b.0));
         let (distance, obstacle) = nearest?;
         if distance <= REACHED {
             return Some((place, obstacle.distance_and_normal(place).1));

@@ -55,6 +55,12 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
 
 /// A shape's surface in tooth space.
 fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
+    if let ColliderGeometry::Voxels(volume) = &shape.geometry {
+        let mut mesh = surface::extract(volume);
+        mesh.positions.iter_mut().for_each(|p| *p = shape.tooth_from_collider * *p);
+        mesh.normals.iter_mut().for_each(|n| *n = shape.tooth_from_collider.rotate(*n));
+        return mesh;
+    }
     let middle = shape.tooth_from_collider.position;
     let within = |reach: Vec3| Aabb::around([middle]).grown(reach);
     let Aabb { low, high } = match &shape.geometry {
@@ -64,7 +70,7 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
         ColliderGeometry::RoundBox { half, .. } => within(Vec3::splat(half.length())),
         ColliderGeometry::Capsule { half_length, radius } => within(Vec3::splat(half_length + radius)),
         ColliderGeometry::Sdf(field) => field.extent(),
-        ColliderGeometry::Mesh(_) => workpiece.bounds().grown(Vec3::splat(REACH)),
+        ColliderGeometry::Mesh(_) | ColliderGeometry::Voxels(_) => workpiece.bounds().grown(Vec3::splat(REACH)),
     };
     let is_drawn_whole = workpiece.own_jaw || workpiece.periodontium.is_some();
     if let ColliderGeometry::Mesh(obstacle) = &shape.geometry

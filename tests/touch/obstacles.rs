@@ -11,10 +11,11 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
-use typodont_core::device::Reading;
+use typodont_core::device::{Reading, UPRIGHT};
 use typodont_core::frame::{Pose, Quat, Vec3};
-use typodont_core::sim::{Setup, Simulation};
-use typodont_core::touch::{ClosedMesh, Collider, ColliderGeometry, WorkingEnd};
+use typodont_core::sim::{Setup, Simulation, Step};
+use typodont_core::touch::{Body, ClosedMesh, Collider, ColliderGeometry, EDGE_RADIUS, Profile, WorkingEnd};
+use typodont_core::volume::{Label, Volume};
 use typodont_exercise::scenario;
 use typodont_exercise::scenario::ResolveMode;
 use typodont_formats::diagnostic::SourceText;
@@ -140,6 +141,86 @@ fn a_groove_holds_a_ball_on_both_sides() {
     }
 }
 
+/// A tooth-like block with a groove and a soft spot in its top.
+fn grooved_block() -> Volume {
+    let slope = |p: Vec3| (p.z - 0.9 * p.x.abs() + 0.8) / (1.0f32 + 0.9 * 0.9).sqrt();
+    let groove = |p: Vec3| p.z.max(slope(p));
+    volume([60, 60, 40], 0.15, |p| {
+        let is_soft = Vec3::new(p.x + 2.0, p.y - 1.0, p.z).length() < 1.2;
+        (groove(p).max(-2.5 - p.z), if is_soft { SOFT } else { HARD })
+    })
+}
+
+#[test]
+fn another_tooth_of_voxels_feels_as_the_one_that_is_worked_on() {
+    // Aim: each tissue, groove and edge of a tooth that stands beside feels as if it were worked on, however it is turned. Method: the
+    // same block as the volume and as a collider, with the same hand; then turned and moved, with the hand and the forces turned
+    // with it. A point, a ball and a body. A ball is sampled in directions that do not turn with the block; a body slips
+    // over edges a tick earlier or later, so that 99 % of the ticks are compared.
+    let body = Body::revolved(Profile::frustum(0.5, 0.5, 3.0, [EDGE_RADIUS; 2]), None);
+    let ends = [
+        ("point", WorkingEnd::Point, [0.0, 1e-4]),
+        ("ball", WorkingEnd::Ball { radius: 0.5 }, [0.0, 0.08]),
+        ("body", WorkingEnd::Body(Arc::new(body)), [0.05, 0.08]),
+    ];
+    let turned = Pose { position: Vec3::new(3.0, -2.0, 5.0), orientation: Quat::from_xyzw(0.5, 0.5, -0.5, 0.5) };
+    let hand = |tick: usize| {
+        let turn = tick as f32 * 0.004;
+        let depth = (tick as f32 / 500.0).min(1.0);
+        Vec3::new(2.2 * libm::cosf(turn), 1.6 * libm::sinf(turn), 1.5 - 2.2 * depth)
+    };
+    // A flat end would rest on all of its points at once, each on another tissue.
+    let leaning = UPRIGHT * Quat::from_rotation_x(0.2) * Quat::from_rotation_y(0.1);
+    for (name, end, [tolerance, tolerance_moved]) in ends {
+        let mut own = Simulation::new(setup(grooved_block(), end.clone(), false));
+        let other = |pose: Pose| {
+            let empty = volume([4, 4, 4], 0.15, |_| (9.0, HARD));
+            let mut other = setup(empty, end.clone(), false);
+            other.scene.colliders = vec![Collider {
+                label: Label(9),
+                tooth_from_collider: pose,
+                geometry: ColliderGeometry::Voxels(Arc::new(grooved_block())),
+            }];
+            Simulation::new(other)
+        };
+        let (mut beside, mut moved) = (other(Pose::IDENTITY), other(turned));
+        let (mut soft, mut touched) = (0, 0);
+        let (mut off, mut off_moved) = (Vec::new(), Vec::new());
+        for tick in 0..4000 {
+            let pose = Pose { position: hand(tick), orientation: leaning };
+            let wanted = own.step(&Reading { pose, buttons: 0 });
+            let found = beside.step(&Reading { pose, buttons: 0 });
+            let found_moved = moved.step(&Reading { pose: turned * pose, buttons: 0 });
+            off.push(found.force.distance(wanted.force));
+            off_moved.push(found_moved.force.distance(turned.rotate(wanted.force)));
+            let label = |step: &Step| step.touch.map(|touch| touch.label);
+            soft += usize::from(label(&found) == Some(SOFT));
+            touched += usize::from(label(&found).is_some());
+            if tolerance == 0.0 {
+                assert_eq!(label(&found), label(&wanted), "{name}, tick {tick}");
+            }
+        }
+        let [off, off_moved] = [off, off_moved].map(|off| percentile(off, 0.99));
+        println!("{name}: {off} N, turned {off_moved} N; {soft} of {touched} ticks on the soft spot");
+        assert!(touched > 2500 && soft > 200, "{name}: {touched} ticks, {soft} soft");
+        assert!(off <= tolerance && off_moved <= tolerance_moved, "{name}: {off} N, turned {off_moved} N");
+    }
+}
+
+#[test]
+fn a_bur_meets_another_tooth_as_one_that_must_not_be_cut() {
+    // Aim: the contact is that of the tooth beside, whatever its tissue, and no voxel is cut.
+    let empty = volume([4, 4, 4], 0.15, |_| (9.0, HARD));
+    let mut world = setup(empty, WorkingEnd::Ball { radius: 0.5 }, true);
+    let geometry = ColliderGeometry::Voxels(Arc::new(grooved_block()));
+    world.scene.colliders = vec![Collider { label: Label(9), tooth_from_collider: Pose::IDENTITY, geometry }];
+    let mut sim = Simulation::new(world);
+    let steps = follow(&mut sim, (0..800).map(|t| Vec3::new(2.5, 0.0, 2.0 - 3.0 * t as f32 / 800.0)));
+    let last = steps.last().unwrap();
+    assert_eq!(last.touch.map(|touch| touch.label), Some(Label(9)));
+    assert!(last.force.z > 1.0 && steps.iter().all(|step| step.removed == 0));
+}
+
 #[test]
 fn touching_a_mesh_never_allocates() {
     let mut sim = Simulation::new(around(&ball_obj(5.0, 60, 120), Pose::IDENTITY, WorkingEnd::Ball { radius: 0.7 }));
@@ -154,6 +235,35 @@ fn touching_a_mesh_never_allocates() {
     });
     assert!(touched > 1000, "{touched}");
     assert_eq!(counted.count_total, 0, "{counted:?}");
+}
+
+#[test]
+fn touching_teeth_of_voxels_never_allocates() {
+    // Four blocks that meet in the middle, so that all of them are in reach at once, and a body and a ball among them.
+    let body = Body::revolved(Profile::frustum(0.5, 0.5, 3.0, [EDGE_RADIUS; 2]), None);
+    for end in [WorkingEnd::Ball { radius: 0.5 }, WorkingEnd::Body(Arc::new(body))] {
+        let empty = volume([4, 4, 4], 0.15, |_| (9.0, HARD));
+        let mut world = setup(empty, end, false);
+        let block = Arc::new(grooved_block());
+        let at = |x: f32, y: f32| Collider {
+            label: Label(9),
+            tooth_from_collider: Pose::at(Vec3::new(x, y, 0.0)),
+            geometry: ColliderGeometry::Voxels(block.clone()),
+        };
+        world.scene.colliders = vec![at(-4.0, -4.0), at(4.0, -4.0), at(-4.0, 4.0), at(4.0, 4.0)];
+        let mut sim = Simulation::new(world);
+        let mut touched = 0;
+        let counted = allocation_counter::measure(|| {
+            for tick in 0..3000 {
+                let turn = tick as f32 * 0.003;
+                let hand = Vec3::new(libm::cosf(turn), libm::sinf(turn), 1.5 - (tick as f32 / 500.0).min(2.5));
+                let step = sim.step(&Reading { pose: Pose { position: hand, orientation: UPRIGHT }, buttons: 0 });
+                touched += u32::from(step.touch.is_some());
+            }
+        });
+        assert!(touched > 1000, "{touched}");
+        assert_eq!(counted.count_total, 0, "{counted:?}");
+    }
 }
 
 /// A short exercise in a jaw of one mesh.

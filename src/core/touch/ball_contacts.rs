@@ -5,7 +5,7 @@
 use super::active_set::{Constraint, ConstraintSource};
 use super::body::BodyRegion;
 use super::collider_bounds::ColliderBounds;
-use super::collision_scene::CollisionScene;
+use super::collision_scene::{Collider, ColliderGeometry, CollisionScene, OwnSpace};
 use super::instrument::{Instrument, SAMPLE_SAG};
 use crate::frame::Vec3;
 use crate::volume::{ISO, Volume};
@@ -37,8 +37,19 @@ pub(super) fn collect_constraints(
     query: ContactQuery,
 ) {
     constraints.clear();
+    collect_volume_constraints(constraints, &scene.volume, instrument, query, ConstraintSource::Volume);
+    collect_collider_constraints(constraints, bounds, scene, instrument, query);
+}
+
+/// Adds a constraint for every sample direction in which matter of a volume is in reach; all in the space of the volume.
+fn collect_volume_constraints(
+    constraints: &mut Vec<Constraint>,
+    volume: &Volume,
+    instrument: &Instrument,
+    query: ContactQuery,
+    source: ConstraintSource,
+) {
     let ContactQuery { tip, goal, reach } = query;
-    let volume = &scene.volume;
     let radius = instrument.radius();
     let grid = volume.grid();
     let tip_in_grid = grid.from_tooth(tip);
@@ -69,11 +80,10 @@ pub(super) fn collect_constraints(
             normal: sample.normal,
             offset: sample.normal.dot(tip) - sample.distance - slack,
             point: tip + sample.direction * radius - sample.normal * sample.distance,
-            source: ConstraintSource::Volume,
+            source,
             region: BodyRegion::Head,
         });
     }
-    collect_collider_constraints(constraints, bounds, scene, radius, query);
 }
 
 /// Clearance by which the ball may enter the volume, mm.
@@ -93,12 +103,23 @@ fn collect_collider_constraints(
     constraints: &mut Vec<Constraint>,
     bounds: &mut ColliderBounds,
     scene: &CollisionScene,
-    radius: f32,
+    instrument: &Instrument,
     query: ContactQuery,
 ) {
     let ContactQuery { tip, reach, .. } = query;
-    for (index, collider) in scene.colliders.iter().enumerate() {
+    let radius = instrument.radius();
+    for place in 0..bounds.count_candidates(scene, tip, radius + reach) {
+        let index = bounds.candidate(place);
+        let collider = &scene.colliders[index];
         if bounds.is_far((index, collider), tip, radius + reach) {
+            continue;
+        }
+        if let ColliderGeometry::Voxels(volume) = &collider.geometry {
+            let distance = collider.distance(tip);
+            bounds.keep(index, tip, distance);
+            if distance <= collider.steepness() * (radius + reach) {
+                collect_voxel_constraints(constraints, (index, collider), volume, instrument, query);
+            }
             continue;
         }
         let distance = collider.for_each_contact(tip, radius + reach, |distance, normal| {
@@ -114,6 +135,28 @@ fn collect_collider_constraints(
             }
         });
         bounds.keep(index, tip, distance);
+    }
+}
+
+/// Adds the constraints of a collider made of voxels, found in its own space. Those for which the buffer has no room are left
+/// out.
+fn collect_voxel_constraints(
+    constraints: &mut Vec<Constraint>,
+    (index, collider): (usize, &Collider),
+    volume: &Volume,
+    instrument: &Instrument,
+    query: ContactQuery,
+) {
+    let own = OwnSpace::of(collider);
+    let [tip, goal] = [query.tip, query.goal].map(|place| own.collider_from_tooth * place);
+    let query_in_own = ContactQuery { tip, goal, reach: query.reach };
+    let first = constraints.len();
+    if constraints.capacity() - first <= instrument.sample_directions().len() {
+        return;
+    }
+    collect_volume_constraints(constraints, volume, instrument, query_in_own, ConstraintSource::Collider(index));
+    for constraint in &mut constraints[first..] {
+        *constraint = own.to_tooth(*constraint, query.tip);
     }
 }
 

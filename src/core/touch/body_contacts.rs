@@ -8,7 +8,7 @@ use super::active_set::{Constraint, ConstraintSource};
 use super::ball_contacts::ContactQuery;
 use super::body::{Body, BodySurfacePoint, CHUNK};
 use super::collider_bounds::{ColliderBounds, ColliderProximity};
-use super::collision_scene::CollisionScene;
+use super::collision_scene::{ColliderGeometry, CollisionScene, OwnSpace};
 use crate::frame::{Pose, Quat, Vec3};
 use crate::volume::{ISO, Volume};
 
@@ -110,28 +110,14 @@ pub(super) fn collect_constraints(
     let ContactQuery { tip, goal, reach } = query;
     let volume = &scene.volume;
     let band = volume.half_band();
-    let slack = slack(volume, posed);
-    let direction = (goal - tip).normalize_or_zero();
-    let min_density = ISO - 0.5 * (reach + slack) / band;
     let rotation = glam::Mat3::from_quat(posed.tooth_from_handle);
-    let mut add_constraint = |node: &BodySurfacePoint, density: f32| {
-        let distance = (ISO - density) * 2.0 * band;
-        let outward = rotation * node.outward;
-        // Matter behind a part that moves away counts only if the body has rotated into it.
-        if density < min_density || distance > 0.0 && outward.dot(direction) < -0.1 {
-            return;
-        }
-        let contact = match distance > REFINE_WITHIN + slack {
-            true => SurfaceContact { at: node.position, normal: -outward, distance },
-            false => refined(volume, &ToolFrame { tip, rotation, posed }, node),
-        };
-        constraints.push(Constraint {
-            normal: contact.normal,
-            offset: contact.normal.dot(tip) - contact.distance - slack,
-            point: tip + rotation * contact.at - contact.normal * contact.distance,
-            source: ConstraintSource::Volume,
-            region: node.region,
-        });
+    let near = VolumeQuery {
+        volume,
+        frame: ToolFrame { tip, rotation, posed },
+        direction: (goal - tip).normalize_or_zero(),
+        reach,
+        slack: slack(volume, posed),
+        source: ConstraintSource::Volume,
     };
     cache.add_motion(posed.body.surface_points().len(), tip);
     let grid = volume.grid();
@@ -147,7 +133,7 @@ pub(super) fn collect_constraints(
             }
             let density = volume.density_in_grid(tip_in_grid + to_grid * node.position);
             if density > 0.0 {
-                add_constraint(node, density);
+                constraints.extend(near.constraint(node, density));
                 continue;
             }
             // Cutting only increases the clearance, so the bound stays valid.
@@ -157,6 +143,44 @@ pub(super) fn collect_constraints(
         *chunk_next = next_checks.iter().copied().fold(f64::INFINITY, f64::min);
     }
     collect_collider_constraints(constraints, (bounds, colliders), scene, posed, query);
+}
+
+/// A body near the matter of a volume; all in the space of the volume.
+struct VolumeQuery<'a> {
+    volume: &'a Volume,
+    frame: ToolFrame<'a>,
+    /// Unit, from the tip to the goal; zero if they are the same.
+    direction: Vec3,
+    /// mm
+    reach: f32,
+    /// Depth by which the body may enter the volume, mm.
+    slack: f32,
+    source: ConstraintSource,
+}
+
+impl VolumeQuery<'_> {
+    /// Constraint of a surface point at which the volume has a density; `None` if no matter is in reach.
+    fn constraint(&self, node: &BodySurfacePoint, density: f32) -> Option<Constraint> {
+        let VolumeQuery { volume, ref frame, direction, reach, slack, source } = *self;
+        let band = volume.half_band();
+        let distance = (ISO - density) * 2.0 * band;
+        let outward = frame.rotation * node.outward;
+        // Matter behind a part that moves away counts only if the body has rotated into it.
+        if density < ISO - 0.5 * (reach + slack) / band || distance > 0.0 && outward.dot(direction) < -0.1 {
+            return None;
+        }
+        let contact = match distance > REFINE_WITHIN + slack {
+            true => SurfaceContact { at: node.position, normal: -outward, distance },
+            false => refined(volume, frame, node),
+        };
+        Some(Constraint {
+            normal: contact.normal,
+            offset: contact.normal.dot(frame.tip) - contact.distance - slack,
+            point: frame.tip + frame.rotation * contact.at - contact.normal * contact.distance,
+            source,
+            region: node.region,
+        })
+    }
 }
 
 /// Between voxel centres a concave surface reads narrower than it is; see `ball_contacts`.
@@ -173,17 +197,40 @@ fn collect_collider_constraints(
     posed: PosedBody,
     query: ContactQuery,
 ) {
-    let ContactQuery { tip, reach, .. } = query;
+    let ContactQuery { tip, goal, reach } = query;
     let tooth_from_handle = Pose { position: tip, orientation: posed.tooth_from_handle };
     let (middle, radius) = posed.body.bounding_sphere();
     let mut has_moved = false;
-    for (index, collider) in scene.colliders.iter().enumerate() {
+    for place in 0..bounds.count_candidates(scene, tooth_from_handle * middle, radius + reach) {
+        let index = bounds.candidate(place);
+        let collider = &scene.colliders[index];
         if bounds.is_beyond((index, collider), tooth_from_handle * middle, radius + reach) {
             continue;
         }
         if !has_moved {
             proximity.move_to(scene, posed.body, tooth_from_handle);
             has_moved = true;
+        }
+        if let ColliderGeometry::Voxels(volume) = &collider.geometry {
+            let own = OwnSpace::of(collider);
+            let orientation = own.collider_from_tooth.orientation * posed.tooth_from_handle;
+            let tip_in_own = own.collider_from_tooth * tip;
+            let near = VolumeQuery {
+                volume,
+                frame: ToolFrame { tip: tip_in_own, rotation: glam::Mat3::from_quat(orientation), posed },
+                direction: own.collider_from_tooth.rotate((goal - tip).normalize_or_zero()),
+                reach,
+                slack: slack(volume, posed),
+                source: ConstraintSource::Collider(index),
+            };
+            proximity.for_each_near((index, collider), posed.body, reach + near.slack, |point| {
+                let node = &posed.body.surface_points()[point];
+                let density = volume.density_at(tip_in_own + near.frame.rotation * node.position);
+                if constraints.len() < constraints.capacity() {
+                    constraints.extend(near.constraint(node, density).map(|found| own.to_tooth(found, tip)));
+                }
+            });
+            continue;
         }
         proximity.for_each_near((index, collider), posed.body, reach, |point| {
             let node = &posed.body.surface_points()[point];

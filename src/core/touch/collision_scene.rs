@@ -1,10 +1,10 @@
 //! Everything the instrument can touch: the voxel volume, and colliders around it that are never cut.
 
+use super::active_set::Constraint;
 use super::closed_mesh::{ClosedMesh, MeshContact};
 use super::sdf_grid::SdfGrid;
-use crate::aabb::Aabb;
 use crate::frame::{Pose, Vec3};
-use crate::volume::{Label, Volume};
+use crate::volume::{ISO, Label, Volume};
 use std::sync::Arc;
 
 /// Volume and colliders, in tooth space.
@@ -22,7 +22,7 @@ pub(super) const ROUNDING: f32 = 1e-2;
 /// Distance of a working end from a compliant collider below which it rests on it, mm: more than a probe's radius.
 const SOFT_CONTACT_DISTANCE: f32 = 0.5;
 
-/// Solid described by a formula, a mesh or a distance grid.
+/// Solid described by a formula, a mesh, a distance grid or voxels.
 #[derive(Clone, Debug)]
 pub struct Collider {
     pub label: Label,
@@ -50,10 +50,16 @@ pub enum ColliderGeometry {
     Mesh(Arc<ClosedMesh>),
     /// Signed distances sampled on a grid.
     Sdf(Arc<SdfGrid>),
+    /// Voxels, such as another tooth: felt as the volume that is worked on, each tissue with its own material.
+    Voxels(Arc<Volume>),
 }
 
+/// Greatest change of a voxel collider's distance per millimetre of motion: its density ramps are a little uneven.
+const VOXEL_STEEPNESS: f32 = 1.1;
+
 impl Collider {
-    /// Signed distance in mm (negative inside) of a point in tooth space from the collider's surface.
+    /// Signed distance in mm (negative inside) of a point in tooth space from the collider's surface. Of voxels, it is accurate
+    /// within their half band, and beyond it nearer to zero than the true distance.
     pub fn distance(&self, point_in_tooth: Vec3) -> f32 {
         let p = self.tooth_from_collider.inverse() * point_in_tooth;
         match &self.geometry {
@@ -67,12 +73,17 @@ impl Collider {
             }
             ColliderGeometry::Mesh(obstacle) => obstacle.distance(p),
             ColliderGeometry::Sdf(field) => field.distance(p),
+            ColliderGeometry::Voxels(volume) => voxel_distance(volume, p),
         }
     }
 
     /// Greatest change of the distance per millimetre of motion: 1, unless samples describe a steeper shape.
     pub fn steepness(&self) -> f32 {
-        if let ColliderGeometry::Sdf(field) = &self.geometry { field.steepness() } else { 1.0 }
+        match &self.geometry {
+            ColliderGeometry::Sdf(field) => field.steepness(),
+            ColliderGeometry::Voxels(_) => VOXEL_STEEPNESS,
+            _ => 1.0,
+        }
     }
 
     /// Returns the distance, as [`Collider::distance`] does, and the outward unit normal.
@@ -81,6 +92,12 @@ impl Collider {
             let MeshContact { distance, normal } =
                 obstacle.nearest_contact(self.tooth_from_collider.inverse() * point_in_tooth);
             return (distance, self.tooth_from_collider.rotate(normal));
+        }
+        if let ColliderGeometry::Voxels(volume) = &self.geometry {
+            let point = self.tooth_from_collider.inverse() * point_in_tooth;
+            let outward = -volume.density_and_gradient_at(point).1;
+            let normal = self.tooth_from_collider.rotate(outward.normalize_or(Vec3::Z));
+            return (voxel_distance(volume, point), normal);
         }
         /// Small compared with every collider, large compared with f32 rounding at 100 mm.
         const STEP: f32 = 0.01;
@@ -93,7 +110,7 @@ impl Collider {
     }
 
     /// Visits the signed distance and outward normal of every contact of a ball around a point: at most one for a
-    /// formula or a distance grid, all local minima for a mesh. Contacts farther than `within` mm may be left out.
+    /// formula, a distance grid or voxels, all local minima for a mesh. Contacts farther than `within` mm may be left out.
     ///
     /// Returns the signed distance of the point, or a lower bound of it.
     pub(super) fn for_each_contact(&self, point_in_tooth: Vec3, within: f32, mut visit: impl FnMut(f32, Vec3)) -> f32 {
@@ -102,7 +119,8 @@ impl Collider {
             ColliderGeometry::Ball { .. }
             | ColliderGeometry::RoundBox { .. }
             | ColliderGeometry::Capsule { .. }
-            | ColliderGeometry::Sdf(_) => {
+            | ColliderGeometry::Sdf(_)
+            | ColliderGeometry::Voxels(_) => {
                 let distance = self.distance(point_in_tooth);
                 if distance <= within + ROUNDING {
                     let (distance, normal) = self.distance_and_normal(point_in_tooth);
@@ -146,24 +164,43 @@ impl CollisionScene {
 
     /// The same for the volume alone.
     pub(super) fn clear_radius_of_volume(&self, point_in_tooth: Vec3) -> f32 {
-        let grid = self.volume.grid();
-        let Aabb { low, high } = grid.extent();
-        let nearest_inside = point_in_tooth.clamp(low, high);
-        let outside_squared = nearest_inside.distance_squared(point_in_tooth);
-        if outside_squared > 0.0 {
-            // Interpolation reaches one voxel beyond the last centre.
-            return (outside_squared.sqrt() - grid.spacing.max_element()).max(0.0);
-        }
-        match grid.nearest(point_in_tooth) {
-            Some(cell) => {
-                // One step less: the point may be half a voxel off the centre of its cell, and the surface half a
-                // voxel nearer.
-                let steps = self.volume.bricks().clear_steps(cell).saturating_sub(1);
-                steps as f32 * grid.spacing.min_element()
-            }
-            None => 0.0,
-        }
+        self.volume.clear_radius(point_in_tooth)
     }
+}
+
+/// The space of a collider, in which its contacts are found.
+#[derive(Clone, Copy)]
+pub(super) struct OwnSpace {
+    tooth_from_collider: Pose,
+    pub collider_from_tooth: Pose,
+}
+
+impl OwnSpace {
+    pub fn of(collider: &Collider) -> OwnSpace {
+        let tooth_from_collider = collider.tooth_from_collider;
+        OwnSpace { tooth_from_collider, collider_from_tooth: tooth_from_collider.inverse() }
+    }
+
+    /// A constraint of this space in tooth space, where the tip is at `tip`.
+    pub fn to_tooth(self, constraint: Constraint, tip: Vec3) -> Constraint {
+        let clearance = constraint.normal.dot(self.collider_from_tooth * tip) - constraint.offset;
+        let normal = self.tooth_from_collider.rotate(constraint.normal);
+        let point = self.tooth_from_collider * constraint.point;
+        Constraint { normal, point, offset: normal.dot(tip) - clearance, ..constraint }
+    }
+
+    /// Contact point and normal of a constraint of tooth space in this space; its offset stays.
+    pub fn of_tooth(self, constraint: Constraint) -> Constraint {
+        let point = self.collider_from_tooth * constraint.point;
+        Constraint { point, normal: self.collider_from_tooth.rotate(constraint.normal), ..constraint }
+    }
+}
+
+/// Signed distance of a point from the surface of voxels, mm, as in [`Collider::distance`].
+fn voxel_distance(volume: &Volume, point: Vec3) -> f32 {
+    let band = volume.half_band();
+    let density = volume.density_at(point);
+    if density > 0.0 { (ISO - density) * 2.0 * band } else { volume.clear_radius(point).max(band) }
 }
 
 #[cfg(test)]

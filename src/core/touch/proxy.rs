@@ -11,7 +11,7 @@ use super::body::{Body, BodyRegion, BodySurfacePoint};
 use super::body_contacts::{self, ProximityCache};
 use super::closed_mesh::MESH_CONTACTS_MAX;
 use super::collider_bounds::{ColliderBounds, ColliderProximity};
-use super::collision_scene::{Collider, CollisionScene, ROUNDING};
+use super::collision_scene::{Collider, ColliderGeometry, CollisionScene, OwnSpace, ROUNDING};
 use super::instrument::Instrument;
 use super::material::{Material, MaterialMean, Materials};
 use crate::frame::{Pose, Quat, Vec3};
@@ -39,6 +39,9 @@ const SLIP_TICKS: f32 = 10.0;
 
 /// Distance around a contact over which tissues are averaged, mm. About the contact width of an explorer's tip.
 const MIX_RADIUS: f32 = 0.1;
+
+/// Most colliders of voxels whose contacts are all kept at once: where teeth meet, two; three in a crowded arch.
+const NEAR_VOXEL_COLLIDERS_MAX: usize = 3;
 
 /// Length of a move below which a body has arrived, mm: over such a distance its constraints stay valid, to a
 /// micrometre at an edge of 0.05 mm radius.
@@ -97,14 +100,20 @@ impl Proxy {
     pub fn new(scene: &CollisionScene, instruments: &[Instrument], tip: Vec3) -> Proxy {
         let directions = instruments.iter().map(|i| i.sample_directions().len()).max().unwrap_or(1);
         let points = instruments.iter().filter_map(|i| i.body()).map(|b| b.surface_points().len()).max().unwrap_or(0);
-        let collider_contacts = scene.colliders.len() * MESH_CONTACTS_MAX;
+        let is_voxels = |collider: &&Collider| matches!(collider.geometry, ColliderGeometry::Voxels(_));
+        let voxel_colliders = scene.colliders.iter().filter(is_voxels).count();
+        let near_voxels = voxel_colliders.min(NEAR_VOXEL_COLLIDERS_MAX);
+        let simple_contacts = (scene.colliders.len() - voxel_colliders) * MESH_CONTACTS_MAX;
         Proxy {
             tip,
             last_hand: tip,
             last_orientation: Quat::IDENTITY,
             contact: None,
             stick: 1.0,
-            constraints: Vec::with_capacity((directions + 1 + collider_contacts).max(points * (1 + collider_contacts))),
+            constraints: Vec::with_capacity(
+                ((directions + 1) * (1 + near_voxels) + simple_contacts)
+                    .max(points * (1 + near_voxels + simple_contacts)),
+            ),
             proximity: ProximityCache::with_capacity(points),
             collider_proximity: ColliderProximity::with_capacity(scene.colliders.len(), points),
             bounds: ColliderBounds::new(scene),
@@ -148,7 +157,7 @@ impl Proxy {
         scene.clear_radius(place) > radius
             || instrument.sample_directions().iter().all(|&f| scene.volume.density_at(place + f * radius) < ISO)
                 && scene.volume.density_at(place) < ISO
-                && scene.colliders.iter().all(|s| s.distance(place) > radius)
+                && scene.colliders.iter().all(|collider| is_ball_outside(collider, instrument, place))
     }
 
     /// Moves the tip as near to the hand as matter and friction allow.
@@ -182,7 +191,7 @@ impl Proxy {
         self.last_hand = hand;
         self.last_orientation = tooth_from_handle.orientation;
         let friction = goal - hand;
-        if let Some(contact) = self.read_contact(scene, materials, &active, friction) {
+        if let Some(contact) = self.read_contact(scene, (materials, instrument.cuts), &active, friction) {
             self.contact = Some(contact);
         } else if self.tip.distance(hand) < ARRIVED {
             self.end_contact_at(hand);
@@ -313,12 +322,12 @@ impl Proxy {
         hand + aside * (holds / dragged)
     }
 
-    /// Computes the contact from the active constraints. `friction` is the displacement of the goal from the hand,
-    /// mm.
+    /// Computes the contact of an instrument, which cuts or does not, from the active constraints. `friction` is the
+    /// displacement of the goal from the hand, mm.
     fn read_contact(
         &self,
         scene: &CollisionScene,
-        materials: &Materials,
+        (materials, cuts): (&Materials, bool),
         active: &ActiveSet,
         friction: Vec3,
     ) -> Option<Contact> {
@@ -336,9 +345,19 @@ impl Proxy {
             by_head += if constraint.region == BodyRegion::Head { share } else { 0.0 };
             let touched = match constraint.source {
                 ConstraintSource::Collider(shape) => {
-                    let label = scene.colliders[shape].label;
-                    blend.add(*materials.get(label), share);
-                    label
+                    let collider = &scene.colliders[shape];
+                    match &collider.geometry {
+                        ColliderGeometry::Voxels(volume) => {
+                            let own = OwnSpace::of(collider).of_tooth(*constraint);
+                            let tissue = mix_tissues(&mut blend, volume, materials, &own, share);
+                            // What a bur bears on is not its tissue but a tooth that must not be cut.
+                            if cuts { collider.label } else { tissue }
+                        }
+                        _ => {
+                            blend.add(*materials.get(collider.label), share);
+                            collider.label
+                        }
+                    }
                 }
                 ConstraintSource::Volume => mix_tissues(&mut blend, &scene.volume, materials, constraint, share),
             };
@@ -452,6 +471,17 @@ fn is_body_free(scene: &CollisionScene, body: &Body, hand: &Pose) -> bool {
     scene.clear_radius(*hand * middle) > radius
         || body.surface_points().iter().all(|node| scene.volume.density_at(*hand * node.position) < ISO)
             && scene.colliders.iter().all(|collider| is_body_outside(collider, body, hand))
+}
+
+/// Returns true if a ball is outside a collider.
+fn is_ball_outside(collider: &Collider, instrument: &Instrument, place: Vec3) -> bool {
+    let radius = instrument.radius();
+    // The distance of voxels is only a lower bound of the true one.
+    collider.distance(place) > radius
+        || matches!(collider.geometry, ColliderGeometry::Voxels(_))
+            && std::iter::once(&Vec3::ZERO)
+                .chain(instrument.sample_directions())
+                .all(|&outward| collider.distance(place + outward * radius) > 0.0)
 }
 
 /// Returns true if all surface points of a body are outside a collider.

@@ -21,6 +21,14 @@ impl Grid {
         Grid { dims, spacing, origin: Vec3::new(nx, ny, nz) * spacing * -0.5 }
     }
 
+    /// Returns the part of the grid above a height, mm: at least its uppermost layer.
+    pub fn above(&self, height: f32) -> Grid {
+        let levels = (((height - self.origin.z) / self.spacing.z).max(0.0) as u32).min(self.dims[2] - 1);
+        let [nx, ny, nz] = self.dims;
+        let origin = self.origin + Vec3::Z * (levels as f32 * self.spacing.z);
+        Grid { dims: [nx, ny, nz - levels], origin, ..*self }
+    }
+
     /// Creates the smallest grid that covers a box in tooth space, with `margin` voxels around it.
     pub fn covering(low: Vec3, high: Vec3, spacing: Vec3, margin: u32) -> Grid {
         let steps = ((high - low) / spacing).ceil();

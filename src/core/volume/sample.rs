@@ -32,6 +32,28 @@ impl Volume {
         self.density_in_grid(self.grid().from_tooth(point_in_tooth))
     }
 
+    /// Radius, mm, around a point in tooth space that is guaranteed to be free of matter; 0 where matter may be near. A coarse
+    /// bound that costs one look-up.
+    pub fn clear_radius(&self, point_in_tooth: Vec3) -> f32 {
+        let grid = self.grid();
+        let Aabb { low, high } = grid.extent();
+        let nearest_inside = point_in_tooth.clamp(low, high);
+        let outside_squared = nearest_inside.distance_squared(point_in_tooth);
+        if outside_squared > 0.0 {
+            // Interpolation reaches one voxel beyond the last centre.
+            return (outside_squared.sqrt() - grid.spacing.max_element()).max(0.0);
+        }
+        match grid.nearest(point_in_tooth) {
+            Some(cell) => {
+                // One step less: the point may be half a voxel off the centre of its cell, and the surface half a
+                // voxel nearer.
+                let steps = self.bricks().clear_steps(cell).saturating_sub(1);
+                steps as f32 * grid.spacing.min_element()
+            }
+            None => 0.0,
+        }
+    }
+
     /// Trilinear density at a point given in voxel steps; zero outside the grid.
     #[inline]
     pub fn density_in_grid(&self, at: Vec3) -> f32 {
