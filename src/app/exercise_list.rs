@@ -15,7 +15,7 @@ use typodont_lesson::{self as lesson, ToothScan};
 use typodont_report::bundle::sha256;
 
 /// Exercises built into the program, in the order of the course, so that they are available wherever it is installed.
-const SHIPPED: [(&str, &str); 16] = [
+const SHIPPED: [(&str, &str); 17] = [
     ("1-introduction.json", include_str!("../../scenarios/1-introduction.json")),
     ("2-decay.json", include_str!("../../scenarios/2-decay.json")),
     ("3-detection.json", include_str!("../../scenarios/3-detection.json")),
@@ -32,6 +32,7 @@ const SHIPPED: [(&str, &str); 16] = [
     ("14-amalgam.json", include_str!("../../scenarios/14-amalgam.json")),
     ("15-charting.json", include_str!("../../scenarios/15-charting.json")),
     ("16-arch-diagnosis.json", include_str!("../../scenarios/16-arch-diagnosis.json")),
+    ("17-mouth-diagnosis.json", include_str!("../../scenarios/17-mouth-diagnosis.json")),
 ];
 
 /// File that a shipped exercise names.

@@ -29,6 +29,9 @@ const EXPLORER_STRENGTH: f32 = 0.5;
 const WITHDRAWAL_STEP: f32 = 1.0;
 const WITHDRAWAL_MAX: f32 = 15.0;
 
+/// Upward component of a surface's unit normal below which the surface counts as overhead.
+const FACING_DOWN: f32 = -0.4;
+
 /// Point of the view under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointedPlace {
@@ -159,7 +162,14 @@ impl PointerHand {
         self.spot = spot_under_ray(&world, eye.position, along);
         // The handle turns with the view, so that a handpiece leads to the operator's side.
         let yaw = orbit.azimuth;
-        let lean = self.world_lean(&eye, yaw);
+        let lean = match self.spot {
+            // A tooth overhead is reached from the open side of the mouth: an upright handle would be inside it.
+            Some(spot) if spot.normal.y < FACING_DOWN && self.pen.is_none() => {
+                let out = eye.position - spot.place;
+                (Vec2::new(out.x, out.z).normalize_or(Vec2::Y) * LEAN_MAX).to_array()
+            }
+            _ => self.world_lean(&eye, yaw),
+        };
         let held = HandTarget { place: Vec3::ZERO, max_force: REST_FORCE, yaw, lean };
         let (place, max_force) = match self.spot {
             Some(spot) => {

@@ -1,5 +1,6 @@
 //! `typodont bench`: measures the program's speed and memory on this computer.
 
+mod mouth;
 mod percentiles;
 mod pictures;
 mod session;
@@ -66,6 +67,9 @@ struct BenchResults {
     stereo_4k_ms: BTreeMap<String, pictures::StereoTimings>,
     edt_ms: BTreeMap<String, Percentiles>,
     load_ms: BTreeMap<String, Percentiles>,
+    /// One tooth by itself, and the same tooth among all others of the mouth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mouth: Option<mouth::MouthTimings>,
     /// Volume removed by the same path at each size, mm³.
     removed_mm3: BTreeMap<String, f64>,
     /// Replay of a session of five minutes, s.
@@ -119,6 +123,7 @@ fn measure(arguments: &Arguments, results: &mut BenchResults) -> Result<(), Stri
             for spacing in VOXEL_SIZES {
                 measure_ticks(grow_tooth_of_spacing(spacing)?, results)?;
             }
+            results.mouth = Some(mouth::measure()?);
         }
         if !is_partial {
             measure_sessions(results)?;
@@ -210,6 +215,12 @@ impl BenchResults {
         };
         for (dims, cases) in &self.tick_us {
             cases.iter().for_each(|(case, f)| line(format!("tick_us.{dims}.{case}"), f));
+        }
+        if let Some(mouth) = &self.mouth {
+            for (name, cases) in [("one_tooth", &mouth.one_tooth_tick_us), ("mouth", &mouth.mouth_tick_us)] {
+                cases.iter().for_each(|(case, f)| line(format!("mouth.{name}.{case}"), f));
+            }
+            line("mouth.open_s".into(), &mouth.open_s);
         }
         for (dims, cases) in &self.frame_ms {
             line(format!("frame_ms.{dims}.surface"), &cases.surface);

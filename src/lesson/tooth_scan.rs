@@ -56,7 +56,8 @@ impl ToothScan {
             tooth.ok_or_else(|| wrong_volume(&self.path, why.into()))?.source = ToothSource::Given(scanned);
             return Ok(());
         }
-        for tooth in &mut scenario.scene.teeth {
+        let treated = scenario.scene.teeth_in_volume().len();
+        for tooth in &mut scenario.scene.teeth[..treated] {
             tooth.source = ToothSource::Given(scanned.clone());
         }
         if let Some(fdi) = self.fdi {

@@ -32,7 +32,8 @@ mod views;
 
 pub use grey_volume::GreyVolume;
 pub use instrument::{ContraAngle, contra_angle, instrument_solid, mirror_face, procedural_instrument};
-pub use jaw::{Mouth, StandaloneJaw, WORKING_OPENING_DEG};
+pub use jaw::{Mouth, StandaloneJaw};
 pub use palette::{enamel_depth, tissue_palette, x_ray_attenuation};
 pub use surroundings::surrounding_solids;
+pub use typodont_anatomy::jaw::WORKING_OPENING_DEG;
 pub use views::{ToothSide, shadow_region, tooth_view, work_view};

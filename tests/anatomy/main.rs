@@ -6,4 +6,5 @@ mod age;
 mod arches;
 mod caries;
 mod dental_arch;
+mod other_teeth;
 mod teeth;

@@ -3,7 +3,7 @@
 use crate::harness::{self, Window};
 use crate::support::folder::folder;
 use crate::support::window_driver::{SCREEN_SIZE, SHIPPED_EXERCISES, WindowDriver};
-use crate::trainee::{Trainee, lesion_in_world};
+use crate::trainee::{Trainee, lesion_in_world, site_in_world};
 use std::path::Path;
 use std::time::Duration;
 use typodont_app::AppOptions;
@@ -187,6 +187,42 @@ fn a_tooth_of_an_arch_is_touched_and_its_quarter_named() {
     desk.choose("Which tooth is carious?: 37");
     desk.wait(Duration::from_millis(500));
     desk.picture("21-arch-quarter");
+    desk.choose(quarter);
+    desk.until("stage", |stage| stage == "1");
+}
+
+#[test]
+fn a_tooth_overhead_is_touched_and_its_quarter_named() {
+    // Aim: a trainee with a mouse examines the opposite jaw, too. In the upper left, quarter 2 is distobuccal. Method: the view of the upper left quadrant; the pointer is led over
+    // a possible site on tooth 26 by where the hand is, and presses; the answer that it was there is taken, one about a tooth that
+    // was not touched is not.
+    let place = folder("mouth_window");
+    let exercise = "scenarios/17-mouth-diagnosis.json";
+    let options = AppOptions { begins_at_once: true, ..exercise_options(&place, exercise) };
+    let Some(mut desk) = Window::open(&place, options) else { return };
+    desk.until("screen", |screen| screen == "practice");
+    desk.until("hand", |_| true);
+    desk.until("tooth", |tooth| tooth == "drawn");
+    desk.choose_from("View", "2 upper left");
+    desk.wait(Duration::from_millis(1500));
+    desk.picture("22-mouth");
+    // Over tooth 26: a click picks the instrument up.
+    desk.move_to([690, 440]);
+    desk.turn();
+    desk.set_button(true);
+    desk.set_button(false);
+    desk.wait(Duration::from_millis(1500));
+    desk.point_at(site_in_world(exercise, "26-2"));
+    desk.set_button(true);
+    desk.wait(Duration::from_millis(1500));
+    desk.picture("22-mouth-pressed");
+    desk.set_button(false);
+    let quarter = "Which quarter of its occlusal surface?: distobuccal";
+    desk.choose("Which tooth is carious?: 27");
+    desk.wait(Duration::from_millis(500));
+    assert!(!desk.offers(quarter), "an answer about a tooth that was not touched is taken");
+    desk.choose("Which tooth is carious?: 26");
+    desk.wait(Duration::from_millis(500));
     desk.choose(quarter);
     desk.until("stage", |stage| stage == "1");
 }

@@ -99,6 +99,13 @@ pub fn lesion_in_world(exercise: &str, seed: u64) -> Vec3 {
     workpiece.world_from_tooth * workpiece.lesions[0].centre
 }
 
+/// The place of a lesion, world space, mm.
+pub fn site_in_world(exercise: &str, id: &str) -> Vec3 {
+    let (_, workpiece) = made(exercise, 0);
+    let lesion = workpiece.lesions.iter().find(|lesion| lesion.id == id).unwrap();
+    workpiece.world_from_tooth * lesion.centre
+}
+
 /// The caries that a trial draws, world space, mm, and the correct answers to its questions as `QUESTION:ANSWER`.
 pub struct DrawnTrial {
     pub place: Vec3,

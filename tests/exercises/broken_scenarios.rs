@@ -604,6 +604,44 @@ fn teeth_that_cannot_stand_in_one_arch() {
 }
 
 #[test]
+fn teeth_that_cannot_stand_in_one_mouth() {
+    let mouth =
+        |pointer: &str, value: Value| edited("17-mouth-diagnosis.json", &format!("/scene/jaw/{pointer}"), Some(value));
+    let others = "/scene/jaw/other_teeth";
+    check_text("the shipped one", &shipped("17-mouth-diagnosis.json"), &[]);
+    let id = format!("{others}/teeth/0/id");
+    let fdi = format!("{others}/teeth/0/fdi");
+    check_text(
+        "the treated tooth",
+        &mouth("other_teeth/teeth/0/fdi", json!(36)),
+        &[("duplicate-tooth", &fdi), ("duplicate-id", &id)],
+    );
+    let form = format!("{others}/teeth/0/form");
+    let coarse = json!({ "procedural": { "spacing_mm": 0.3 } });
+    let unequal = [("unequal-spacing", &*format!("{form}/procedural"))];
+    check_text("larger voxels", &mouth("other_teeth/teeth/0/form", coarse), &unequal);
+    let found = |text: &str| -> Vec<(String, String)> {
+        let found =
+            scenario::resolve(SourceText::new("exercise.json", text), &Library::shipped(), ResolveMode::ReadScans);
+        found.err().unwrap_or_default().iter().map(|d| (d.code.to_string(), d.path.clone())).collect()
+    };
+    let has = |text: &str, code: &str, path: &str| found(text).contains(&(code.to_string(), path.to_string()));
+    let filling = json!([{ "id": "old", "offset_mm": [0, 0], "size_mm": [2, 2], "depth_mm": 1.5 }]);
+    let filled = mouth("other_teeth/teeth/0/old_fillings", filling);
+    assert!(has(&filled, "only-examined", &format!("{others}/teeth/0/old_fillings")), "{:?}", found(&filled));
+    let gum = mouth("periodontium", json!({}));
+    check_text("two kinds of gingiva", &gum, &[("two-gums", "/scene/jaw/periodontium")]);
+    let missing = mouth("arch", json!({ "missing": [17] }));
+    check_text("there and missing", &missing, &[("wrong-tooth", "/scene/jaw/arch/missing/0")]);
+    check_text("rotated", &mouth("arch", json!({ "rotated": [{ "fdi": 17, "degrees": 10 }] })), &[]);
+    check_text(
+        "too fine",
+        &mouth("other_teeth/spacing_mm", json!(0.05)),
+        &[("out-of-range", &*format!("{others}/spacing_mm"))],
+    );
+}
+
+#[test]
 fn points_that_nobody_could_earn() {
     let charting = |pointer: &str, value: Option<Value>| edited("15-charting.json", pointer, value);
     let complaints = |text: &str| -> Vec<(String, String)> {

@@ -12,7 +12,7 @@ pub const SCREEN_SIZE: [i32; 2] = [1280, 800];
 pub const PATIENCE: Duration = Duration::from_secs(180);
 
 /// Number of exercises that the list shows before those of a school.
-pub const SHIPPED_EXERCISES: usize = 16;
+pub const SHIPPED_EXERCISES: usize = 17;
 
 /// Poll interval of the state log.
 pub const LOOK_EVERY: Duration = Duration::from_millis(20);

@@ -5,7 +5,7 @@ use super::tooth_model::{ToothKind, ToothModel};
 use crate::grow::grow_with_ramp;
 use crate::{TissueLabels, grid_of_spacing};
 use typodont_core::frame::Vec3;
-use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_core::volume::{Label, Volume, surface};
 
 /// Distance between samples, mm: cusps and ridges show, the finest grooves as shallow valleys. From 0.45 on edges fray, below 0.3
 /// a mouth takes longer to draw than it gains.
@@ -33,19 +33,11 @@ const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2)
 
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm. `recession`: length of root above the gingiva.
 pub fn crown(model: &ToothModel, recession: f32) -> TintedMesh {
-    let grid = cropped_above(grid_of_spacing(&model.form, SPACING), -recession - ROOT_LENGTH);
+    let grid = grid_of_spacing(&model.form, SPACING).above(-recession - ROOT_LENGTH);
     let volume = grow_with_ramp(&model.form, grid, &TISSUES, DRAWN_HALF_BAND);
     let mesh = surface::extract(&volume);
     let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
     TintedMesh { mesh, tints }
-}
-
-/// The part of a grid above a height.
-fn cropped_above(grid: Grid, height: f32) -> Grid {
-    let levels = (((height - grid.origin.z) / grid.spacing.z).max(0.0) as u32).min(grid.dims[2] - 1);
-    let [nx, ny, nz] = grid.dims;
-    let origin = grid.origin + Vec3::Z * (levels as f32 * grid.spacing.z);
-    Grid { dims: [nx, ny, nz - levels], origin, ..grid }
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.

@@ -7,6 +7,7 @@
 mod crown;
 mod gum;
 mod half_arch;
+mod occlusion;
 mod tinted_mesh;
 mod tooth_model;
 
@@ -26,6 +27,7 @@ use typodont_core::parallel;
 
 pub use self::gum::{GumForm, MucosaRegion};
 pub use self::half_arch::ToothSeat;
+pub use self::occlusion::{CUSP_WIDTH, Occlusion, WORKING_OPENING_DEG};
 pub use self::tinted_mesh::{Tint, TintedMesh};
 
 /// Upper or lower jaw.
@@ -36,6 +38,8 @@ pub enum Jaw {
 }
 
 impl Jaw {
+    pub const BOTH: [Jaw; 2] = [Jaw::Upper, Jaw::Lower];
+
     /// The jaw of a tooth.
     pub fn of(fdi: u8) -> Jaw {
         if fdi / 10 <= 2 { Jaw::Upper } else { Jaw::Lower }
@@ -57,6 +61,11 @@ impl Jaw {
             (Jaw::Lower, false) => 4,
         };
         10 * quadrant + index as u8 + 1
+    }
+
+    /// FDI numbers of the fourteen teeth of an adult without third molars.
+    pub fn teeth_of_adult(self) -> impl Iterator<Item = u8> {
+        [1.0, -1.0].into_iter().flat_map(move |side| (0..7).map(move |index| self.fdi(side, index)))
     }
 
     fn models(self) -> [ToothModel; 8] {

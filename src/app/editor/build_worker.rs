@@ -231,7 +231,8 @@ fn quick_variant(scenario: &Scenario) -> Option<Scenario> {
     let is_grown =
         |form: &ToothSource| matches!(form, ToothSource::Procedural { spacing, .. } if *spacing < quick_spacing);
     let has_maps = scenario.zones.iter().any(|zone| zone.region.map_dims().is_some());
-    if has_maps || !scenario.scene.teeth.iter().all(|tooth| is_grown(&tooth.source)) {
+    let treated = scenario.scene.teeth_in_volume().len();
+    if has_maps || !scenario.scene.teeth[..treated].iter().all(|tooth| is_grown(&tooth.source)) {
         return None;
     }
     let mut quick = scenario.clone();
@@ -241,7 +242,7 @@ fn quick_variant(scenario: &Scenario) -> Option<Scenario> {
         .teeth
         .iter_mut()
         .for_each(|tooth| tooth.source = ToothSource::Procedural { spacing: quick_spacing, age });
-    if let SceneLayout::Arch { spacing } = &mut quick.scene.layout {
+    if let SceneLayout::Arch { spacing } | SceneLayout::Mouth { spacing } = &mut quick.scene.layout {
         *spacing = quick_spacing;
     }
     Some(quick)

@@ -8,7 +8,7 @@ use crate::ui::theme;
 use crate::ui::ui_anchors::anchor;
 use eframe::egui;
 use typodont_exercise::local_text::LocalTexts;
-use typodont_exercise::scenario::{Question, QuestionKind, Stage, distal};
+use typodont_exercise::scenario::{Question, QuestionKind, SceneLayout, Stage, distal};
 use typodont_exercise::session::AnswerValue;
 
 /// Every question of a stage.
@@ -21,7 +21,15 @@ pub fn questions_ui(
 ) {
     let scenario = &lesson.scenario;
     let mut teeth: Vec<(String, u8)> = lesson.scenario.scene.teeth.iter().map(|t| (t.id.clone(), t.fdi)).collect();
-    if scenario.scene.is_in_mouth() {
+    if let SceneLayout::Mouth { .. } = scenario.scene.layout {
+        // As in a dental chart: the patient's right on the left, the upper jaw first.
+        teeth.sort_by_key(|(_, fdi)| match fdi / 10 {
+            1 => -i16::from(*fdi),
+            2 => i16::from(*fdi),
+            4 => 100 - i16::from(*fdi),
+            _ => 100 + i16::from(*fdi),
+        });
+    } else if scenario.scene.is_in_mouth() {
         // As they stand before the trainee, from left to right; an upper arch lies on the bench, too.
         teeth.sort_by_key(|(_, fdi)| match fdi / 10 {
             2 | 4 => -i16::from(*fdi),
@@ -29,7 +37,7 @@ pub fn questions_ui(
             _ => i16::from(*fdi) + 100,
         });
     }
-    let is_in_arch = scenario.scene.is_arch();
+    let is_in_arch = scenario.scene.has_whole_arch();
     for (place, question) in stage.ask.iter().enumerate() {
         let is_answered = lesson.answered.get(place).copied().unwrap_or_default();
         ui.add_space(10.0);
@@ -95,6 +103,9 @@ fn answer_word(answer: &AnswerValue) -> String {
     }
 }
 
+/// Room beside the number on a tooth's button, and between two of them, points.
+const TOOTH_BUTTON_PADDING: f32 = 5.0;
+
 impl QuestionUi<'_> {
     /// Draws the controls of the question; returns the answer given in this frame, if any.
     fn answer_ui(
@@ -114,7 +125,20 @@ impl QuestionUi<'_> {
                 };
                 let options =
                     teeth.iter().enumerate().map(|(i, (id, fdi))| (AnswerValue::Word(id.clone()), title(i, *fdi)));
-                self.buttons(ui, options)
+                if teeth.len() <= 2 {
+                    return self.buttons(ui, options);
+                }
+                let mut options = options;
+                // A row for each quadrant, whose seven or eight teeth have room side by side.
+                let mut chosen = None;
+                ui.scope(|ui| {
+                    ui.spacing_mut().button_padding.x = TOOTH_BUTTON_PADDING;
+                    ui.spacing_mut().item_spacing.x = TOOTH_BUTTON_PADDING;
+                    for row in teeth.chunk_by(|(_, a), (_, b)| a / 10 == b / 10) {
+                        chosen = self.buttons(ui, options.by_ref().take(row.len())).or(chosen.take());
+                    }
+                });
+                chosen
             }
             QuestionKind::QuadrantOf { .. } => self.quadrants(ui),
             QuestionKind::Choice { options, .. } => self.buttons(

@@ -21,11 +21,11 @@ pub struct TickTimings {
     pub removed_mm3: f64,
 }
 
-/// Radius of the round bur, ISO 014.
-const BUR: WorkingEnd = WorkingEnd::Ball { radius: 0.7 };
+/// A round bur, ISO 014.
+pub const BUR: WorkingEnd = WorkingEnd::Ball { radius: 0.7 };
 
 /// A straight fissure bur, US 57.
-fn fissure_bur() -> WorkingEnd {
+pub fn fissure_bur() -> WorkingEnd {
     let profile = Profile::frustum(0.5, 0.5, 4.0, [EDGE_RADIUS; 2]);
     WorkingEnd::Body(Arc::new(Body::revolved(profile, Some(Shank::friction_grip(1.0, 4.0)))))
 }
@@ -40,17 +40,17 @@ const DEPTH: f32 = 7.5;
 const STROKE: f32 = 12.0;
 
 /// Circular path over the occlusal surface, in tooth space.
-struct CircularPath {
+pub struct CircularPath {
     /// Centre of the crown; z is its highest point.
-    middle: Vec3,
+    pub middle: Vec3,
     /// mm
-    radius: f32,
+    pub radius: f32,
     /// Speed of the hand, mm/s.
-    speed: f32,
+    pub speed: f32,
 }
 
 impl CircularPath {
-    fn at(&self, tick: usize) -> Vec3 {
+    pub fn at(&self, tick: usize) -> Vec3 {
         let angle = tick as f32 * 0.001 * self.speed / self.radius;
         self.middle + self.radius * Vec3::new(libm::cosf(angle), libm::sinf(angle), 0.0)
     }
@@ -96,7 +96,7 @@ fn crown(workpiece: &Workpiece) -> Vec3 {
 }
 
 /// Height of the first solid voxel straight below a point, tooth space, mm.
-fn surface_height(volume: &Volume, from: Vec3) -> f32 {
+pub fn surface_height(volume: &Volume, from: Vec3) -> f32 {
     let steps = (0..1000).map(|i| from - Vec3::Z * (i as f32 * 0.01));
     steps.into_iter().find(|p| volume.density_at(*p) >= ISO).map_or(from.z, |p| p.z)
 }
@@ -116,7 +116,7 @@ fn begin_simulation(setup: &Setup, end: WorkingEnd, cuts: bool, first: Vec3) -> 
 }
 
 /// Measures those ticks of a path to which the case applies.
-fn measure_ticks(
+pub fn measure_ticks(
     setup: &Setup,
     end: WorkingEnd,
     cuts: bool,

@@ -1,5 +1,6 @@
 //! The dental arches in the scenario file. Around a single tooth they are displayed; the only key that changes what can be
-//! touched is `missing`, which removes a neighbouring tooth. In a `dental_arch`, all teeth and the mucosa can be touched.
+//! touched is `missing`, which removes a neighbouring tooth. In a `dental_arch`, or a `jaw` with `other_teeth`, all teeth and the
+//! mucosa can be touched.
 
 use super::file::ToothFile;
 use schemars::JsonSchema;

@@ -4,7 +4,7 @@
 //! occlusal surfaces up.
 
 use super::tooth_bounds::{SeatedTooth, ToothBounds, VolumePart, anatomy_tissues};
-use super::workpiece::WorkpieceError;
+use super::workpiece_error::WorkpieceError;
 use super::{Scene, ToothSpec};
 use crate::catalog::TissueTable;
 use std::f32::consts::FRAC_1_SQRT_2;
@@ -82,19 +82,24 @@ impl ArchSeats {
 
     /// Gingiva and palate or floor of the mouth as they are drawn.
     pub fn mucosa(&self, scene: &Scene, tissues: &TissueTable) -> Vec<Collider> {
-        let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
-        let collider = |(region, mesh)| {
-            let label = label(match region {
-                MucosaRegion::Gingiva => "gingiva",
-                MucosaRegion::Palate => "palate",
-                MucosaRegion::FloorOfMouth => "mouth_floor",
-            });
-            let solid = ClosedMesh::new(&mesh).expect("the solids of the mucosa are closed");
-            let geometry = ColliderGeometry::Mesh(Arc::new(solid));
-            Collider { label, tooth_from_collider: self.tooth_from_arch, geometry }
-        };
-        arch_of(scene).gum_solids().into_iter().map(collider).collect()
+        mucosa_colliders(&arch_of(scene), self.tooth_from_arch, tissues)
     }
+}
+
+/// The mucosa of one jaw as closed solids; `tooth_from_arch`: where its arch space is.
+pub(super) fn mucosa_colliders(arch: &DentalArch, tooth_from_arch: Pose, tissues: &TissueTable) -> Vec<Collider> {
+    let label = |name: &str| tissues.by_name(name).map_or(Label::AIR, |e| e.label());
+    let collider = |(region, mesh)| {
+        let label = label(match region {
+            MucosaRegion::Gingiva => "gingiva",
+            MucosaRegion::Palate => "palate",
+            MucosaRegion::FloorOfMouth => "mouth_floor",
+        });
+        let solid = ClosedMesh::new(&mesh).expect("the solids of the mucosa are closed");
+        let geometry = ColliderGeometry::Mesh(Arc::new(solid));
+        Collider { label, tooth_from_collider: tooth_from_arch, geometry }
+    };
+    arch.gum_solids().into_iter().map(collider).collect()
 }
 
 fn arch_of(scene: &Scene) -> DentalArch {
@@ -110,12 +115,8 @@ pub(super) fn in_arch(teeth: &[Volume], seats: &ArchSeats, spacing: f32) -> Resu
     let floor =
         seats.teeth.iter().map(|seat| seat.tooth_from_own.position.z).fold(f32::INFINITY, f32::min) - ROOT_LENGTH;
     let extents = teeth.iter().zip(&seats.teeth).map(|(tooth, seat)| {
-        let Aabb { low, high } = tooth.extent();
-        let corner = |i: usize| {
-            let end = |bit: usize, low: f32, high: f32| if i & bit == 0 { low } else { high };
-            Vec3::new(end(1, low.x, high.x), end(2, low.y, high.y), end(4, low.z, high.z))
-        };
-        let Aabb { low, high } = Aabb::around((0..8).map(|i| seat.tooth_from_own * corner(i)));
+        let corners = tooth.extent().corners();
+        let Aabb { low, high } = Aabb::around(corners.map(|corner| seat.tooth_from_own * corner));
         Aabb::new(low.with_z(low.z.max(floor)), high)
     });
     let extents: Vec<Aabb> = extents.collect();

@@ -137,6 +137,7 @@ impl Workpiece {
             grey_values: None,
             original: Some(whole.into()),
             teeth: Vec::new(),
+            teeth_in_volume: 0,
             lesions: Vec::new(),
             drawn: Vec::new(),
             surroundings: Vec::new(),

@@ -173,7 +173,7 @@ impl SceneFile {
         let teeth = match self {
             SceneFile::Tooth(tooth) => vec![tooth],
             SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
-            SceneFile::Jaw(jaw) => vec![&jaw.tooth],
+            SceneFile::Jaw(jaw) => jaw.teeth().collect(),
             SceneFile::DentalArch(arch) => arch.teeth.iter().collect(),
         };
         teeth.into_iter().flat_map(|tooth| match &tooth.form {
@@ -230,6 +230,37 @@ pub struct JawFile {
     /// Positions of the teeth in both jaws.
     #[serde(default)]
     pub arch: ArchFile,
+    /// All other teeth of both jaws as teeth of voxels, with the gingiva, the palate and the floor of the mouth, which is open:
+    /// they can be examined, but not cut. If omitted, only the adjacent teeth can be touched, as simple shapes.
+    #[serde(default)]
+    pub other_teeth: Option<OtherTeethFile>,
+}
+
+impl JawFile {
+    /// The tooth to be treated, and the listed ones among the others.
+    pub fn teeth(&self) -> impl Iterator<Item = &ToothFile> {
+        std::iter::once(&self.tooth).chain(self.other_teeth.iter().flat_map(|others| &others.teeth))
+    }
+}
+
+/// The other teeth of a mouth.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OtherTeethFile {
+    /// The teeth with decay or stains. Those that are not listed are sound; each has its FDI number as its name.
+    #[serde(default)]
+    #[schemars(length(max = 31))]
+    pub teeth: Vec<ToothFile>,
+    /// Voxel size of these teeth, mm: 0.1 (fine) to 0.4 (coarse).
+    #[serde(default = "OtherTeethFile::spacing")]
+    #[schemars(range(min = 0.1, max = 0.4))]
+    pub spacing_mm: f32,
+}
+
+impl OtherTeethFile {
+    fn spacing() -> f32 {
+        0.15
+    }
 }
 
 /// An object that can be touched but not cut.

@@ -14,6 +14,7 @@ mod calculus_and_fillings;
 pub mod file;
 mod generated_teeth;
 mod lesion;
+mod other_teeth;
 mod limits_file;
 pub mod metric;
 pub mod metric_id;
@@ -24,6 +25,7 @@ mod soft_neighbours;
 mod tooth_bounds;
 mod tooth_words;
 mod workpiece;
+mod workpiece_error;
 
 /// Names under which a recording keeps its own parts; no file of an exercise may have one of them.
 pub const RECORDING_PARTS: [&str; 5] =
@@ -42,13 +44,15 @@ pub use contact_limit::{ContactLimit, LimitPlace, LimitedQuantity};
 pub use file::QuestionnaireTime;
 pub use lesion::{Lesion, seeded_random};
 pub use metric::Metric;
+pub use other_teeth::MouthArches;
 pub use questionnaire::{Questionnaire, QuestionnaireCategory, QuestionnaireItem};
 pub use resolve::{ResolveMode, hex, resolve};
 pub use schema::schema_text;
 pub use tooth_bounds::{ToothBounds, anatomy_tissues};
 pub use typodont_anatomy::jaw::Jaw;
 pub use typodont_anatomy::periodontium::{Periodontium, Pockets, ProbingSite};
-pub use workpiece::{NeighbourTooth, Workpiece, WorkpieceError};
+pub use workpiece::{NeighbourTooth, Workpiece};
+pub use workpiece_error::WorkpieceError;
 
 use crate::catalog::{InstrumentEntry, TissueTable};
 use crate::local_text::LocalTexts;
@@ -57,7 +61,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use typodont_anatomy::caries::LesionDepth;
 use typodont_anatomy::cheek_and_tongue::SoftNeighbour;
-use typodont_anatomy::jaw::{ArchPlan, DentalArch};
+use typodont_anatomy::jaw::{ArchPlan, CUSP_WIDTH, DentalArch, Occlusion};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::touch::{CarvingParameters, Collider, Guidance, MaterialScales, Vibration};
@@ -133,7 +137,7 @@ impl OperatingField {
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub layout: SceneLayout,
-    /// One tooth, two from left to right, or all teeth of an arch.
+    /// One tooth, two from left to right, all teeth of an arch, or one and then all others of the mouth.
     pub teeth: Vec<ToothSpec>,
     /// Objects around a tooth in its jaw, tooth space; `None` for simple shapes of average size.
     pub surroundings: Option<Vec<Collider>>,
@@ -152,9 +156,20 @@ impl Scene {
         matches!(self.layout, SceneLayout::Arch { .. })
     }
 
+    /// Returns true if all teeth of an arch can be touched.
+    pub fn has_whole_arch(&self) -> bool {
+        matches!(self.layout, SceneLayout::Mouth { .. } | SceneLayout::Arch { .. })
+    }
+
     /// Returns true if the teeth stand in a jaw that is drawn around them.
     pub fn is_in_mouth(&self) -> bool {
-        self.is_arch() || matches!(self.layout, SceneLayout::Jaw)
+        matches!(self.layout, SceneLayout::Jaw | SceneLayout::Mouth { .. } | SceneLayout::Arch { .. })
+    }
+
+    /// Returns the teeth that are in the workpiece's volume, and so can be cut.
+    pub fn teeth_in_volume(&self) -> &[ToothSpec] {
+        let count = if let SceneLayout::Mouth { .. } = self.layout { 1 } else { self.teeth.len() };
+        &self.teeth[..count.min(self.teeth.len())]
     }
 }
 
@@ -188,6 +203,16 @@ impl DentalArches {
         let count = if teeth.into_iter().any(|fdi| fdi % 10 == 8) { 8 } else { 7 };
         DentalArch::new(jaw, count, None, &self.plan(jaw))
     }
+
+    /// Returns how the opposite jaw stands to the one that is worked on.
+    pub fn occlusion(&self, near: &DentalArch, opposite: &DentalArch) -> Occlusion {
+        let ahead = match self.angle_class {
+            AngleClassFile::I => 0.0,
+            AngleClassFile::II => -CUSP_WIDTH,
+            AngleClassFile::III => CUSP_WIDTH,
+        };
+        Occlusion::new(near, opposite, ahead)
+    }
 }
 
 /// Arch form of one jaw, mm; `None` for the average.
@@ -206,6 +231,11 @@ pub enum SceneLayout {
     },
     /// A tooth with gingiva and neighbouring teeth.
     Jaw,
+    /// A tooth, the first one, among all others of both jaws, which can be examined but not cut; `spacing` is their voxel
+    /// size, mm.
+    Mouth {
+        spacing: f32,
+    },
     /// All teeth of one jaw in their arch, with its gingiva; `spacing` is the voxel size, mm.
     Arch {
         spacing: f32,
@@ -550,7 +580,7 @@ impl Scenario {
     /// # Errors
     /// Returns a message if there is no tooth with this number, or if the exercise has all teeth of a jaw.
     pub fn renumber_teeth(&mut self, fdi: u8) -> Result<(), String> {
-        if self.scene.is_arch() {
+        if self.scene.has_whole_arch() {
             return Err("the exercise has all teeth of a jaw, none of which can take another's number".into());
         }
         let Some(former) = self.scene.teeth.first().map(|tooth| tooth.fdi) else { return Ok(()) };

@@ -1,10 +1,10 @@
 //! Place of a tooth in the volume of its workpiece, and the labels of its tissues.
 
-use super::distal;
+use super::{ToothSpec, distal};
 use crate::catalog::TissueTable;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
-use typodont_core::volume::Label;
+use typodont_core::volume::{Label, Volume};
 
 /// Position of a tooth, mm. Its *own axes* are those of tooth space, unless it stands in an arch: x lingual to buccal, y
 /// mesial to distal (the reverse for 21–28 and 41–48), z occlusal.
@@ -91,4 +91,43 @@ impl VolumePart<'_> {
 pub fn anatomy_tissues(tissues: &TissueTable) -> typodont_anatomy::TissueLabels {
     let label = |name: &str, otherwise: u8| tissues.by_name(name).map_or(Label(otherwise), |e| e.label());
     typodont_anatomy::TissueLabels { enamel: label("enamel", 1), dentine: label("dentine", 2), pulp: label("pulp", 3) }
+}
+
+/// Returns the place of a tooth that has a volume of its own; `None` if it has no enamel.
+pub(super) fn bounds_of(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable) -> Option<ToothBounds> {
+    bounds_within(tooth, volume, tissues, VolumePart::All)
+}
+
+/// The same of a tooth that shares its volume with others.
+pub(super) fn bounds_within(
+    tooth: &ToothSpec,
+    volume: &Volume,
+    tissues: &TissueTable,
+    part: VolumePart,
+) -> Option<ToothBounds> {
+    let enamel = anatomy_tissues(tissues).enamel;
+    let grid = volume.grid();
+    let mut whole = Aabb::EMPTY;
+    let mut crown = Aabb::EMPTY;
+    let [nx, ny, nz] = grid.dims;
+    for [y, z] in (0..nz).flat_map(|z| (0..ny).map(move |y| [y, z])) {
+        let centre = |x: u32| grid.centre([x, y, z]);
+        if !part.contains(centre(0)) {
+            continue;
+        }
+        // The ends of each row are sufficient to determine the bounds.
+        let first = grid.index([0, y, z]);
+        let tissue = |x: u32| volume.tissue(first + x as usize);
+        let ends = |bounds: &mut Aabb, is_meant: &dyn Fn(Label) -> bool| {
+            if let Some(low) = (0..nx).find(|&x| is_meant(tissue(x))) {
+                let high = (low..nx).rfind(|&x| is_meant(tissue(x))).unwrap_or(low);
+                *bounds = bounds.with(centre(low)).with(centre(high));
+            }
+        };
+        ends(&mut whole, &|label| label != Label::AIR);
+        ends(&mut crown, &|label| label == enamel);
+    }
+    let (id, tooth_from_own) = (tooth.id.clone(), Pose::IDENTITY);
+    let place = ToothBounds { id, fdi: tooth.fdi, whole, crown, own_crown: crown, tooth_from_own };
+    (!crown.is_empty()).then_some(place)
 }

@@ -6,21 +6,19 @@
 use super::arch_volume::{ArchSeats, in_arch};
 use super::calculus_and_fillings::{apply_calculus, apply_old_filling};
 use super::cavity::CavityError;
-use super::generated_teeth::generated_tooth;
-use super::lesion::{DecayPlacementError, Lesion, apply_decay, drawn_lesion, locate_lesion};
+use super::generated_teeth::{GeneratedTooth, generated_tooth};
+use super::lesion::{Lesion, apply_decay, drawn_lesion, locate_lesion};
+use super::other_teeth::OtherTeeth;
 use super::soft_neighbours::soft_neighbour;
-use super::tooth_bounds::{ToothBounds, VolumePart, anatomy_tissues};
-use super::{DentalArches, Scenario, SceneLayout, ToothSource, ToothSpec, distal};
-
-use super::Jaw;
+use super::tooth_bounds::{ToothBounds, VolumePart, anatomy_tissues, bounds_of, bounds_within};
+use super::workpiece_error::WorkpieceError;
+use super::{DentalArches, Jaw, Scenario, SceneLayout, ToothSource, ToothSpec, distal};
 use crate::catalog::TissueTable;
-use std::fmt;
 use std::sync::Arc;
 use typodont_anatomy::periodontium::{Periodontium, Pockets, ToothContext};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
-use typodont_core::touch;
-use typodont_core::touch::{ClosedMesh, Collider, Compliance, SdfGrid};
+use typodont_core::touch::{ClosedMesh, Collider, ColliderGeometry, Compliance, SdfGrid};
 use typodont_core::volume::{Density, Grid, Label, Volume, surface};
 use typodont_formats::import::GreyValues;
 use typodont_formats::limits::WORKPIECE_VOXELS_MAX;
@@ -35,6 +33,8 @@ pub struct Workpiece {
     /// The volume before its cavities were cut, with its decay: the original contour. `None` without a cavity.
     pub original: Option<Arc<Volume>>,
     pub teeth: Vec<ToothBounds>,
+    /// Number of teeth, the first ones, that are in the volume. The others are among the surroundings: they cannot be cut.
+    pub teeth_in_volume: usize,
     pub lesions: Vec<Lesion>,
     /// For each stage of the scenario, the lesion that was drawn, as an index into `lesions`; `None` without a draw.
     pub drawn: Vec<Option<usize>>,
@@ -64,73 +64,6 @@ pub struct NeighbourTooth {
     pub collider: usize,
 }
 
-/// Reason for which a workpiece cannot be made.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum WorkpieceError {
-    /// A decay contains no hard tissue: tooth and decay by index.
-    DecayOutside { tooth: usize, decay: usize },
-    /// A decay that follows a groove finds none: tooth and decay by index.
-    NoGroove { tooth: usize, decay: usize },
-    /// A stain contains no sound tissue, or finds no groove to follow: tooth and stain by index.
-    StainOutside { tooth: usize, stain: usize },
-    /// A cavity contains no tissue: tooth by index.
-    CavityOutside { tooth: usize },
-    /// A cavity opens the pulp: tooth by index.
-    CavityInPulp { tooth: usize },
-    /// There is no root at the site of a deposit: tooth and deposit by index.
-    NoRoot { tooth: usize, calculus: usize },
-    /// An existing filling contains no hard tissue: tooth and filling by index.
-    FillingOutside { tooth: usize, filling: usize },
-    /// A pocket extends below the root: excess of the deepest pocket, tenths of a millimetre.
-    PocketTooDeep { tenths: u32 },
-    /// Two teeth of a pair have different voxel sizes.
-    UnequalSpacing,
-    /// A tooth has no enamel, so that its crown cannot be determined.
-    NoEnamel { tooth: usize },
-    /// A zone's label map differs in size from the workpiece: zone by index, size of the map and of the workpiece in
-    /// voxels.
-    ZoneSize { zone: usize, map: [u32; 3], workpiece: [u32; 3] },
-    /// The volume would have too many voxels.
-    TooLarge { voxels: u64 },
-    /// There is no tooth of this number.
-    NoSuchTooth { fdi: u8 },
-    /// The teeth's shapes were not read, since the volume is to be taken from a recording.
-    OnlyRecorded,
-}
-
-impl fmt::Display for WorkpieceError {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            WorkpieceError::DecayOutside { .. } => f.write_str("the caries is outside the tooth's hard tissue"),
-            WorkpieceError::NoGroove { .. } => {
-                f.write_str("there is no fissure in the occlusal surface near the position of the caries")
-            }
-            WorkpieceError::StainOutside { .. } => f.write_str("the stain is outside the tooth's sound tissue"),
-            WorkpieceError::CavityOutside { .. } => f.write_str("the cavity is outside the tooth"),
-            WorkpieceError::CavityInPulp { .. } => f.write_str("the cavity exposes the pulp"),
-            WorkpieceError::NoRoot { .. } => f.write_str("there is no tooth surface at the position of the calculus"),
-            WorkpieceError::FillingOutside { .. } => f.write_str("the old filling is outside the crown's hard tissue"),
-            WorkpieceError::PocketTooDeep { tenths } => {
-                write!(f, "the deepest pocket extends {:.1} mm beyond the apex of the root", f64::from(*tenths) / 10.0)
-            }
-            WorkpieceError::UnequalSpacing => f.write_str("the two teeth have different voxel sizes"),
-            WorkpieceError::NoEnamel { .. } => f.write_str("the tooth has no enamel, so its crown cannot be located"),
-            WorkpieceError::ZoneSize { map, workpiece, .. } => write!(
-                f,
-                "the zone's label map has {}×{}×{} voxels, but the workpiece has {}×{}×{}",
-                map[0], map[1], map[2], workpiece[0], workpiece[1], workpiece[2]
-            ),
-            WorkpieceError::NoSuchTooth { fdi } => write!(f, "there is no tooth {fdi}"),
-            WorkpieceError::OnlyRecorded => f.write_str("the shapes of the teeth are available only in the recording"),
-            WorkpieceError::TooLarge { voxels } => {
-                write!(f, "the volume would have {voxels} voxels, which is too many")
-            }
-        }
-    }
-}
-
-impl std::error::Error for WorkpieceError {}
-
 impl Workpiece {
     /// Makes the workpiece of a scenario; the seed determines everything that the scenario leaves to chance.
     ///
@@ -140,7 +73,7 @@ impl Workpiece {
         // The volumes before their cavities were cut; not needed if no tooth has a cavity.
         let (mut parts, mut wholes) = (Vec::new(), Vec::new());
         let has_cavity = scenario.has_cavity();
-        for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
+        for (index, tooth) in scenario.scene.teeth_in_volume().iter().enumerate() {
             let mut volume = tooth_volume(tooth, &scenario.tissues)?;
             let mut place =
                 bounds_of(tooth, &volume, &scenario.tissues).ok_or(WorkpieceError::NoEnamel { tooth: index })?;
@@ -148,11 +81,8 @@ impl Workpiece {
                 (volume, place) = moved_to_seat(tooth, volume, place, &scenario.tissues);
             }
             for (number, decay) in tooth.decay.iter().enumerate() {
-                volume =
-                    apply_decay(volume, decay, &place, &scenario.tissues, seed).map_err(|reason| match reason {
-                        DecayPlacementError::Outside => WorkpieceError::DecayOutside { tooth: index, decay: number },
-                        DecayPlacementError::NoGroove => WorkpieceError::NoGroove { tooth: index, decay: number },
-                    })?;
+                volume = apply_decay(volume, decay, &place, &scenario.tissues, seed)
+                    .map_err(|reason| WorkpieceError::of_decay(reason, index, number))?;
             }
             for (stain, patch) in tooth.stains.iter().enumerate() {
                 volume = apply_decay(volume, patch, &place, &scenario.tissues, seed)
@@ -187,7 +117,7 @@ impl Workpiece {
                 (side_by_side(&parts, &wholes, gap)?, Some(side_by_side(&wholes, &wholes, gap)?))
             }
             SceneLayout::Pair { gap } => (side_by_side(&parts, &parts, gap)?, None),
-            SceneLayout::Single | SceneLayout::Jaw => (parts.swap_remove(0), wholes.pop()),
+            SceneLayout::Single | SceneLayout::Jaw | SceneLayout::Mouth { .. } => (parts.swap_remove(0), wholes.pop()),
             SceneLayout::Arch { spacing } => {
                 let seats = ArchSeats::of(&scenario.scene);
                 let original = has_cavity.then(|| in_arch(&wholes, &seats, spacing)).transpose()?;
@@ -222,7 +152,7 @@ impl Workpiece {
         let seats = scenario.scene.is_arch().then(|| ArchSeats::of(&scenario.scene));
         let mut teeth = Vec::new();
         let mut lesions = Vec::new();
-        for (index, tooth) in scenario.scene.teeth.iter().enumerate() {
+        for (index, tooth) in scenario.scene.teeth_in_volume().iter().enumerate() {
             let part = match (scenario.scene.layout, &seats) {
                 (_, Some(seats)) => VolumePart::Seat { seats: &seats.teeth, tooth: index },
                 (SceneLayout::Pair { .. }, _) if index == 0 => VolumePart::Left,
@@ -255,6 +185,12 @@ impl Workpiece {
                 neighbours = around.neighbours;
                 around.colliders
             }
+            (SceneLayout::Mouth { .. }, _) => {
+                let others = OtherTeeth::around(&scenario.scene, &teeth[0], &scenario.tissues, seed)?;
+                teeth.extend(others.teeth);
+                lesions.extend(others.lesions);
+                others.colliders
+            }
             (SceneLayout::Single | SceneLayout::Pair { .. }, _) => Vec::new(),
             (SceneLayout::Arch { .. }, _) => {
                 seats.as_ref().map_or_else(Vec::new, |seats| seats.mucosa(&scenario.scene, &scenario.tissues))
@@ -262,7 +198,8 @@ impl Workpiece {
         };
         let soft = scenario.scene.soft_neighbours.iter();
         around.extend(soft.map(|kind| soft_neighbour(*kind, &teeth[0], &scenario.scene.arch, &scenario.tissues)));
-        let crowns = union(teeth.iter().map(|tooth| tooth.crown));
+        let teeth_in_volume = scenario.scene.teeth_in_volume().len();
+        let crowns = union(teeth[..teeth_in_volume].iter().map(|tooth| tooth.crown));
         let orientation = if seats.is_some() { ARCH_ORIENTATION } else { TOOTH_ORIENTATION };
         let world_from_tooth = world_from_tooth_above(crowns.centre().with_z(crowns.high.z), orientation);
         let periodontium = gum.map(Arc::new);
@@ -274,6 +211,7 @@ impl Workpiece {
             grey_values: None,
             original,
             teeth,
+            teeth_in_volume,
             lesions,
             drawn,
             surroundings: around,
@@ -310,14 +248,28 @@ impl Workpiece {
         (0..self.teeth.len()).min_by(|a, b| distance(&self.teeth[*a]).total_cmp(&distance(&self.teeth[*b])))
     }
 
-    /// Returns the bounding box of all teeth, tooth space, mm; without teeth the origin.
-    pub fn bounds(&self) -> Aabb {
-        union(self.teeth.iter().map(|tooth| tooth.whole))
+    /// Returns the voxels of a tooth that is not in the volume, by its index, and their place in tooth space.
+    pub fn voxels_beside(&self, tooth: usize) -> Option<(&Volume, Pose)> {
+        let collider = self.surroundings.get(tooth.checked_sub(self.teeth_in_volume)?)?;
+        match &collider.geometry {
+            ColliderGeometry::Voxels(volume) => Some((volume, collider.tooth_from_collider)),
+            _ => None,
+        }
     }
 
-    /// Returns the bounding box of all crowns, tooth space, mm; without teeth the origin.
+    /// Returns true for a tooth of the jaw opposite to the one that is worked on, by its index.
+    pub fn is_overhead(&self, tooth: usize) -> bool {
+        tooth >= self.teeth_in_volume && Jaw::of(self.teeth[tooth].fdi) != Jaw::of(self.teeth[0].fdi)
+    }
+
+    /// Returns the bounding box of all teeth in the volume, tooth space, mm; without teeth the origin.
+    pub fn bounds(&self) -> Aabb {
+        union(self.teeth[..self.teeth_in_volume].iter().map(|tooth| tooth.whole))
+    }
+
+    /// Returns the bounding box of their crowns, tooth space, mm; without teeth the origin.
     pub fn crown_bounds(&self) -> Aabb {
-        union(self.teeth.iter().map(|tooth| tooth.crown))
+        union(self.teeth[..self.teeth_in_volume].iter().map(|tooth| tooth.crown))
     }
 
     /// Returns the jaw whose teeth are all in the volume; `None` for one or two teeth.
@@ -366,8 +318,9 @@ fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, Work
         ToothSource::Given(tooth) => Ok(tooth.volume.clone()),
         ToothSource::Recorded => Err(WorkpieceError::OnlyRecorded),
         ToothSource::Procedural { spacing, age } => {
-            generated_tooth(tooth.fdi, *age, *spacing, anatomy_tissues(tissues))
-                .ok_or(WorkpieceError::NoSuchTooth { fdi: tooth.fdi })
+            let tissues = anatomy_tissues(tissues);
+            let form = GeneratedTooth { fdi: tooth.fdi, age: *age, spacing: *spacing, root_length: None, tissues };
+            generated_tooth(form).ok_or(WorkpieceError::NoSuchTooth { fdi: tooth.fdi })
         }
     }
 }
@@ -375,7 +328,7 @@ fn tooth_volume(tooth: &ToothSpec, tissues: &TissueTable) -> Result<Volume, Work
 /// Returns the grey values of a workpiece, if all its teeth are from CT scans and it is not a whole arch. `whole`: the teeth
 /// before their cavities were cut.
 fn grey_values(scenario: &Scenario, whole: &[Volume]) -> Result<Option<GreyValues>, WorkpieceError> {
-    let scanned = scenario.scene.teeth.iter().zip(whole).map(|(tooth, now)| match &tooth.source {
+    let scanned = scenario.scene.teeth_in_volume().iter().zip(whole).map(|(tooth, now)| match &tooth.source {
         ToothSource::Given(tooth) => Some(tooth.grey_values.as_ref()?.only_where(&tooth.volume, now)),
         ToothSource::Procedural { .. } | ToothSource::Recorded => None,
     });
@@ -384,7 +337,7 @@ fn grey_values(scenario: &Scenario, whole: &[Volume]) -> Result<Option<GreyValue
     }
     let Some(mut scanned) = scanned.collect::<Option<Vec<GreyValues>>>() else { return Ok(None) };
     match scenario.scene.layout {
-        SceneLayout::Single | SceneLayout::Jaw => Ok(scanned.pop()),
+        SceneLayout::Single | SceneLayout::Jaw | SceneLayout::Mouth { .. } => Ok(scanned.pop()),
         SceneLayout::Pair { gap } => {
             // The values take the place of the densities and go where the teeth go.
             let as_volume = |(tooth, values): (&Volume, &GreyValues)| {
@@ -430,38 +383,6 @@ fn moved_to_seat(
 
 fn union(boxes: impl Iterator<Item = Aabb>) -> Aabb {
     boxes.reduce(Aabb::union).unwrap_or_default()
-}
-
-fn bounds_of(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable) -> Option<ToothBounds> {
-    bounds_within(tooth, volume, tissues, VolumePart::All)
-}
-
-fn bounds_within(tooth: &ToothSpec, volume: &Volume, tissues: &TissueTable, part: VolumePart) -> Option<ToothBounds> {
-    let enamel = anatomy_tissues(tissues).enamel;
-    let grid = volume.grid();
-    let mut whole = Aabb::EMPTY;
-    let mut crown = Aabb::EMPTY;
-    let [nx, ny, nz] = grid.dims;
-    for [y, z] in (0..nz).flat_map(|z| (0..ny).map(move |y| [y, z])) {
-        let centre = |x: u32| grid.centre([x, y, z]);
-        if !part.contains(centre(0)) {
-            continue;
-        }
-        // The ends of each row are sufficient to determine the bounds.
-        let first = grid.index([0, y, z]);
-        let tissue = |x: u32| volume.tissue(first + x as usize);
-        let ends = |bounds: &mut Aabb, is_meant: &dyn Fn(Label) -> bool| {
-            if let Some(low) = (0..nx).find(|&x| is_meant(tissue(x))) {
-                let high = (low..nx).rfind(|&x| is_meant(tissue(x))).unwrap_or(low);
-                *bounds = bounds.with(centre(low)).with(centre(high));
-            }
-        };
-        ends(&mut whole, &|label| label != Label::AIR);
-        ends(&mut crown, &|label| label == enamel);
-    }
-    let (id, tooth_from_own) = (tooth.id.clone(), Pose::IDENTITY);
-    let place = ToothBounds { id, fdi: tooth.fdi, whole, crown, own_crown: crown, tooth_from_own };
-    (!crown.is_empty()).then_some(place)
 }
 
 /// Combines two teeth in one volume, the first on the left (y > 0). Each tooth is placed so that its `whole` form
@@ -544,7 +465,7 @@ fn surroundings(
         Some(Collider {
             label: label("neighbour"),
             tooth_from_collider: Pose::at(Vec3::new(middle.x, side, top - 0.3 - half.z)),
-            geometry: touch::ColliderGeometry::RoundBox { half, rounding: ROUNDING.min(0.6 * half.min_element()) },
+            geometry: ColliderGeometry::RoundBox { half, rounding: ROUNDING.min(0.6 * half.min_element()) },
         })
     };
     let [mesial, distal] = adjacent_teeth(tooth.fdi).map(|fdi| fdi.filter(|fdi| !arch.missing.contains(fdi)));
@@ -553,7 +474,7 @@ fn surroundings(
     let gum = Collider {
         label: label("gingiva"),
         tooth_from_collider: Pose::at(Vec3::new(middle.x, middle.y, neck + 0.5 - gone - gum_half.z)),
-        geometry: touch::ColliderGeometry::RoundBox { half: gum_half, rounding: 4.0 },
+        geometry: ColliderGeometry::RoundBox { half: gum_half, rounding: 4.0 },
     };
     let beside = [(mesial, -tooth.distal()), (distal, tooth.distal())]
         .into_iter()
@@ -586,11 +507,7 @@ fn anatomical_neighbour(
     /// Length of root kept below the neck, mm: no probe reaches deeper.
     const ROOT: f32 = 7.0;
     let form = typodont_anatomy::teeth::tooth_of_age(fdi, age)?;
-    let whole = typodont_anatomy::grid_of_spacing(&form, SPACING);
-    let cut = (((-ROOT - whole.origin.z) / SPACING).max(0.0) as u32).min(whole.dims[2] - 2);
-    let [nx, ny, nz] = whole.dims;
-    let origin = whole.origin + Vec3::Z * (cut as f32 * SPACING);
-    let grid = Grid { dims: [nx, ny, nz - cut], origin, ..whole };
+    let grid = typodont_anatomy::grid_of_spacing(&form, SPACING).above(-ROOT);
     let labels = typodont_anatomy::TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
     let mesh = surface::extract(&typodont_anatomy::grow(&form, grid, &labels));
     let extent = Aabb::around(mesh.positions.iter().copied());
@@ -600,7 +517,7 @@ fn anatomical_neighbour(
         false => tooth.crown.high.y + CONTACT_GAP - extent.low.y,
     };
     let place = Vec3::new(middle.x, along, tooth.crown.high.z - 0.3 - extent.high.z);
-    let form = touch::ColliderGeometry::Mesh(Arc::new(ClosedMesh::new(&mesh)?));
+    let form = ColliderGeometry::Mesh(Arc::new(ClosedMesh::new(&mesh)?));
     Some(Collider { label, tooth_from_collider: Pose::at(place), geometry: form })
 }
 
@@ -619,7 +536,7 @@ fn gum_beside_tooth(tooth: &ToothBounds, periodontium: &Periodontium, tissues: &
         ((low - beside).with_z(periodontium.lowest_floor() - 2.5), (high + beside).with_z(low.z + GUM_HIGH));
     let grid = Grid::covering(from, to, Vec3::splat(SPACING), 1);
     let field = |yields: Compliance, at: &dyn Fn(Vec3) -> f32| {
-        touch::ColliderGeometry::Sdf(Arc::new(SdfGrid::from_fn(grid, yields, at)))
+        ColliderGeometry::Sdf(Arc::new(SdfGrid::from_fn(grid, yields, at)))
     };
     let near = Collider {
         label: label("gingiva"),
@@ -643,13 +560,13 @@ fn gum_with_pockets(
 ) -> Vec<Collider> {
     let (low, high) = (tooth.crown.low, tooth.crown.high);
     let [near, floor] = gum_beside_tooth(tooth, periodontium, tissues);
-    let touch::ColliderGeometry::RoundBox { half, rounding } = plain.geometry else { return vec![near, floor] };
+    let ColliderGeometry::RoundBox { half, rounding } = plain.geometry else { return vec![near, floor] };
     let beyond = |toward: f32| {
         let edge = if toward < 0.0 { low.y - GUM_ALONG } else { high.y + GUM_ALONG };
         let far = plain.tooth_from_collider.position.y + toward * half.y;
         let half = Vec3::new(half.x, 0.5 * (far - edge).abs(), half.z);
         let position = plain.tooth_from_collider.position.with_y(0.5 * (far + edge));
-        let form = touch::ColliderGeometry::RoundBox { half, rounding: rounding.min(0.9 * half.y) };
+        let form = ColliderGeometry::RoundBox { half, rounding: rounding.min(0.9 * half.y) };
         Collider { label: plain.label, tooth_from_collider: Pose::at(position), geometry: form }
     };
     vec![near, floor, beyond(-1.0), beyond(1.0)]

@@ -7,35 +7,18 @@
 use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
-use typodont_anatomy::jaw::{ArchPlan, DentalArch, FittedTooth, GumForm, Jaw, TintedMesh, ToothSeat};
+use typodont_anatomy::jaw::{
+    ArchPlan, DentalArch, FittedTooth, GumForm, Jaw, Occlusion, TintedMesh, ToothSeat, WORKING_OPENING_DEG,
+};
 use typodont_anatomy::periodontium::Periodontium;
 use typodont_anatomy::teeth::distal_sign;
-use typodont_core::frame::{Pose, Quat, Vec3, smooth_step};
+use typodont_core::frame::{Pose, Vec3, smooth_step};
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Collider, ColliderGeometry};
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
-use typodont_exercise::scenario::file::AngleClassFile;
-use typodont_exercise::scenario::{ToothBounds, Workpiece};
+use typodont_exercise::scenario::{MouthArches, ToothBounds, Workpiece};
 use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb, Viewpoint};
-
-/// Opening of the mouth during treatment, degrees: some 40 mm between the incisors.
-pub const WORKING_OPENING_DEG: f32 = 26.0;
-
-/// Position of the condyles' axis relative to the edges of the lower incisors, back and up, mm: the height of Bonwill's
-/// triangle of four inches, raised by Balkwill's angle of 26° over the occlusal plane.
-const CONDYLES: [f32; 2] = [79.0, 38.5];
-
-/// Overlap of upper and lower edges and cusps when the jaws are closed, mm.
-const OVERBITE: f32 = 2.0;
-
-/// Distance by which the upper first molar's centre lies behind the lower one's, mm, so that its mesiobuccal cusp meets
-/// the lower one's buccal groove (Angle's class I).
-const MOLAR_RELATION: f32 = 0.9;
-
-/// Width of a cusp, mm: distance by which the lower jaw is placed backward in Angle's class II and forward in class
-/// III.
-const CUSP_WIDTH: f32 = 4.5;
 
 /// Gloss of wet gingiva and enamel, 0 to 1.
 const GUM_GLOSS: f32 = 0.19;
@@ -69,7 +52,9 @@ pub struct Mouth {
     opposite: Option<JawMeshes>,
     jaw: Jaw,
     world_from_near: Pose,
-    near_from_opposite: Pose,
+    occlusion: Occlusion,
+    /// Opening at which the opposite jaw can be touched, degrees; `None` where it is only drawn.
+    felt_opening: Option<f32>,
     /// Solids that can be touched beside the tooth and are not part of the near jaw's gingiva.
     touched: Vec<MeshInstance>,
     /// Cheek and tongue.
@@ -129,6 +114,9 @@ impl Mouth {
             (Some(tooth_from_arch), [first, ..]) => {
                 Some(Mouth::around_arch(workpiece, Jaw::of(first.fdi), tooth_from_arch, tissues))
             }
+            (None, [tooth, others @ ..]) if workpiece.teeth_in_volume == 1 && !others.is_empty() => {
+                Mouth::among_other_teeth(workpiece, tooth, others, tissues)
+            }
             (None, [tooth]) if workpiece.own_jaw => Mouth::of_own_jaw(workpiece, tooth, tissues),
             (None, [tooth]) => Mouth::around_tooth(workpiece, tooth, tissues),
             _ => None,
@@ -144,10 +132,38 @@ impl Mouth {
             opposite: None,
             jaw,
             world_from_near: workpiece.world_from_tooth * tooth_from_arch,
-            near_from_opposite: closed_pose(&near, &other, workpiece.arch.angle_class),
+            occlusion: workpiece.arch.occlusion(&near, &other),
+            felt_opening: None,
             touched: Vec::new(),
             yielding: Vec::new(),
         }
+    }
+
+    /// The jaws of a tooth all of whose others can be touched, and are drawn where they are felt.
+    fn among_other_teeth(
+        workpiece: &Workpiece,
+        tooth: &ToothBounds,
+        others: &[ToothBounds],
+        tissues: &TissueTable,
+    ) -> Option<Mouth> {
+        let numbers: Vec<u8> = workpiece.teeth.iter().map(|tooth| tooth.fdi).collect();
+        let arches = MouthArches::around_tooth(&workpiece.arch, tooth, &numbers)?;
+        let drawn = |arch: &DentalArch| {
+            let is_there = |fdi: u8| others.iter().any(|tooth| tooth.fdi == fdi);
+            let crowns = arch.crowns(&|side, index, _| !is_there(arch.jaw().fdi(side, index)));
+            JawMeshes::new(crowns, arch.gum(GumForm::Touched, &|p| p), tissues)
+        };
+        let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
+        Some(Mouth {
+            near: drawn(&arches.near),
+            opposite: Some(drawn(&arches.opposite)),
+            jaw: arches.near.jaw(),
+            world_from_near: workpiece.world_from_tooth * arches.tooth_from_near,
+            occlusion: workpiece.arch.occlusion(&arches.near, &arches.opposite),
+            felt_opening: Some(WORKING_OPENING_DEG),
+            touched: Vec::new(),
+            yielding: yielding.collect(),
+        })
     }
 
     /// The jaw that an exercise brings along. Its bite is not known: nothing is drawn opposite to it.
@@ -168,7 +184,8 @@ impl Mouth {
             opposite: None,
             jaw,
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
-            near_from_opposite: closed_pose(&near, &plan.of_jaw(jaw.other(), []), plan.angle_class),
+            occlusion: plan.occlusion(&near, &plan.of_jaw(jaw.other(), [])),
+            felt_opening: None,
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
             yielding: yielding.collect(),
         })
@@ -226,14 +243,15 @@ impl Mouth {
             opposite: Some(opposite_jaw(workpiece, &other, tissues)),
             jaw,
             world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
-            near_from_opposite: closed_pose(&near, &other, plan.angle_class),
+            occlusion: plan.occlusion(&near, &other),
+            felt_opening: None,
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
             yielding: yielding.collect(),
         })
     }
 
     /// Everything but the teeth that are worked on, world space: the mouth open by an angle about the condyles' axis,
-    /// degrees, 0 to 35; the jaw with these teeth stays where it is.
+    /// degrees, 0 to 35, unless the opposite jaw can be touched where it is; the jaw with these teeth stays where it is.
     pub fn solids(&self, open: f32) -> Vec<MeshInstance> {
         let opposite = self.opposite.iter().flat_map(|jaw| jaw.instances(self.world_from_opposite(open)));
         // The lamp is aimed past the jaw that is not worked on.
@@ -278,19 +296,7 @@ impl Mouth {
     }
 
     fn world_from_opposite(&self, open: f32) -> Pose {
-        self.world_from_near * self.opening_pose(open.clamp(0.0, 35.0)) * self.near_from_opposite
-    }
-
-    /// Rotation of the opposite jaw about the condyles' axis, in the near jaw's arch space.
-    fn opening_pose(&self, degrees: f32) -> Pose {
-        let [back, up] = CONDYLES;
-        let axis = match self.jaw {
-            Jaw::Lower => Vec3::new(0.0, back, up),
-            Jaw::Upper => self.near_from_opposite * Vec3::new(0.0, back, up),
-        };
-        // About x, which points to one side: the other jaw's front, at −y from the axis, goes to +z.
-        let orientation = Quat::from_rotation_x(-degrees.to_radians());
-        Pose { position: axis - orientation * axis, orientation }
+        self.world_from_near * self.occlusion.near_from_opposite(self.felt_opening.unwrap_or(open))
     }
 }
 
@@ -319,24 +325,6 @@ fn opposite_jaw(workpiece: &Workpiece, arch: &DentalArch, tissues: &TissueTable)
     let missing = &workpiece.arch.missing;
     let crowns = arch.crowns(&|side, index, _| missing.contains(&arch.jaw().fdi(side, index)));
     JawMeshes::new(crowns, arch.gum(GumForm::Drawn, &|p| p), tissues)
-}
-
-/// The opposite jaw's arch space in the near one's when the jaws are closed.
-fn closed_pose(near: &DentalArch, other: &DentalArch, class: AngleClassFile) -> Pose {
-    let ahead = match class {
-        AngleClassFile::I => 0.0,
-        AngleClassFile::II => -CUSP_WIDTH,
-        AngleClassFile::III => CUSP_WIDTH,
-    };
-    let is_upper = near.jaw() == Jaw::Upper;
-    let (upper, lower) = if is_upper { (near, other) } else { (other, near) };
-    // Of the side without a fitted tooth.
-    let first_molar = |arch: &DentalArch| arch.seat(-arch.fitted_side(), 5).map_or(0.0, |seat| seat.top.y);
-    let forward = first_molar(lower) + MOLAR_RELATION + ahead - first_molar(upper);
-    // Turned about y by half a turn: left becomes right and up becomes down.
-    let orientation = Quat::from_rotation_y(std::f32::consts::PI);
-    let lower_from_upper = Pose { position: Vec3::new(0.0, forward, -OVERBITE), orientation };
-    if is_upper { lower_from_upper.inverse() } else { lower_from_upper }
 }
 
 /// Colliders around the carved tooth, which the drawn jaw follows.

@@ -3,7 +3,7 @@
 use super::tooth_path;
 use crate::catalog::TissueRole;
 use crate::scenario::file::ScenarioFile;
-use crate::scenario::workpiece::WorkpieceError;
+use crate::scenario::workpiece_error::WorkpieceError;
 use crate::scenario::{DecayPlace, Scenario, Workpiece};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;

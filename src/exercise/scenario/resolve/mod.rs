@@ -113,7 +113,7 @@ pub fn resolve(source: Arc<SourceText>, library: &Library, mode: ResolveMode) ->
 fn written_teeth(scene: &file::SceneFile) -> Vec<&file::ToothFile> {
     match scene {
         file::SceneFile::Tooth(tooth) => vec![tooth],
-        file::SceneFile::Jaw(jaw) => vec![&jaw.tooth],
+        file::SceneFile::Jaw(jaw) => jaw.teeth().collect(),
         file::SceneFile::Pair(pair) => vec![&pair.left, &pair.right],
         file::SceneFile::DentalArch(arch) => arch.teeth.iter().collect(),
     }
@@ -122,7 +122,11 @@ fn written_teeth(scene: &file::SceneFile) -> Vec<&file::ToothFile> {
 fn tooth_path(scene: &file::SceneFile, tooth: usize) -> String {
     match scene {
         file::SceneFile::Tooth(_) => "/scene/tooth".into(),
-        file::SceneFile::Jaw(_) => "/scene/jaw/tooth".into(),
+        file::SceneFile::Jaw(_) if tooth == 0 => "/scene/jaw/tooth".into(),
+        file::SceneFile::Jaw(jaw) => match &jaw.other_teeth {
+            Some(others) if tooth <= others.teeth.len() => format!("/scene/jaw/other_teeth/teeth/{}", tooth - 1),
+            _ => "/scene/jaw/other_teeth".into(),
+        },
         file::SceneFile::Pair(_) => format!("/scene/pair/{}", ["left", "right"][tooth.min(1)]),
         file::SceneFile::DentalArch(arch) if tooth < arch.teeth.len() => format!("/scene/dental_arch/teeth/{tooth}"),
         // A tooth that is not listed.

@@ -41,15 +41,18 @@ impl Resolver<'_> {
         Some(age)
     }
 
-    pub(super) fn scene(&mut self, written: &file::SceneFile, age: Option<f32>) -> Option<Scene> {
-        let layout = match written {
+    pub(super) fn scene(&mut self, scene: &file::SceneFile, age: Option<f32>) -> Option<Scene> {
+        let layout = match scene {
             file::SceneFile::Tooth(_) => SceneLayout::Single,
             file::SceneFile::Pair(pair) => SceneLayout::Pair { gap: pair.gap_mm },
+            file::SceneFile::Jaw(file::JawFile { other_teeth: Some(others), .. }) => {
+                SceneLayout::Mouth { spacing: others.spacing_mm }
+            }
             file::SceneFile::Jaw(_) => SceneLayout::Jaw,
             file::SceneFile::DentalArch(arch) => SceneLayout::Arch { spacing: arch.spacing_mm },
         };
-        let teeth = written_teeth(written);
-        let paths: Vec<String> = (0..teeth.len()).map(|i| tooth_path(written, i)).collect();
+        let teeth = written_teeth(scene);
+        let paths: Vec<String> = (0..teeth.len()).map(|i| tooth_path(scene, i)).collect();
         self.unique(teeth.iter().zip(&paths).map(|(t, p)| (t.id.as_str(), format!("{p}/id"))));
         let decay = teeth.iter().zip(&paths).flat_map(|(t, p)| t.decay.iter().enumerate().map(move |(i, d)| (d, p, i)));
         let decay = decay.map(|(d, p, i)| (d.id.as_str(), format!("{p}/decay/{i}/id")));
@@ -65,15 +68,15 @@ impl Resolver<'_> {
         self.unique(decay.chain(stains).chain(deposits).chain(fillings));
         let mut teeth: Vec<Option<ToothSpec>> =
             teeth.iter().zip(&paths).map(|(tooth, path)| self.tooth(tooth, path, age)).collect();
-        let around = match written {
+        let around = match scene {
             file::SceneFile::Jaw(jaw) => jaw.around.as_ref().map(|around| self.obstacles(around)),
             _ => None,
         };
-        let pockets = match written {
+        let pockets = match scene {
             file::SceneFile::Jaw(jaw) => jaw.periodontium.as_ref().map(|gum| pockets(gum, age)),
             _ => None,
         };
-        let own_jaw = matches!(written, file::SceneFile::Jaw(jaw) if jaw.own_jaw);
+        let own_jaw = matches!(scene, file::SceneFile::Jaw(jaw) if jaw.own_jaw);
         if pockets.is_some() && around.is_some() && !own_jaw {
             let help = "remove \"around\": a jaw with \"periodontium\" has its own adjacent teeth; or set \"own_jaw\" to true if \
                         \"around\" has a whole jaw";
@@ -81,20 +84,32 @@ impl Resolver<'_> {
             self.complain("/scene/jaw/periodontium", "two-gums", message, help);
         }
         let has_surfaces = |jaw: &file::JawFile| jaw.around.as_ref().is_some_and(|around| !around.is_empty());
-        if matches!(written, file::SceneFile::Jaw(jaw) if jaw.own_jaw && !has_surfaces(jaw)) {
+        if matches!(scene, file::SceneFile::Jaw(jaw) if jaw.own_jaw && !has_surfaces(jaw)) {
             let help = "list the surfaces of the jaw in \"around\", or remove \"own_jaw\"";
             self.complain("/scene/jaw/own_jaw", "no-own-jaw", "a jaw of one's own has no surfaces", help);
         }
-        let arch = match written {
+        let arch = match scene {
             file::SceneFile::Jaw(jaw) => {
-                let own = |fdi, _| fdi == jaw.tooth.fdi;
+                // A listed tooth can be rotated, but not be missing.
+                let own =
+                    |fdi, is_missing| fdi == jaw.tooth.fdi || is_missing && jaw.teeth().any(|tooth| tooth.fdi == fdi);
+                if let Some(others) = &jaw.other_teeth {
+                    self.check_other_teeth(scene, jaw, others);
+                    // They are generated for each session and each replay: a recording has the treated tooth only.
+                    let source = ToothSource::Procedural { spacing: others.spacing_mm, age };
+                    teeth.iter_mut().skip(1).flatten().for_each(|tooth| tooth.source = source.clone());
+                    let listed: BTreeSet<u8> = jaw.teeth().map(|tooth| tooth.fdi).collect();
+                    let numbers = Jaw::BOTH.into_iter().flat_map(Jaw::teeth_of_adult);
+                    let numbers = numbers.filter(|fdi| !listed.contains(fdi) && !jaw.arch.missing.contains(fdi));
+                    teeth.extend(self.sound_teeth(scene, numbers, source));
+                }
                 self.arch(&jaw.arch, "/scene/jaw/arch", own, age)
             }
             file::SceneFile::DentalArch(written) => {
                 // A listed tooth can be rotated, but not be missing.
                 let own = |fdi, is_missing| is_missing && written.teeth.iter().any(|tooth| tooth.fdi == fdi);
                 let arch = self.arch(&written.arch, "/scene/dental_arch/arch", own, age);
-                teeth.extend(self.unlisted_teeth(written, age));
+                teeth.extend(self.unlisted_teeth(scene, written, age));
                 arch
             }
             file::SceneFile::Tooth(_) | file::SceneFile::Pair(_) => DentalArches { age, ..DentalArches::default() },
@@ -103,9 +118,9 @@ impl Resolver<'_> {
         if let Some(tooth) = with_calculus.filter(|_| pockets.is_none()) {
             let help = "put the tooth into a \"jaw\" with \"periodontium\": {}";
             let message = "calculus is placed in relation to the gingival margin, but there is no gingiva";
-            self.complain(&format!("{}/calculus", tooth_path(written, tooth)), "no-gum", message, help);
+            self.complain(&format!("{}/calculus", tooth_path(scene, tooth)), "no-gum", message, help);
         }
-        let soft_neighbours = match written {
+        let soft_neighbours = match scene {
             file::SceneFile::Jaw(jaw) => self.soft_neighbours(jaw),
             _ => Vec::new(),
         };
@@ -141,39 +156,89 @@ impl Resolver<'_> {
     }
 
     /// Returns the sound teeth of an arch that the author did not list, and reports teeth that cannot stand in one arch.
-    fn unlisted_teeth(&mut self, written: &file::DentalArchFile, age: Option<f32>) -> Vec<Option<ToothSpec>> {
+    fn unlisted_teeth(
+        &mut self,
+        scene: &file::SceneFile,
+        written: &file::DentalArchFile,
+        age: Option<f32>,
+    ) -> Vec<Option<ToothSpec>> {
         let jaw = written.teeth.first().map_or(Jaw::Lower, |tooth| Jaw::of(tooth.fdi));
+        let listed: BTreeSet<u8> = written.teeth.iter().map(|tooth| tooth.fdi).collect();
+        self.check_listed_teeth(scene, &written.teeth, written.spacing_mm);
+        for (index, _) in written.teeth.iter().enumerate().filter(|(_, tooth)| Jaw::of(tooth.fdi) != jaw) {
+            let message = "the teeth belong to both jaws";
+            let help = "list teeth of one jaw: 11–28 or 31–48";
+            self.complain(&format!("{}/fdi", tooth_path(scene, index)), "two-jaws", message, help);
+        }
+        let numbers = jaw.teeth_of_adult().filter(|fdi| !listed.contains(fdi) && !written.arch.missing.contains(fdi));
+        let source = match self.mode {
+            ResolveMode::FromRecording => ToothSource::Recorded,
+            _ => ToothSource::Procedural { spacing: written.spacing_mm, age },
+        };
+        self.sound_teeth(scene, numbers, source)
+    }
+
+    /// Reports teeth that are listed twice, and generated ones among `made_alike` that have voxels of another size, mm.
+    fn check_listed_teeth(&mut self, scene: &file::SceneFile, made_alike: &[file::ToothFile], spacing: f32) {
         let mut listed = BTreeSet::new();
-        for (index, tooth) in written.teeth.iter().enumerate() {
-            let path = format!("/scene/dental_arch/teeth/{index}");
+        let teeth = written_teeth(scene);
+        let first_alike = teeth.len() - made_alike.len();
+        for (index, tooth) in teeth.into_iter().enumerate() {
+            let path = tooth_path(scene, index);
             if !listed.insert(tooth.fdi) {
                 let message = format!("tooth {} is listed more than once", tooth.fdi);
                 self.complain(&format!("{path}/fdi"), "duplicate-tooth", message, "list each tooth once");
             }
-            if Jaw::of(tooth.fdi) != jaw {
-                let message = "the teeth belong to both jaws";
-                let help = "list teeth of one jaw: 11–28 or 31–48";
-                self.complain(&format!("{path}/fdi"), "two-jaws", message, help);
-            }
             if let file::ToothSourceFile::Procedural(made) = &tooth.form
-                && made.spacing_mm != written.spacing_mm
+                && made.spacing_mm != spacing
+                && index >= first_alike
             {
                 let message =
-                    format!("the tooth has voxels of {} mm, the arch of {} mm", made.spacing_mm, written.spacing_mm);
+                    format!("the tooth has voxels of {} mm, the other teeth of {spacing} mm", made.spacing_mm);
                 let help = "set both spacing_mm to the same value";
                 self.complain(&format!("{path}/form/procedural"), "unequal-spacing", message, help);
             }
         }
-        let numbers = [1.0, -1.0].into_iter().flat_map(|side| (0..7).map(move |index| jaw.fdi(side, index)));
-        let numbers = numbers.filter(|fdi| !listed.contains(fdi) && !written.arch.missing.contains(fdi));
-        let source = || match self.mode {
-            ResolveMode::FromRecording => ToothSource::Recorded,
-            _ => ToothSource::Procedural { spacing: written.spacing_mm, age },
-        };
+    }
+
+    /// Reports what the other teeth of a mouth cannot have, and what a jaw cannot have together with them.
+    fn check_other_teeth(&mut self, scene: &file::SceneFile, jaw: &file::JawFile, others: &file::OtherTeethFile) {
+        self.check_listed_teeth(scene, &others.teeth, others.spacing_mm);
+        let excluded = [("periodontium", jaw.periodontium.is_some()), ("around", jaw.around.is_some())];
+        for (key, _) in excluded.into_iter().filter(|(_, is_given)| *is_given) {
+            let message = format!("\"{key}\" cannot be combined with \"other_teeth\", which have their own gingiva");
+            self.complain(&format!("/scene/jaw/{key}"), "two-gums", message, "remove one of the two");
+        }
+        for (index, tooth) in others.teeth.iter().enumerate() {
+            let path = format!("/scene/jaw/other_teeth/teeth/{index}");
+            let parts = [
+                ("cavity", tooth.cavity.is_some()),
+                ("calculus", !tooth.calculus.is_empty()),
+                ("old_fillings", !tooth.old_fillings.is_empty()),
+            ];
+            for (key, _) in parts.into_iter().filter(|(_, is_given)| *is_given) {
+                let message = format!("only the treated tooth can have \"{key}\": the other teeth are examined");
+                self.complain(&format!("{path}/{key}"), "only-examined", message, "move it to the treated tooth");
+            }
+            if !matches!(tooth.form, file::ToothSourceFile::Procedural(_)) {
+                let message = "only the treated tooth can come from a scan";
+                let help = "use { \"procedural\": { \"spacing_mm\": … } } with the voxel size of the other teeth";
+                self.complain(&format!("{path}/form"), "only-examined", message, help);
+            }
+        }
+    }
+
+    /// Returns sound teeth of these numbers, and reports listed ones that have the name of one of them.
+    fn sound_teeth(
+        &mut self,
+        scene: &file::SceneFile,
+        numbers: impl Iterator<Item = u8>,
+        source: ToothSource,
+    ) -> Vec<Option<ToothSpec>> {
         let sound = |fdi: u8| ToothSpec {
             id: fdi.to_string(),
             fdi,
-            source: source(),
+            source: source.clone(),
             decay: Vec::new(),
             stains: Vec::new(),
             cavity: None,
@@ -181,10 +246,10 @@ impl Resolver<'_> {
             fillings: Vec::new(),
         };
         let teeth: Vec<ToothSpec> = numbers.map(sound).collect();
-        for (index, tooth) in written.teeth.iter().enumerate() {
+        for (index, tooth) in written_teeth(scene).into_iter().enumerate() {
             if teeth.iter().any(|sound| sound.id == tooth.id) {
                 let message = format!("\"{}\" is the name of a tooth that is not listed", tooth.id);
-                let path = format!("/scene/dental_arch/teeth/{index}/id");
+                let path = format!("{}/id", tooth_path(scene, index));
                 self.complain(&path, "duplicate-id", message, "name the tooth by its own FDI number");
             }
         }

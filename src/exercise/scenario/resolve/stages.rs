@@ -273,13 +273,18 @@ impl Resolver<'_> {
         let kind = match &written.answer {
             file::AnswerFile::ToothWith(decay) => {
                 self.lesion(decay, lesions, &format!("{path}/answer/tooth_with"));
-                if !matches!(scenario.scene, file::SceneFile::Pair(_) | file::SceneFile::DentalArch(_)) {
+                let has_one_tooth = match &scenario.scene {
+                    file::SceneFile::Tooth(_) => true,
+                    file::SceneFile::Jaw(jaw) => jaw.other_teeth.is_none(),
+                    file::SceneFile::Pair(_) | file::SceneFile::DentalArch(_) => false,
+                };
+                if has_one_tooth {
                     let message = "there is only one tooth to choose from";
                     self.complain(
                         &format!("{path}/answer"),
                         "no-choice",
                         message,
-                        "use a scene of several teeth: { \"pair\": … } or { \"dental_arch\": … }",
+                        "use a scene of several teeth: { \"pair\": … }, { \"dental_arch\": … }, or a \"jaw\" with \"other_teeth\"",
                     );
                 }
                 QuestionKind::ToothWith { decay: decay.clone() }

@@ -1,12 +1,12 @@
 //! Positions on the visible surface, and hand paths through the air to them.
 
-use crate::scenario::{Lesion, seeded_random};
+use crate::scenario::{Lesion, ToothBounds, seeded_random};
 use crate::session::operator::file::{CarveFile, CutFile, PlaceFile};
 use crate::session::operator::palpation::over_crown;
 use crate::session::operator::{Operator, OperatorTask, TOUCH_HEIGHT, TOUCH_SPEED, TRAVEL_HEIGHT};
 use typodont_core::device::Move;
 use typodont_core::frame::Vec3;
-use typodont_core::volume::ISO;
+use typodont_core::volume::{ISO, Volume};
 
 /// Parameters with which a hand leads a tip along a path.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +58,6 @@ impl Operator {
             PlaceFile::Site => self.random_site().map_or(0, |lesion| lesion.tooth),
             PlaceFile::Crown | PlaceFile::Quadrant(_) => 0,
         };
-        let high = teeth[tooth].crown.high;
         let middle = over_crown(&teeth[tooth], 1.0, [0.0; 2]);
         let over = match place {
             PlaceFile::Decay(id) => self.workpiece.lesions.iter().find(|l| l.id == *id).map_or(middle, |l| l.centre),
@@ -70,7 +69,7 @@ impl Operator {
             }
             PlaceFile::Crown | PlaceFile::Tooth(_) => middle,
         };
-        let (surface, normal) = self.surface_at(over.x, over.y, high.z).unwrap_or((over, Vec3::Z));
+        let (surface, normal) = self.surface_of(tooth, over).unwrap_or((over, self.away_from(tooth)));
         (tooth, surface, normal)
     }
 
@@ -84,21 +83,53 @@ impl Operator {
         self.workpiece.lesions.iter().find(|lesion| lesion.id == *site)
     }
 
-    /// Returns the uppermost surface point at (x, y) and its unit normal; tooth space, mm.
+    /// Returns the occlusal surface of a tooth at a point over it, and the unit normal there; tooth space, mm.
+    pub(super) fn surface_of(&self, tooth: usize, over: Vec3) -> Option<(Vec3, Vec3)> {
+        let place = &self.workpiece.teeth[tooth];
+        let Some((volume, tooth_from_own)) = self.workpiece.voxels_beside(tooth) else {
+            return self.surface_at(over.x, over.y, place.crown.high.z);
+        };
+        let own = tooth_from_own.inverse() * over;
+        let (surface, normal) = uppermost_surface(volume, own.x, own.y, place.own_crown.high.z)?;
+        Some((tooth_from_own * surface, tooth_from_own.rotate(normal)))
+    }
+
+    /// Returns the unit direction in tooth space in which a hand leaves the occlusal surface of a tooth.
+    pub(super) fn away_from(&self, tooth: usize) -> Vec3 {
+        match self.workpiece.is_overhead(tooth) {
+            true => self.workpiece.teeth[tooth].tooth_from_own.rotate(Vec3::Z),
+            false => Vec3::Z,
+        }
+    }
+
+    /// Returns a point in the air over a point of a tooth's surface, from which the hand may move straight to any other such point;
+    /// tooth space, mm.
+    pub(super) fn clear_of(&self, tooth: usize, surface: Vec3) -> Vec3 {
+        if !self.workpiece.is_overhead(tooth) {
+            return surface.with_z(self.top() + 1.0);
+        }
+        // All the way out to the plane on the cusps of all teeth overhead.
+        let overhead = (0..self.workpiece.teeth.len()).filter(|&other| self.workpiece.is_overhead(other));
+        let overhead: Vec<&ToothBounds> = overhead.map(|other| &self.workpiece.teeth[other]).collect();
+        let out =
+            overhead.iter().map(|tooth| tooth.tooth_from_own.rotate(Vec3::Z)).sum::<Vec3>().normalize_or(Vec3::NEG_Z);
+        let corners =
+            overhead.iter().flat_map(|tooth| tooth.own_crown.corners().map(|c| (tooth.tooth_from_own * c).dot(out)));
+        let plane = corners.fold(f32::NEG_INFINITY, f32::max);
+        surface + out * (plane + 1.0 - surface.dot(out))
+    }
+
+    /// Returns the uppermost surface point of the volume at (x, y) and its unit normal; tooth space, mm.
     ///
     /// Searches downward from 1 mm above `top` over 12 mm.
     pub(super) fn surface_at(&self, x: f32, y: f32, top: f32) -> Option<(Vec3, Vec3)> {
-        let volume = &self.workpiece.volume;
-        let step = 0.5 * volume.grid().spacing.min_element();
-        let point = |i: u32| Vec3::new(x, y, top + 1.0 - i as f32 * step);
-        let hit = (0..(12.0 / step) as u32).map(point).find(|&p| volume.density_at(p) >= ISO)?;
-        let (_, gradient) = volume.density_and_gradient_at(hit);
-        Some((hit, (-gradient).try_normalize().unwrap_or(Vec3::Z)))
+        uppermost_surface(&self.workpiece.volume, x, y, top)
     }
 
-    /// Returns the height of the highest crown, tooth space, mm.
+    /// Returns the height of the highest crown of the jaw that is worked on, tooth space, mm.
     pub(super) fn top(&self) -> f32 {
-        self.workpiece.teeth.iter().map(|t| t.crown.high.z).fold(f32::NEG_INFINITY, f32::max)
+        let near = (0..self.workpiece.teeth.len()).filter(|&tooth| !self.workpiece.is_overhead(tooth));
+        near.map(|tooth| self.workpiece.teeth[tooth].crown.high.z).fold(f32::NEG_INFINITY, f32::max)
     }
 
     /// Plans a move straight up to travelling height from the hand's position at that time.
@@ -159,4 +190,14 @@ impl Operator {
         let along = self.workpiece.world_from_tooth.rotate(Vec3::NEG_Z);
         [rise, above, before, Move::Press { along, force, hold, reach: 15.0, speed: TOUCH_SPEED.min(speed) }]
     }
+}
+
+/// Returns the uppermost surface point of a volume at (x, y) and its unit normal, in the volume's space, mm. Searches downward from
+/// 1 mm above `top` over 12 mm.
+fn uppermost_surface(volume: &Volume, x: f32, y: f32, top: f32) -> Option<(Vec3, Vec3)> {
+    let step = 0.5 * volume.grid().spacing.min_element();
+    let point = |i: u32| Vec3::new(x, y, top + 1.0 - i as f32 * step);
+    let hit = (0..(12.0 / step) as u32).map(point).find(|&p| volume.density_at(p) >= ISO)?;
+    let (_, gradient) = volume.density_and_gradient_at(hit);
+    Some((hit, (-gradient).try_normalize().unwrap_or(Vec3::Z)))
 }

@@ -36,7 +36,7 @@ impl Operator {
 
     pub(super) fn follow(&mut self, follow: &FollowFile, radius: f32) {
         let along = self.workpiece.world_from_tooth.rotate(Vec3::NEG_Z);
-        for tooth in self.workpiece.clone().teeth.iter() {
+        for tooth in 0..self.workpiece.teeth_in_volume {
             for line in 0..follow.lines {
                 let across = spread(line, follow.lines);
                 let path = self.line_over(tooth, across, radius);
@@ -57,13 +57,13 @@ impl Operator {
 
     /// Returns the path of the instrument's centre along a mesiodistal line over a crown; tooth space, mm. `across`
     /// is the buccolingual position, -1 to 1.
-    fn line_over(&self, tooth: &ToothBounds, across: f32, radius: f32) -> Vec<Vec3> {
+    fn line_over(&self, tooth: usize, across: f32, radius: f32) -> Vec<Vec3> {
         /// Share of the crown's width that belongs to the occlusal surface.
         const OCCLUSAL: f32 = 0.7;
         (0..=24)
             .filter_map(|i| {
-                let Vec3 { x, y, .. } = over_crown(tooth, OCCLUSAL, [across, i as f32 / 12.0 - 1.0]);
-                self.surface_at(x, y, tooth.crown.high.z).map(|(p, n)| p + n * radius)
+                let over = over_crown(&self.workpiece.teeth[tooth], OCCLUSAL, [across, i as f32 / 12.0 - 1.0]);
+                self.surface_of(tooth, over).map(|(p, n)| p + n * radius)
             })
             .collect()
     }
@@ -76,9 +76,7 @@ impl Operator {
                     // Alternating direction keeps the hand's paths short.
                     let j = if i % 2 == 0 { j } else { probe.side - 1 - j };
                     let (u, v) = (spread(i, probe.side) * probe.width, spread(j, probe.side) * probe.width);
-                    let Vec3 { x, y, .. } = over_crown(tooth, 1.0, [u, v]);
-                    let at = self.surface_at(x, y, tooth.crown.high.z);
-                    if let Some((surface, normal)) = at {
+                    if let Some((surface, normal)) = self.surface_of(index, over_crown(tooth, 1.0, [u, v])) {
                         self.tap(index, surface, normal, radius, probe);
                     }
                 }
@@ -102,7 +100,7 @@ impl Operator {
     fn tap(&mut self, tooth: usize, surface: Vec3, normal: Vec3, radius: f32, probe: &ProbeFile) {
         let speed = self.file.hand.speed_mm_s;
         let before = self.in_world(surface + normal * (radius + TOUCH_HEIGHT));
-        let above = self.in_world(Vec3::new(surface.x, surface.y, self.top() + 1.0));
+        let above = self.in_world(self.clear_of(tooth, surface));
         let along = -self.workpiece.world_from_tooth.rotate(normal);
         let press_speed = TOUCH_SPEED.min(speed);
         self.plan.push_back(OperatorTask::Move(Move::Reach { to: above, speed }));
