@@ -25,6 +25,7 @@ mod surroundings;
 pub mod particles;
 mod instrument;
 mod jaw;
+mod lips;
 mod palette;
 mod soft_tissue;
 pub mod pointing;

@@ -58,6 +58,20 @@ impl BurRotation {
     }
 }
 
+/// Cost of the pictures as they are drawn now.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PictureCost {
+    /// Number of pictures per second of a changing view, smoothed.
+    pub frames_per_second: f64,
+    pub has_shadows: bool,
+    /// True if edges are smoothed.
+    pub is_smooth: bool,
+    /// Share of the view's width and height at which a changing view is drawn.
+    pub share_while_changing: f32,
+    /// Name of the graphics processor, or of the software in its place.
+    pub adapter: String,
+}
+
 /// The picture that a frame asks for: its size, pixels, and the time of the frame, s.
 #[derive(Clone, Copy)]
 pub struct PictureFrame {
@@ -81,9 +95,15 @@ impl LessonView {
         self.refresh.is_active(now)
     }
 
-    /// Number of pictures per second of a changing view, smoothed.
-    pub fn frames_per_second(&self) -> f64 {
-        self.refresh.frames_per_second()
+    /// Returns what the pictures cost, and what they leave out where they are slow.
+    pub fn picture_cost(&self, settings: &Settings, viewport: Option<&Viewport>) -> PictureCost {
+        PictureCost {
+            frames_per_second: self.refresh.frames_per_second(),
+            has_shadows: viewport.is_some_and(|viewport| self.has_shadows(settings, viewport)),
+            is_smooth: viewport.is_some_and(|viewport| settings.is_smooth(viewport.has_graphics())),
+            share_while_changing: self.refresh.share_while_changing(),
+            adapter: viewport.map(Viewport::adapter).unwrap_or_default(),
+        }
     }
 
     /// Draws the lesson's scene if the last picture is not right any more; `None` before it is built.
@@ -211,6 +231,7 @@ fn solids(
     if lesson.display_mode != DisplayMode::Xray {
         solids.extend(scene.surroundings.iter().cloned());
         solids.extend(suction_and_syringe(lesson, scene));
+        solids.extend(scene.mouth.as_ref().and_then(|mouth| mouth.lips(viewpoint)));
     }
     if let Some(mouth) = &scene.mouth {
         let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));

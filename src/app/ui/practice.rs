@@ -46,7 +46,7 @@ pub fn practice_ui(
     // is no graphics processor.
     let side = egui::Frame::side_top_panel(ui.style()).inner_margin(16).fill(Color32::TRANSPARENT);
     let width = ui.available_width();
-    let frames_per_second = views.lesson.frames_per_second();
+    let cost = views.lesson.picture_cost(settings, views.viewport.as_ref());
     let sides = [310.0f32.min(0.28 * width), 250.0f32.min(0.24 * width)];
     // In a narrow middle the words stand under the bar.
     let is_narrow = width - sides[0] - sides[1] < NARROW;
@@ -54,7 +54,7 @@ pub fn practice_ui(
         scroll_area(ui, |ui| task_ui(ui, lesson, words, commands));
     });
     egui::Panel::right("menu").exact_size(sides[1]).resizable(false).frame(side).show(ui, |ui| {
-        scroll_area(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, frames_per_second, words, commands));
+        scroll_area(ui, |ui| tools_panel::tools_panel_ui(ui, lesson, &cost, words, commands));
     });
     egui::Panel::bottom("force")
         .exact_size(if is_narrow { 128.0 } else { 64.0 })

@@ -6,6 +6,7 @@ use crate::command::{AppCommand, PracticeCommand};
 use crate::i18n::Translations;
 use crate::lesson_scene::DisplayMode;
 use crate::lesson_state::LessonState;
+use crate::ui::lesson_view::PictureCost;
 use crate::ui::theme;
 use crate::ui::transfer_function_editor::transfer_function_ui;
 use eframe::egui;
@@ -16,7 +17,7 @@ use typodont_exercise::catalog::TissueEntry;
 pub fn tools_panel_ui(
     ui: &mut egui::Ui,
     lesson: &LessonState,
-    frames_per_second: f64,
+    cost: &PictureCost,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
 ) {
@@ -67,7 +68,7 @@ pub fn tools_panel_ui(
     }
     ui.add_space(14.0);
     egui::CollapsingHeader::new(words.get("menu.beat")).show(ui, |ui| {
-        performance_ui(ui, lesson, frames_per_second, words);
+        performance_ui(ui, lesson, cost, words);
         if let Some(why) = &lesson.audio_error {
             ui.small(words.get("menu.sound"));
             ui.small(why);
@@ -186,10 +187,20 @@ fn slider_of(which: Coefficient, value: &mut f32) -> egui::Slider<'_> {
     slider.clamping(egui::SliderClamping::Edits).update_while_editing(false)
 }
 
-/// Pictures a second, and how late the servo's ticks come.
-fn performance_ui(ui: &mut egui::Ui, lesson: &LessonState, frames_per_second: f64, words: &Translations) {
+/// Cost of the pictures, and how late the servo's ticks come.
+fn performance_ui(ui: &mut egui::Ui, lesson: &LessonState, cost: &PictureCost, words: &Translations) {
     let timing = lesson.snapshot.unwrap_or_default().timing;
-    ui.small(words.format("menu.pictures", format!("{:.0}", frames_per_second)));
+    ui.small(words.get(match (cost.has_shadows, cost.is_smooth) {
+        (true, true) => "menu.picture_full",
+        (true, false) => "menu.picture_shadows",
+        (false, true) => "menu.picture_smooth",
+        (false, false) => "menu.picture_light",
+    }));
+    ui.small(&cost.adapter);
+    ui.small(words.format("menu.pictures", format!("{:.0}", cost.frames_per_second)));
+    if cost.share_while_changing < 1.0 {
+        ui.small(words.format("menu.resolution", format!("{:.0}", 100.0 * cost.share_while_changing)));
+    }
     ui.small(words.format("menu.ticks", timing.ticks));
     ui.small(words.format("menu.late", format!("{:.2}", f64::from(timing.late_p99) / 1000.0)));
     ui.small(words.format("menu.missed", timing.missed));

@@ -111,6 +111,11 @@ impl ViewRefresh {
         self.has_been_slow
     }
 
+    /// Share of the view's width and height at which a changing view is drawn.
+    pub fn share_while_changing(&self) -> f32 {
+        RESOLUTIONS[self.resolution]
+    }
+
     /// Number of frames per second of a changing view, smoothed.
     pub fn frames_per_second(&self) -> f64 {
         1.0 / self.mean_frame_time.max(1e-3)

@@ -56,6 +56,11 @@ impl Viewport {
         has_graphics(&self.state)
     }
 
+    /// Name of the graphics processor, or of the software in its place.
+    pub fn adapter(&self) -> String {
+        self.state.adapter.get_info().name
+    }
+
     /// Pixels of the second window from now on.
     pub fn set_second_eye_size(&mut self, size: [u32; 2]) {
         self.second_eye_size = size;

@@ -4,6 +4,7 @@
 //! jaw follows the gingiva and neighbours that can be touched, so that the picture agrees with the contact. Where a whole
 //! arch can be touched, its gingiva is drawn as it is felt.
 
+use super::lips::Lips;
 use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
@@ -59,6 +60,7 @@ pub struct Mouth {
     touched: Vec<MeshInstance>,
     /// Cheek and tongue.
     yielding: Vec<YieldingSurface>,
+    lips: Option<Lips>,
 }
 
 #[derive(Clone, Debug)]
@@ -110,7 +112,7 @@ impl Mouth {
     /// The jaws for a workpiece with one tooth of FDI 11–48 or a whole arch; `None` for two teeth side by side, which
     /// stand in no jaw.
     pub fn around(workpiece: &Workpiece, tissues: &TissueTable) -> Option<Mouth> {
-        match (workpiece.tooth_from_arch, &workpiece.teeth[..]) {
+        let mouth = match (workpiece.tooth_from_arch, &workpiece.teeth[..]) {
             (Some(tooth_from_arch), [first, ..]) => {
                 Some(Mouth::around_arch(workpiece, Jaw::of(first.fdi), tooth_from_arch, tissues))
             }
@@ -120,7 +122,8 @@ impl Mouth {
             (None, [tooth]) if workpiece.own_jaw => Mouth::of_own_jaw(workpiece, tooth, tissues),
             (None, [tooth]) => Mouth::around_tooth(workpiece, tooth, tissues),
             _ => None,
-        }
+        };
+        mouth.map(Mouth::with_lips)
     }
 
     /// The gingiva of an arch whose teeth are all worked on.
@@ -136,6 +139,7 @@ impl Mouth {
             felt_opening: None,
             touched: Vec::new(),
             yielding: Vec::new(),
+            lips: None,
         }
     }
 
@@ -163,6 +167,7 @@ impl Mouth {
             felt_opening: Some(WORKING_OPENING_DEG),
             touched: Vec::new(),
             yielding: yielding.collect(),
+            lips: None,
         })
     }
 
@@ -188,6 +193,7 @@ impl Mouth {
             felt_opening: None,
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
             yielding: yielding.collect(),
+            lips: None,
         })
     }
 
@@ -247,6 +253,7 @@ impl Mouth {
             felt_opening: None,
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
             yielding: yielding.collect(),
+            lips: None,
         })
     }
 
@@ -259,6 +266,19 @@ impl Mouth {
         let yielding = self.yielding.iter().map(|surface| surface.at_rest().clone());
         let touched = self.touched.iter().cloned().chain(yielding);
         self.near.instances(self.world_from_near).chain(opposite).chain(touched).collect()
+    }
+
+    /// The lips of the mouth, open as during treatment, unless they would be in the way of the eye; `None` around a jaw by itself.
+    pub fn lips(&self, viewpoint: &Viewpoint) -> Option<MeshInstance> {
+        self.lips.as_ref()?.seen_from(viewpoint)
+    }
+
+    /// Puts lips around both jaws, if both are drawn.
+    fn with_lips(self) -> Mouth {
+        let arches = [self.world_from_near, self.world_from_opposite(WORKING_OPENING_DEG)];
+        let front = arches.iter().map(|arch| arch.rotate(Vec3::NEG_Y)).sum::<Vec3>().normalize_or(Vec3::Z);
+        let lips = self.opposite.is_some().then(|| Lips::around(arches.map(|arch| arch.position), front));
+        Mouth { lips, ..self }
     }
 
     /// Fits the cheek and the tongue among the mouth's solids to a picture: without those that hide the work, and with the dent

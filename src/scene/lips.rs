@@ -1,0 +1,176 @@
+//! Lips of the open mouth and the skin around them, which fades into the dark: from far off they tell where one is.
+
+use glam::Mat3;
+use std::f32::consts::TAU;
+use std::sync::Arc;
+use typodont_core::frame::{Pose, Quat, Vec3};
+use typodont_core::mesh::Mesh;
+use typodont_render::{Appearance, MeshInstance, Rgb, Viewpoint};
+
+/// Half the width of the opening, held aside by retractors, mm.
+const HALF_WIDTH: f32 = 37.0;
+
+/// Distance by which the opening reaches beyond the incisors' edges of each jaw, mm: their whole crowns are seen.
+const BEYOND_EDGES: f32 = 12.0;
+
+/// Distance of the lips in front of the incisors' edges, mm.
+const IN_FRONT: f32 = 8.0;
+
+/// Radius of the face about the vertical, mm.
+const FACE_RADIUS: f32 = 75.0;
+
+/// Parts around the opening.
+const PARTS: usize = 192;
+
+/// Exponent of the opening's outline: below 2 it is pointed toward the corners of the mouth.
+const ROUNDNESS: f32 = 1.8;
+
+/// Outline of a section through lip and skin, from the inside of the lip outward: the distance beyond the opening's edge and the way
+/// forward, mm, how much of it is lip rather than skin, and how bright it is.
+const SECTION: [[f32; 4]; 20] = [
+    [4.0, -9.0, 1.0, 0.25],
+    [1.2, -6.5, 1.0, 0.45],
+    [-0.2, -4.0, 1.0, 0.7],
+    [-0.3, -2.0, 1.0, 0.9],
+    [0.2, -0.4, 1.0, 1.0],
+    [1.2, 0.8, 1.0, 1.0],
+    [2.6, 1.5, 1.0, 1.0],
+    [4.0, 1.5, 1.0, 0.98],
+    [5.2, 1.1, 0.92, 0.97],
+    [6.0, 0.9, 0.55, 0.98],
+    [6.8, 0.9, 0.2, 1.0],
+    [8.2, 0.7, 0.05, 0.98],
+    [10.5, 0.2, 0.0, 0.93],
+    [14.0, -0.6, 0.0, 0.85],
+    [19.0, -1.6, 0.0, 0.72],
+    [26.0, -2.8, 0.0, 0.54],
+    [35.0, -4.4, 0.0, 0.36],
+    [46.0, -6.5, 0.0, 0.2],
+    [60.0, -10.0, 0.0, 0.08],
+    [78.0, -16.0, 0.0, 0.0],
+];
+
+/// The row of the section at which the lip ends.
+const LIP_ENDS: usize = 10;
+
+const LIP: Rgb = [0.64, 0.39, 0.36];
+const SKIN: Rgb = [0.74, 0.58, 0.49];
+
+/// Colour of the dark around the mouth, as it is drawn behind everything.
+const DARK: Rgb = [0.10, 0.055, 0.05];
+
+/// Gloss of dry lips and skin.
+const GLOSS: f32 = 0.08;
+
+/// Lips in world space.
+#[derive(Clone, Debug)]
+pub struct Lips {
+    solid: MeshInstance,
+    /// Half the height of the opening, mm; about the middle of the solid's own space.
+    half_height: f32,
+}
+
+impl Lips {
+    /// Around the edges of the incisors of both jaws, world space, mm; `front`: unit vector out of the mouth.
+    pub fn around([near, opposite]: [Vec3; 2], front: Vec3) -> Lips {
+        let up = (opposite - near).reject_from_normalized(front).normalize_or(Vec3::Y);
+        let half_height = 0.5 * (opposite - near).dot(up).abs() + BEYOND_EDGES;
+        // Before the edge that is farther in front.
+        let ahead = near.dot(front).max(opposite.dot(front)) + IN_FRONT;
+        let middle = near.midpoint(opposite);
+        let middle = middle + front * (ahead - middle.dot(front));
+        let orientation = Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize();
+        let (mesh, tints) = lip_mesh(half_height);
+        let appearance = Appearance { colour: [1.0; 3], gloss: GLOSS };
+        let plain = MeshInstance::plain(Arc::new(mesh), Pose { position: middle, orientation }, appearance);
+        let solid = MeshInstance { vertex_colours: Arc::new(tints), casts_shadow: false, ..plain };
+        Lips { solid, half_height }
+    }
+
+    /// The lips, unless they would stand between an eye and what it looks at.
+    pub fn seen_from(&self, viewpoint: &Viewpoint) -> Option<MeshInstance> {
+        /// Share of the opening through which an eye looks past the lips.
+        const CLEAR: f32 = 0.8;
+        let own_from_world = self.solid.world_from_solid.inverse();
+        let [eye, focus] = [viewpoint.position, viewpoint.focus].map(|place| own_from_world * place);
+        if eye.z <= 0.0 || focus.z >= 0.0 {
+            return None;
+        }
+        let through = eye.lerp(focus, eye.z / (eye.z - focus.z));
+        let share = libm::hypotf(through.x / HALF_WIDTH, through.y / self.half_height);
+        (share < CLEAR).then(|| self.solid.clone())
+    }
+}
+
+/// A ring of sections around an oval opening in the plane z = 0, which looks toward +z, and its colours.
+fn lip_mesh(half_height: f32) -> (Mesh, Vec<Rgb>) {
+    let (mut positions, mut colours) = (Vec::new(), Vec::new());
+    let [lip_width, ..] = SECTION[LIP_ENDS];
+    for part in 0..PARTS {
+        let turn = TAU * part as f32 / PARTS as f32;
+        let (cos, sin) = (libm::cosf(turn), libm::sinf(turn));
+        let power = |value: f32| libm::powf(value.abs(), ROUNDNESS);
+        let radius = libm::powf(power(cos) + power(sin), -1.0 / ROUNDNESS);
+        let edge = Vec3::new(HALF_WIDTH * cos * radius, half_height * sin * radius, 0.0);
+        // Outward, as the outline of an ellipse runs.
+        let out = Vec3::new(cos / HALF_WIDTH, sin / half_height, 0.0).normalize_or(Vec3::X);
+        let width = lip_share(edge.x, sin);
+        // Fine furrows across the lip.
+        let furrows = 0.018 * libm::sinf(47.0 * turn) + 0.015 * libm::sinf(83.0 * turn + 1.0);
+        for (row, [beyond, forward, lip, light]) in SECTION.into_iter().enumerate() {
+            let narrowed = if row <= LIP_ENDS { beyond * width } else { beyond - lip_width * (1.0 - width) };
+            let place = edge + out * narrowed;
+            // The cheeks lie back from the lips' middle.
+            positions.push(place.with_z(forward * width.sqrt() - place.x * place.x / (2.0 * FACE_RADIUS)));
+            let light = light * (1.0 + lip * furrows);
+            let colour = |i: usize| DARK[i] + light * (SKIN[i] + lip * (LIP[i] - SKIN[i]) - DARK[i]);
+            colours.push([colour(0), colour(1), colour(2)]);
+        }
+    }
+    let rows = SECTION.len();
+    let corner = |part: usize, row: usize| ((part % PARTS) * rows + row) as u32;
+    let mut triangles = Vec::new();
+    for (part, row) in (0..PARTS).flat_map(|part| (0..rows - 1).map(move |row| (part, row))) {
+        let [a, b, c, d] = [corner(part, row), corner(part, row + 1), corner(part + 1, row), corner(part + 1, row + 1)];
+        triangles.extend([[a, b, c], [c, b, d]]);
+    }
+    let mut mesh = Mesh { positions, normals: Vec::new(), triangles };
+    mesh.compute_normals();
+    (mesh, colours)
+}
+
+/// Width of the lip as a share of the section's: narrow toward the corners, above with two peaks beside the middle. `x`: mm beside
+/// the middle; `up`: above 0 for the upper lip.
+fn lip_share(x: f32, up: f32) -> f32 {
+    /// Distance of the peaks of the upper lip from the middle, and their width, mm.
+    const PEAK: f32 = 7.0;
+    const PEAK_WIDTH: f32 = 5.0;
+    let corner = 1.0 - libm::powf(libm::fabsf(x) / HALF_WIDTH, 2.2).min(1.0);
+    let peak = libm::expf(-libm::powf((libm::fabsf(x) - PEAK) / PEAK_WIDTH, 2.0));
+    let middle = if up > 0.0 { 0.8 + 0.22 * peak } else { 1.15 };
+    (middle * corner).max(0.3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lips_stand_around_the_teeth_and_never_before_them() {
+        // Aim: seen from the front, away where they would hide the work. Method: incisors 40 mm apart; eyes in front, above, beside and
+        // within the mouth; the surface looks forward.
+        let lips = Lips::around([Vec3::ZERO, Vec3::new(0.0, 40.0, -4.0)], Vec3::Z);
+        let looks = |eye: Vec3, focus: Vec3| lips.seen_from(&Viewpoint::look_at(eye, focus, Vec3::Y)).is_some();
+        let middle = Vec3::new(0.0, 20.0, -20.0);
+        assert!(looks(Vec3::new(0.0, 20.0, 200.0), middle), "from the front");
+        assert!(looks(Vec3::new(30.0, 40.0, 150.0), middle), "a little from aside");
+        assert!(!looks(Vec3::new(0.0, 150.0, 30.0), middle), "from above, past the upper lip");
+        assert!(!looks(Vec3::new(120.0, 20.0, 10.0), middle), "through the cheek");
+        assert!(!looks(Vec3::new(0.0, 20.0, 2.0), middle), "from within");
+        let mesh = &lips.solid.mesh;
+        let forward = mesh.normals.iter().filter(|normal| normal.z > 0.0).count();
+        assert!(forward * 10 > 7 * mesh.normals.len(), "{forward} of {} look forward", mesh.normals.len());
+        let nearest = mesh.positions.iter().map(|p| libm::hypotf(p.x, p.y)).fold(f32::INFINITY, f32::min);
+        assert!(nearest > 30.0, "{nearest} mm");
+    }
+}
