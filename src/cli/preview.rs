@@ -101,7 +101,11 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
             enamel_depth: Some(&enamel_depth),
             mode: RenderMode::Iso,
         }),
-        solids: mouth.map_or_else(around, |mouth| mouth.solids(scene::WORKING_OPENING_DEG)),
+        solids: mouth.map_or_else(around, |mouth| {
+            let mut solids = mouth.solids(scene::WORKING_OPENING_DEG);
+            mouth.fit_to_view(&mut solids, &viewpoint, None);
+            solids
+        }),
         lights: Lights::along(&viewpoint),
         shadows: Some(scene::shadow_region(workpiece, &orbit)),
         ..RenderScene::empty()

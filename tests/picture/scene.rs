@@ -289,3 +289,34 @@ fn the_mouth_opens_about_the_condyles() {
     assert!((28.0..45.0).contains(&open), "{open} mm between the incisors");
     assert!(behind < 0.75 * open, "{behind} mm between the molars");
 }
+
+#[test]
+fn the_opposite_jaw_is_left_out_where_it_hides_the_work() {
+    // Aim: a tooth is seen from above though the opposite jaw would be before it, as the lower jaw is before an upper tooth, which stands
+    // upright; from the front both jaws are there. Method: the solids of both views for teeth of both jaws.
+    for fdi in [16, 26, 36, 46] {
+        let text = std::fs::read_to_string(scenarios().join("17-mouth-diagnosis.json")).unwrap();
+        let mut root: serde_json::Value = serde_json::from_str(&text).unwrap();
+        root["scene"]["jaw"].as_object_mut().unwrap().remove("other_teeth");
+        root["scene"]["jaw"]["tooth"]["fdi"] = fdi.into();
+        root["scene"]["jaw"]["tooth"]["form"]["procedural"]["spacing_mm"] = 0.3.into();
+        let stage = root["stages"][0].as_object_mut().unwrap();
+        stage.remove("draw");
+        stage.remove("ask");
+        stage.insert("ends_when".into(), serde_json::json!(["confirmed"]));
+        root.as_object_mut().unwrap().remove("rubric");
+        let (scenario, workpiece) =
+            resolved(typodont_formats::decode_text("upper.json", root.to_string().into_bytes()).unwrap());
+        let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
+        let seen = |viewpoint: &Viewpoint| {
+            let mut solids = mouth.solids(WORKING_OPENING_DEG);
+            mouth.fit_to_view(&mut solids, viewpoint, None);
+            solids.len()
+        };
+        let (work, front) = (work_view(&workpiece).viewpoint(), mouth.front_view(WORKING_OPENING_DEG).viewpoint());
+        assert_eq!(seen(&front), mouth.solids(WORKING_OPENING_DEG).len(), "{fdi}");
+        assert_eq!(seen(&front) - seen(&work), 2, "{fdi}: teeth and gum of the opposite jaw");
+        // Lips frame what is seen through them, and nothing else.
+        assert!(mouth.lips(&front).is_some() && mouth.lips(&work).is_none(), "{fdi}");
+    }
+}

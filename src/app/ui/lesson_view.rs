@@ -235,7 +235,7 @@ fn solids(
     }
     if let Some(mouth) = &scene.mouth {
         let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));
-        mouth.fit_soft_tissue(&mut solids, viewpoint, ball);
+        mouth.fit_to_view(&mut solids, viewpoint, ball);
     }
     let Some(seen) = &lesson.snapshot else { return solids };
     let index = seen.instrument as usize;

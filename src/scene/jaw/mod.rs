@@ -281,9 +281,15 @@ impl Mouth {
         Mouth { lips, ..self }
     }
 
-    /// Fits the cheek and the tongue among the mouth's solids to a picture: without those that hide the work, and with the dent
-    /// of a working end's ball, its middle in world space and its radius, mm.
-    pub fn fit_soft_tissue(&self, solids: &mut Vec<MeshInstance>, viewpoint: &Viewpoint, ball: Option<(Vec3, f32)>) {
+    /// Fits the mouth's solids to a picture: without the opposite jaw, the cheek or the tongue where they hide the work, and with the
+    /// dent of a working end's ball in soft tissue, its middle in world space and its radius, mm.
+    pub fn fit_to_view(&self, solids: &mut Vec<MeshInstance>, viewpoint: &Viewpoint, ball: Option<(Vec3, f32)>) {
+        if let Some(opposite) = self.opposite.as_ref().filter(|_| self.is_behind_opposite(viewpoint)) {
+            let is_opposite = |solid: &MeshInstance| {
+                [&opposite.gum, &opposite.teeth].iter().any(|own| Arc::ptr_eq(&own.mesh, &solid.mesh))
+            };
+            solids.retain(|solid| !is_opposite(solid));
+        }
         for surface in &self.yielding {
             let is_own = |solid: &MeshInstance| Arc::ptr_eq(&solid.mesh, &surface.at_rest().mesh);
             if surface.hides(viewpoint.position, viewpoint.focus) {
@@ -292,6 +298,21 @@ impl Mouth {
                 solids.iter_mut().filter(|solid| is_own(solid)).for_each(|solid| *solid = pressed.clone());
             }
         }
+    }
+
+    /// True if the eye looks through the opposite jaw, as from above at an upper tooth, which stands upright.
+    fn is_behind_opposite(&self, viewpoint: &Viewpoint) -> bool {
+        /// Extent of a jaw in its arch space, to each side and from before its incisors to behind its molars, mm.
+        const ASIDE: f32 = 38.0;
+        const BACK: [f32; 2] = [-10.0, 62.0];
+        let opposite_from_world = self.world_from_opposite(WORKING_OPENING_DEG).inverse();
+        let [eye, focus] = [viewpoint.position, viewpoint.focus].map(|place| opposite_from_world * place);
+        // The mouth is on the occlusal side of the jaw's plane.
+        if eye.z >= 0.0 || focus.z <= 0.0 {
+            return false;
+        }
+        let through = eye.lerp(focus, eye.z / (eye.z - focus.z));
+        through.x.abs() < ASIDE && (BACK[0]..BACK[1]).contains(&through.y)
     }
 
     /// The same without the opposite jaw: as a model jaw lies on the bench.
