@@ -76,14 +76,23 @@ fn share_of_other(
     Message::text(key, &[("title", title), ("percent", percent)])
 }
 
-/// Place (directions and mm from the crown's centre; in an arch from its midline) and time at which a measure arose in a
-/// session.
+/// Place (directions and mm from the crown's centre; in an arch from its midline; on another tooth its number) and time at which a
+/// measure arose in a session.
 pub fn place(evidence: &EvidenceFile, session: &SessionFile) -> Message {
     let part = |v: f64, positive: &str, negative: &str| {
         let direction = if v >= 0.0 { positive } else { negative };
         Message::text(format!("way.{direction}"), &[("mm", Message::plain(format!("{:.1}", v.abs())))])
     };
     let [x, y, z] = evidence.place_mm;
+    let when = |place: Message| match evidence.at_s {
+        Some(at) => {
+            Message::text("place.when", &[("at", Message::plain(display_format::duration(at))), ("place", place)])
+        }
+        None => place,
+    };
+    if let Some(fdi) = evidence.tooth_fdi {
+        return when(Message::text("place.tooth", &[("fdi", Message::plain(fdi.to_string()))]));
+    }
     let [x, y] = match session.jaw {
         // The patient's left and right.
         Some(ArchJaw::Lower) => [part(x, "front", "back"), part(y, "left", "right")],
@@ -94,13 +103,7 @@ pub fn place(evidence: &EvidenceFile, session: &SessionFile) -> Message {
         }
     };
     let place = [("x", x), ("y", y), ("z", part(z, "up", "down"))];
-    let place = Message::text("place.at", &place);
-    match evidence.at_s {
-        Some(at) => {
-            Message::text("place.when", &[("at", Message::plain(display_format::duration(at))), ("place", place)])
-        }
-        None => place,
-    }
+    when(Message::text("place.at", &place))
 }
 
 /// Name of a view or a section: of the tooth, or of an arch, whose teeth have no sides in common.

@@ -211,6 +211,9 @@ pub struct EvidenceFile {
     /// Position in tooth space, mm from the centre of the crown at the neck: buccal, distal (mesial for 21–28 and
     /// 41–48), occlusal.
     pub place_mm: [f64; 3],
+    /// FDI number of the tooth there, if it is not the treated one but another tooth of the mouth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tooth_fdi: Option<u8>,
     /// Name of the tissue that was removed, left, exposed or touched there.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tissue: Option<String>,
@@ -368,7 +371,9 @@ impl SessionFile {
         let jaw = scored.replay.workpiece.arch_jaw();
         let metrics = scored.measures.all.iter().map(|m| (m.metric.name(), m.value.map(round_to_nine_decimals)));
         let evidence =
-            scored.measures.all.iter().filter_map(|m| Some((m.metric.name(), evidence_file(scenario, &m.evidence?))));
+            scored.measures.all.iter().filter_map(|m| {
+                Some((m.metric.name(), evidence_file(scenario, &scored.replay.workpiece, &m.evidence?)))
+            });
         let ended = match &recording.end {
             Some(end) => end.reason.clone(),
             None => "the recording breaks off".to_string(),
@@ -492,11 +497,13 @@ impl SessionFile {
     }
 }
 
-fn evidence_file(scenario: &Scenario, evidence: &Evidence) -> EvidenceFile {
+fn evidence_file(scenario: &Scenario, workpiece: &Workpiece, evidence: &Evidence) -> EvidenceFile {
+    let nearest = workpiece.nearest_tooth(evidence.place).filter(|tooth| *tooth >= workpiece.teeth_in_volume);
     let rounded = |value: f32| round_to_nine_decimals(f64::from(value));
     EvidenceFile {
         at_s: evidence.at.map(Tick::seconds),
         place_mm: evidence.place.to_array().map(rounded),
+        tooth_fdi: nearest.map(|tooth| workpiece.teeth[tooth].fdi),
         tissue: evidence.tissue.and_then(|tissue| tissue_name(scenario, tissue)),
         wall: evidence.direction.map(|direction| direction.id().to_string()),
         depth_mm: evidence.depth.map(rounded),

@@ -295,7 +295,7 @@ fn time_plot(scored: &Scored, session: &SessionFile, feedback: &Feedback, langua
         .collect();
     let flag_of = |m: &FeedbackMoment| Some(EventFlag { number: m.number, at: m.at?, span: m.span });
     let flags: Vec<EventFlag> = feedback.moments.iter().filter_map(flag_of).collect();
-    let has_decay = !scored.replay.workpiece.lesions.is_empty();
+    let has_decay = !scored.replay.workpiece.lesions_in_volume().is_empty();
     curves::svg(&scored.trace, has_decay, &spans, &flags, languages)
 }
 

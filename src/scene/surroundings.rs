@@ -7,7 +7,7 @@ use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Collider, ColliderGeometry, Compliance, SdfGrid};
-use typodont_core::volume::{Grid, Label, Volume, surface};
+use typodont_core::volume::{Grid, ISO, Label, Volume, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario::Workpiece;
 use typodont_render::{Appearance, MeshInstance};
@@ -56,7 +56,11 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
 /// A shape's surface in tooth space.
 fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
     if let ColliderGeometry::Voxels(volume) = &shape.geometry {
-        let mut mesh = surface::extract(volume);
+        let Aabb { low, high } = volume.extent();
+        let grid = Grid::covering(low, high, Vec3::splat(SPACING), 2);
+        let band = 2.0 * volume.half_band();
+        let coarse = Volume::from_distance(grid, 2.0 * SPACING, |p| ((ISO - volume.density_at(p)) * band, Label(1)));
+        let mut mesh = surface::extract(&coarse);
         mesh.positions.iter_mut().for_each(|p| *p = shape.tooth_from_collider * *p);
         mesh.normals.iter_mut().for_each(|n| *n = shape.tooth_from_collider.rotate(*n));
         return mesh;

@@ -103,3 +103,16 @@ fn a_recording_of_one_tooth_gives_the_others_again() {
         }
     }
 }
+
+#[test]
+fn caries_on_the_other_teeth_alone_leaves_nothing_to_remove() {
+    // Aim: the treated tooth may be sound; what is examined only is no target and is not missed in the volume.
+    let scenario = mouth(ResolveMode::MakeWorkpiece, |root| {
+        root["scene"]["jaw"]["tooth"]["decay"] = serde_json::json!([]);
+        let sites = root["stages"][0]["draw"]["one_of"].as_array_mut().unwrap();
+        sites.retain(|site| !site.as_str().unwrap().starts_with("36"));
+    });
+    let workpiece = Workpiece::make(&scenario, 0).unwrap();
+    assert_eq!((workpiece.lesions.len(), workpiece.lesions_in_volume().len()), (28, 0));
+    assert!(!scenario.has_target());
+}

@@ -75,8 +75,8 @@ impl PreviewState {
         if teeth != self.teeth {
             self.orbit = scene::work_view(&build.workpiece).zoomed(0.8);
             let middle = build.workpiece.teeth.first().map(|tooth| tooth.crown.centre());
-            self.slice_point =
-                build.workpiece.lesions.first().map(|lesion| lesion.centre).or(middle).unwrap_or_default();
+            let lesion = build.workpiece.lesions_in_volume().first();
+            self.slice_point = lesion.map(|lesion| lesion.centre).or(middle).unwrap_or_default();
             self.teeth = teeth;
         }
         self.generation += 1;

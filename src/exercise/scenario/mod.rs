@@ -625,7 +625,7 @@ impl Scenario {
     /// Returns true if something is to be removed: decay, or tissue in a target zone.
     pub fn has_target(&self) -> bool {
         let has_zone = self.zones.iter().any(|zone| zone.role == ZoneRole::Target);
-        has_zone || self.scene.teeth.iter().any(|tooth| !tooth.decay.is_empty())
+        has_zone || self.scene.teeth_in_volume().iter().any(|tooth| !tooth.decay.is_empty())
     }
 
     /// Returns true if a tooth has a prepared cavity, so that a filling can be compared with the tooth's contour.

@@ -248,6 +248,12 @@ impl Workpiece {
         (0..self.teeth.len()).min_by(|a, b| distance(&self.teeth[*a]).total_cmp(&distance(&self.teeth[*b])))
     }
 
+    /// Returns the lesions in the volume, which can be cut.
+    pub fn lesions_in_volume(&self) -> &[Lesion] {
+        // In the order of the teeth.
+        &self.lesions[..self.lesions.partition_point(|lesion| lesion.tooth < self.teeth_in_volume)]
+    }
+
     /// Returns the voxels of a tooth that is not in the volume, by its index, and their place in tooth space.
     pub fn voxels_beside(&self, tooth: usize) -> Option<(&Volume, Pose)> {
         let collider = self.surroundings.get(tooth.checked_sub(self.teeth_in_volume)?)?;

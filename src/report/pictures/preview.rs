@@ -26,7 +26,7 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, first_view: &Rgba
     let palette = TissueColours::of(&scenario.tissues);
     let decay = decay_volume(scenario, &workpiece.volume);
     let tooth = &workpiece.teeth[0];
-    let middle = workpiece.lesions.first().map_or(tooth.crown.centre(), |l| l.centre);
+    let middle = workpiece.lesions_in_volume().first().map_or(tooth.crown.centre(), |l| l.centre);
     let from = |side: ViewSide| {
         let shot = ImagePlane {
             camera: OrthographicCamera::framing_volume(side, &workpiece.volume, 1.0),

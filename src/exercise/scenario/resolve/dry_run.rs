@@ -108,7 +108,7 @@ fn find_decay_cut_away(
 ) {
     let is_decay = |label: Label| scenario.tissues.role(label) == Some(TissueRole::Decay);
     let is_left = || workpiece.volume.tissues().any(is_decay);
-    if let Some(tooth) = scenario.scene.teeth.iter().position(|t| !t.decay.is_empty())
+    if let Some(tooth) = scenario.scene.teeth_in_volume().iter().position(|t| !t.decay.is_empty())
         && !is_left()
     {
         let message = "no caries remains: a cavity or an old filling occupies its entire volume";

@@ -34,10 +34,10 @@ impl Operator {
             self.lift_off();
             return;
         }
-        if self.workpiece.lesions.is_empty() {
+        if self.workpiece.lesions_in_volume().is_empty() {
             self.prepare(cut, instrument);
         }
-        for lesion in &self.workpiece.clone().lesions {
+        for lesion in self.workpiece.clone().lesions_in_volume() {
             for pass in 0..cut.passes {
                 let before = self.plan.len();
                 match lesion.radii {
@@ -83,7 +83,7 @@ impl Operator {
     /// the pass over that lesion.
     fn excavate(&mut self, cut: &CutFile, lesion: &Lesion, radius: f32) {
         let workpiece = self.workpiece.clone();
-        let (lesions, tissues) = (&workpiece.lesions, &self.scenario.tissues);
+        let (lesions, tissues) = (workpiece.lesions_in_volume(), &self.scenario.tissues);
         let is_own = |place: Vec3| {
             let away = lesion.centre.distance_squared(place);
             lesions.iter().all(|other| other.centre.distance_squared(place) >= away)
