@@ -29,9 +29,6 @@ const EXPLORER_STRENGTH: f32 = 0.5;
 const WITHDRAWAL_STEP: f32 = 1.0;
 const WITHDRAWAL_MAX: f32 = 15.0;
 
-/// Upward component of a surface's unit normal below which the surface counts as overhead.
-const FACING_DOWN: f32 = -0.4;
-
 /// Point of the view under the pointer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointedPlace {
@@ -159,12 +156,22 @@ impl PointerHand {
             world_from_tooth: scene.workpiece.world_from_tooth,
             obstacles: &scene.workpiece.surroundings,
         };
-        self.spot = spot_under_ray(&world, eye.position, along);
+        // An opposite jaw that is left out of the picture is not pointed at either.
+        let hidden = scene.mouth.as_ref().and_then(|m| m.way_past_opposite(&orbit.viewpoint(), scene.mouth_opening));
+        let from = hidden.map_or(eye.position, |(place, inward)| {
+            let way = (place - eye.position).dot(inward) / along.dot(inward).max(1e-3);
+            eye.position + along * way.max(0.0)
+        });
+        self.spot = spot_under_ray(&world, from, along);
+        let is_overhead = |spot: SurfaceSpot| {
+            let place = scene.workpiece.world_from_tooth.inverse() * spot.place;
+            scene.workpiece.other_tooth_at(place).is_some_and(|tooth| scene.workpiece.is_overhead(tooth))
+        };
         // The handle turns with the view, so that a handpiece leads to the operator's side.
         let yaw = orbit.azimuth;
         let lean = match self.spot {
             // A tooth overhead is reached from the open side of the mouth: an upright handle would be inside it.
-            Some(spot) if spot.normal.y < FACING_DOWN && self.pen.is_none() => {
+            Some(spot) if self.pen.is_none() && is_overhead(spot) => {
                 let out = eye.position - spot.place;
                 (Vec2::new(out.x, out.z).normalize_or(Vec2::Y) * LEAN_MAX).to_array()
             }

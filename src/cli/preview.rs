@@ -103,7 +103,7 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
         }),
         solids: mouth.map_or_else(around, |mouth| {
             let mut solids = mouth.solids(scene::WORKING_OPENING_DEG);
-            mouth.fit_to_view(&mut solids, &viewpoint, None);
+            mouth.fit_to_view(&mut solids, &viewpoint, scene::WORKING_OPENING_DEG, None);
             solids
         }),
         lights: Lights::along(&viewpoint),

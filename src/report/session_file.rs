@@ -498,12 +498,12 @@ impl SessionFile {
 }
 
 fn evidence_file(scenario: &Scenario, workpiece: &Workpiece, evidence: &Evidence) -> EvidenceFile {
-    let nearest = workpiece.nearest_tooth(evidence.place).filter(|tooth| *tooth >= workpiece.teeth_in_volume);
+    let other = workpiece.other_tooth_at(evidence.place);
     let rounded = |value: f32| round_to_nine_decimals(f64::from(value));
     EvidenceFile {
         at_s: evidence.at.map(Tick::seconds),
         place_mm: evidence.place.to_array().map(rounded),
-        tooth_fdi: nearest.map(|tooth| workpiece.teeth[tooth].fdi),
+        tooth_fdi: other.map(|tooth| workpiece.teeth[tooth].fdi),
         tissue: evidence.tissue.and_then(|tissue| tissue_name(scenario, tissue)),
         wall: evidence.direction.map(|direction| direction.id().to_string()),
         depth_mm: evidence.depth.map(rounded),

@@ -80,7 +80,11 @@ impl FixedCase {
                 enamel_depth: Some(&self.enamel_depth),
                 mode,
             }),
-            solids: mouth.solids(WORKING_OPENING_DEG).into_iter().chain(mouth.lips(&viewpoint)).collect(),
+            solids: mouth
+                .solids(WORKING_OPENING_DEG)
+                .into_iter()
+                .chain(mouth.lips(&viewpoint, WORKING_OPENING_DEG))
+                .collect(),
             lights: Lights::along(&viewpoint),
             shadows: has_shadows.then(|| shadow_region(&self.workpiece, &orbit)),
             is_antialiased: true,

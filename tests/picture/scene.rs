@@ -310,13 +310,16 @@ fn the_opposite_jaw_is_left_out_where_it_hides_the_work() {
         let mouth = Mouth::around(&workpiece, &scenario.tissues).unwrap();
         let seen = |viewpoint: &Viewpoint| {
             let mut solids = mouth.solids(WORKING_OPENING_DEG);
-            mouth.fit_to_view(&mut solids, viewpoint, None);
+            mouth.fit_to_view(&mut solids, viewpoint, WORKING_OPENING_DEG, None);
             solids.len()
         };
         let (work, front) = (work_view(&workpiece).viewpoint(), mouth.front_view(WORKING_OPENING_DEG).viewpoint());
         assert_eq!(seen(&front), mouth.solids(WORKING_OPENING_DEG).len(), "{fdi}");
         assert_eq!(seen(&front) - seen(&work), 2, "{fdi}: teeth and gum of the opposite jaw");
         // Lips frame what is seen through them, and nothing else.
-        assert!(mouth.lips(&front).is_some() && mouth.lips(&work).is_none(), "{fdi}");
+        assert!(
+            mouth.lips(&front, WORKING_OPENING_DEG).is_some() && mouth.lips(&work, WORKING_OPENING_DEG).is_none(),
+            "{fdi}"
+        );
     }
 }

@@ -242,8 +242,10 @@ fn quick_variant(scenario: &Scenario) -> Option<Scenario> {
         .teeth
         .iter_mut()
         .for_each(|tooth| tooth.source = ToothSource::Procedural { spacing: quick_spacing, age });
-    if let SceneLayout::Arch { spacing } | SceneLayout::Mouth { spacing } = &mut quick.scene.layout {
-        *spacing = quick_spacing;
+    match &mut quick.scene.layout {
+        SceneLayout::Arch { spacing } => *spacing = quick_spacing,
+        SceneLayout::Mouth { spacing } => *spacing = spacing.max(QUICK_ARCH_SPACING),
+        _ => {}
     }
     Some(quick)
 }

@@ -501,6 +501,7 @@ impl EditorState {
         let at = match listed.get(tooth) {
             Some(at) => at.clone(),
             // A tooth of an arch that is not listed yet.
+            None if self.draft.value_at(ARCH_TEETH).is_none() => return Ok(()),
             None => {
                 self.draft.push(ARCH_TEETH, &arch_tooth(self.draft.value(), place.fdi))?;
                 format!("{ARCH_TEETH}/{tooth}")

@@ -231,11 +231,11 @@ fn solids(
     if lesson.display_mode != DisplayMode::Xray {
         solids.extend(scene.surroundings.iter().cloned());
         solids.extend(suction_and_syringe(lesson, scene));
-        solids.extend(scene.mouth.as_ref().and_then(|mouth| mouth.lips(viewpoint)));
+        solids.extend(scene.mouth.as_ref().and_then(|mouth| mouth.lips(viewpoint, scene.mouth_opening)));
     }
     if let Some(mouth) = &scene.mouth {
         let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));
-        mouth.fit_to_view(&mut solids, viewpoint, ball);
+        mouth.fit_to_view(&mut solids, viewpoint, scene.mouth_opening, ball);
     }
     let Some(seen) = &lesson.snapshot else { return solids };
     let index = seen.instrument as usize;

@@ -124,7 +124,7 @@ fn collect_collider_constraints(
         }
         let distance = collider.for_each_contact(tip, radius + reach, |distance, normal| {
             let clearance = distance - radius;
-            if clearance < reach {
+            if clearance < reach && constraints.len() < constraints.capacity() {
                 constraints.push(Constraint {
                     normal,
                     offset: normal.dot(tip) - clearance,
@@ -138,6 +138,14 @@ fn collect_collider_constraints(
     }
 }
 
+/// The search distance, mm, for a volume that may have a narrower half band than the one that is worked on, and into which the
+/// instrument may enter by `slack`: beyond its band a volume's distances are unknown.
+pub(super) fn reach_within_band(volume: &Volume, reach: f32, slack: f32) -> f32 {
+    /// Share of the half band within which distances are looked up.
+    const SHARE: f32 = 0.75;
+    reach.min(SHARE * volume.half_band() - slack).max(0.0)
+}
+
 /// Adds the constraints of a collider made of voxels, found in its own space. Those for which the buffer has no room are left
 /// out.
 fn collect_voxel_constraints(
@@ -149,7 +157,8 @@ fn collect_voxel_constraints(
 ) {
     let own = OwnSpace::of(collider);
     let [tip, goal] = [query.tip, query.goal].map(|place| own.collider_from_tooth * place);
-    let query_in_own = ContactQuery { tip, goal, reach: query.reach };
+    let query_in_own =
+        ContactQuery { tip, goal, reach: reach_within_band(volume, query.reach, slack(volume, instrument)) };
     let first = constraints.len();
     if constraints.capacity() - first <= instrument.sample_directions().len() {
         return;

@@ -5,7 +5,7 @@
 //! takes over from another. After McNeely et al. (1999), with constraints instead of springs.
 
 use super::active_set::{Constraint, ConstraintSource};
-use super::ball_contacts::ContactQuery;
+use super::ball_contacts::{ContactQuery, reach_within_band};
 use super::body::{Body, BodySurfacePoint, CHUNK};
 use super::collider_bounds::{ColliderBounds, ColliderProximity};
 use super::collision_scene::{ColliderGeometry, CollisionScene, OwnSpace};
@@ -215,12 +215,13 @@ fn collect_collider_constraints(
             let own = OwnSpace::of(collider);
             let orientation = own.collider_from_tooth.orientation * posed.tooth_from_handle;
             let tip_in_own = own.collider_from_tooth * tip;
+            let slack = slack(volume, posed);
             let near = VolumeQuery {
                 volume,
                 frame: ToolFrame { tip: tip_in_own, rotation: glam::Mat3::from_quat(orientation), posed },
                 direction: own.collider_from_tooth.rotate((goal - tip).normalize_or_zero()),
-                reach,
-                slack: slack(volume, posed),
+                reach: reach_within_band(volume, reach, slack),
+                slack,
                 source: ConstraintSource::Collider(index),
             };
             proximity.for_each_near((index, collider), posed.body, reach + near.slack, |point| {

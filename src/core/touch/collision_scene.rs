@@ -4,7 +4,7 @@ use super::active_set::Constraint;
 use super::closed_mesh::{ClosedMesh, MeshContact};
 use super::sdf_grid::SdfGrid;
 use crate::frame::{Pose, Vec3};
-use crate::volume::{ISO, Label, Volume};
+use crate::volume::{Label, Volume};
 use std::sync::Arc;
 
 /// Volume and colliders, in tooth space.
@@ -73,7 +73,7 @@ impl Collider {
             }
             ColliderGeometry::Mesh(obstacle) => obstacle.distance(p),
             ColliderGeometry::Sdf(field) => field.distance(p),
-            ColliderGeometry::Voxels(volume) => voxel_distance(volume, p),
+            ColliderGeometry::Voxels(volume) => volume.distance_bound(p),
         }
     }
 
@@ -97,7 +97,7 @@ impl Collider {
             let point = self.tooth_from_collider.inverse() * point_in_tooth;
             let outward = -volume.density_and_gradient_at(point).1;
             let normal = self.tooth_from_collider.rotate(outward.normalize_or(Vec3::Z));
-            return (voxel_distance(volume, point), normal);
+            return (volume.distance_bound(point), normal);
         }
         /// Small compared with every collider, large compared with f32 rounding at 100 mm.
         const STEP: f32 = 0.01;
@@ -194,13 +194,6 @@ impl OwnSpace {
         let point = self.collider_from_tooth * constraint.point;
         Constraint { point, normal: self.collider_from_tooth.rotate(constraint.normal), ..constraint }
     }
-}
-
-/// Signed distance of a point from the surface of voxels, mm, as in [`Collider::distance`].
-fn voxel_distance(volume: &Volume, point: Vec3) -> f32 {
-    let band = volume.half_band();
-    let density = volume.density_at(point);
-    if density > 0.0 { (ISO - density) * 2.0 * band } else { volume.clear_radius(point).max(band) }
 }
 
 #[cfg(test)]

@@ -191,7 +191,9 @@ impl Proxy {
         self.last_hand = hand;
         self.last_orientation = tooth_from_handle.orientation;
         let friction = goal - hand;
-        if let Some(contact) = self.read_contact(scene, (materials, instrument.cuts), &active, friction) {
+        if let Some(contact) =
+            self.read_contact(scene, (materials, instrument.cuts && instrument.is_rotary), &active, friction)
+        {
             self.contact = Some(contact);
         } else if self.tip.distance(hand) < ARRIVED {
             self.end_contact_at(hand);
@@ -322,12 +324,12 @@ impl Proxy {
         hand + aside * (holds / dragged)
     }
 
-    /// Computes the contact of an instrument, which cuts or does not, from the active constraints. `friction` is the
+    /// Computes the contact of an instrument, a rotating bur or another one, from the active constraints. `friction` is the
     /// displacement of the goal from the hand, mm.
     fn read_contact(
         &self,
         scene: &CollisionScene,
-        (materials, cuts): (&Materials, bool),
+        (materials, is_bur): (&Materials, bool),
         active: &ActiveSet,
         friction: Vec3,
     ) -> Option<Contact> {
@@ -351,7 +353,7 @@ impl Proxy {
                             let own = OwnSpace::of(collider).of_tooth(*constraint);
                             let tissue = mix_tissues(&mut blend, volume, materials, &own, share);
                             // What a bur bears on is not its tissue but a tooth that must not be cut.
-                            if cuts { collider.label } else { tissue }
+                            if is_bur { collider.label } else { tissue }
                         }
                         _ => {
                             blend.add(*materials.get(collider.label), share);

@@ -54,6 +54,14 @@ impl Volume {
         }
     }
 
+    /// Signed distance of a point in tooth space from the surface, mm, negative inside: accurate within the half band, and beyond it
+    /// nearer to zero than the true distance.
+    pub fn distance_bound(&self, point_in_tooth: Vec3) -> f32 {
+        let band = self.half_band();
+        let density = self.density_at(point_in_tooth);
+        if density > 0.0 { (ISO - density) * 2.0 * band } else { self.clear_radius(point_in_tooth).max(band) }
+    }
+
     /// Trilinear density at a point given in voxel steps; zero outside the grid.
     #[inline]
     pub fn density_in_grid(&self, at: Vec3) -> f32 {

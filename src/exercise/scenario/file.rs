@@ -247,7 +247,7 @@ impl JawFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OtherTeethFile {
-    /// The teeth with decay or stains. Those that are not listed are sound; each has its FDI number as its name.
+    /// The teeth with decay, which is felt but not seen. Those that are not listed are sound; each has its FDI number as its name.
     #[serde(default)]
     #[schemars(length(max = 31))]
     pub teeth: Vec<ToothFile>,

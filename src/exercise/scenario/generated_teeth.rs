@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use typodont_anatomy::TissueLabels;
 use typodont_core::volume::Volume;
 
-/// Maximum number of voxels kept, of all teeth together: 32 MB.
-const KEPT_VOXELS_MAX: usize = 16 << 20;
+/// Maximum number of voxels kept, of all teeth together, 56 MB: those of a mouth, coarse and as the author wants them.
+const KEPT_VOXELS_MAX: usize = 28 << 20;
 
 /// Teeth, the last used one first.
 static KEPT: Mutex<VecDeque<(GeneratedTooth, Arc<Volume>)>> = Mutex::new(VecDeque::new());

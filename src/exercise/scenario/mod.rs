@@ -580,6 +580,11 @@ impl Scenario {
     /// # Errors
     /// Returns a message if there is no tooth with this number, or if the exercise has all teeth of a jaw.
     pub fn renumber_teeth(&mut self, fdi: u8) -> Result<(), String> {
+        if let (SceneLayout::Mouth { .. }, Some(treated)) = (self.scene.layout, self.scene.teeth.first())
+            && treated.fdi == fdi
+        {
+            return Ok(());
+        }
         if self.scene.has_whole_arch() {
             return Err("the exercise has all teeth of a jaw, none of which can take another's number".into());
         }

@@ -131,10 +131,6 @@ impl PlacedTooth {
             volume = apply_decay(volume, decay, &own, tissues, seed)
                 .map_err(|reason| WorkpieceError::of_decay(reason, self.index, number))?;
         }
-        for (stain, patch) in tooth.stains.iter().enumerate() {
-            volume = apply_decay(volume, patch, &own, tissues, seed)
-                .map_err(|_| WorkpieceError::StainOutside { tooth: self.index, stain })?;
-        }
         let located = tooth.decay.iter().map(|decay| {
             let found = locate_lesion(decay, self.index, &own, &volume, VolumePart::All, seed);
             Lesion { centre: self.tooth_from_own * found.centre, ..found }

@@ -239,13 +239,27 @@ impl Workpiece {
         }
     }
 
-    /// Returns the index of the tooth whose crown is nearest to a point in tooth space; `None` without teeth.
+    /// Returns the index of the tooth in the volume whose crown is nearest to a point in tooth space; `None` without teeth.
     pub fn nearest_tooth(&self, point_in_tooth: Vec3) -> Option<usize> {
         let distance = |tooth: &ToothBounds| {
             let own = tooth.tooth_from_own.inverse() * point_in_tooth;
             own.distance(tooth.own_crown.nearest(own))
         };
-        (0..self.teeth.len()).min_by(|a, b| distance(&self.teeth[*a]).total_cmp(&distance(&self.teeth[*b])))
+        (0..self.teeth_in_volume).min_by(|a, b| distance(&self.teeth[*a]).total_cmp(&distance(&self.teeth[*b])))
+    }
+
+    /// Returns the index of the tooth beside the volume that is touched at a point in tooth space; `None` where the volume is
+    /// nearer, or no tooth is within a millimetre.
+    pub fn other_tooth_at(&self, point_in_tooth: Vec3) -> Option<usize> {
+        /// mm
+        const TOUCHED_WITHIN: f32 = 1.0;
+        let others = (self.teeth_in_volume..self.teeth.len()).filter_map(|tooth| {
+            let (volume, tooth_from_own) = self.voxels_beside(tooth)?;
+            Some((volume.distance_bound(tooth_from_own.inverse() * point_in_tooth), tooth))
+        });
+        let (distance, tooth) = others.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let is_nearer = distance < self.volume.distance_bound(point_in_tooth);
+        (is_nearer && distance < TOUCHED_WITHIN).then_some(tooth)
     }
 
     /// Returns the lesions in the volume, which can be cut.

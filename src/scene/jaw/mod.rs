@@ -268,9 +268,10 @@ impl Mouth {
         self.near.instances(self.world_from_near).chain(opposite).chain(touched).collect()
     }
 
-    /// The lips of the mouth, open as during treatment, unless they would be in the way of the eye; `None` around a jaw by itself.
-    pub fn lips(&self, viewpoint: &Viewpoint) -> Option<MeshInstance> {
-        self.lips.as_ref()?.seen_from(viewpoint)
+    /// The lips of the mouth, unless they would be in the way of the eye; `None` around a jaw by itself, and where the mouth is open
+    /// otherwise than during treatment. `open`: as in [`Mouth::solids`].
+    pub fn lips(&self, viewpoint: &Viewpoint, open: f32) -> Option<MeshInstance> {
+        self.lips.as_ref().filter(|_| open == WORKING_OPENING_DEG)?.seen_from(viewpoint)
     }
 
     /// Puts lips around both jaws, if both are drawn.
@@ -281,10 +282,16 @@ impl Mouth {
         Mouth { lips, ..self }
     }
 
-    /// Fits the mouth's solids to a picture: without the opposite jaw, the cheek or the tongue where they hide the work, and with the
+    /// Fits the mouth's solids, made for an opening, to a picture: without the opposite jaw, the cheek or the tongue where they hide the work, and with the
     /// dent of a working end's ball in soft tissue, its middle in world space and its radius, mm.
-    pub fn fit_to_view(&self, solids: &mut Vec<MeshInstance>, viewpoint: &Viewpoint, ball: Option<(Vec3, f32)>) {
-        if let Some(opposite) = self.opposite.as_ref().filter(|_| self.is_behind_opposite(viewpoint)) {
+    pub fn fit_to_view(
+        &self,
+        solids: &mut Vec<MeshInstance>,
+        viewpoint: &Viewpoint,
+        open: f32,
+        ball: Option<(Vec3, f32)>,
+    ) {
+        if let Some(opposite) = self.opposite.as_ref().filter(|_| self.way_past_opposite(viewpoint, open).is_some()) {
             let is_opposite = |solid: &MeshInstance| {
                 [&opposite.gum, &opposite.teeth].iter().any(|own| Arc::ptr_eq(&own.mesh, &solid.mesh))
             };
@@ -300,19 +307,25 @@ impl Mouth {
         }
     }
 
-    /// True if the eye looks through the opposite jaw, as from above at an upper tooth, which stands upright.
-    fn is_behind_opposite(&self, viewpoint: &Viewpoint) -> bool {
+    /// Plane on the cusps of the opposite jaw, world space, as a point and the unit vector into the mouth, if the eye looks through that
+    /// jaw, as from above at an upper tooth, which stands upright; `None` if it does not. What is before the plane is not drawn then.
+    pub fn way_past_opposite(&self, viewpoint: &Viewpoint, open: f32) -> Option<(Vec3, Vec3)> {
         /// Extent of a jaw in its arch space, to each side and from before its incisors to behind its molars, mm.
         const ASIDE: f32 = 38.0;
         const BACK: [f32; 2] = [-10.0, 62.0];
-        let opposite_from_world = self.world_from_opposite(WORKING_OPENING_DEG).inverse();
+        /// Height above which nothing of the jaw stands, arch space, mm.
+        const CUSPS: f32 = 1.5;
+        self.opposite.as_ref()?;
+        let world_from_opposite = self.world_from_opposite(open);
+        let opposite_from_world = world_from_opposite.inverse();
         let [eye, focus] = [viewpoint.position, viewpoint.focus].map(|place| opposite_from_world * place);
         // The mouth is on the occlusal side of the jaw's plane.
         if eye.z >= 0.0 || focus.z <= 0.0 {
-            return false;
+            return None;
         }
         let through = eye.lerp(focus, eye.z / (eye.z - focus.z));
-        through.x.abs() < ASIDE && (BACK[0]..BACK[1]).contains(&through.y)
+        let is_through_jaw = through.x.abs() < ASIDE && (BACK[0]..BACK[1]).contains(&through.y);
+        is_through_jaw.then(|| (world_from_opposite * (Vec3::Z * CUSPS), world_from_opposite.rotate(Vec3::Z)))
     }
 
     /// The same without the opposite jaw: as a model jaw lies on the bench.

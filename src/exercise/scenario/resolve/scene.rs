@@ -103,12 +103,12 @@ impl Resolver<'_> {
                     let numbers = numbers.filter(|fdi| !listed.contains(fdi) && !jaw.arch.missing.contains(fdi));
                     teeth.extend(self.sound_teeth(scene, numbers, source));
                 }
-                self.arch(&jaw.arch, "/scene/jaw/arch", own, age)
+                self.arch(&jaw.arch, "/scene/jaw/arch", own, Some(jaw.tooth.fdi), age)
             }
             file::SceneFile::DentalArch(written) => {
                 // A listed tooth can be rotated, but not be missing.
                 let own = |fdi, is_missing| is_missing && written.teeth.iter().any(|tooth| tooth.fdi == fdi);
-                let arch = self.arch(&written.arch, "/scene/dental_arch/arch", own, age);
+                let arch = self.arch(&written.arch, "/scene/dental_arch/arch", own, None, age);
                 teeth.extend(self.unlisted_teeth(scene, written, age));
                 arch
             }
@@ -212,6 +212,7 @@ impl Resolver<'_> {
         for (index, tooth) in others.teeth.iter().enumerate() {
             let path = format!("/scene/jaw/other_teeth/teeth/{index}");
             let parts = [
+                ("stains", !tooth.stains.is_empty()),
                 ("cavity", tooth.cavity.is_some()),
                 ("calculus", !tooth.calculus.is_empty()),
                 ("old_fillings", !tooth.old_fillings.is_empty()),
@@ -256,19 +257,20 @@ impl Resolver<'_> {
         teeth.into_iter().map(Some).collect()
     }
 
-    /// `is_own` tells of a number, and of whether it is listed as missing, that it is a tooth of the exercise.
+    /// `is_own` tells of a number, and of whether it is listed as missing, that it is a tooth of the exercise; `treated`: the number of
+    /// the one tooth that is treated.
     fn arch(
         &mut self,
         written: &file::ArchFile,
         place: &str,
         is_own: impl Fn(u8, bool) -> bool,
+        treated: Option<u8>,
         age: Option<f32>,
     ) -> DentalArches {
         let missing = written.missing.iter().enumerate();
         let missing = missing.map(|(i, fdi)| (*fdi, true, format!("{place}/missing/{i}")));
         let rotated = written.rotated.iter().enumerate();
         let rotated = rotated.map(|(i, r)| (r.fdi, false, format!("{place}/rotated/{i}/fdi")));
-        let is_arch = place.starts_with("/scene/dental_arch");
         let mut named = BTreeSet::new();
         for (fdi, is_missing, path) in missing.chain(rotated) {
             if !named.insert(fdi) {
@@ -278,7 +280,7 @@ impl Resolver<'_> {
                 let help = "the FDI number must be one of 11–18, 21–28, 31–38 or 41–48";
                 self.complain(&path, "unknown-tooth", format!("there is no tooth {fdi}"), help);
             } else if is_own(fdi, is_missing) {
-                let (message, help) = match is_arch {
+                let (message, help) = match Some(fdi) != treated {
                     true => ("is listed under \"teeth\" and cannot be missing", "remove it from one of the two lists"),
                     false => ("is the tooth of the exercise", "give one of the surrounding teeth"),
                 };

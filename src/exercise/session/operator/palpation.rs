@@ -23,6 +23,10 @@ impl Operator {
     pub(super) fn press(&mut self, press: &PressFile, radius: f32) {
         let (tooth, surface, normal) = self.locate(&press.at);
         self.press_at(tooth, surface, normal, radius, press.force_n, press.hold_s);
+        if self.workpiece.is_overhead(tooth) {
+            let to = self.in_world(self.clear_of(tooth, surface));
+            self.plan.push_back(OperatorTask::Move(Move::Reach { to, speed: self.file.hand.speed_mm_s }));
+        }
         self.lift_off();
     }
 
