@@ -78,6 +78,7 @@ mod renderer;
 #[cfg(feature = "gpu")]
 mod resources;
 mod scene;
+mod shading;
 #[cfg(feature = "gpu")]
 mod fxaa_pass;
 #[cfg(feature = "gpu")]
@@ -118,7 +119,9 @@ pub use scene::{
     Appearance, Background, Changes, LabelPalette, Lamp, Lights, MeshInstance, Particle, RenderMode, RenderScene, Rgb,
     ShadowRegion, VolumeInstance,
 };
+pub use shading::LitPoint;
 pub use stereo::{Stereo, StereoLayout};
+pub use surface_colours::SurfaceColours;
 #[cfg(feature = "gpu")]
 pub use tooth::Uploads;
 pub use transfer_function::{TransferFunction, TransferTable};

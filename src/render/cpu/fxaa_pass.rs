@@ -1,5 +1,6 @@
 //! Anti-aliasing of a finished picture along its edges. Twin of `fxaa_pass.wgsl`.
 
+use super::texture_reads::{Texture, TextureReads};
 use typodont_core::frame::Vec3;
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
@@ -15,11 +16,12 @@ const FOLLOWS: i32 = 8;
 /// Share of the edge's contrast by which its brightness must change to end it.
 const ENDS: f32 = 0.25;
 
-pub fn fxaa_pass(drawn: &RgbaImage) -> RgbaImage {
+pub fn fxaa_pass(drawn: &RgbaImage, reads: &TextureReads) -> RgbaImage {
     let mut pixels: Vec<[u8; 4]> = drawn.rgba.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
     par_rows(&mut pixels, drawn.width, available_threads(), |y, row| {
         for (x, pixel) in row.iter_mut().enumerate() {
-            if let Some((across, share)) = neighbour_blend(drawn, [x as i32, y as i32]) {
+            if let Some((across, share)) = neighbour_blend(drawn, reads, [x as i32, y as i32]) {
+                reads.count(Texture::Picture, 1);
                 let (own, other) = (colour(*pixel), colour(texel(drawn, across)));
                 let [r, g, b] = own.lerp(other, share).to_array().map(|v| (v + 0.5) as u8);
                 *pixel = [r, g, b, u8::MAX];
@@ -30,8 +32,9 @@ pub fn fxaa_pass(drawn: &RgbaImage) -> RgbaImage {
 }
 
 /// The neighbour that is blended into a pixel, and its share; `None` if the pixel is not on an edge.
-fn neighbour_blend(drawn: &RgbaImage, at: [i32; 2]) -> Option<([i32; 2], f32)> {
+fn neighbour_blend(drawn: &RgbaImage, reads: &TextureReads, at: [i32; 2]) -> Option<([i32; 2], f32)> {
     let near = |x: i32, y: i32| brightness(drawn, [at[0] + x, at[1] + y]);
+    reads.count(Texture::Picture, 5);
     let (m, n, s, w, e) = (near(0, 0), near(0, -1), near(0, 1), near(-1, 0), near(1, 0));
     let high = [n, s, w, e].into_iter().fold(m, f32::max);
     let low = [n, s, w, e].into_iter().fold(m, f32::min);
@@ -39,6 +42,7 @@ fn neighbour_blend(drawn: &RgbaImage, at: [i32; 2]) -> Option<([i32; 2], f32)> {
     if high - low <= faint {
         return None;
     }
+    reads.count(Texture::Picture, 4);
     let (nw, ne, sw, se) = (near(-1, -1), near(1, -1), near(-1, 1), near(1, 1));
     let bend = |a: f32, b: f32, c: f32| (a + c - 2.0 * b).abs();
     let bends_down = 2.0 * bend(n, m, s) + bend(nw, w, sw) + bend(ne, e, se);
@@ -48,7 +52,7 @@ fn neighbour_blend(drawn: &RgbaImage, at: [i32; 2]) -> Option<([i32; 2], f32)> {
     let is_before = (before - m).abs() > (after - m).abs();
     let (side, other) = if is_before { (-1, before) } else { (1, after) };
     let (across, along) = if is_level { ([0, side], [1, 0]) } else { ([side, 0], [0, 1]) };
-    let edge = FxaaEdge { drawn, at, across, level: 0.5 * (m + other), contrast: (other - m).abs() };
+    let edge = FxaaEdge { drawn, reads, at, across, level: 0.5 * (m + other), contrast: (other - m).abs() };
     let (back, forth) = (edge.find_end(along.map(|v: i32| -v)), edge.find_end(along));
     let (nearest, change) = if back.0 < forth.0 { back } else { forth };
     // The other side is blended only if the nearer end of the edge bends away from this pixel.
@@ -62,6 +66,7 @@ fn neighbour_blend(drawn: &RgbaImage, at: [i32; 2]) -> Option<([i32; 2], f32)> {
 /// Edge between a pixel's row (or column) and the neighbouring one.
 struct FxaaEdge<'a> {
     drawn: &'a RgbaImage,
+    reads: &'a TextureReads,
     at: [i32; 2],
     across: [i32; 2],
     level: f32,
@@ -74,6 +79,7 @@ impl FxaaEdge<'_> {
         let mut change = 0.0;
         for i in 1..=FOLLOWS {
             let here: [i32; 2] = std::array::from_fn(|a| self.at[a] + along[a] * i);
+            self.reads.count(Texture::Picture, 2);
             let beside = std::array::from_fn(|a| here[a] + self.across[a]);
             change = 0.5 * (brightness(self.drawn, here) + brightness(self.drawn, beside)) - self.level;
             if change.abs() >= ENDS * self.contrast {

@@ -4,7 +4,6 @@
 //! tests that compare both. Never reads a clock, a file or an adapter.
 
 mod iso_pass;
-mod light;
 mod volume_sampler;
 mod mirror_pass;
 mod raster;
@@ -13,6 +12,7 @@ mod particle_pass;
 mod shadow_pass;
 mod stereo_pass;
 mod surface_pass;
+mod texture_reads;
 mod volume_pass;
 
 pub use stereo_pass::stereo_pass;
@@ -20,12 +20,15 @@ pub use stereo_pass::stereo_pass;
 use super::drawn_volume::DrawnVolume;
 use super::eye::Eye;
 use super::mirror::{self, PlaneMirror};
-use super::scene::{Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
+use super::scene::{Appearance, Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
+use super::shading::LitPoint;
 use super::surface_colours::SurfaceColours;
 use super::{ambient_occlusion::OcclusionVolume, empty_space::EmptySpaceMap};
 use shadow_pass::LampDepths;
 use std::sync::{Arc, OnceLock};
 use surface_pass::SurfaceTriangles;
+use texture_reads::TextureReads;
+use typodont_core::frame::Vec3;
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
 use volume_sampler::VolumeSampler;
@@ -34,6 +37,7 @@ use volume_sampler::VolumeSampler;
 #[derive(Default)]
 pub struct CpuRenderer {
     cached: Option<CachedVolume>,
+    reads: Arc<TextureReads>,
 }
 
 struct CachedVolume {
@@ -43,10 +47,11 @@ struct CachedVolume {
     colours: SurfaceColours,
     /// Computed when they are drawn for the first time.
     surface: OnceLock<SurfaceTriangles>,
+    reads: Arc<TextureReads>,
 }
 
 impl CachedVolume {
-    fn new(tooth: &VolumeInstance) -> CachedVolume {
+    fn new(tooth: &VolumeInstance, reads: &Arc<TextureReads>) -> CachedVolume {
         let drawn = DrawnVolume::new(tooth.volume, 1);
         let volume = &drawn.volume;
         CachedVolume {
@@ -54,6 +59,7 @@ impl CachedVolume {
             occlusion: OcclusionVolume::new(volume),
             colours: SurfaceColours::new(&VolumeInstance { volume, ..tooth.clone() }),
             surface: OnceLock::new(),
+            reads: reads.clone(),
             drawn,
         }
     }
@@ -88,13 +94,13 @@ impl CpuRenderer {
             (Some(known), Changes::Bricks(changed)) if known.drawn.matches(tooth.volume, 1) => {
                 known.update(tooth, changed);
             }
-            _ => self.cached = Some(CachedVolume::new(tooth)),
+            _ => self.cached = Some(CachedVolume::new(tooth, &self.reads)),
         }
     }
 
     /// The scene through one eye.
     pub fn draw(&self, scene: &RenderScene, eye: &Eye, [width, height]: [u32; 2]) -> RgbaImage {
-        let shadows = LampDepths::draw(scene, self.cached.as_ref()).map(Arc::new);
+        let shadows = LampDepths::draw(scene, self.cached.as_ref(), &self.reads).map(Arc::new);
         let mirrored = scene.mirror.as_ref().and_then(|mirror| Some((mirror, mirror.reflected_eye(eye)?)));
         let reflected = mirrored.map(|(mirror, image)| {
             (
@@ -109,7 +115,7 @@ impl CpuRenderer {
             eye,
             [width, height],
         );
-        if scene.is_antialiased { fxaa_pass::fxaa_pass(&drawn) } else { drawn }
+        if scene.is_antialiased { fxaa_pass::fxaa_pass(&drawn, &self.reads) } else { drawn }
     }
 
     /// Draws the whole scene through one eye; a mirror shows the picture that is passed with it.
@@ -152,6 +158,22 @@ struct CpuView {
     width: u32,
     height: u32,
     shadows: Option<Arc<LampDepths>>,
+}
+
+impl CpuView {
+    /// Ray through a pixel, per mm of depth; world space.
+    fn ray(&self, x: f32, y: f32) -> Vec3 {
+        self.eye.ray(x / self.width as f32, y / self.height as f32)
+    }
+
+    /// Shaded colour of a surface at a point of world space with a unit normal; `open` is the share of light that
+    /// reaches it.
+    fn shade(&self, finish: Appearance, open: f32, point: Vec3, normal: Vec3) -> Rgb {
+        let to_eye = (self.eye.position - point).normalize_or_zero();
+        self.lights.shade(finish, LitPoint { point, normal, to_eye, open }, || {
+            self.shadows.as_ref().map_or(1.0, |map| map.lamp_share(point, normal))
+        })
+    }
 }
 
 /// Colours with the depth buffer's values.

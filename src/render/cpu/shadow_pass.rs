@@ -1,11 +1,13 @@
 //! The depths that the chair lamp sees, and the share of the lamp that a surface sees. Twin of `view.wgsl` and of the depths in
 //! `surface_pass.wgsl` and `iso_pass.wgsl`.
 
+use super::texture_reads::{Texture, TextureReads};
 use super::volume_sampler::VolumeSampler;
 use super::{CachedVolume, CpuView, Framebuffer, iso_pass, surface_pass};
 use crate::eye::Eye;
 use crate::scene::{Background, RenderMode, RenderScene};
 use crate::shadow;
+use std::sync::Arc;
 use typodont_core::frame::{Vec2, Vec3, smooth_step};
 
 /// Places at which a shadow is looked for, and at which its edge is measured.
@@ -28,6 +30,7 @@ pub struct LampDepths {
     radius: f32,
     /// Values of the depth buffer, row by row.
     depths: Vec<f32>,
+    reads: Arc<TextureReads>,
 }
 
 /// A receiver of the lamp's light, as the lamp sees it.
@@ -50,7 +53,11 @@ impl ShadowReceiver {
 
 impl LampDepths {
     /// The map of a scene; `None` if the scene has no region for shadows, or its lamp is off or too near.
-    pub(super) fn draw(scene: &RenderScene, known: Option<&CachedVolume>) -> Option<LampDepths> {
+    pub(super) fn draw(
+        scene: &RenderScene,
+        known: Option<&CachedVolume>,
+        reads: &Arc<TextureReads>,
+    ) -> Option<LampDepths> {
         let eye = shadow::chair_eye(scene)?;
         let (width, height) = (shadow::MAP_SIZE, shadow::MAP_SIZE);
         let view = CpuView { eye, lights: scene.lights, width, height, shadows: None };
@@ -68,7 +75,7 @@ impl LampDepths {
             }
         }
         let depths = framebuffer.pixels.iter().map(|pixel| pixel.depth).collect();
-        Some(LampDepths { eye, radius: scene.lights.chair.radius, depths })
+        Some(LampDepths { eye, radius: scene.lights.chair.radius, depths, reads: reads.clone() })
     }
 
     /// Share of the lamp that a point of world space with a unit normal sees.
@@ -97,6 +104,7 @@ impl LampDepths {
         let reach = (self.radius * GAP / z).max(texel);
         let Some(caster) = self.caster_depth(&receiver, reach) else { return 1.0 };
         let blur = (self.radius * (z - caster) / caster).clamp(texel, reach);
+        self.reads.count(Texture::LampComparison, TAPS as u64);
         let seen: f32 = places::<TAPS>(blur).map(|offset| self.compared(&receiver, offset)).sum();
         let share = seen / TAPS as f32;
         share + (1.0 - share) * fade
@@ -105,6 +113,7 @@ impl LampDepths {
     /// Mean depth, mm, of what lies between the lamp and the receiver.
     fn caster_depth(&self, receiver: &ShadowReceiver, reach: f32) -> Option<f32> {
         let (mut sum, mut count) = (0.0, 0.0);
+        self.reads.count(Texture::LampDepth, SEARCHES as u64);
         for offset in places::<SEARCHES>(reach) {
             let texel = (receiver.at + offset * receiver.scale) * shadow::MAP_SIZE as f32;
             let depth = self.eye.depth(self.stored(texel.x.floor(), texel.y.floor()));

@@ -1,5 +1,6 @@
 //! Colours and opacities by density, blended along each ray. Twin of `volume_pass.wgsl`.
 
+use super::texture_reads::{Texture, TextureReads};
 use super::volume_sampler::{Ray, VolumeSampler};
 use super::{CpuView, Framebuffer};
 use crate::empty_space;
@@ -95,8 +96,11 @@ fn blend(sampler: &VolumeSampler, tables: &StepTables, ray: &Ray, pace: f32, nea
         while z < out {
             let [r, g, b, a] = match code {
                 UNIFORM => unit(entry(sampler, tables, ray.at(z))),
-                ONE_TISSUE => unit(tables.entry(Label(label), sampler.density(ray.at(z)))),
-                _ => mixed_entry(sampler.volume, tables, ray.at(z)),
+                ONE_TISSUE => {
+                    sampler.reads.count(Texture::TransferTable, 1);
+                    unit(tables.entry(Label(label), sampler.density(ray.at(z))))
+                }
+                _ => mixed_entry(sampler.volume, tables, sampler.reads, ray.at(z)),
             };
             if a > 0.0 {
                 let opacity = if is_uniform { 1.0 - libm::powf(1.0 - a, samples) } else { a };
@@ -155,8 +159,12 @@ fn film(depth: f32) -> f32 {
 
 /// Colour and opacity at a place: the entries of the eight labels around it for the density there, by the matter of their
 /// voxels, so that no face of a voxel shows where tissues meet.
-fn mixed_entry(volume: &Volume, tables: &StepTables, at: Vec3) -> [f32; 4] {
+fn mixed_entry(volume: &Volume, tables: &StepTables, reads: &TextureReads, at: Vec3) -> [f32; 4] {
+    reads.count(Texture::Voxel, 8);
+    reads.count(Texture::Density, 1);
     let (corner, labels, densities) = voxels_around(volume, at);
+    // The shader looks each voxel's label up unless all are equal.
+    reads.count(Texture::TransferTable, if labels == [labels[0]; 8] { 1 } else { 9 });
     let labels = labels.map(|label| tables.alike[usize::from(label.0)]);
     let density = volume.density_in_grid(at);
     let entry_of = |label: Label| unit(tables.entry(label, density));
@@ -241,6 +249,8 @@ fn entry(sampler: &VolumeSampler, tables: &StepTables, at: Vec3) -> [u8; 4] {
     let last = Vec3::from(grid.dims.map(|n| n as f32 - 1.0));
     let nearest = (at + 0.5).floor().clamp(Vec3::ZERO, last);
     let label = sampler.volume.labels()[grid.index([nearest.x as u32, nearest.y as u32, nearest.z as u32])];
+    sampler.reads.count(Texture::Voxel, 1);
+    sampler.reads.count(Texture::TransferTable, 1);
     tables.entry(label, sampler.density(at))
 }
 
@@ -278,7 +288,8 @@ mod tests {
         of_label[1] = [[255, 0, 0, 51]; 256];
         of_label[2] = [[0, 0, 255, 102]; 256];
         let tables = StepTables { of_label, alike: std::array::from_fn(|label| Label(label as u8)) };
-        let at = |x: f32| mixed_entry(&volume, &tables, Vec3::new(x, 1.3, 1.6));
+        let reads = TextureReads::default();
+        let at = |x: f32| mixed_entry(&volume, &tables, &reads, Vec3::new(x, 1.3, 1.6));
         let close = |found: [f32; 4], expected: [f32; 4]| found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5);
         assert!(close(at(2.7), [1.0, 0.0, 0.0, 0.2]), "{:?}", at(2.7));
         assert!(close(at(6.2), [0.0, 0.0, 1.0, 0.4]), "{:?}", at(6.2));

@@ -1,5 +1,6 @@
 //! The carved tooth as a volume, for the passes that look into it. Twin of `tooth.wgsl`.
 
+use super::texture_reads::{Texture, TextureReads};
 use super::{CachedVolume, CpuView};
 use crate::ambient_occlusion::OcclusionVolume;
 use crate::bounds_of_matter;
@@ -20,6 +21,7 @@ pub struct VolumeSampler<'a> {
     empty_space: &'a EmptySpaceMap,
     occlusion: &'a OcclusionVolume,
     colours: &'a SurfaceColours,
+    pub reads: &'a TextureReads,
     low: Vec3,
     high: Vec3,
 }
@@ -41,10 +43,10 @@ impl Ray {
 
 impl<'a> VolumeSampler<'a> {
     pub fn new(tooth: &VolumeInstance, cached: &'a CachedVolume) -> VolumeSampler<'a> {
-        let CachedVolume { drawn, empty_space, occlusion, colours, .. } = cached;
+        let CachedVolume { drawn, empty_space, occlusion, colours, reads, .. } = cached;
         let (volume, world_from_tooth) = (&drawn.volume, tooth.world_from_tooth);
         let Aabb { low, high } = bounds_of_matter(volume);
-        VolumeSampler { volume, world_from_tooth, empty_space, occlusion, colours, low, high }
+        VolumeSampler { volume, world_from_tooth, empty_space, occlusion, colours, reads, low, high }
     }
 
     /// The ray through a pixel, with its way in world space.
@@ -58,6 +60,7 @@ impl<'a> VolumeSampler<'a> {
     }
 
     pub fn density(&self, at: Vec3) -> f32 {
+        self.reads.count(Texture::Density, 1);
         self.volume.density_in_grid(at)
     }
 
@@ -76,6 +79,7 @@ impl<'a> VolumeSampler<'a> {
     /// The entry of the brick around a place on a ray, and how far on the ray leaves the cube of bricks in which there is no
     /// other.
     pub fn leap(&self, ray: &Ray, at: Vec3) -> (BrickEntry, f32) {
+        self.reads.count(Texture::EmptySpace, 1);
         let dims = self.empty_space.dims();
         // The conversion rounds down, and to 0 before the grid.
         let brick: [u32; 3] = std::array::from_fn(|a| (((at[a] / BRICK as f32) as i32).max(0) as u32).min(dims[a] - 1));
@@ -109,11 +113,13 @@ impl<'a> VolumeSampler<'a> {
     /// Share of light that reaches a surface with this normal in world space.
     pub fn openness(&self, at: Vec3, normal: Vec3) -> f32 {
         let outward = self.world_from_tooth.inverse().rotate(normal) / self.volume.grid().spacing;
+        self.reads.count(Texture::Occlusion, 1);
         self.occlusion.openness(at, outward)
     }
 
     /// Colour and gloss of the surface at a place.
     pub fn appearance(&self, at: Vec3) -> Appearance {
+        self.reads.count(Texture::Colour, 1);
         self.colours.at(at)
     }
 }

@@ -1,7 +1,9 @@
-//! Lighting of a surface. Twin of `view.wgsl`.
+//! Light on a surface: from the lamps and the surroundings, over the tissue and its coat of saliva, to the screen's colour.
+//!
+//! Takes lights, a finish and unit vectors of one space. Gives colours. Twin of `view.wgsl`. Uses no mathematics of the platform but
+//! square roots, which are the same on every machine.
 
-use super::CpuView;
-use crate::scene::{Appearance, Rgb};
+use crate::scene::{Appearance, Lights, Rgb};
 use typodont_core::frame::{Vec3, smooth_step};
 
 /// Light of the surroundings, as shares of the ambient light: from the opening of the mouth (above and toward the trainee;
@@ -19,23 +21,28 @@ const RETURNED: f32 = 0.5;
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;
 
-impl CpuView {
-    /// Ray through a pixel, per mm of depth; world space.
-    pub fn ray(&self, x: f32, y: f32) -> Vec3 {
-        self.eye.ray(x / self.width as f32, y / self.height as f32)
+/// A place on a surface, as its light depends on it.
+#[derive(Clone, Copy, Debug)]
+pub struct LitPoint {
+    pub point: Vec3,
+    /// Outward, unit.
+    pub normal: Vec3,
+    /// Toward the eye, unit.
+    pub to_eye: Vec3,
+    /// Share of the light that reaches it out of hollows.
+    pub open: f32,
+}
+
+impl Lights {
+    /// Colour of a surface on the screen. `chair_share`: share of the chair lamp that the place sees, asked for only where that lamp
+    /// shines.
+    pub fn shade(&self, finish: Appearance, at: LitPoint, chair_share: impl Fn() -> f32) -> Rgb {
+        tone(self.radiance(finish, at, chair_share)).to_array().map(f32::sqrt)
     }
 
-    /// Shaded colour of a surface at a point of world space with a unit normal; `open` is the share of light that
-    /// reaches it.
-    pub fn shade(&self, finish: Appearance, open: f32, point: Vec3, normal: Vec3) -> Rgb {
-        let to_eye = (self.eye.position - point).normalize_or_zero();
-        let radiance = self.radiance(finish, open, point, normal, to_eye);
-        tone(radiance).to_array().map(f32::sqrt)
-    }
-
-    /// Light that leaves the surface toward a unit direction: what the coat of saliva mirrors, and what the tissue under it
-    /// scatters.
-    fn radiance(&self, finish: Appearance, open: f32, point: Vec3, normal: Vec3, to_eye: Vec3) -> Vec3 {
+    /// Light that leaves the surface toward the eye: what the coat of saliva mirrors, and what the tissue under it scatters.
+    fn radiance(&self, finish: Appearance, at: LitPoint, chair_share: impl Fn() -> f32) -> Vec3 {
+        let LitPoint { point, normal, to_eye, open } = at;
         let albedo = Vec3::from(finish.colour) * Vec3::from(finish.colour);
         let mirrored = coat_albedo(finish.gloss, normal.dot(to_eye).clamp(0.0, 1.0));
         // The mean over a hemisphere of a light that changes evenly is that from two thirds of the way.
@@ -46,13 +53,13 @@ impl CpuView {
                 true => self.mirrored_surroundings(toward),
                 false => self.surroundings(toward),
             };
-        for (lamp, shadows) in [(&self.lights.chair, self.shadows.as_ref()), (&self.lights.head, None)] {
+        for (lamp, is_chair) in [(&self.chair, true), (&self.head, false)] {
             let to_lamp = (lamp.position - point).normalize_or_zero();
             // Light spreads farther in a tissue the less of it is absorbed: red in gingiva. The total stays the same.
             let wrap = lamp.wrap * albedo;
             let beyond = Vec3::ONE + wrap;
             let scattered = ((Vec3::splat(normal.dot(to_lamp)) + wrap) / (beyond * beyond)).max(Vec3::ZERO);
-            let seen = shadows.filter(|_| scattered != Vec3::ZERO).map_or(1.0, |map| map.lamp_share(point, normal));
+            let seen = if is_chair && scattered != Vec3::ZERO { chair_share() } else { 1.0 };
             let colour = Vec3::from(lamp.colour) * (lamp.strength * seen);
             light += colour * scattered;
             shine += colour * coat(finish.gloss, normal, to_lamp, to_eye);
@@ -73,7 +80,7 @@ impl CpuView {
 
     /// Light of the surroundings between their depth (0) and the opening of the mouth (1).
     fn surroundings_at(&self, share: f32) -> Vec3 {
-        self.lights.ambient * (DEEP + (BRIGHT - DEEP) * share)
+        self.ambient * (DEEP + (BRIGHT - DEEP) * share)
     }
 }
 
@@ -142,12 +149,12 @@ fn tone(linear: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Orbit;
-    use crate::scene::{Lamp, Lights};
+    use crate::scene::Lamp;
 
-    fn lit_by(chair: Lamp, ambient: f32) -> CpuView {
-        let eye = Orbit::around(Vec3::ZERO, 15.0).viewpoint().eye(1.0);
-        CpuView { eye, lights: Lights { ambient, chair, head: Lamp::OFF }, width: 1, height: 1, shadows: None }
+    /// Light that leaves the origin of a surface toward an eye, all of it lit by one lamp.
+    fn radiance(chair: Lamp, finish: Appearance, normal: Vec3, to_eye: Vec3) -> Vec3 {
+        let lights = Lights { ambient: 0.0, chair, head: Lamp::OFF };
+        lights.radiance(finish, LitPoint { point: Vec3::ZERO, normal, to_eye, open: 1.0 }, || 1.0)
     }
 
     /// A direction at an angle from +z with this cosine.
@@ -175,8 +182,7 @@ mod tests {
                         let toward = leaning(height, (turn as f32 + 0.5) / TURNS as f32 * std::f32::consts::TAU);
                         // So far that all places are lit alike.
                         let chair = Lamp { position: toward * 1e6, strength: 1.0, ..Lamp::chair() };
-                        let view = lit_by(chair, 0.0);
-                        sum += f64::from(view.radiance(white, 1.0, Vec3::ZERO, Vec3::Z, to_eye).y / chair.colour[1]);
+                        sum += f64::from(radiance(chair, white, Vec3::Z, to_eye).y / chair.colour[1]);
                     }
                 }
                 // A lamp's light is multiplied by pi; the directions cover a sphere.
@@ -204,9 +210,9 @@ mod tests {
     fn light_reaches_farther_into_red_tissue_in_red() {
         // Aim: the shaded side of gingiva is redder than the lit side, since red light scatters farthest in it.
         let gum = Appearance { colour: [0.85, 0.53, 0.50], gloss: 0.0 };
-        let view = lit_by(Lamp { position: Vec3::Z * 1e6, ..Lamp::chair() }, 0.0);
+        let lamp = Lamp { position: Vec3::Z * 1e6, ..Lamp::chair() };
         let red_share = |cosine: f32| {
-            let seen = view.radiance(gum, 1.0, Vec3::ZERO, leaning(cosine, 0.0), Vec3::Z);
+            let seen = radiance(lamp, gum, leaning(cosine, 0.0), Vec3::Z);
             seen.x / (seen.x + seen.y + seen.z)
         };
         assert!(red_share(0.02) > red_share(0.9) + 0.05, "{} {}", red_share(0.02), red_share(0.9));
