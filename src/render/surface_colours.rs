@@ -30,9 +30,9 @@ const OWN_WEIGHT: f32 = 0.6;
 /// Cells along the edge of the surroundings of a brick's cells.
 const WINDOW: usize = BRICK as usize + 2 * REACH;
 
-/// Colours of decay's border: the white spot of demineralised enamel, which scatters more than sound enamel, and the amber
-/// of firm, discoloured tissue. Chosen by eye on the fixed scenes; no published source.
-const WHITE_SPOT: Vec3 = Vec3::new(0.975, 0.965, 0.93);
+/// Colours of decay's border: the white spot of demineralised enamel, which scatters more than sound enamel and is that share nearer
+/// to white, and the amber of firm, discoloured tissue. Chosen by eye on the fixed scenes; no published source.
+const WHITE_SPOT: f32 = 0.55;
 const AMBER: Vec3 = Vec3::new(0.80, 0.60, 0.33);
 
 /// Distance between the values of the noise that mottles decay, mm.
@@ -443,7 +443,7 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
         None => (decay, decay_gloss),
     };
     let enamel = wide.enamel / wide.sound_amount.max(1e-6);
-    let spot = sound.lerp(WHITE_SPOT, 0.7 * enamel.min(1.0));
+    let spot = sound.lerp(Vec3::ONE, 0.7 * WHITE_SPOT * enamel.min(1.0));
     let amber = decay.lerp(AMBER, 0.6);
     let colour = sound
         .lerp(spot, rise(0.02, 0.2, uneven))

@@ -7,6 +7,7 @@ mod annotations;
 mod preview;
 mod sections;
 mod removal_share;
+mod tooth_surface;
 mod verdict_colours;
 
 pub use preview::{PREVIEW_SIZE, preview_png};
@@ -19,6 +20,7 @@ use crate::raycast;
 use crate::raycast::{ImagePlane, OrthographicCamera, PixelBuffer, ViewSide};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+use tooth_surface::{ToothMaterial, ToothSurface};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::par_map;
@@ -68,10 +70,13 @@ pub fn all_pictures(
     let all = ViewSide::ALL.len() + SECTIONS.len();
     let palette = TissueColours::of(&recording.scenario.tissues);
     let colours = VerdictColours::of(scored);
+    let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
+    let material = ToothMaterial::of(&recording.scenario.tissues, before);
+    let surfaces = SurfacesOfWork { before: material.surface_of(before), after: material.surface_of(after) };
     let mut raw = Vec::new();
     for (done, side) in ViewSide::ALL.into_iter().enumerate() {
         progress(done, all);
-        raw.extend(side_pictures(scored, &palette, &colours, side));
+        raw.extend(side_pictures(scored, &palette, &colours, &surfaces, side));
     }
     let middle = centre_of_work(scored);
     for (done, cut) in SECTIONS.into_iter().enumerate() {
@@ -100,10 +105,17 @@ impl RawPicture {
     }
 }
 
+/// The tooth before and after the work.
+struct SurfacesOfWork<'a> {
+    before: ToothSurface<'a>,
+    after: ToothSurface<'a>,
+}
+
 fn side_pictures(
     scored: &Scored,
     palette: &TissueColours,
     colours: &VerdictColours,
+    surfaces: &SurfacesOfWork,
     side: ViewSide,
 ) -> [RawPicture; 3] {
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
@@ -131,9 +143,12 @@ fn side_pictures(
     };
     let unchanged = |label, voxel: usize| palette.muted(label, scored.verdicts[voxel]);
     [
-        (ViewKind::Before, before_view.paint(before, |label, _| palette.tissue(label))),
-        (ViewKind::After, after_view.paint(after, |label, _| palette.tissue(label))),
-        (ViewKind::Map, after_view.paint(after, |label, voxel| colours.colour_at(voxel, unchanged(label, voxel)))),
+        (ViewKind::Before, surfaces.before.paint(&before_view)),
+        (ViewKind::After, surfaces.after.paint(&after_view)),
+        (
+            ViewKind::Map,
+            after_view.paint_voxels(after, |label, voxel| colours.colour_at(voxel, unchanged(label, voxel))),
+        ),
     ]
     .map(|(shows, pixels)| {
         RawPicture::new(

@@ -1,5 +1,6 @@
 //! Preview of an exercise: the trainee's first view, and the position of the decay for the author.
 
+use super::tooth_surface::ToothMaterial;
 use super::verdict_colours::TissueColours;
 use super::{CONTOUR, CONTOUR_WIDTH, SIZE, annotations, crown_image_plane, encode_png, nearest_tooth};
 use crate::raycast;
@@ -24,6 +25,8 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, first_view: &Rgba
     let pixels = first_view.rgba.chunks(4).map(|p| [share(p[0]), share(p[1]), share(p[2]), 1.0]).collect();
     let first = PixelBuffer { width: first_view.width, height: first_view.height, pixels };
     let palette = TissueColours::of(&scenario.tissues);
+    let material = ToothMaterial::of(&scenario.tissues, &workpiece.volume);
+    let surface = material.surface_of(&workpiece.volume);
     let decay = decay_volume(scenario, &workpiece.volume);
     let tooth = &workpiece.teeth[0];
     let middle = workpiece.lesions_in_volume().first().map_or(tooth.crown.centre(), |l| l.centre);
@@ -33,7 +36,7 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, first_view: &Rgba
             width: SIZE,
             height: SIZE,
         };
-        let mut picture = raycast::render_iso(&workpiece.volume, &shot, |label, _| palette.tissue(label));
+        let mut picture = surface.paint(&raycast::render(&workpiece.volume, &shot));
         if let Some(decay) = &decay {
             picture.composite(&highlight(&raycast::render_iso(decay, &shot, |_, _| DECAY_HIGHLIGHT)));
         }

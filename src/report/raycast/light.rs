@@ -1,5 +1,5 @@
-//! Light as in a photograph for a textbook: a soft lamp from the upper left, a weaker one from the right, and shade in
-//! hollows, so that fissures and cavities are seen while colours stay what they are.
+//! Light on a tooth that lies before white paper: that of a lesson, seen from the camera's side, and shade in hollows, so that
+//! fissures and cavities are seen.
 //!
 //! Shade in hollows is the depth of a place below its surroundings in the picture, at three sizes of surroundings. After
 //! Luft, Colditz & Deussen, *Image Enhancement by Unsharp Masking the Depth Buffer* (2006).
@@ -7,56 +7,39 @@
 use crate::raycast::{Hit, OrthographicCamera};
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::par_rows;
+use typodont_render::{Appearance, Lamp, Lights, LitPoint};
 
-/// Toward the lamps as (right, up, back), need not be unit; chosen by eye on teeth.
-const KEY: Vec3 = Vec3::new(-0.55, 0.65, 0.8);
-const FILL: Vec3 = Vec3::new(0.8, 0.05, 0.6);
-
-/// Shares of full light. Together a little more than 1 where a surface faces the key.
-const AMBIENT: f32 = 0.30;
-const KEY_SHARE: f32 = 0.60;
-const FILL_SHARE: f32 = 0.17;
-
-/// Reach of the key light past the edge of its own shadow, as a cosine: a large, soft lamp.
-const WRAP: f32 = 0.2;
+/// Distance of the head lamp from the tooth, mm: that of a dentist's eyes.
+const EYE_DISTANCE: f32 = 350.0;
 
 /// Light lost where a surface turns away from the eye: draws a pale tooth's outline on white paper.
 const RIM: f32 = 0.2;
-
-/// Gloss of wet enamel, as a share of full light, and how tight its highlight is.
-const GLOSS: f32 = 0.10;
-const GLOSS_TIGHTNESS: f32 = 28.0;
-
-/// Shade on a tooth is warm, because light comes through it: the share by which red gains and blue loses there.
-const WARMTH: f32 = 0.12;
 
 /// Surroundings that a place's depth is compared with: half their width, mm, and the share of light that is lost at most.
 /// The finest shows fissures, the widest a cavity's floor. 0.6 in all still tells colours.
 const OCCLUSION_SCALES: [(f32, f32); 3] = [(0.25, 0.24), (0.7, 0.22), (1.8, 0.16)];
 
-/// Sets the light that falls on a hit; `occlusion` is the share of light lost in hollows there.
-pub fn shade_hit(camera: &OrthographicCamera, hit: Hit, occlusion: f32) -> Hit {
-    let normal = Vec3::new(hit.normal.dot(camera.right), hit.normal.dot(camera.up), hit.normal.dot(camera.back()));
-    let (key, fill) = (KEY.normalize(), FILL.normalize());
-    let from_key = ((normal.dot(key) + WRAP) / (1.0 + WRAP)).max(0.0);
-    let from_fill = normal.dot(fill).max(0.0);
-    let away = 1.0 - normal.z.clamp(0.0, 1.0);
-    let rim = 1.0 - RIM * away * away;
+/// Share of light that a surface with this normal in tooth space returns; `occlusion` is the share lost in hollows there. It
+/// falls toward the outline, too.
+pub fn openness(camera: &OrthographicCamera, normal: Vec3, occlusion: f32) -> f32 {
+    let facing = normal.dot(camera.back()).clamp(0.0, 1.0);
+    let away = 1.0 - facing;
     // At its outline a surface is deeper than its surroundings without being a hollow.
-    let open = 1.0 - occlusion * (0.3 + 0.7 * normal.z.clamp(0.0, 1.0));
-    let light = (AMBIENT + KEY_SHARE * from_key + FILL_SHARE * from_fill) * rim * open;
-    let half = (key + Vec3::Z).normalize();
-    let gloss = GLOSS * libm::powf(normal.dot(half).max(0.0), GLOSS_TIGHTNESS) * open;
-    Hit { light, gloss, ..hit }
+    ((1.0 - occlusion * (0.3 + 0.7 * facing)) * (1.0 - RIM * away * away)).min(1.0)
 }
 
-/// A colour as a screen shows it, in the light of a hit.
-pub fn lit_colour(colour: [f32; 3], hit: &Hit) -> [f32; 4] {
-    let lost = (1.0 - hit.light).max(0.0);
-    // A square is near enough to a screen's curve, and the same on every machine.
-    let lit = |c: f32, warmth: f32| (c * c * (hit.light + warmth * lost * hit.light) + hit.gloss).min(1.0).sqrt();
-    let [red, green, blue] = colour;
-    [lit(red, WARMTH), lit(green, 0.0), lit(blue, -WARMTH), 1.0]
+/// Lamps around a camera, in its space, placed as around a trainee.
+pub fn lamps() -> Lights {
+    Lights { head: Lamp::head(Vec3::new(0.0, 0.0, EYE_DISTANCE)), ..Lights::default() }
+}
+
+/// A surface's colour on the screen, in the light of [`lamps`].
+pub fn lit_colour(lamps: &Lights, camera: &OrthographicCamera, finish: Appearance, hit: &Hit) -> [f32; 4] {
+    let seen = |v: Vec3| Vec3::new(v.dot(camera.right), v.dot(camera.up), v.dot(camera.back()));
+    let place =
+        LitPoint { point: seen(hit.point - camera.middle), normal: seen(hit.normal), to_eye: Vec3::Z, open: hit.open };
+    let [red, green, blue] = lamps.shade(finish, place, || 1.0);
+    [red, green, blue, 1.0]
 }
 
 /// Share of light lost per pixel because the surface is deeper there than around it.

@@ -1,6 +1,6 @@
 //! Pictures of a volume: its surface from any side, and cuts through it.
 //!
-//! Takes a volume, a camera and colours by closure. Gives pixels; the same ones however many threads help. Never knows a
+//! Takes a volume, a camera and the surface's finish by closure. Gives pixels; the same ones however many threads help. Never knows a
 //! tissue's name, and never writes a file or a letter.
 
 mod camera;
@@ -17,13 +17,18 @@ use ray::RayMarcher;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::{available_threads, par_rows};
 use typodont_core::volume::{Label, Volume};
+use typodont_render::Appearance;
 
 /// Samples along each side of a pixel where the picture has an edge; elsewhere one does.
 const SUPERSAMPLES: u32 = 3;
 
-/// The surface as a camera sees it, lit but without colour: one rendering serves several colourings.
+/// Gloss of surfaces that show something other than a tooth: low, so that the colours of a legend are recognised.
+const FAINT_GLOSS: f32 = 0.1;
+
+/// The surface as a camera sees it, without colour: one rendering serves several colourings.
 #[derive(Clone, Debug)]
 pub struct GBuffer {
+    camera: OrthographicCamera,
     width: u32,
     height: u32,
     /// One per pixel.
@@ -32,30 +37,29 @@ pub struct GBuffer {
     edges: Vec<(usize, Vec<Option<Hit>>)>,
 }
 
-/// Point at which a ray meets the surface, with its light.
+/// Point at which a ray meets the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Hit {
     /// In tooth space, mm.
     point: Vec3,
-    /// Unit, outward.
+    /// Unit, outward, in tooth space.
     normal: Vec3,
     /// From the camera's plane, mm.
     depth: f32,
-    /// Share of full light, and gloss to be added.
-    light: f32,
-    gloss: f32,
+    /// Share of the light that it returns: less in hollows and at the outline.
+    open: f32,
 }
 
-/// The iso-surface, lit and coloured; `colour` is asked for voxels on the surface.
+/// The iso-surface, lit, in the colours of its voxels; `colour` is asked for voxels on the surface.
 pub fn render_iso(
     volume: &Volume,
     plane: &ImagePlane,
     colour: impl Fn(Label, usize) -> [f32; 3] + Sync,
 ) -> PixelBuffer {
-    render(volume, plane).paint(volume, colour)
+    render(volume, plane).paint_voxels(volume, colour)
 }
 
-/// Finds and lights the surface.
+/// Finds the surface.
 pub fn render(volume: &Volume, plane: &ImagePlane) -> GBuffer {
     render_with(volume, plane, None, available_threads())
 }
@@ -82,7 +86,7 @@ fn render_with(volume: &Volume, plane: &ImagePlane, earlier: Option<&GBuffer>, t
     let depths: Vec<Option<f32>> = hits.iter().map(|h| h.as_ref().map(|h| h.depth)).collect();
     let occlusion =
         light::ambient_occlusion(&depths, width as usize, camera.half_height * 2.0 / height as f32, threads);
-    let shaded = |hit: Hit, pixel: usize| light::shade_hit(&camera, hit, occlusion[pixel]);
+    let shaded = |hit: Hit, pixel: usize| Hit { open: light::openness(&camera, hit.normal, occlusion[pixel]), ..hit };
     let mut edges: Vec<(usize, Vec<Option<Hit>>)> =
         edge_pixels(&hits, width as usize, plane.pixel_mm()).into_iter().map(|pixel| (pixel, Vec::new())).collect();
     par_rows(&mut edges, 64, threads, |_, some| {
@@ -98,7 +102,7 @@ fn render_with(volume: &Volume, plane: &ImagePlane, earlier: Option<&GBuffer>, t
     for (pixel, hit) in hits.iter_mut().enumerate() {
         *hit = hit.map(|h| shaded(h, pixel));
     }
-    GBuffer { width, height, hits, edges }
+    GBuffer { camera, width, height, hits, edges }
 }
 
 /// Pixels whose neighbours see something else: nothing, a surface turned elsewhere, or one that is not its continuation.
@@ -125,20 +129,21 @@ fn edge_pixels(hits: &[Option<Hit>], width: usize, pixel: f32) -> Vec<usize> {
 }
 
 impl GBuffer {
-    /// Colours what was seen; nothing stays transparent.
-    pub fn paint(&self, volume: &Volume, colour: impl Fn(Label, usize) -> [f32; 3] + Sync) -> PixelBuffer {
-        self.paint_with(volume, colour, available_threads())
+    /// The surface that was seen, lit; `finish` is asked for points of the surface in tooth space. Nothing stays transparent.
+    pub fn paint(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
+        self.paint_with(finish, available_threads())
     }
 
-    fn paint_with(
-        &self,
-        volume: &Volume,
-        colour: impl Fn(Label, usize) -> [f32; 3] + Sync,
-        threads: usize,
-    ) -> PixelBuffer {
+    /// The same in the colours of voxels.
+    pub fn paint_voxels(&self, volume: &Volume, colour: impl Fn(Label, usize) -> [f32; 3] + Sync) -> PixelBuffer {
+        self.paint(|point| Appearance { colour: surface_colour(volume, point, &colour), gloss: FAINT_GLOSS })
+    }
+
+    fn paint_with(&self, finish: impl Fn(Vec3) -> Appearance + Sync, threads: usize) -> PixelBuffer {
+        let lamps = light::lamps();
         let mut picture = PixelBuffer::transparent(self.width, self.height);
         let shade = |hit: &Option<Hit>| match hit {
-            Some(hit) => light::lit_colour(surface_colour(volume, hit.point, &colour), hit),
+            Some(hit) => light::lit_colour(&lamps, &self.camera, finish(hit.point), hit),
             None => [0.0; 4],
         };
         par_rows(&mut picture.pixels, self.width, threads, |y, row| {
@@ -238,8 +243,8 @@ mod tests {
             width: 97,
             height: 61,
         };
-        let colour = |_: Label, index: usize| [index as f32 % 7.0 / 7.0, 0.4, 0.2];
-        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(&volume, colour, threads);
+        let finish = |p: Vec3| Appearance { colour: [0.5 + 0.4 * p.x, 0.4, 0.2], gloss: 0.2 };
+        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(finish, threads);
         assert_eq!(picture(1), picture(3));
     }
 

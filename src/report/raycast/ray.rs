@@ -144,7 +144,7 @@ impl<'a> RayMarcher<'a> {
         let grid = self.volume.grid();
         let point = grid.origin + (start + self.along * depth) * grid.spacing;
         let normal = self.normal(point).unwrap_or(self.camera.back());
-        Hit { point, normal, depth, light: 1.0, gloss: 0.0 }
+        Hit { point, normal, depth, open: 1.0 }
     }
 
     /// Outward, from gradients around a point: stairs that carving along voxels leaves do not catch the light.
