@@ -3,6 +3,8 @@
 use super::palette::GLOSS;
 use super::soft_tissue::YieldingSurface;
 use std::sync::Arc;
+use typodont_anatomy::jaw::{Jaw, RidgeSide, ridge_tint};
+use typodont_anatomy::periodontium::Periodontium;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
@@ -10,7 +12,7 @@ use typodont_core::touch::{Collider, ColliderGeometry, Compliance, SdfGrid};
 use typodont_core::volume::{Grid, ISO, Label, Volume, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Appearance, MeshInstance};
+use typodont_render::{Appearance, MeshInstance, Rgb};
 
 /// Distance between samples of a solid, mm: its curvature radii are larger.
 const SPACING: f32 = 0.4;
@@ -50,7 +52,30 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
     }
     let colour = tissues.by_label(shape.label).map_or([0.8; 3], |e| e.rgb());
     let mesh = Arc::new(shape_mesh(shape, workpiece));
-    MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS })
+    let tints = modelled_gum(shape, workpiece).map(|(_, gum)| gum_tints(gum, workpiece, &mesh));
+    let plain = MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS });
+    MeshInstance { vertex_colours: Arc::new(tints.unwrap_or_default()), ..plain }
+}
+
+/// Gingiva with a modelled margin: its field as it is felt, and its form; `None` for another shape.
+fn modelled_gum<'a>(shape: &'a Collider, workpiece: &'a Workpiece) -> Option<(&'a SdfGrid, &'a Periodontium)> {
+    match &shape.geometry {
+        ColliderGeometry::Sdf(field) => Some((field, workpiece.periodontium.as_ref()?)),
+        _ => None,
+    }
+}
+
+/// Tints of gingiva with a modelled margin: those of the jaw's own gingiva around it.
+fn gum_tints(gum: &Periodontium, workpiece: &Workpiece, mesh: &Mesh) -> Vec<Rgb> {
+    let is_upper = workpiece.teeth.first().is_some_and(|tooth| tooth.fdi < 30);
+    let jaw = if is_upper { Jaw::Upper } else { Jaw::Lower };
+    let middle = gum.middle();
+    let tint = |place: &Vec3| {
+        let azimuth = gum.azimuth(*place);
+        let side = if place.x < middle.x { RidgeSide::Inner } else { RidgeSide::Outer };
+        ridge_tint(jaw, side, place.z, [gum.margin(azimuth), gum.neckline(azimuth)], gum.distance_to_tooth(*place))
+    };
+    mesh.positions.iter().map(tint).collect()
 }
 
 /// A shape's surface in tooth space.
@@ -87,7 +112,7 @@ fn shape_mesh(shape: &Collider, workpiece: &Workpiece) -> Mesh {
         mesh.smooth_normals(SMOOTHING);
         return mesh;
     }
-    if let (ColliderGeometry::Sdf(field), Some(gum)) = (&shape.geometry, &workpiece.periodontium) {
+    if let Some((field, gum)) = modelled_gum(shape, workpiece) {
         // As the eye sees it: lying on the tooth. A probe finds it a little off.
         let Aabb { low, high } = field.extent();
         let grid = Grid::covering(low, high, Vec3::splat(GUM_SPACING), 1);

@@ -226,9 +226,9 @@ impl HalfJaw<'_> {
             (wide + 5.0, BASE, MUCOSA),
             (wide + 4.7, BASE + 4.0, MUCOSA),
             (wide + 4.0, neck - 11.0, MUCOSA),
-            (wide + 3.1 + 0.4 * root, neck - 8.5, MUCOSA),
-            (wide + 2.2 + 0.8 * root, neck - 6.0, LINE),
-            (wide + 1.5 + root, neck - 3.6, ATTACHED),
+            (wide + 3.1 + 0.4 * root, neck - MUCOSA_BELOW_NECK, MUCOSA),
+            (wide + 2.2 + 0.8 * root, neck - LINE_BELOW_NECK, LINE),
+            (wide + 1.5 + root, neck - ATTACHED_BELOW_NECK, ATTACHED),
         ];
         rows.extend(match form {
             GumForm::Touched => vec![
@@ -249,12 +249,11 @@ impl HalfJaw<'_> {
                 let (outer, inner) = (edge(out, margin), edge(-out, inner_margin));
                 // On a papilla there is no sulcus.
                 let [edge_tint, sulcus_tint] = [EDGE, SULCUS].map(|tint| mixed_tint(tint, FREE, between));
-                // Above the next row, however far the margin has receded.
-                let attached = |margin: f32| (margin - 1.6).max(neck - 2.9);
+                let [first, last] = FREE_BELOW_MARGIN;
                 vec![
-                    (outer + 0.85 + 0.5 * root, attached(margin), ATTACHED),
-                    (outer + 0.55, margin - 0.8, FREE),
-                    (outer + 0.30, margin - 0.3, FREE),
+                    (outer + 0.85 + 0.5 * root, attached_from(margin, neck), ATTACHED),
+                    (outer + 0.55, margin - last, FREE),
+                    (outer + 0.30, margin - first, FREE),
                     (outer + 0.04, margin, edge_tint),
                     (outer - 0.40, margin + 0.15, sulcus_tint),
                     (outer - 1.10, crest, sulcus_tint),
@@ -262,9 +261,9 @@ impl HalfJaw<'_> {
                     (1.10 - inner, crest, sulcus_tint),
                     (0.40 - inner, inner_margin + 0.15, sulcus_tint),
                     (-inner - 0.04, inner_margin, edge_tint),
-                    (-inner - 0.30, inner_margin - 0.3, FREE),
-                    (-inner - 0.55, inner_margin - 0.8, FREE),
-                    (-inner - 0.95, attached(inner_margin), ATTACHED),
+                    (-inner - 0.30, inner_margin - first, FREE),
+                    (-inner - 0.55, inner_margin - last, FREE),
+                    (-inner - 0.95, attached_from(inner_margin, neck), ATTACHED),
                 ]
             }
         });
@@ -401,6 +400,65 @@ const MUCOSA: Tint = [0.90, 0.70, 0.69];
 const PALATE: Tint = [0.98, 0.96, 0.94];
 const FLOOR: Tint = [0.88, 0.68, 0.67];
 
+/// Heights below the gingival margin, mm, between which the gingiva is free.
+const FREE_BELOW_MARGIN: [f32; 2] = [0.3, 0.8];
+
+/// Heights below the neck of a tooth, mm, down to which gingiva is attached, and at which it ends and loose mucosa begins.
+const ATTACHED_BELOW_NECK: f32 = 3.6;
+const LINE_BELOW_NECK: f32 = 6.0;
+const MUCOSA_BELOW_NECK: f32 = 8.5;
+
+/// The same of the line and of the floor of the mouth on the inner side of the lower jaw.
+const INNER_LINE_BELOW_NECK: f32 = 6.6;
+const FLOOR_BELOW_NECK: f32 = 10.0;
+
+/// Height from which gingiva is attached: above the next row, however far the margin has receded.
+fn attached_from(margin: f32, neck: f32) -> f32 {
+    (margin - 1.6).max(neck - 2.9)
+}
+
+/// Side of the ridge: toward the cheek, or toward palate or tongue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RidgeSide {
+    Outer,
+    Inner,
+}
+
+/// Tint at a height, mm, on a side of the ridge beside a tooth whose margin and neck lie at other heights: the tint that [`gum`] has
+/// there. `from_tooth`: distance from the tooth, mm; the margin is dark only where it lies on the tooth.
+pub fn ridge_tint(jaw: Jaw, side: RidgeSide, height: f32, [margin, neck]: [f32; 2], from_tooth: f32) -> Tint {
+    let edge = mixed_tint(EDGE, FREE, from_tooth / 0.4);
+    let [first, last] = FREE_BELOW_MARGIN;
+    let [line, lowest] = match (side, jaw) {
+        (RidgeSide::Outer, _) => [(neck - LINE_BELOW_NECK, LINE), (neck - MUCOSA_BELOW_NECK, MUCOSA)],
+        (RidgeSide::Inner, Jaw::Upper) => [(neck - LINE_BELOW_NECK, PALATE), (neck - MUCOSA_BELOW_NECK, PALATE)],
+        (RidgeSide::Inner, Jaw::Lower) => [(neck - INNER_LINE_BELOW_NECK, LINE), (neck - FLOOR_BELOW_NECK, FLOOR)],
+    };
+    let rows = [
+        (margin + first, FREE),
+        (margin, edge),
+        (margin - first, FREE),
+        (margin - last, FREE),
+        (attached_from(margin, neck), ATTACHED),
+        (neck - ATTACHED_BELOW_NECK, ATTACHED),
+        line,
+        lowest,
+    ];
+    let mut above = rows[0];
+    if height >= above.0 {
+        return above.1;
+    }
+    for (row, tint) in rows {
+        // A margin that has receded far lies below rows that depend on the neck: none is above the one before it.
+        let row = row.min(above.0);
+        if height >= row {
+            return mixed_tint(tint, above.1, (height - row) / (above.0 - row).max(1e-6));
+        }
+        above = (row, tint);
+    }
+    above.1
+}
+
 /// Height on the midline.
 fn midline_height(jaw: Jaw, front: Vec3, y: f32) -> f32 {
     match jaw {
@@ -518,6 +576,28 @@ mod tests {
                 .map(|p| closed.iter().map(|solid| solid.distance(*p).abs()).fold(f32::INFINITY, f32::min));
             let worst = worst.fold(0.0, f32::max);
             assert!(worst < 0.01, "{jaw:?}: {worst} mm off");
+        }
+    }
+
+    #[test]
+    fn tints_beside_a_tooth_change_gradually_however_far_the_margin_has_receded() {
+        // Aim: no step of colour, free gingiva at the margin's height away from the tooth, and mucosa far below. Method: steps of
+        // 0.05 mm from above the margin down.
+        for (jaw, side) in
+            [(Jaw::Lower, RidgeSide::Outer), (Jaw::Lower, RidgeSide::Inner), (Jaw::Upper, RidgeSide::Inner)]
+        {
+            for recession in [-4.0, -1.0, 0.0, 1.0, 2.5, 4.0, 8.0] {
+                let tint = |height: f32| ridge_tint(jaw, side, height, [-recession, 0.0], 1.0);
+                assert_eq!(tint(-recession), FREE);
+                let all: Vec<Tint> = (0..400).map(|i| tint(5.0 - 0.05 * i as f32)).collect();
+                for pair in all.windows(2) {
+                    let step = (0..3).map(|c| (pair[0][c] - pair[1][c]).abs()).fold(0.0, f32::max);
+                    assert!(step < 0.05 || recession > 2.0 && step < 0.35, "{side:?}, recession {recession}: {pair:?}");
+                }
+                let lowest =
+                    if side == RidgeSide::Outer { MUCOSA } else { [PALATE, FLOOR][usize::from(jaw == Jaw::Lower)] };
+                assert_eq!(all[399], lowest);
+            }
         }
     }
 }

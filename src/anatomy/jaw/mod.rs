@@ -25,7 +25,7 @@ use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
 use typodont_core::parallel;
 
-pub use self::gum::{GumForm, MucosaRegion};
+pub use self::gum::{GumForm, MucosaRegion, RidgeSide, ridge_tint};
 pub use self::half_arch::ToothSeat;
 pub use self::occlusion::{CUSP_WIDTH, Occlusion, WORKING_OPENING_DEG};
 pub use self::tinted_mesh::{Tint, TintedMesh};
