@@ -511,6 +511,11 @@ fn laws_patients_and_hardness() {
     check("no speed", "/carving", json!({ "law": { "rate": {} } }), &[("missing-key", "/carving/law/rate")]);
     check("an unknown law", "/carving", json!({ "law": "ohm" }), &[("unknown-word", "/carving/law")]);
     check("a patient", "/patient", json!({ "age_years": 45 }), &[]);
+    check("a patient of a shade", "/patient", json!({ "shade": "A3.5" }), &[]);
+    check("the shade of an age", "/patient", json!({ "age_years": 45, "shade": "of_age" }), &[]);
+    check("the shade of no age", "/patient", json!({ "shade": "of_age" }), &[("missing-age", "/patient/shade")]);
+    check("no age to show", "/patient", json!({ "shows_age": true }), &[("missing-age", "/patient/shows_age")]);
+    check("an unknown shade", "/patient", json!({ "shade": "E1" }), &[("invalid-value", "/patient/shade")]);
     check("an unborn patient", "/patient", json!({ "age_years": 0 }), &[("out-of-range", "/patient/age_years")]);
     check("a patient who looks the age", "/patient", json!({ "age_years": 70, "shows_age": true }), &[]);
     check(

@@ -4,6 +4,7 @@
 
 mod coefficient;
 mod tissues;
+mod tooth_shade;
 mod hand_instruments;
 mod shape;
 mod instruments;
@@ -17,4 +18,5 @@ pub use instruments::{
 };
 pub use shape::{CuttingPartEntry, LengthUnitEntry, SampledEnd, ShapeEntry};
 pub use tissues::{PackingEntry, TissueEntry, TissueRole, TissueTable, parse_color};
+pub use tooth_shade::{ShadeColours, ToothShade};
 pub use touch_factors::{AgeBand, TouchFactorTable};

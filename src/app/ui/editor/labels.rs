@@ -95,6 +95,7 @@ const LABELS: &[(&str, &str)] = &[
     ("patient", "label.patient"),
     ("age_years", "label.age"),
     ("shows_age", "label.shows_age"),
+    ("shade", "label.shade"),
     ("instruments", "label.instruments"),
     ("zones", "label.zones"),
     ("role", "label.role"),

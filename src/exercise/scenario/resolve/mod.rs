@@ -14,7 +14,8 @@ mod zones;
 use super::file::{self, ScenarioFile};
 use super::{CasePicture, MeasureParams, OperatingField, Questionnaire, RECORDING_PARTS, Scenario};
 use crate::catalog::{
-    AgeBand, InstrumentEntry, InstrumentTable, ShapeEntry, TissueEntry, TissueTable, TouchFactorTable, WorkingEndEntry,
+    AgeBand, InstrumentEntry, InstrumentTable, ShapeEntry, TissueEntry, TissueTable, ToothShade, TouchFactorTable,
+    WorkingEndEntry,
 };
 use crate::instrument_import;
 use crate::local_text::LocalTexts;
@@ -160,6 +161,7 @@ impl Resolver<'_> {
     /// Returns the scenario; `None` only if a necessary part is missing, after a diagnostic.
     fn scenario(&mut self, written: &ScenarioFile, text: &str) -> Option<Scenario> {
         self.change_tissues(written);
+        self.colour_teeth(written);
         let age = self.age_shown(written);
         let scene = self.scene(&written.scene, age);
         let instruments = self.tray(&written.instruments);
@@ -237,6 +239,25 @@ impl Resolver<'_> {
                 let help = did_you_mean(name, self.tissues.names());
                 self.complain(path, "unknown-tissue", format!("there is no tissue \"{name}\""), help);
                 Label::AIR
+            }
+        }
+    }
+
+    /// Gives all teeth the colours of the patient's shade.
+    fn colour_teeth(&mut self, written: &ScenarioFile) {
+        let Some(patient) = &written.patient else { return };
+        let Some(shade) = patient.shade else { return };
+        if shade == ToothShade::OfAge && patient.age_years.is_none() {
+            let message = "the shade of an age requires the age";
+            let help = "add \"age_years\", or name a shade such as \"A2\"";
+            self.complain("/patient/shade", "missing-age", message, help);
+            return;
+        }
+        let colours = shade.colours(patient.age_years.unwrap_or_default());
+        let enamel = ["enamel", "neighbour"].map(|name| (name, colours.enamel.clone()));
+        for (name, colour) in enamel.into_iter().chain([("dentine", colours.dentine)]) {
+            if let Some(entry) = self.tissues.by_name_mut(name) {
+                entry.color = colour;
             }
         }
     }
@@ -353,7 +374,7 @@ impl Resolver<'_> {
     /// Returns the factors by which each instrument of the tray and the patient's age change the tissues' tactile
     /// properties.
     fn factors(&mut self, written: &ScenarioFile, tray: &[InstrumentEntry]) -> Vec<MaterialScales> {
-        let band = written.patient.as_ref().map(|p| AgeBand::of(p.age_years));
+        let band = written.patient.as_ref().and_then(|patient| patient.age_years).map(AgeBand::of);
         let Some(touch_factors) = &self.touch_factors else {
             if band.is_some() || tray.iter().any(|i| i.kind.is_some()) {
                 let message = "the table of the effects of age and instruments on tissues is missing";

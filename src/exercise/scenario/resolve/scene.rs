@@ -31,7 +31,12 @@ const NARROWEST: f32 = 0.25;
 impl Resolver<'_> {
     /// Returns the age that the anatomy is to show, years; `None` for no age.
     pub(super) fn age_shown(&mut self, written: &file::ScenarioFile) -> Option<f32> {
-        let age = written.patient.as_ref().filter(|patient| patient.shows_age)?.age_years;
+        let patient = written.patient.as_ref().filter(|patient| patient.shows_age)?;
+        let Some(age) = patient.age_years else {
+            let message = "the anatomy cannot show an age that is not given";
+            self.complain("/patient/shows_age", "missing-age", message, "add \"age_years\"");
+            return None;
+        };
         if !(age::MIN_AGE..=age::MAX_AGE).contains(&age) {
             let message =
                 format!("the anatomy cannot show an age of {age} years: expected {} to {}", age::MIN_AGE, age::MAX_AGE);
