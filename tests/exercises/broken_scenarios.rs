@@ -515,7 +515,7 @@ fn laws_patients_and_hardness() {
     check("the shade of an age", "/patient", json!({ "age_years": 45, "shade": "of_age" }), &[]);
     check("the shade of no age", "/patient", json!({ "shade": "of_age" }), &[("missing-age", "/patient/shade")]);
     check("no age to show", "/patient", json!({ "shows_age": true }), &[("missing-age", "/patient/shows_age")]);
-    check("an unknown shade", "/patient", json!({ "shade": "E1" }), &[("invalid-value", "/patient/shade")]);
+    check("an unknown shade", "/patient", json!({ "shade": "E1" }), &[("unknown-word", "/patient/shade")]);
     check("an unborn patient", "/patient", json!({ "age_years": 0 }), &[("out-of-range", "/patient/age_years")]);
     check("a patient who looks the age", "/patient", json!({ "age_years": 70, "shows_age": true }), &[]);
     check(
