@@ -267,7 +267,7 @@ impl App {
     pub(super) fn confirm_close(&mut self, is_closing: bool, ctx: &egui::Context) {
         self.closing = CloseState::No;
         match &mut self.screen {
-            _ if !is_closing => {}
+            _ if !is_closing => self.kiosk_exit.is_allowed = false,
             Screen::Lesson(lesson) => {
                 lesson.abort();
                 self.closing = CloseState::AfterLesson;

@@ -247,7 +247,9 @@ impl App {
                 self.closing = CloseState::Asked;
             }
         }
-        if self.closing == CloseState::AfterLesson && !is_in_lesson && !is_completing {
+        // A request can be lost, and is repeated until the window has closed.
+        let is_wanted = self.closing == CloseState::AfterLesson || self.kiosk_exit.is_allowed;
+        if is_wanted && !is_in_lesson && !is_completing {
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
