@@ -187,10 +187,10 @@ impl ObjectStoreHandle {
         })
     }
 
-    /// Removes incomplete files that a killed program left directly within a folder. Only stores in a folder of this
+    /// Removes incomplete files that a killed program left directly within a folder, "" for the store's own. Only stores in a folder of this
     /// computer have such files, named `NAME#1`; in other stores an object is complete or absent.
     pub fn remove_partial_uploads(&self, folder: &str) {
-        let is_within = folder.split('/').all(is_plain_name);
+        let is_within = folder.is_empty() || folder.split('/').all(is_plain_name);
         let own = self.folder.as_ref().filter(|_| is_within).map(|base| base.join(folder));
         let entries = own.and_then(|own| std::fs::read_dir(own).ok()).into_iter().flatten().flatten();
         for entry in entries.filter(|entry| entry.file_name().to_string_lossy().contains('#')) {

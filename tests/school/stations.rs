@@ -223,6 +223,36 @@ fn files_below(folder: &Path) -> BTreeSet<String> {
 }
 
 #[test]
+fn parts_that_no_row_names_are_removed() {
+    // Aim: nothing of a session lies in the store twice, or after its erasure. Method: the files that a station leaves when it is
+    // killed while it writes the marker, after another station has entered its session, and after an erasure.
+    let Some(cluster) = school_of(&["station-1", "station-2"]) else { return };
+    let folder = folder("orphans");
+    let store = folder.join("store");
+    let address = format!("file://{}", store.display());
+    let [own, copy] = ["own", "copy"].map(|name| folder.join(name));
+    enter(&own, "bundle", school::session("5-grinding", "anna", 50.0), 20_000);
+    enter(&copy, "bundle", school::session("5-grinding", "anna", 50.0), 20_000);
+    assert!(sync(&cluster, "station-1", &own, &address, "A").starts_with("1 sessions sent"));
+    let stored = files_below(&store);
+    let part = stored.iter().next().unwrap();
+    let leave_orphans = |name: &str| {
+        let orphan = store.join(part.replacen("station-1", name, 1));
+        fs::create_dir_all(orphan.parent().unwrap()).unwrap();
+        fs::write(orphan, b"part").unwrap();
+        fs::write(store.join("typodont-store#1"), b"half").unwrap();
+    };
+    leave_orphans("station-2");
+    assert!(sync(&cluster, "station-2", &copy, &address, "A").contains("1 already stored"));
+    assert_eq!(files_below(&store), stored);
+    cluster.ask("registrar", &["school", "erase", "anna", "--store", &address]);
+    assert_eq!(files_below(&store), BTreeSet::new());
+    leave_orphans("station-1");
+    assert!(sync(&cluster, "station-1", &own, &address, "A").contains("1 erased"));
+    assert_eq!(files_below(&store), BTreeSet::new());
+}
+
+#[test]
 fn a_file_goes_on_in_its_middle_after_a_kill() {
     // Aim: what is stored is not sent again. Method: a recording of six parts, the station killed after the first; the first part's
     // time is the same in the end. A part that was bent meanwhile is sent again.

@@ -7,7 +7,7 @@ use super::sync::SyncError;
 use crate::cli::CliError;
 use typodont_school::connection::DbConnection;
 use typodont_school::records::{confirm_store_marker, store_marker};
-use typodont_school::store::ObjectStoreHandle;
+use typodont_school::store::{ObjectStoreHandle, StoreError};
 
 /// Name of the object that holds the marker.
 const MARKER_OBJECT: &str = "typodont-store";
@@ -29,14 +29,25 @@ pub fn verify(connection: &mut DbConnection, store: &ObjectStoreHandle) -> Resul
 pub fn verify_or_create(connection: &mut DbConnection, store: &ObjectStoreHandle) -> Result<(), SyncError> {
     let (marker, is_marked) = connection.query_with_retry(store_marker)?;
     match store.get_if_present(MARKER_OBJECT)? {
+        // Nothing writes the marker any more: what is left of it is of a station that was stopped while it did.
+        Some(found) if found == marker.as_bytes() && is_marked => store.remove_partial_uploads(""),
         Some(found) if found == marker.as_bytes() => {}
-        None if !is_marked => store.put(MARKER_OBJECT, marker.into_bytes())?,
+        None if !is_marked => put_marker(store, &marker)?,
         found => return Err(SyncError::WrongStore(wrong_store_error(found.is_some()))),
     }
     if !is_marked {
         connection.query_with_retry(confirm_store_marker)?;
     }
     Ok(())
+}
+
+/// Writes the marker, which other stations may write at the same time.
+fn put_marker(store: &ObjectStoreHandle, marker: &str) -> Result<(), StoreError> {
+    let Err(error) = store.put(MARKER_OBJECT, marker.as_bytes().to_vec()) else { return Ok(()) };
+    match store.get_if_present(MARKER_OBJECT) {
+        Ok(Some(found)) if found == marker.as_bytes() => Ok(()),
+        _ => Err(error),
+    }
 }
 
 fn wrong_store_error(is_marked: bool) -> CliError {

@@ -115,9 +115,11 @@ pub fn run(arguments: Arguments) -> Result<(), CliError> {
     // Before anything is sent: an unreadable template is a mistake to be mended, not a reason to send unchecked bundles.
     let verifier = verification::verifier()?;
     let mut reported = BTreeSet::new();
+    let mut swept = BTreeSet::new();
     loop {
         let mut stats = SyncStats::default();
-        let sync_error = sync_once(arguments, &verifier, &mut connection, &store, &mut stats, &mut reported).err();
+        let (log, kept) = (&mut reported, &mut swept);
+        let sync_error = sync_once(arguments, &verifier, &mut connection, &store, &mut stats, log, kept).err();
         let words = describe(&stats);
         match sync_error {
             None if !stay && stats.refused == 0 => return print_line(words),
@@ -175,6 +177,7 @@ fn sync_once(
     store: &ObjectStoreHandle,
     stats: &mut SyncStats,
     reported: &mut BTreeSet<String>,
+    swept: &mut BTreeSet<String>,
 ) -> Result<(), SyncError> {
     let mut complain = |path: &Path, why: &str| {
         let text = format!(
@@ -193,7 +196,8 @@ fn sync_once(
         return Err(SyncError::UnknownClass);
     }
     store_marker::verify_or_create(connection, store)?;
-    let new = select_new(arguments, connection, stats, &found, &mut complain)?;
+    let mut orphans = OrphanSweep { store, station: &station, swept };
+    let new = select_new(arguments, connection, stats, &mut orphans, &found, &mut complain)?;
     let bar = progress_bar(new.len() as u64, "sent");
     // One after the other: the station's processors belong to the session that is running.
     for found in new {
@@ -220,11 +224,38 @@ fn sync_once(
     Ok(())
 }
 
+/// Folder of the store that holds a station's copy of a session.
+fn store_folder(station: &str, session: &SessionFile) -> String {
+    format!("{station}/{}", session_id(session))
+}
+
+/// Removal of parts to which no row refers: a station that is stopped after the upload, but before it learns that the
+/// session was erased or sent by another station, leaves them in the store.
+struct OrphanSweep<'a> {
+    store: &'a ObjectStoreHandle,
+    station: &'a str,
+    /// Folders that were searched; with `--stay` each is searched once.
+    swept: &'a mut BTreeSet<String>,
+}
+
+impl OrphanSweep<'_> {
+    /// Removes this station's parts of a session of which it has no row.
+    fn remove(&mut self, session: &SessionFile) -> Result<(), StoreError> {
+        let folder = store_folder(self.station, session);
+        if !self.swept.contains(&folder) {
+            self.store.remove_folder(&folder)?;
+            self.swept.insert(folder);
+        }
+        Ok(())
+    }
+}
+
 /// Bundles that the school does not yet have. Counts the others, and reports those that were changed or erased.
 fn select_new<'a>(
     arguments: &Arguments,
     connection: &mut DbConnection,
     stats: &mut SyncStats,
+    orphans: &mut OrphanSweep,
     all: &'a [LocalBundle],
     complain: &mut impl FnMut(&Path, &str),
 ) -> Result<Vec<&'a LocalBundle>, SyncError> {
@@ -239,18 +270,21 @@ fn select_new<'a>(
                 SyncStatus::New => new.push(found),
                 SyncStatus::Known => {
                     stats.known += 1;
-                    if written
-                        .get(&session_id(&found.session))
-                        .is_some_and(|digest| *digest != session_file_digest(&found.path))
-                    {
-                        complain(
+                    match written.get(&session_id(&found.session)) {
+                        Some(digest) if *digest != session_file_digest(&found.path) => complain(
                             &found.path,
-                            "changed: session.json differs from the version that was sent; the \
-                        version that was sent is valid",
-                        );
+                            "changed: session.json differs from the version that was sent; the version that was sent \
+                             is valid",
+                        ),
+                        Some(_) => {}
+                        // Another station sent the session.
+                        None => orphans.remove(&found.session)?,
                     }
                 }
-                SyncStatus::Erased => handle_erased(arguments, stats, found, complain),
+                SyncStatus::Erased => {
+                    orphans.remove(&found.session)?;
+                    handle_erased(arguments, stats, found, complain);
+                }
             }
         }
     }
@@ -303,7 +337,7 @@ fn upload_session(
     station: &str,
     found: &LocalBundle,
 ) -> Result<Result<InsertOutcome, String>, SyncError> {
-    let folder = format!("{station}/{}", session_id(&found.session));
+    let folder = store_folder(station, &found.session);
     let text = match typodont_formats::read_text(&found.path.join(typodont_report::bundle::SESSION_FILE)) {
         Ok(source) => source.text.clone(),
         Err(complaint) => return Ok(Err(complaint.message)),
