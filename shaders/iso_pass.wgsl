@@ -1,4 +1,5 @@
-// Surface of the carved tooth, found by a ray through each pixel. Compiled after view.wgsl and tooth.wgsl.
+// Surface of the carved tooth, found by a ray through each pixel. Compiled after view.wgsl,
+// relief.wgsl and tooth.wgsl.
 // CPU twin: src/render/cpu/iso_pass.rs.
 
 // Density at which matter begins.
@@ -94,6 +95,7 @@ fn iso_fragment(@builtin(position) pixel: vec4f) -> Seen {
     let downhill = -slope(at);
     let long = length(downhill);
     let normal = select(-normalize(way), downhill / max(long, 1e-9), long > 1e-6);
-    let colour = lit(finish(at), openness(at, normal), point, normal);
+    let seen = finish(at);
+    let colour = lit(seen, openness(at, normal), point, marked(at, point, normal, seen.a));
     return Seen(vec4f(screen(colour), 1.0), buffer_depth(z));
 }

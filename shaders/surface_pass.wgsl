@@ -1,4 +1,4 @@
-// Triangles shaded per pixel: solids, and the carved tooth as a mesh. Compiled after view.wgsl and tooth.wgsl.
+// Triangles shaded per pixel: solids, and the carved tooth as a mesh. Compiled after view.wgsl, relief.wgsl and tooth.wgsl.
 // CPU twin: src/render/cpu/surface_pass.rs.
 
 struct Solid {
@@ -13,6 +13,7 @@ struct Corner {
     @location(0) position: vec3f,
     // w: gloss.
     @location(1) normal: vec4f,
+    // w: stippling.
     @location(2) colour: vec4f,
 }
 
@@ -21,12 +22,15 @@ struct Varying {
     @location(0) point: vec3f,
     @location(1) normal: vec3f,
     @location(2) finish: vec4f,
+    // Place in the mesh's own space, mm; w: stippling.
+    @location(3) own: vec4f,
 }
 
 fn placed(corner: Corner, world_from_own: mat4x4f) -> Varying {
     let point = world_from_own * vec4f(corner.position, 1.0);
     let normal = (world_from_own * vec4f(corner.normal.xyz, 0.0)).xyz;
-    return Varying(view.clip_from_world * point, point.xyz, normal, vec4f(corner.colour.rgb, corner.normal.w));
+    let finish = vec4f(corner.colour.rgb, corner.normal.w);
+    return Varying(view.clip_from_world * point, point.xyz, normal, finish, vec4f(corner.position, corner.colour.w));
 }
 
 @vertex
@@ -39,6 +43,16 @@ fn solid_fragment(in: Varying) -> @location(0) vec4f {
     return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normalize(in.normal))), 1.0);
 }
 
+@fragment
+fn stippled_fragment(in: Varying) -> @location(0) vec4f {
+    var normal = normalize(in.normal);
+    if has_relief {
+        let gradient = stipple_gradient(in.own.xyz) * (in.own.w * resolved(in.point, STIPPLE_WIDTH));
+        normal = tilted(normal, (solid.world_from_solid * vec4f(gradient, 0.0)).xyz);
+    }
+    return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normal)), 1.0);
+}
+
 @vertex
 fn tooth_vertex(corner: Corner) -> Varying {
     return placed(corner, tooth.world_from_tooth);
@@ -48,7 +62,8 @@ fn tooth_vertex(corner: Corner) -> Varying {
 fn tooth_fragment(in: Varying) -> @location(0) vec4f {
     let normal = normalize(in.normal);
     let at = (tooth.voxel_from_world * vec4f(in.point, 1.0)).xyz;
-    return vec4f(screen(lit(finish(at), openness(at, normal), in.point, normal)), 1.0);
+    let seen = finish(at);
+    return vec4f(screen(lit(seen, openness(at, normal), in.point, marked(at, in.point, normal, seen.a))), 1.0);
 }
 
 // Behind everything: a triangle that covers the picture.

@@ -1,4 +1,4 @@
-// The carved tooth as a volume, for the passes that sample it. Compiled after view.wgsl.
+// The carved tooth as a volume, for the passes that sample it. Compiled after view.wgsl and relief.wgsl.
 // CPU twin: src/render/cpu/volume_sampler.rs. `at` is a place in voxel steps from the centre of the first voxel.
 
 struct Tooth {
@@ -108,6 +108,15 @@ fn openness(at: vec3f, normal: vec3f) -> f32 {
 fn finish(at: vec3f) -> vec4f {
     let cells = vec3f(textureDimensions(colours));
     return textureSampleLevel(colours, between, (at + 0.5) / (tooth.cells.x * cells), 0.0);
+}
+
+// Unit normal of a surface with the relief that belongs to its gloss.
+fn marked(at: vec3f, point: vec3f, normal: vec3f, gloss: f32) -> vec3f {
+    if !has_relief {
+        return normal;
+    }
+    let gradient = mark_gradient(at * tooth.spacing.xyz, gloss) * resolved(point, MARK_WIDTH.z);
+    return tilted(normal, (tooth.world_from_tooth * vec4f(gradient, 0.0)).xyz);
 }
 
 fn box_corner(index: u32) -> vec3f {

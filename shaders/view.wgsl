@@ -1,4 +1,4 @@
-// Uniform and functions of every pass: one eye, the lamps, and the lighting. CPU twin: src/render/cpu/light.rs.
+// Uniform and functions of every pass: one eye, the lamps, and the lighting. CPU twin: src/render/shading.rs.
 // Colours are sRGB, 0 to 1; lengths in mm; world space.
 
 struct Lamp {

@@ -8,7 +8,7 @@ use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::{Scenario, Stage, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::Diagnostic;
-use typodont_render::{EnamelDepth, LabelPalette, MeshInstance, RenderMode, TransferFunction};
+use typodont_render::{LabelPalette, MeshInstance, RenderMode, TransferFunction, UnworkedTooth};
 use typodont_scene::particles;
 use typodont_scene::particles::ParticleField;
 use typodont_scene::{self as scene, ContraAngle, GreyVolume, Mouth};
@@ -46,7 +46,7 @@ pub struct LessonScene {
     /// Bricks of the volume that were edited and are not drawn yet, in ascending order.
     pub undrawn: Vec<usize>,
     histogram: OnceCell<DensityHistogram>,
-    enamel_depth: OnceCell<EnamelDepth>,
+    unworked_tooth: OnceCell<UnworkedTooth>,
     pub transfer_function: TransferFunctionDraft,
     presets: TransferFunctionPresets,
 }
@@ -73,10 +73,13 @@ impl LessonScene {
             true => Some(particles::saliva_ejector(&workpiece)).unzip(),
             false => (None, None),
         };
+        let pulp =
+            tissues.entries().iter().find(|entry| entry.role == TissueRole::Vulnerable).map(|entry| entry.label());
+        let pulp = pulp.filter(|&label| volume.tissues().any(|tissue| tissue == label));
         let grey_volume = grey_volume(&workpiece, &volume, tissues, is_decay_shown);
         let built = LessonScene {
             histogram: OnceCell::new(),
-            enamel_depth: OnceCell::new(),
+            unworked_tooth: OnceCell::new(),
             transfer_function: match grey_volume {
                 Some(_) => TransferFunctionDraft::straight_line(&palette),
                 None => TransferFunctionDraft::new(TransferFunction::tissue(&palette)),
@@ -91,7 +94,8 @@ impl LessonScene {
             },
             mouth,
             mouth_opening: scene::WORKING_OPENING_DEG,
-            particles: options.is_any().then(|| ParticleField::new(options, &scenario.instruments, suction_inlet)),
+            particles: (options.is_any() || pulp.is_some())
+                .then(|| ParticleField::new(options, &scenario.instruments, suction_inlet, pulp)),
             ejector,
             instruments,
             head_radii: scenario.instruments.iter().map(|entry| entry.to_instrument().head_radius()).collect(),
@@ -104,11 +108,10 @@ impl LessonScene {
         (built, complaints.iter().flatten().map(Diagnostic::headline).collect())
     }
 
-    /// Thickness of the enamel before the session, where dentine shines through it; measured at the first call. `tissues`: those
+    /// The tooth before anybody worked on it, by which its enamel and its cuts are drawn; measured at the first call. `tissues`: those
     /// of the exercise.
-    pub fn enamel_depth(&self, tissues: &TissueTable) -> Option<&EnamelDepth> {
-        let is_seen = self.palette.under_translucent.is_some();
-        is_seen.then(|| self.enamel_depth.get_or_init(|| scene::enamel_depth(&self.workpiece.volume, tissues)))
+    pub fn unworked_tooth(&self, tissues: &TissueTable) -> &UnworkedTooth {
+        self.unworked_tooth.get_or_init(|| scene::unworked_tooth(&self.workpiece, tissues))
     }
 
     /// Applies an edit of the session to the window's own copy of the volume.

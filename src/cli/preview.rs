@@ -87,7 +87,7 @@ fn draw_preview(arguments: &Arguments, output: &Path) -> Result<(), CliError> {
 /// Renders the trainee's first view, on a graphics adapter or else in software.
 fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bool) -> Result<RgbaImage, CliError> {
     let palette = scene::tissue_palette(&scenario.tissues, true);
-    let enamel_depth = scene::enamel_depth(&workpiece.volume, &scenario.tissues);
+    let unworked_tooth = scene::unworked_tooth(workpiece, &scenario.tissues);
     let mouth = Mouth::around(workpiece, &scenario.tissues).filter(|_| is_in_mouth);
     let around = || scene::surrounding_solids(workpiece, &scenario.tissues);
     let orbit = scene::work_view(workpiece);
@@ -98,7 +98,7 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
             changes: Changes::All,
             world_from_tooth: workpiece.world_from_tooth,
             palette: &palette,
-            enamel_depth: Some(&enamel_depth),
+            unworked_tooth: Some(&unworked_tooth),
             mode: RenderMode::Iso,
         }),
         solids: mouth.map_or_else(around, |mouth| {
@@ -108,6 +108,7 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
         }),
         lights: Lights::along(&viewpoint),
         shadows: Some(scene::shadow_region(workpiece, &orbit)),
+        has_relief: true,
         ..RenderScene::empty()
     };
     let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();

@@ -33,7 +33,7 @@ impl FxaaPass {
             depth: DepthMode::None,
             format: Some(format),
             blend: None,
-            has_shadows: false,
+            detail: passes::Detail::default(),
         };
         FxaaPass { pipeline: pass.build(device), layout }
     }

@@ -1,6 +1,6 @@
 //! Traced isosurface of the carved tooth: one ray through each pixel.
 
-use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
+use super::passes::{self, DepthMode, Detail, DrawnFaces, PipelineDesc};
 
 pub const SOURCE: &str = include_str!("../../shaders/iso_pass.wgsl");
 
@@ -12,7 +12,7 @@ pub fn pipeline(
     format: wgpu::TextureFormat,
     view: &wgpu::BindGroupLayout,
     tooth: &wgpu::BindGroupLayout,
-    has_shadows: bool,
+    detail: Detail,
 ) -> wgpu::RenderPipeline {
     let module = passes::shader_module(device, "iso_pass", &passes::full_source(SOURCE));
     PipelineDesc {
@@ -26,7 +26,7 @@ pub fn pipeline(
         depth: DepthMode::ReadWrite,
         format: Some(format),
         blend: None,
-        has_shadows,
+        detail,
     }
     .build(device)
 }

@@ -38,7 +38,7 @@
 //!         changes: Changes::Bricks(&changed),
 //!         world_from_tooth: Pose::IDENTITY,
 //!         palette,
-//!         enamel_depth: None,
+//!         unworked_tooth: None,
 //!         mode: RenderMode::Iso,
 //!     }),
 //!     ..RenderScene::empty()
@@ -55,7 +55,7 @@ mod brick_surfaces;
 mod camera;
 mod drawn_volume;
 mod empty_space;
-mod enamel_depth;
+mod enamel_colours;
 mod error;
 mod eye;
 #[cfg(feature = "gpu")]
@@ -71,6 +71,7 @@ mod mirror;
 #[cfg(feature = "gpu")]
 mod mirror_pass;
 mod offscreen;
+mod relief;
 #[cfg(feature = "gpu")]
 mod passes;
 #[cfg(feature = "gpu")]
@@ -96,6 +97,7 @@ mod surface_pass;
 #[cfg(feature = "gpu")]
 mod tooth;
 pub mod transfer_function;
+mod unworked_tooth;
 mod vertex;
 #[cfg(feature = "gpu")]
 mod view;
@@ -104,7 +106,6 @@ mod volume_pass;
 pub mod cpu;
 
 pub use camera::{Orbit, Quadrant, Viewpoint};
-pub use enamel_depth::EnamelDepth;
 pub use error::RenderError;
 pub use eye::{Eye, FrustumWindow};
 #[cfg(feature = "gpu")]
@@ -113,11 +114,12 @@ pub use gpu::{DeviceErrorListener, Gpu};
 pub use gpu_offscreen::GpuOffscreenRenderer;
 pub use mirror::PlaneMirror;
 pub use offscreen::OffscreenRenderer;
+pub use relief::marked_normal;
 #[cfg(feature = "gpu")]
 pub use renderer::{RenderTarget, Renderer};
 pub use scene::{
     Appearance, Background, Changes, LabelPalette, Lamp, Lights, MeshInstance, Particle, RenderMode, RenderScene, Rgb,
-    ShadowRegion, VolumeInstance,
+    ShadowRegion, VertexTint, VolumeInstance,
 };
 pub use shading::LitPoint;
 pub use stereo::{Stereo, StereoLayout};
@@ -126,6 +128,7 @@ pub use surface_colours::SurfaceColours;
 pub use tooth::Uploads;
 pub use transfer_function::{TransferFunction, TransferTable};
 pub use typodont_core::image::RgbaImage;
+pub use unworked_tooth::UnworkedTooth;
 
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;

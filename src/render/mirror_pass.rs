@@ -43,7 +43,7 @@ impl MirrorPass {
             depth: DepthMode::ReadWrite,
             format: Some(format),
             blend: None,
-            has_shadows: false,
+            detail: passes::Detail::default(),
         };
         let uniform = resources::uniform_buffer(device, "mirror", size_of::<gpu::MirrorUniform>());
         MirrorPass { pipeline: pass.build(device), layout, uniform }

@@ -1,6 +1,6 @@
 //! Particles, which are dust and water: balls and discs, with a ray through each pixel.
 
-use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
+use super::passes::{self, DepthMode, Detail, DrawnFaces, PipelineDesc};
 use super::scene::Particle;
 use std::ops::Range;
 use typodont_core::frame::Vec3;
@@ -42,7 +42,7 @@ impl ParticlePass {
         device: &wgpu::Device,
         format: wgpu::TextureFormat,
         view: &wgpu::BindGroupLayout,
-        has_shadows: bool,
+        detail: Detail,
     ) -> ParticlePass {
         let module = passes::shader_module(device, "particle_pass", &passes::full_source(SOURCE));
         let attributes = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4, 2 => Float32x4];
@@ -65,7 +65,7 @@ impl ParticlePass {
                 depth,
                 format: Some(format),
                 blend,
-                has_shadows,
+                detail,
             }
             .build(device)
         };

@@ -1,6 +1,6 @@
 //! Construction of a pass's pipeline from its shaders, bind groups, target and depth mode.
 
-use super::{tooth, view};
+use super::{relief, tooth, view};
 
 /// Format of every depth buffer.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -20,8 +20,29 @@ pub struct PipelineDesc<'a> {
     /// Format of the colours; `None` if depths alone are drawn.
     pub format: Option<wgpu::TextureFormat>,
     pub blend: Option<wgpu::BlendState>,
-    /// True if the fragment shader reads the shadow map.
+    pub detail: Detail,
+}
+
+/// Detail that the fragment shaders of a scene draw: each part costs time even where nothing of it is seen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Detail {
+    /// Shadows of the chair lamp.
     pub has_shadows: bool,
+    /// Fine relief of surfaces.
+    pub has_relief: bool,
+}
+
+impl Detail {
+    /// Constants of the shaders, beside their defaults.
+    fn constants(self) -> &'static [(&'static str, f64)] {
+        const ALL: [(&str, f64); 2] = [("has_shadows", 1.0), ("has_relief", 1.0)];
+        match (self.has_shadows, self.has_relief) {
+            (true, true) => &ALL,
+            (true, false) => &ALL[..1],
+            (false, true) => &ALL[1..],
+            (false, false) => &[],
+        }
+    }
 }
 
 /// Faces of triangles that are drawn.
@@ -82,7 +103,7 @@ impl PipelineDesc<'_> {
                 module: self.module,
                 entry_point: Some(fragment),
                 compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: if self.has_shadows { &[("has_shadows", 1.0)] } else { &[] },
+                    constants: self.detail.constants(),
                     ..Default::default()
                 },
                 targets,
@@ -103,7 +124,7 @@ impl PipelineDesc<'_> {
 
 /// Returns the source of a pass's shader, preceded by the common sources that it builds on.
 pub fn full_source(own: &str) -> String {
-    [view::SOURCE, tooth::SOURCE, own].concat()
+    [view::SOURCE, relief::SOURCE, tooth::SOURCE, own].concat()
 }
 
 pub fn shader_module(device: &wgpu::Device, label: &str, source: &str) -> wgpu::ShaderModule {

@@ -9,7 +9,7 @@ use super::fxaa_pass::FxaaPass;
 use super::mirror;
 use super::mirror_pass::MirrorPass;
 use super::particle_pass::ParticlePass;
-use super::passes::DEPTH;
+use super::passes::{DEPTH, Detail};
 use super::scene::{Background, Changes, RenderMode, RenderScene, VolumeInstance};
 use super::shadow;
 use super::shadow_pass::{ShadowMap, ShadowPass};
@@ -34,8 +34,8 @@ pub struct Renderer {
     fxaa_pass: FxaaPass,
     stereo_pass: StereoPass,
     mirror_pass: MirrorPass,
-    /// True while the pipelines read the shadow map.
-    has_shadows: bool,
+    /// Detail that the pipelines draw.
+    detail: Detail,
     /// Present once a scene has had shadows.
     shadow_pass: Option<ShadowPass>,
     no_shadows: ShadowMap,
@@ -104,10 +104,10 @@ impl Renderer {
         let tooth_layout = ToothTextures::layout(device);
         let [lamp_view, left, right] = [0; 3].map(|_| ViewBindings::new(device, &view_layout, &no_shadows));
         Renderer {
-            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout, false),
-            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout, false),
-            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, false),
-            particle_pass: ParticlePass::new(device, format, &view_layout, false),
+            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout, Detail::default()),
+            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout, Detail::default()),
+            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, Detail::default()),
+            particle_pass: ParticlePass::new(device, format, &view_layout, Detail::default()),
             fxaa_pass: FxaaPass::new(device, format),
             stereo_pass: StereoPass::new(device, format),
             mirror_pass: MirrorPass::new(device, format, &view_layout),
@@ -116,7 +116,7 @@ impl Renderer {
             queue: queue.clone(),
             format,
             tooth_layout,
-            has_shadows: false,
+            detail: Detail::default(),
             shadow_pass: None,
             no_shadows,
             lamp_view,
@@ -144,7 +144,7 @@ impl Renderer {
     ) -> Result<Uploads, RenderError> {
         let limit = self.device.limits().max_texture_dimension_2d;
         validate(scene, viewpoint, stereo, target.size, limit)?;
-        self.fit_shadows(scene);
+        self.fit_detail(scene);
         let uploads = self.prepare(scene);
         let [width, height] = target.size;
         let aspect = width as f32 / height as f32;
@@ -173,21 +173,21 @@ impl Renderer {
         Ok(uploads)
     }
 
-    /// Changes to pipelines with or without shadows as the scene needs, and creates the shadow map when it is first needed.
-    fn fit_shadows(&mut self, scene: &RenderScene) {
-        let has_shadows = shadow::chair_eye(scene).is_some();
-        if has_shadows == self.has_shadows {
+    /// Changes to the pipelines for a scene's detail, and creates the shadow map when it is first needed.
+    fn fit_detail(&mut self, scene: &RenderScene) {
+        let detail = Detail { has_shadows: shadow::chair_eye(scene).is_some(), has_relief: scene.has_relief };
+        if detail == self.detail {
             return;
         }
-        self.has_shadows = has_shadows;
+        self.detail = detail;
         let (device, format, view, tooth) = (&self.device, self.format, &self.view_layout, &self.tooth_layout);
-        self.surface_pass = SurfacePass::new(device, format, view, tooth, has_shadows);
-        self.iso_pass = iso_pass::pipeline(device, format, view, tooth, has_shadows);
-        self.volume_pass = VolumePass::new(device, format, view, tooth, has_shadows);
-        self.particle_pass = ParticlePass::new(device, format, view, has_shadows);
+        self.surface_pass = SurfacePass::new(device, format, view, tooth, detail);
+        self.iso_pass = iso_pass::pipeline(device, format, view, tooth, detail);
+        self.volume_pass = VolumePass::new(device, format, view, tooth, detail);
+        self.particle_pass = ParticlePass::new(device, format, view, detail);
         // Their bind groups are of the passes that are gone.
         (self.eye_targets, self.mirror_targets) = ([None, None], [None, None]);
-        if self.shadow_pass.is_none() {
+        if detail.has_shadows && self.shadow_pass.is_none() {
             let pass = ShadowPass::new(device, view, tooth, &self.surface_pass.layout);
             self.views = [0; 2].map(|_| ViewBindings::new(device, view, &pass.map));
             self.shadow_pass = Some(pass);

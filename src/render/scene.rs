@@ -1,9 +1,9 @@
 //! A scene as plain data: the carved tooth, other meshes, particles, lamps and a background.
 
 use super::camera::Viewpoint;
-use super::enamel_depth::EnamelDepth;
 use super::mirror::PlaneMirror;
 use super::transfer_function::TransferFunction;
+use super::unworked_tooth::UnworkedTooth;
 use std::sync::Arc;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
@@ -27,6 +27,8 @@ pub struct RenderScene<'a> {
     pub lights: Lights,
     /// Region in which the chair lamp casts shadows; `None` for no shadows.
     pub shadows: Option<ShadowRegion>,
+    /// True when fine relief is drawn: stippled gingiva, and the marks of burs where a tooth is dull.
+    pub has_relief: bool,
     pub background: Background,
     /// True when the finished image is antialiased.
     pub is_antialiased: bool,
@@ -43,6 +45,7 @@ impl RenderScene<'_> {
             mirror: None,
             lights: Lights::default(),
             shadows: None,
+            has_relief: false,
             background: Background::default(),
             is_antialiased: false,
         }
@@ -57,9 +60,9 @@ pub struct VolumeInstance<'a> {
     pub changes: Changes<'a>,
     pub world_from_tooth: Pose,
     pub palette: &'a LabelPalette,
-    /// Thickness of its enamel before it was worked on: dentine shines through it if the palette says what colour that has.
-    /// Another one is used only after [`Changes::All`] or with another palette.
-    pub enamel_depth: Option<&'a EnamelDepth>,
+    /// The tooth before it was worked on: dentine shines through thin enamel if the palette says what colour it has, and what is
+    /// cut is dull. Another one is used only after [`Changes::All`] or with another palette.
+    pub unworked_tooth: Option<&'a UnworkedTooth>,
     pub mode: RenderMode,
 }
 
@@ -90,6 +93,8 @@ pub struct LabelPalette {
     pub appearances: [Appearance; 256],
     /// True for labels that are drawn as decay, with a soft border.
     pub is_decay: [bool; 256],
+    /// True for hard tissue, which is duller where it is cut.
+    pub dulls_when_cut: [bool; 256],
     /// Label of the translucent tissue, enamel: decay near its surface is seen as a white spot, and the tissue beneath shines
     /// through.
     pub translucent: Option<Label>,
@@ -101,7 +106,13 @@ impl LabelPalette {
     /// Builds a palette with one colour per label and the same gloss for all, without decay.
     pub fn from_colours(colour: impl Fn(Label) -> Rgb, gloss: f32) -> LabelPalette {
         let appearances = std::array::from_fn(|l| Appearance { colour: colour(Label(l as u8)), gloss });
-        LabelPalette { appearances, is_decay: [false; 256], translucent: None, under_translucent: None }
+        LabelPalette {
+            appearances,
+            is_decay: [false; 256],
+            dulls_when_cut: [false; 256],
+            translucent: None,
+            under_translucent: None,
+        }
     }
 
     pub fn appearance(&self, label: Label) -> Appearance {
@@ -118,13 +129,31 @@ pub struct Appearance {
     pub gloss: f32,
 }
 
+/// Difference of a place of a mesh from the rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexTint {
+    /// Multiplied with the colour of the mesh's appearance.
+    pub colour: Rgb,
+    /// Share of the stippling of gingiva, 0 to 1; drawn where a scene has relief.
+    pub stippling: f32,
+}
+
+impl VertexTint {
+    /// White and smooth.
+    pub const NONE: VertexTint = VertexTint::smooth([1.0; 3]);
+
+    pub const fn smooth(colour: Rgb) -> VertexTint {
+        VertexTint { colour, stippling: 0.0 }
+    }
+}
+
 /// A closed surface that is not carved: gingiva, palate, another tooth, an instrument.
 #[derive(Clone, Debug)]
 pub struct MeshInstance {
     /// Shared, so that a renderer keeps the uploaded mesh for as long as scenes refer to it.
     pub mesh: Arc<Mesh>,
-    /// One colour per position of the mesh, multiplied with the colour of `appearance`. Empty: white everywhere.
-    pub vertex_colours: Arc<Vec<Rgb>>,
+    /// One per position of the mesh. Empty: white and smooth everywhere.
+    pub vertex_tints: Arc<Vec<VertexTint>>,
     pub world_from_solid: Pose,
     pub appearance: Appearance,
     /// False for what would block the lamp only because the lamp is not aimed as a dentist would aim it.
@@ -134,7 +163,7 @@ pub struct MeshInstance {
 impl MeshInstance {
     /// Creates an instance of one colour.
     pub fn plain(mesh: Arc<Mesh>, world_from_solid: Pose, appearance: Appearance) -> MeshInstance {
-        MeshInstance { mesh, vertex_colours: Arc::default(), world_from_solid, appearance, casts_shadow: true }
+        MeshInstance { mesh, vertex_tints: Arc::default(), world_from_solid, appearance, casts_shadow: true }
     }
 }
 

@@ -63,7 +63,7 @@ impl ShadowPass {
                 depth: DepthMode::ReadWrite,
                 format: None,
                 blend: None,
-                has_shadows: false,
+                detail: passes::Detail::default(),
             }
             .build(device)
         };

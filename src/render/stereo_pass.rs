@@ -45,7 +45,7 @@ impl StereoPass {
             depth: DepthMode::None,
             format: Some(format),
             blend: None,
-            has_shadows: false,
+            detail: passes::Detail::default(),
         };
         let pipeline = pass.build(device);
         let uniform = resources::uniform_buffer(device, "stereo", size_of::<gpu::StereoUniform>());

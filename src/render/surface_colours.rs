@@ -4,8 +4,10 @@
 //! the renderers interpolate. Decay has a soft border: from sound tissue over a white spot (in enamel) and amber to its own
 //! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
 
-use super::enamel_depth::EnamelLayers;
+use super::enamel_colours::EnamelLayers;
+use super::relief::GROUND;
 use super::scene::{Appearance, LabelPalette, VolumeInstance};
+use super::unworked_tooth::UnworkedTooth;
 use typodont_core::frame::{Vec3, smooth_step};
 use typodont_core::parallel::par_map;
 use typodont_core::volume::{BRICK, Density, Label, Volume};
@@ -32,8 +34,12 @@ const WINDOW: usize = BRICK as usize + 2 * REACH;
 
 /// Colours of decay's border: the white spot of demineralised enamel, which scatters more than sound enamel and is that share nearer
 /// to white, and the amber of firm, discoloured tissue. Chosen by eye on the fixed scenes; no published source.
-const WHITE_SPOT: f32 = 0.55;
+const WHITE_SPOT: f32 = 0.385;
 const AMBER: Vec3 = Vec3::new(0.80, 0.60, 0.33);
+
+/// Gloss of hard tissue where it is cut, and the depths under the tooth's own surface, mm, between which it is taken for cut.
+const CUT_GLOSS: f32 = GROUND;
+const CUT_DEPTHS: [f32; 2] = [0.15, 0.4];
 
 /// Distance between the values of the noise that mottles decay, mm.
 const MOTTLE: [f32; 2] = [0.55, 0.21];
@@ -58,6 +64,8 @@ struct Matter {
     sound_amount: f32,
     /// Amount of enamel in it.
     enamel: f32,
+    /// Gloss that it loses where it is cut.
+    dulling: f32,
     /// Colour and gloss of decayed matter, and its amount.
     decay: [f32; 4],
     decay_amount: f32,
@@ -71,6 +79,7 @@ impl Matter {
         }
         self.sound_amount += other.sound_amount * weight;
         self.enamel += other.enamel * weight;
+        self.dulling += other.dulling * weight;
         self.decay_amount += other.decay_amount * weight;
     }
 
@@ -244,23 +253,22 @@ impl SurfaceColours {
         let grid = volume.grid();
         let edge = self.cell_voxels as f32;
         let in_tooth = |cell: Vec3| grid.origin + (cell * edge + 0.5 * (edge - 1.0)) * grid.spacing;
-        let enamel = mixer.enamel.as_ref().zip(tooth.enamel_depth);
         if let Some(Label(sole)) = window.sole_label.filter(|_| !window.has_decay) {
             let matter = &mixer.matter[usize::from(sole)];
-            return match enamel.filter(|_| matter.enamel > 0.0) {
+            return match tooth.unworked_tooth.filter(|_| mixer.depends_on_place(matter)) {
                 None => vec![texel(matter.sound, 1.0); count],
-                Some((enamel, depth)) => {
-                    let seen = |i: usize| enamel.seen_through(matter, depth.at(in_tooth(cell_at(i))));
+                Some(unworked) => {
+                    let seen = |i: usize| mixer.seen_at(matter, unworked, in_tooth(cell_at(i)));
                     (0..count).map(|i| texel(seen(i).sound, 1.0)).collect()
                 }
             };
         }
         let mut narrow = blurred(&window.cells, size, &NARROW);
         let mut wide = window.has_decay.then(|| blurred(&window.cells, size, &WIDE));
-        if let Some((enamel, depth)) = enamel {
+        if let Some(unworked) = tooth.unworked_tooth {
             let all = narrow.iter_mut().enumerate().chain(wide.iter_mut().flatten().enumerate());
-            for (i, matter) in all.filter(|(_, matter)| matter.enamel > 0.0) {
-                *matter = enamel.seen_through(matter, depth.at(in_tooth(cell_at(i))));
+            for (i, matter) in all.filter(|(_, matter)| mixer.depends_on_place(matter)) {
+                *matter = mixer.seen_at(matter, unworked, in_tooth(cell_at(i)));
             }
         }
         let mut texels = Vec::with_capacity(count);
@@ -360,16 +368,33 @@ impl TranslucentEnamel {
 }
 
 impl Mixer {
+    /// True if matter looks different where enamel is thin, or where it is cut.
+    fn depends_on_place(&self, matter: &Matter) -> bool {
+        matter.dulling > 0.0 || matter.enamel > 0.0 && self.enamel.is_some()
+    }
+
+    /// Matter as it looks at a place in tooth space: its enamel as thick as it is there, and dull where it is cut.
+    fn seen_at(&self, matter: &Matter, unworked: &UnworkedTooth, place: Vec3) -> Matter {
+        let mut seen = match &self.enamel {
+            Some(enamel) if matter.enamel > 0.0 => enamel.seen_through(matter, unworked.enamel_under(place)),
+            _ => *matter,
+        };
+        if matter.dulling > 0.0 {
+            seen.sound[3] -= matter.dulling * rise(CUT_DEPTHS[0], CUT_DEPTHS[1], unworked.depth_of(place));
+        }
+        seen
+    }
+
     fn new(palette: &LabelPalette) -> Mixer {
         let look = |label: u8| {
             let index = usize::from(label);
-            (palette.appearances[index], palette.is_decay[index])
+            (palette.appearances[index], palette.is_decay[index], palette.dulls_when_cut[index])
         };
         let all = || 1..=u8::MAX;
         let alike = all().map(|label| Label(all().find(|&other| look(other) == look(label)).unwrap_or(label)));
         let translucent = palette.translucent.map(|Label(label)| look(label));
         let matter = |label: u8| {
-            let (Appearance { colour: [r, g, b], gloss }, is_decay) = look(label);
+            let (Appearance { colour: [r, g, b], gloss }, is_decay, is_dulled) = look(label);
             let own = [r, g, b, gloss];
             match is_decay {
                 true => Matter { decay: own, decay_amount: 1.0, ..Matter::default() },
@@ -377,6 +402,7 @@ impl Mixer {
                     sound: own,
                     sound_amount: 1.0,
                     enamel: if translucent == Some(look(label)) { 1.0 } else { 0.0 },
+                    dulling: if is_dulled { (gloss - CUT_GLOSS).max(0.0) } else { 0.0 },
                     ..Matter::default()
                 },
             }
@@ -443,7 +469,7 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
         None => (decay, decay_gloss),
     };
     let enamel = wide.enamel / wide.sound_amount.max(1e-6);
-    let spot = sound.lerp(Vec3::ONE, 0.7 * WHITE_SPOT * enamel.min(1.0));
+    let spot = sound.lerp(Vec3::ONE, WHITE_SPOT * enamel.min(1.0));
     let amber = decay.lerp(AMBER, 0.6);
     let colour = sound
         .lerp(spot, rise(0.02, 0.2, uneven))
@@ -490,7 +516,6 @@ fn lattice_value([x, y, z]: [u32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::enamel_depth::EnamelDepth;
     use crate::scene::{Changes, RenderMode};
     use typodont_core::frame::{Pose, Vec3};
     use typodont_core::volume::{Grid, Voxel};
@@ -504,16 +529,17 @@ mod tests {
         palette.is_decay[usize::from(DECAY.0)] = true;
         palette.translucent = Some(Label(1));
         palette.under_translucent = Some([0.8, 0.7, 0.5]);
+        palette.dulls_when_cut = std::array::from_fn(|label| Label(label as u8) != DECAY);
         palette
     }
 
-    fn tooth<'a>(volume: &'a Volume, palette: &'a LabelPalette, depth: &'a EnamelDepth) -> VolumeInstance<'a> {
+    fn tooth<'a>(volume: &'a Volume, palette: &'a LabelPalette, unworked: &'a UnworkedTooth) -> VolumeInstance<'a> {
         VolumeInstance {
             volume,
             changes: Changes::All,
             world_from_tooth: Pose::IDENTITY,
             palette,
-            enamel_depth: Some(depth),
+            unworked_tooth: Some(unworked),
             mode: RenderMode::Surface,
         }
     }
@@ -536,7 +562,7 @@ mod tests {
         for spacing in [0.2, 0.06, 0.03] {
             let mut volume = ball(spacing);
             let palette = palette();
-            let depth = EnamelDepth::of(&volume, |label| label == DENTINE);
+            let depth = UnworkedTooth::of(&volume, &[DENTINE]);
             let mut colours = SurfaceColours::new(&tooth(&volume, &palette, &depth));
             for cell in [[26, 23, 40], [26, 24, 39], [27, 24, 38], [26, 23, 31], [8, 23, 22]] {
                 volume.set_cell(cell, Voxel::AIR);
@@ -571,7 +597,7 @@ mod tests {
             LabelPalette::from_colours(|l| if l == DENTINE { [0.8, 0.7, 0.5] } else { [0.95, 0.94, 0.9] }, 0.2);
         palette.translucent = Some(Label(1));
         palette.under_translucent = Some([0.8, 0.7, 0.5]);
-        let depth = EnamelDepth::of(&volume, |label| label == DENTINE);
+        let depth = UnworkedTooth::of(&volume, &[DENTINE]);
         let colours = SurfaceColours::new(&tooth(&volume, &palette, &depth));
         let blue: Vec<f32> = (0..50)
             .map(|i| colours.at(grid.from_tooth(Vec3::new(-2.5 + 0.1 * i as f32, 0.0, 1.0))).colour[2])
@@ -580,7 +606,7 @@ mod tests {
         assert!(blue[0] < 0.51 && blue[49] > 0.82, "{blue:?}");
         // Without the depth, or where the palette hides what is under enamel, all enamel has one colour.
         let without_depth =
-            SurfaceColours::new(&VolumeInstance { enamel_depth: None, ..tooth(&volume, &palette, &depth) });
+            SurfaceColours::new(&VolumeInstance { unworked_tooth: None, ..tooth(&volume, &palette, &depth) });
         palette.under_translucent = None;
         let hidden = SurfaceColours::new(&tooth(&volume, &palette, &depth));
         assert!(colours.has_palette(&palette) != hidden.has_palette(&palette));
@@ -599,7 +625,7 @@ mod tests {
         let colour = |above: Label| {
             let label = |p: Vec3| if p.z > 0.0 { above } else { DENTINE };
             let volume = Volume::from_distance(grid, 1.5 * spacing, |p| (p.z - 0.02, label(p)));
-            let depth = EnamelDepth::of(&volume, |label| label == DENTINE);
+            let depth = UnworkedTooth::of(&volume, &[DENTINE]);
             SurfaceColours::new(&tooth(&volume, &palette, &depth)).at(grid.from_tooth(Vec3::new(0.0, 0.0, 0.02)))
         };
         let (cut, sound) = (Vec3::from(colour(DECAY).colour), Vec3::from(colour(DENTINE).colour));
@@ -614,5 +640,23 @@ mod tests {
         assert!((values.iter().sum::<f32>() / values.len() as f32).abs() < 0.05);
         assert!(values.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.12));
         assert!(values.iter().any(|v| *v > 0.4) && values.iter().any(|v| *v < -0.4));
+    }
+
+    #[test]
+    fn cut_tissue_is_dull_and_the_tooth_s_own_surface_is_not() {
+        // Aim: gloss tells a cut from what nobody touched. Method: a block of enamel of 4 mm with a pit of 1.5 mm in its top.
+        let grid = Grid::centred([60, 60, 60], Vec3::splat(0.1));
+        let block = |p: Vec3| (p.abs() - 2.0).max_element();
+        let whole = Volume::from_distance(grid, 0.2, |p| (block(p), Label(1)));
+        let pit = |p: Vec3| 1.5 - p.distance(Vec3::Z * 2.0);
+        let cut = Volume::from_distance(grid, 0.2, |p| (block(p).max(pit(p)), Label(1)));
+        let unworked = UnworkedTooth::of(&whole, &[DENTINE]);
+        let palette = palette();
+        let colours = SurfaceColours::new(&tooth(&cut, &palette, &unworked));
+        let gloss = |p: Vec3| colours.at(grid.from_tooth(p)).gloss;
+        assert!((gloss(Vec3::new(0.0, 0.0, 0.5)) - CUT_GLOSS).abs() < 0.005, "{}", gloss(Vec3::new(0.0, 0.0, 0.5)));
+        for own in [Vec3::new(1.9, 0.0, 2.0), Vec3::new(2.0, 0.3, -0.4), Vec3::new(-0.2, 2.0, 0.5)] {
+            assert!((gloss(own) - 0.2).abs() < 0.01, "{own}: {}", gloss(own));
+        }
     }
 }

@@ -2,9 +2,9 @@
 
 use super::eye::Eye;
 use super::mesh_parts::MeshParts;
-use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
+use super::passes::{self, DepthMode, Detail, DrawnFaces, PipelineDesc};
 use super::resources;
-use super::scene::{MeshInstance, Rgb};
+use super::scene::{MeshInstance, VertexTint};
 use super::surface_mesh;
 use super::vertex::Vertex;
 use std::sync::Arc;
@@ -29,6 +29,8 @@ pub struct SurfacePass {
     pub background: wgpu::RenderPipeline,
     pub tooth: wgpu::RenderPipeline,
     solid: wgpu::RenderPipeline,
+    /// For meshes with stippling; `None` without relief.
+    stippled: Option<wgpu::RenderPipeline>,
     pub layout: wgpu::BindGroupLayout,
     cached_meshes: Vec<CachedMesh>,
     /// One entry per mesh instance of a scene, in its order.
@@ -38,10 +40,11 @@ pub struct SurfacePass {
 /// An uploaded mesh, kept for as long as scenes refer to it.
 struct CachedMesh {
     mesh: Arc<Mesh>,
-    vertex_colours: Arc<Vec<Rgb>>,
+    vertex_tints: Arc<Vec<VertexTint>>,
     parts: MeshParts,
     vertices: wgpu::Buffer,
     indices: wgpu::Buffer,
+    is_stippled: bool,
     is_used: bool,
 }
 
@@ -60,7 +63,7 @@ impl SurfacePass {
         format: wgpu::TextureFormat,
         view: &wgpu::BindGroupLayout,
         tooth: &wgpu::BindGroupLayout,
-        has_shadows: bool,
+        detail: Detail,
     ) -> SurfacePass {
         let module = passes::shader_module(device, "surface_pass", &passes::full_source(SOURCE));
         let layout = resources::layout(device, "solid", &[resources::uniform()]);
@@ -78,7 +81,7 @@ impl SurfacePass {
                 depth,
                 format: Some(format),
                 blend,
-                has_shadows,
+                detail,
             }
             .build(device)
         };
@@ -94,6 +97,9 @@ impl SurfacePass {
                 DepthMode::Disabled,
             ),
             tooth: pass("tooth", "tooth_vertex", "tooth_fragment", &with_tooth, &corners, DepthMode::ReadWrite),
+            stippled: detail.has_relief.then(|| {
+                pass("stippled", "solid_vertex", "stippled_fragment", &with_solid, &corners, DepthMode::ReadWrite)
+            }),
             solid: pass("solid", "solid_vertex", "solid_fragment", &with_solid, &corners, DepthMode::ReadWrite),
             layout,
             cached_meshes: Vec::new(),
@@ -138,7 +144,7 @@ impl SurfacePass {
 
     fn cache_mesh(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, solid: &MeshInstance) -> CacheIndex {
         let is_same =
-            |k: &CachedMesh| Arc::ptr_eq(&k.mesh, &solid.mesh) && Arc::ptr_eq(&k.vertex_colours, &solid.vertex_colours);
+            |k: &CachedMesh| Arc::ptr_eq(&k.mesh, &solid.mesh) && Arc::ptr_eq(&k.vertex_tints, &solid.vertex_tints);
         let found = self.cached_meshes.iter().position(is_same).unwrap_or_else(|| {
             let filled = |label, usage, bytes: &[u8]| {
                 let usage = usage | wgpu::BufferUsages::COPY_DST;
@@ -153,8 +159,17 @@ impl SurfacePass {
             let parts = MeshParts::new(&solid.mesh);
             let indices = bytemuck::cast_slice(&parts.triangles);
             let indices = filled("triangles", wgpu::BufferUsages::INDEX, indices);
-            let (mesh, vertex_colours) = (solid.mesh.clone(), solid.vertex_colours.clone());
-            self.cached_meshes.push(CachedMesh { mesh, vertex_colours, parts, vertices, indices, is_used: true });
+            let (mesh, vertex_tints) = (solid.mesh.clone(), solid.vertex_tints.clone());
+            let is_stippled = vertex_tints.iter().any(|tint| tint.stippling > 0.0);
+            self.cached_meshes.push(CachedMesh {
+                mesh,
+                vertex_tints,
+                parts,
+                vertices,
+                indices,
+                is_stippled,
+                is_used: true,
+            });
             self.cached_meshes.len() - 1
         });
         self.cached_meshes[found].is_used = true;
@@ -163,8 +178,13 @@ impl SurfacePass {
 
     /// Draws all prepared mesh instances that an eye may see; the view's bind group must be set.
     pub fn draw_solids(&self, pass: &mut wgpu::RenderPass, eye: &Eye) {
+        let is_stippled = |draw: &MeshDraw| self.stippled.is_some() && self.cached_meshes[draw.mesh].is_stippled;
         pass.set_pipeline(&self.solid);
-        self.draw_each(pass, eye, |_| true);
+        self.draw_each(pass, eye, |draw| !is_stippled(draw));
+        if let Some(stippled) = &self.stippled {
+            pass.set_pipeline(stippled);
+            self.draw_each(pass, eye, is_stippled);
+        }
     }
 
     /// Draws all prepared mesh instances that cast shadows and that a lamp may see, with the pipeline that is set.

@@ -1,6 +1,6 @@
 //! Memory layout of one vertex, for the shader and for its CPU twin.
 
-use super::scene::{Appearance, Rgb};
+use super::scene::{Rgb, VertexTint};
 use typodont_core::frame::Vec3;
 
 /// Vertex layout that matches `surface_pass.wgsl`.
@@ -12,7 +12,7 @@ pub struct Vertex {
     position: [f32; 3],
     /// Unit normal and gloss, each scaled by 32767.
     normal: [i16; 4],
-    /// Colour scaled by 255; the fourth component is unused.
+    /// Colour and stippling, each scaled by 255.
     colour: [u8; 4],
 }
 
@@ -34,14 +34,15 @@ impl Vertex {
         }
     }
 
-    pub fn new(position: Vec3, normal: Vec3, finish: Appearance) -> Vertex {
+    /// A vertex with full gloss.
+    pub fn new(position: Vec3, normal: Vec3, tint: VertexTint) -> Vertex {
         let short = |v: f32| (v.clamp(-1.0, 1.0) * 32767.0).round() as i16;
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-        let [r, g, b] = finish.colour.map(byte);
+        let [r, g, b] = tint.colour.map(byte);
         Vertex {
             position: position.to_array(),
-            normal: [short(normal.x), short(normal.y), short(normal.z), short(finish.gloss)],
-            colour: [r, g, b, u8::MAX],
+            normal: [short(normal.x), short(normal.y), short(normal.z), i16::MAX],
+            colour: [r, g, b, byte(tint.stippling)],
         }
     }
 
@@ -56,6 +57,10 @@ impl Vertex {
 
     pub fn gloss(&self) -> f32 {
         f32::from(self.normal[3]) / 32767.0
+    }
+
+    pub fn stippling(&self) -> f32 {
+        f32::from(self.colour[3]) / 255.0
     }
 
     pub fn colour(&self) -> Rgb {

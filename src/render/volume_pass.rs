@@ -1,6 +1,6 @@
 //! Colours and opacities by density, blended along each ray in front of what is already drawn.
 
-use super::passes::{self, DepthMode, DrawnFaces, PipelineDesc};
+use super::passes::{self, DepthMode, Detail, DrawnFaces, PipelineDesc};
 use super::resources;
 
 pub const SOURCE: &str = include_str!("../../shaders/volume_pass.wgsl");
@@ -16,7 +16,7 @@ impl VolumePass {
         format: wgpu::TextureFormat,
         view: &wgpu::BindGroupLayout,
         tooth: &wgpu::BindGroupLayout,
-        has_shadows: bool,
+        detail: Detail,
     ) -> VolumePass {
         let module = passes::shader_module(device, "volume_pass", &passes::full_source(SOURCE));
         let numbers = wgpu::TextureSampleType::Float { filterable: false };
@@ -33,7 +33,7 @@ impl VolumePass {
             depth: DepthMode::None,
             format: Some(format),
             blend: Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING),
-            has_shadows,
+            detail,
         };
         VolumePass { pipeline: pass.build(device), layout }
     }

@@ -8,10 +8,10 @@ use typodont_core::mesh::Mesh;
 use typodont_exercise::catalog::{BentExplorerEntry, InstrumentEntry, MirrorEntry, ProbeEntry, WorkingEndEntry};
 use typodont_formats::diagnostic::Diagnostic;
 use typodont_formats::{Library, visual_mesh};
-use typodont_render::{Appearance, MeshInstance, PlaneMirror, Rgb};
+use typodont_render::{Appearance, MeshInstance, PlaneMirror, Rgb, VertexTint};
 
 /// Polished steel: it mirrors two thirds of the light, and scatters little.
-const STEEL: Appearance = Appearance { colour: [0.52, 0.53, 0.55], gloss: 0.8 };
+pub(super) const STEEL: Appearance = Appearance { colour: [0.52, 0.53, 0.55], gloss: 0.8 };
 
 /// Tints of steel: as it is, in a groove, and of the ring of a fast contra-angle.
 const PLAIN: Rgb = [1.0; 3];
@@ -139,7 +139,8 @@ fn bur(entry: &InstrumentEntry, holder: &[[f32; 2]]) -> (Mesh, Vec<Rgb>) {
 
 /// A steel instrument with a tint for each vertex.
 fn tinted((mesh, tints): (Mesh, Vec<Rgb>)) -> MeshInstance {
-    MeshInstance { vertex_colours: Arc::new(tints), ..MeshInstance::plain(Arc::new(mesh), Pose::IDENTITY, STEEL) }
+    let tints = tints.into_iter().map(VertexTint::smooth).collect();
+    MeshInstance { vertex_tints: Arc::new(tints), ..MeshInstance::plain(Arc::new(mesh), Pose::IDENTITY, STEEL) }
 }
 
 /// A periodontal probe with its marks and bands, so that a depth can be read; the middle of its end at the origin.
@@ -186,7 +187,7 @@ fn explorer_mesh(wire: &BentExplorerEntry) -> Mesh {
 }
 
 /// A tube along rings: middle, way, radius.
-fn tube(rings: &[(Vec3, Vec3, f32)]) -> Mesh {
+pub(super) fn tube(rings: &[(Vec3, Vec3, f32)]) -> Mesh {
     let mut mesh = Mesh::default();
     for (at, direction, radius) in rings {
         let side = direction.cross(Vec3::Y).normalize_or(Vec3::X);

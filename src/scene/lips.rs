@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
-use typodont_render::{Appearance, MeshInstance, Rgb, Viewpoint};
+use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint, Viewpoint};
 
 /// Half the width of the opening, held aside by retractors, mm.
 const HALF_WIDTH: f32 = 37.0;
@@ -81,9 +81,10 @@ impl Lips {
         let middle = middle + front * (ahead - middle.dot(front));
         let orientation = Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize();
         let (mesh, tints) = lip_mesh(half_height);
+        let tints = tints.into_iter().map(VertexTint::smooth).collect();
         let appearance = Appearance { colour: [1.0; 3], gloss: GLOSS };
         let plain = MeshInstance::plain(Arc::new(mesh), Pose { position: middle, orientation }, appearance);
-        let solid = MeshInstance { vertex_colours: Arc::new(tints), casts_shadow: false, ..plain };
+        let solid = MeshInstance { vertex_tints: Arc::new(tints), casts_shadow: false, ..plain };
         Lips { solid, half_height }
     }
 

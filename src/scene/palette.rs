@@ -1,12 +1,14 @@
 //! Colours of the tissues.
 
-use typodont_core::volume::{Label, Volume};
+use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
-use typodont_render::{Appearance, EnamelDepth, LabelPalette};
+use typodont_exercise::scenario::Workpiece;
+use typodont_render::{Appearance, LabelPalette, UnworkedTooth};
 
-/// Gloss of tissue under a film of saliva, and of dull decay and deposits; see [`Appearance`](typodont_render::Appearance).
+/// Gloss of tissue under a film of saliva, of dull decay and deposits, and of the wet pulp; see [`Appearance`](typodont_render::Appearance).
 pub(super) const GLOSS: f32 = 0.2;
 const DULL: f32 = 0.1;
+const WET: f32 = 0.3;
 
 /// Colour of each tissue. Unless the exercise shows decay, it has the colour of enamel and cannot be seen; dentine does not
 /// shine through enamel then, because its absence above decayed dentine would give the decay away.
@@ -16,24 +18,33 @@ pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalet
         |label: u8| tissues.by_label(Label(label)).filter(|e| is_decay_shown || e.role != TissueRole::Decay).or(enamel);
     let appearances = std::array::from_fn(|label| {
         let entry = entry(label as u8);
-        let is_dull = entry.is_some_and(|e| matches!(e.role, TissueRole::Decay | TissueRole::Deposit));
-        Appearance { colour: entry.map_or([0.85, 0.82, 0.75], |e| e.rgb()), gloss: if is_dull { DULL } else { GLOSS } }
+        let gloss = match entry.map(|entry| entry.role) {
+            Some(TissueRole::Decay | TissueRole::Deposit) => DULL,
+            Some(TissueRole::Vulnerable) => WET,
+            _ => GLOSS,
+        };
+        Appearance { colour: entry.map_or([0.85, 0.82, 0.75], |e| e.rgb()), gloss }
     });
     let is_decay = std::array::from_fn(|label| entry(label as u8).is_some_and(|entry| entry.role == TissueRole::Decay));
+    let dulls_when_cut =
+        std::array::from_fn(|label| entry(label as u8).is_some_and(|entry| entry.role == TissueRole::Sound));
     let dentine = tissues.by_name("dentine").filter(|_| is_decay_shown);
     LabelPalette {
         appearances,
         is_decay,
+        dulls_when_cut,
         translucent: enamel.map(|entry| entry.label()),
         under_translucent: dentine.map(|entry| entry.rgb()),
     }
 }
 
-/// Thickness of the enamel of a tooth that nobody has worked on yet, over its sound dentine and pulp. Decay does not count as
+/// A tooth that nobody has worked on yet, with its enamel over sound dentine and pulp. Decay does not count as
 /// dentine: what is decayed is drawn as decay, and its part in enamel would make the enamel around it look thin.
-pub fn enamel_depth(volume: &Volume, tissues: &TissueTable) -> EnamelDepth {
+pub fn unworked_tooth(workpiece: &Workpiece, tissues: &TissueTable) -> UnworkedTooth {
+    // Cavities that an exercise begins with are cuts, too.
+    let volume = workpiece.original.as_ref().unwrap_or(&workpiece.volume);
     let under = ["dentine", "pulp"].map(|name| tissues.by_name(name).map(|entry| entry.label()));
-    EnamelDepth::of(volume, |label| under.contains(&Some(label)))
+    UnworkedTooth::of(volume, &under.into_iter().flatten().collect::<Vec<_>>())
 }
 
 /// Attenuation of X-rays by enamel, per mm; see [`x_ray_attenuation`].

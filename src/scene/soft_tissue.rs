@@ -8,7 +8,7 @@ use typodont_core::touch::{Collider, ColliderGeometry};
 use typodont_core::volume::{Grid, Label, Volume, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Appearance, MeshInstance, Rgb};
+use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint};
 
 /// Names of the tissues that are drawn in this way.
 const CHEEK: &str = "cheek";
@@ -43,10 +43,10 @@ impl YieldingSurface {
         let sampled = Volume::from_distance(grid, 2.0 * SPACING, |place| (shape.distance(place), Label(1)));
         let mut mesh = surface::extract(&sampled);
         mesh.smooth_normals(SMOOTHING);
-        let tints = mesh.positions.iter().map(|place| tint(*place)).collect();
+        let tints = mesh.positions.iter().map(|place| VertexTint::smooth(tint(*place))).collect();
         let appearance = Appearance { colour: entry.rgb(), gloss: GLOSS };
         let plain = MeshInstance::plain(Arc::new(mesh), workpiece.world_from_tooth, appearance);
-        let at_rest = MeshInstance { vertex_colours: Arc::new(tints), ..plain };
+        let at_rest = MeshInstance { vertex_tints: Arc::new(tints), ..plain };
         Some(YieldingSurface { at_rest, felt: shape.clone(), is_cheek: entry.name == CHEEK })
     }
 

@@ -1,5 +1,6 @@
 //! Solids around the tooth, drawn as they are touched.
 
+use super::jaw::vertex_tint;
 use super::palette::GLOSS;
 use super::soft_tissue::YieldingSurface;
 use std::sync::Arc;
@@ -10,9 +11,9 @@ use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
 use typodont_core::touch::{Collider, ColliderGeometry, Compliance, SdfGrid};
 use typodont_core::volume::{Grid, ISO, Label, Volume, surface};
-use typodont_exercise::catalog::TissueTable;
+use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Appearance, MeshInstance, Rgb};
+use typodont_render::{Appearance, MeshInstance, VertexTint};
 
 /// Distance between samples of a solid, mm: its curvature radii are larger.
 const SPACING: f32 = 0.4;
@@ -30,12 +31,13 @@ const FADE: f32 = 2.2;
 /// Distance from the tooth up to which a mesh around it is drawn, mm.
 const REACH: f32 = 12.0;
 
-/// Gingiva and neighbouring teeth as they are touched, world space.
+/// Gingiva and neighbouring teeth as they are touched, world space; without the gingiva under a rubber dam.
 pub fn surrounding_solids(workpiece: &Workpiece, tissues: &TissueTable) -> Vec<MeshInstance> {
     workpiece
         .surroundings
         .iter()
         .filter(|shape| is_visible(shape, tissues))
+        .filter(|shape| !workpiece.rubber_dam || tissues.role(shape.label) != Some(TissueRole::Soft))
         .map(|s| solid_of_shape(s, workpiece, tissues))
         .collect()
 }
@@ -54,7 +56,7 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
     let mesh = Arc::new(shape_mesh(shape, workpiece));
     let tints = modelled_gum(shape, workpiece).map(|(_, gum)| gum_tints(gum, workpiece, &mesh));
     let plain = MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS });
-    MeshInstance { vertex_colours: Arc::new(tints.unwrap_or_default()), ..plain }
+    MeshInstance { vertex_tints: Arc::new(tints.unwrap_or_default()), ..plain }
 }
 
 /// Gingiva with a modelled margin: its field as it is felt, and its form; `None` for another shape.
@@ -66,7 +68,7 @@ fn modelled_gum<'a>(shape: &'a Collider, workpiece: &'a Workpiece) -> Option<(&'
 }
 
 /// Tints of gingiva with a modelled margin: those of the jaw's own gingiva around it.
-fn gum_tints(gum: &Periodontium, workpiece: &Workpiece, mesh: &Mesh) -> Vec<Rgb> {
+fn gum_tints(gum: &Periodontium, workpiece: &Workpiece, mesh: &Mesh) -> Vec<VertexTint> {
     let is_upper = workpiece.teeth.first().is_some_and(|tooth| tooth.fdi < 30);
     let jaw = if is_upper { Jaw::Upper } else { Jaw::Lower };
     let middle = gum.middle();
@@ -75,7 +77,7 @@ fn gum_tints(gum: &Periodontium, workpiece: &Workpiece, mesh: &Mesh) -> Vec<Rgb>
         let side = if place.x < middle.x { RidgeSide::Inner } else { RidgeSide::Outer };
         ridge_tint(jaw, side, place.z, [gum.margin(azimuth), gum.neckline(azimuth)], gum.distance_to_tooth(*place))
     };
-    mesh.positions.iter().map(tint).collect()
+    mesh.positions.iter().map(|place| vertex_tint(tint(place))).collect()
 }
 
 /// A shape's surface in tooth space.

@@ -16,10 +16,10 @@ use typodont_scene::*;
 pub struct FixedCase {
     pub number: u32,
     pub scenario: Scenario,
-    workpiece: Workpiece,
-    prepared: Volume,
-    palette: LabelPalette,
-    enamel_depth: EnamelDepth,
+    pub workpiece: Workpiece,
+    pub prepared: Volume,
+    pub palette: LabelPalette,
+    unworked_tooth: UnworkedTooth,
 }
 
 /// One view of a case.
@@ -46,22 +46,24 @@ impl FixedCase {
             .collect()
     }
 
-    fn new(number: u32, file: &str) -> FixedCase {
+    pub fn new(number: u32, file: &str) -> FixedCase {
         let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
         let source = typodont_formats::read_text(&scenarios.join(file)).unwrap();
         let library = Library::shipped().with_folder(scenarios);
         let scenario = scenario::resolve(source, &library, ResolveMode::MakeWorkpiece).unwrap();
         let workpiece = Workpiece::make(&scenario, 0).unwrap();
         let mut prepared = (*workpiece.volume).clone();
-        prepare(&mut prepared, &workpiece);
+        if !workpiece.lesions.is_empty() {
+            prepare(&mut prepared, &workpiece);
+        }
         prepared.take_dirty();
         let palette = tissue_palette(&scenario.tissues, true);
-        let enamel_depth = enamel_depth(&workpiece.volume, &scenario.tissues);
-        FixedCase { number, scenario, workpiece, prepared, palette, enamel_depth }
+        let unworked_tooth = unworked_tooth(&workpiece, &scenario.tissues);
+        FixedCase { number, scenario, workpiece, prepared, palette, unworked_tooth }
     }
 
-    /// The scene as the trainee has it, drawn by rays, and where it is seen from.
-    pub fn scene(&self, view: FixedView, mode: RenderMode, has_shadows: bool) -> (RenderScene<'_>, Viewpoint) {
+    /// The scene as the trainee has it, and where it is seen from. `is_full`: with shadows and relief, as a graphics processor draws it.
+    pub fn scene(&self, view: FixedView, mode: RenderMode, is_full: bool) -> (RenderScene<'_>, Viewpoint) {
         let mouth = Mouth::around(&self.workpiece, &self.scenario.tissues).unwrap();
         let orbit = match view.distance {
             Some(share) => {
@@ -77,7 +79,7 @@ impl FixedCase {
                 changes: Changes::All,
                 world_from_tooth: self.workpiece.world_from_tooth,
                 palette: &self.palette,
-                enamel_depth: Some(&self.enamel_depth),
+                unworked_tooth: Some(&self.unworked_tooth),
                 mode,
             }),
             solids: mouth
@@ -86,7 +88,8 @@ impl FixedCase {
                 .chain(mouth.lips(&viewpoint, WORKING_OPENING_DEG))
                 .collect(),
             lights: Lights::along(&viewpoint),
-            shadows: has_shadows.then(|| shadow_region(&self.workpiece, &orbit)),
+            shadows: is_full.then(|| shadow_region(&self.workpiece, &orbit)),
+            has_relief: is_full,
             is_antialiased: true,
             ..RenderScene::empty()
         };

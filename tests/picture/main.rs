@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 mod fixed_scenes;
+mod mouth_options;
 mod radiograph;
 mod render;
 mod scene;

@@ -68,7 +68,7 @@ fn film_by(
         changes: Changes::All,
         world_from_tooth: Pose::IDENTITY,
         palette: &palette,
-        enamel_depth: None,
+        unworked_tooth: None,
         mode: RenderMode::Volume(Arc::new(function)),
     };
     let background = Background::plain([0.0; 3]);

@@ -14,7 +14,7 @@ use typodont_core::volume::{BRICK, Grid, Label, Volume, surface};
 use typodont_render::*;
 
 /// One test draws at a time: an adapter in software takes all processors anyway.
-fn adapter() -> Option<(OffscreenRenderer, MutexGuard<'static, ()>)> {
+pub fn adapter() -> Option<(OffscreenRenderer, MutexGuard<'static, ()>)> {
     static TURN: Mutex<()> = Mutex::new(());
     let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
     match OffscreenRenderer::gpu() {
@@ -27,7 +27,7 @@ fn adapter() -> Option<(OffscreenRenderer, MutexGuard<'static, ()>)> {
     }
 }
 
-fn keep(name: &str, image: &RgbaImage) {
+pub fn keep(name: &str, image: &RgbaImage) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("render");
     std::fs::create_dir_all(&folder).unwrap();
     let RgbaImage { width, height, rgba } = image;
@@ -44,7 +44,7 @@ fn differences(a: &RgbaImage, b: &RgbaImage) -> (f64, f64) {
     (sum as f64 / (a.rgba.len() / 4 * 3) as f64, far as f64 / (a.rgba.len() / 4) as f64)
 }
 
-fn is_close(a: &RgbaImage, b: &RgbaImage) -> bool {
+pub fn is_close(a: &RgbaImage, b: &RgbaImage) -> bool {
     let (mean, far) = differences(a, b);
     mean < 1.0 && far < 0.001
 }

@@ -51,7 +51,7 @@ fn tooth<'a>(workpiece: &'a Workpiece, palette: &'a LabelPalette) -> VolumeInsta
         changes: Changes::All,
         world_from_tooth: workpiece.world_from_tooth,
         palette,
-        enamel_depth: None,
+        unworked_tooth: None,
         mode: RenderMode::Iso,
     }
 }

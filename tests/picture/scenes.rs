@@ -4,7 +4,7 @@ use std::sync::Arc;
 use typodont_anatomy::TissueLabels;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
-use typodont_core::volume::{Grid, Label, Volume, Voxel, surface};
+use typodont_core::volume::{Edit, Grid, Label, Volume, Voxel, surface};
 use typodont_render::*;
 
 pub const CARIES: Label = Label(4);
@@ -25,7 +25,8 @@ pub fn molar(dims: [u32; 3]) -> Volume {
 }
 
 /// Takes a ball of matter away, as a bur does: with a surface as wide as any.
-pub fn carve(volume: &mut Volume, centre: Vec3, radius: f32) {
+pub fn carve(volume: &mut Volume, centre: Vec3, radius: f32) -> Vec<Edit> {
+    let mut edits = Vec::new();
     let (grid, band) = (*volume.grid(), volume.half_band());
     let [xs, ys, zs] = grid.cells_within(centre - radius - 0.5, centre + radius + 0.5);
     for z in zs {
@@ -35,11 +36,12 @@ pub fn carve(volume: &mut Volume, centre: Vec3, radius: f32) {
                     typodont_core::volume::density_at_distance(radius - grid.centre([x, y, z]).distance(centre), band);
                 let before = volume.voxel(grid.index([x, y, z]));
                 if density < before.density {
-                    volume.set_cell([x, y, z], Voxel { density, label: before.label });
+                    edits.push(volume.set_cell([x, y, z], Voxel { density, label: before.label }));
                 }
             }
         }
     }
+    edits
 }
 
 pub fn palette() -> LabelPalette {
@@ -104,7 +106,7 @@ pub fn tooth<'a>(volume: &'a Volume, palette: &'a LabelPalette, shown: RenderMod
         changes: Changes::All,
         world_from_tooth: upright(),
         palette,
-        enamel_depth: None,
+        unworked_tooth: None,
         mode: shown,
     }
 }
@@ -154,7 +156,7 @@ pub fn stories<'a>(
     let solids = vec![
         MeshInstance::plain(ball(3.0), Pose::at(Vec3::new(4.0, 3.0, 2.0)), steel),
         MeshInstance {
-            vertex_colours: Arc::new(vec![[1.0, 0.9, 0.9]; 24]),
+            vertex_tints: Arc::new(vec![VertexTint { colour: [1.0, 0.9, 0.9], stippling: 1.0 }; 24]),
             ..MeshInstance::plain(block(Vec3::new(9.0, 3.0, 9.0)), Pose::at(Vec3::new(0.0, -7.0, 0.0)), gum)
         },
     ];

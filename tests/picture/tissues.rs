@@ -7,7 +7,7 @@ use typodont_core::volume::{Grid, Label, Volume};
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_formats::Library;
 use typodont_render::*;
-use typodont_scene::{enamel_depth, tissue_palette};
+use typodont_scene::tissue_palette;
 
 const SPACING: f32 = 0.1;
 
@@ -107,8 +107,8 @@ fn hidden_decay_changes_no_pixel() {
         Orbit { middle: Vec3::new(0.0, 1.0, 0.0), azimuth: 0.5, elevation: 0.9, distance: 42.0 }.viewpoint();
     let mut gpu = OffscreenRenderer::gpu().ok();
     let mut draw = |volume: &Volume, palette: &LabelPalette, mode: RenderMode| {
-        let depth = enamel_depth(volume, &tissues);
-        let shown = VolumeInstance { enamel_depth: Some(&depth), ..tooth(volume, palette, mode) };
+        let unworked = UnworkedTooth::of(volume, &[dentine]);
+        let shown = VolumeInstance { unworked_tooth: Some(&unworked), ..tooth(volume, palette, mode) };
         let scene = RenderScene { tooth: Some(shown), ..RenderScene::empty() };
         let by_processor = OffscreenRenderer::cpu().draw(&scene, &viewpoint, None, [240, 240]).unwrap();
         let by_adapter = gpu.as_mut().map(|gpu| gpu.draw(&scene, &viewpoint, None, [240, 240]).unwrap().rgba);

@@ -78,3 +78,17 @@ fn cheek_and_tongue_are_beside_the_teeth_where_they_are_in_a_mouth() {
         assert_eq!(count, complaints, "tooth {fdi}");
     }
 }
+
+#[test]
+fn a_rubber_dam_hides_nothing_that_has_to_be_seen() {
+    // Aim: an author cannot cover what the exercise asks for. Method: the shipped exercise with a dam, with each thing beside it.
+    let text = include_str!("../../scenarios/14-amalgam.json");
+    let others = [("", 0), ("\"cheek\": true,", 1), ("\"tongue\": true,", 1), ("\"other_teeth\": {},", 1)];
+    for (other, complaints) in others {
+        let text = text.replace("\"rubber_dam\": true", &format!("{other} \"rubber_dam\": true"));
+        let source = SourceText::new("14-amalgam.json", text);
+        let found = scenario::resolve(source, &Library::shipped(), ResolveMode::MakeWorkpiece);
+        let count = found.err().map_or(0, |found| found.iter().filter(|each| each.code == "hidden-by-dam").count());
+        assert_eq!(count, complaints, "{other}");
+    }
+}

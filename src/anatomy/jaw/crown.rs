@@ -41,12 +41,12 @@ pub fn crown(model: &ToothModel, recession: f32) -> TintedMesh {
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
-const NECK: Tint = [0.98, 0.94, 0.86];
-const ROOT: Tint = [0.93, 0.83, 0.66];
-const EDGE: Tint = [0.945, 0.95, 0.965];
-const DEEP: Tint = [0.93, 0.885, 0.81];
-const CANINE: Tint = [0.99, 0.98, 0.95];
-const PLAIN: Tint = [1.0, 1.0, 1.0];
+const NECK: Tint = Tint::smooth([0.98, 0.94, 0.86]);
+const ROOT: Tint = Tint::smooth([0.93, 0.83, 0.66]);
+const EDGE: Tint = Tint::smooth([0.945, 0.95, 0.965]);
+const DEEP: Tint = Tint::smooth([0.93, 0.885, 0.81]);
+const CANINE: Tint = Tint::smooth([0.99, 0.98, 0.95]);
+const PLAIN: Tint = Tint::smooth([1.0, 1.0, 1.0]);
 
 fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
     let sizes = &model.form.sizes;

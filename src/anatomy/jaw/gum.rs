@@ -93,9 +93,7 @@ pub fn necks(models: &[ToothModel]) -> Vec<CrownContour> {
 
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.
 pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], form: GumForm, fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
-    let [left, right] = halves(jaw, &sides, form);
-    // From behind to the midline, then from there back; the midline once.
-    let mut columns: Vec<Vec<(Vec3, Tint)>> = left.into_iter().skip(1).rev().chain(right).collect();
+    let mut columns = from_end_to_end(halves(jaw, &sides, form));
     for (place, _) in columns.iter_mut().flatten() {
         *place = fit(*place);
     }
@@ -123,16 +121,30 @@ pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
     solids
 }
 
+/// Columns from behind to the midline, then from there back; the midline once.
+pub(super) fn from_end_to_end<T>([left, right]: [Vec<T>; 2]) -> Vec<T> {
+    left.into_iter().skip(1).rev().chain(right).collect()
+}
+
+/// Positions of columns along each half of the arch, mm, from the midline back: at a distance of about `spacing`, and as far behind the
+/// last tooth of the longer half as `beyond`.
+pub(super) fn column_positions(sides: &[HalfJaw; 2], spacing: f32, beyond: f32) -> [Vec<f32>; 2] {
+    // Both sides end equally far back, also where one tooth is larger than its twin.
+    let ends = sides.each_ref().map(|side| side.half.frame_at(side.half.length() + beyond).0.y);
+    std::array::from_fn(|number| {
+        let end = sides[number].half.length() + beyond + ends[0].max(ends[1]) - ends[number];
+        let count = (end / spacing).ceil() as usize;
+        (0..=count).map(|i| end * i as f32 / count as f32).collect()
+    })
+}
+
 /// Columns of places from the midline back, for each half.
 fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: GumForm) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
-    // Both sides end equally far back, also where one tooth is larger than its twin.
-    let ends = sides.each_ref().map(|side| side.half.frame_at(side.half.length() + PAD).0.y);
+    let positions = column_positions(sides, form.column(), PAD);
     std::array::from_fn(|number| {
         let side = &sides[number];
-        let end = side.half.length() + PAD + ends[0].max(ends[1]) - ends[number];
-        let count = (end / form.column()).ceil() as usize;
         let front = side.ridge(jaw, form, 0.0).pop().map_or(Vec3::ZERO, |row| row.0);
-        (0..=count).map(|i| side.column(jaw, form, front, end * i as f32 / count as f32)).collect()
+        positions[number].iter().map(|&arc_length| side.column(jaw, form, front, arc_length)).collect()
     })
 }
 
@@ -321,7 +333,7 @@ impl HalfJaw<'_> {
         outside
     }
 
-    fn section(&self, form: GumForm, arc_length: f32) -> RidgeSection {
+    pub(super) fn section(&self, form: GumForm, arc_length: f32) -> RidgeSection {
         let seats = &self.half.seats;
         let neck_of = |seat: &ToothSeat| seat.neck().z;
         let offset_of = |seat: &ToothSeat| (seat.neck() - self.half.frame_at(seat.middle()).0).dot(seat.buccal);
@@ -372,16 +384,16 @@ fn smooth_max(a: f32, b: f32) -> f32 {
 }
 
 /// Section of the ridge at one point of the arch; lengths in mm.
-struct RidgeSection {
+pub(super) struct RidgeSection {
     /// Height of the necks.
     neck: f32,
     /// Distance of the necks from the line through the crowns, outward.
-    offset: f32,
+    pub offset: f32,
     /// Half the necks' width.
-    half: f32,
+    pub half: f32,
     /// Height of the gingival margin, buccally and lingually.
-    margin: f32,
-    inner_margin: f32,
+    pub margin: f32,
+    pub inner_margin: f32,
     /// 0 in the middle of a tooth, 1 between two.
     between_teeth: f32,
     /// Bulge of the ridge over a root.
@@ -390,15 +402,16 @@ struct RidgeSection {
     pad: f32,
 }
 
-/// Tints of the gingiva's colour: pale where it is attached to bone, redder where it is loose, dark in the sulcus around a tooth.
-const ATTACHED: Tint = [1.0, 1.0, 1.0];
-const FREE: Tint = [1.0, 0.94, 0.93];
-const EDGE: Tint = [0.96, 0.86, 0.85];
-const SULCUS: Tint = [0.84, 0.64, 0.63];
-const LINE: Tint = [0.97, 0.87, 0.86];
-const MUCOSA: Tint = [0.90, 0.70, 0.69];
-const PALATE: Tint = [0.98, 0.96, 0.94];
-const FLOOR: Tint = [0.88, 0.68, 0.67];
+/// Tints of the gingiva's colour: pale and stippled where it is attached to bone, smooth and redder where it is loose, dark in the
+/// sulcus around a tooth.
+const ATTACHED: Tint = Tint::stippled([1.0, 1.0, 1.0], 1.0);
+const FREE: Tint = Tint::smooth([1.0, 0.94, 0.93]);
+const EDGE: Tint = Tint::smooth([0.96, 0.86, 0.85]);
+const SULCUS: Tint = Tint::smooth([0.84, 0.64, 0.63]);
+const LINE: Tint = Tint::smooth([0.97, 0.87, 0.86]);
+const MUCOSA: Tint = Tint::smooth([0.90, 0.70, 0.69]);
+const PALATE: Tint = Tint::stippled([0.98, 0.96, 0.94], 0.4);
+const FLOOR: Tint = Tint::smooth([0.88, 0.68, 0.67]);
 
 /// Heights below the gingival margin, mm, between which the gingiva is free.
 const FREE_BELOW_MARGIN: [f32; 2] = [0.3, 0.8];
@@ -498,8 +511,8 @@ fn subdivide(rows: &[(Vec3, Tint)]) -> Vec<(Vec3, Tint)> {
     finer
 }
 
-/// Columns of places as one closed surface: the sheet, a flat base under it and a wall behind.
-fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
+/// Columns of places from one end of the arch to the other, each from the outer side to the midline, as a sheet.
+pub(super) fn open_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
     let mut made = TintedMesh::default();
     let rows = columns[0].len();
     for (place, tint) in columns.iter().flatten() {
@@ -522,6 +535,13 @@ fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
         let normal = &mut made.mesh.normals[c * rows + rows - 1];
         *normal = Vec3::new(0.0, normal.y, normal.z).normalize_or(Vec3::Z);
     }
+    made
+}
+
+/// Columns of places as one closed surface: the sheet, a flat base under it and a wall behind.
+fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
+    let mut made = open_sheet(columns);
+    let rows = columns[0].len();
     let mut flat = |places: &dyn Fn(usize) -> [Vec3; 2], count: usize, normal: Vec3| {
         let first = made.mesh.positions.len() as u32;
         for i in 0..count {
@@ -591,7 +611,7 @@ mod tests {
                 assert_eq!(tint(-recession), FREE);
                 let all: Vec<Tint> = (0..400).map(|i| tint(5.0 - 0.05 * i as f32)).collect();
                 for pair in all.windows(2) {
-                    let step = (0..3).map(|c| (pair[0][c] - pair[1][c]).abs()).fold(0.0, f32::max);
+                    let step = (0..3).map(|c| (pair[0].colour[c] - pair[1].colour[c]).abs()).fold(0.0, f32::max);
                     assert!(step < 0.05 || recession > 2.0 && step < 0.35, "{side:?}, recession {recession}: {pair:?}");
                 }
                 let lowest =

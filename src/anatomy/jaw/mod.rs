@@ -8,6 +8,7 @@ mod crown;
 mod gum;
 mod half_arch;
 mod occlusion;
+mod rubber_dam;
 mod tinted_mesh;
 mod tooth_model;
 
@@ -218,6 +219,11 @@ impl DentalArch {
     /// The gingiva with the palate or the floor of the mouth. `fit` may move each point.
     pub fn gum(&self, form: GumForm, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
         gum::gum(self.jaw, self.sides(form), form, fit)
+    }
+
+    /// A rubber dam over this jaw. `is_isolated`: by side of x and place from the midline.
+    pub fn rubber_dam(&self, is_isolated: &dyn Fn(f32, usize) -> bool) -> TintedMesh {
+        rubber_dam::rubber_dam(&self.sides(GumForm::Touched), is_isolated)
     }
 
     /// The gingiva that is touched as closed solids that do not overlap, each of one region of the mucosa.

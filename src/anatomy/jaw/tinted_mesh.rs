@@ -3,13 +3,30 @@
 use typodont_core::frame::Vec3;
 use typodont_core::mesh::Mesh;
 
-/// Factors of a tissue's red, green and blue, 0 to 1.
-pub type Tint = [f32; 3];
+/// Difference of a place from the rest of its tissue.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tint {
+    /// Factors of the tissue's red, green and blue, 0 to 1.
+    pub colour: [f32; 3],
+    /// Share of the stippling of attached gingiva, 0 to 1.
+    pub stippling: f32,
+}
+
+impl Tint {
+    pub(super) const fn smooth(colour: [f32; 3]) -> Tint {
+        Tint { colour, stippling: 0.0 }
+    }
+
+    pub(super) const fn stippled(colour: [f32; 3], stippling: f32) -> Tint {
+        Tint { colour, stippling }
+    }
+}
 
 /// Tint between two others; a share above 1 counts as 1, below 0 as 0.
 pub(super) fn mixed_tint(a: Tint, b: Tint, share: f32) -> Tint {
     let share = share.clamp(0.0, 1.0);
-    std::array::from_fn(|c| a[c] + (b[c] - a[c]) * share)
+    let mix = |a: f32, b: f32| a + (b - a) * share;
+    Tint { colour: std::array::from_fn(|c| mix(a.colour[c], b.colour[c])), stippling: mix(a.stippling, b.stippling) }
 }
 
 #[derive(Clone, Debug, Default)]

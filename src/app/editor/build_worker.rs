@@ -10,7 +10,7 @@ use typodont_exercise::scenario;
 use typodont_exercise::scenario::{ResolveMode, Scenario, SceneLayout, ToothSource, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::{Diagnostic, SourceText};
-use typodont_render::EnamelDepth;
+use typodont_render::UnworkedTooth;
 
 /// Voxel spacing of the quick first build, mm; it takes an eighth of the work.
 const QUICK_SPACING: f32 = 0.2;
@@ -42,7 +42,7 @@ pub struct BuildEvent {
 pub struct BuildResult {
     pub scenario: Arc<Scenario>,
     pub workpiece: Workpiece,
-    pub enamel_depth: EnamelDepth,
+    pub unworked_tooth: UnworkedTooth,
     /// True if it was built with coarse voxels as a first view, which the full one follows. A page has coarse voxels only.
     pub is_quick: bool,
 }
@@ -219,8 +219,8 @@ impl Build {
     /// Builds the workpiece of a variant of the scenario.
     fn build(&self, variant: &Scenario, is_quick: bool) -> Option<BuildResult> {
         let workpiece = Workpiece::make(variant, self.job.seed).ok()?;
-        let enamel_depth = typodont_scene::enamel_depth(&workpiece.volume, &variant.tissues);
-        Some(BuildResult { scenario: self.scenario.clone()?, workpiece, enamel_depth, is_quick })
+        let unworked_tooth = typodont_scene::unworked_tooth(&workpiece, &variant.tissues);
+        Some(BuildResult { scenario: self.scenario.clone()?, workpiece, unworked_tooth, is_quick })
     }
 }
 

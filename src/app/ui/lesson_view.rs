@@ -119,7 +119,7 @@ impl LessonView {
         commands: &mut Vec<AppCommand>,
     ) -> Result<Option<egui::TextureId>, RenderError> {
         let Some(scene) = &lesson.scene else { return Ok(None) };
-        let particle_count = scene.particles.as_ref().map_or(0, ParticleField::count);
+        let particle_count = scene.particles.as_ref().map_or(0, ParticleField::moving_count);
         let stereo = [settings.stereo(), settings.second_eye()];
         // What cuts changes the picture anyhow: the rotation alone asks for none.
         self.bur.advance(frame.now, lesson.snapshot.is_some_and(|seen| seen.cutting));
@@ -135,6 +135,7 @@ impl LessonView {
             second_size: second_size(settings, viewport, frame.size),
             is_smooth: settings.is_smooth(viewport.has_graphics()),
             has_shadows: self.has_shadows(settings, viewport),
+            has_relief: self.is_quick(viewport),
             is_left_handed: settings.left_handed,
             particle_count,
         };
@@ -158,7 +159,12 @@ impl LessonView {
     }
 
     fn has_shadows(&self, settings: &Settings, viewport: &Viewport) -> bool {
-        settings.has_shadows(viewport.has_graphics() && !self.refresh.has_been_slow())
+        settings.has_shadows(self.is_quick(viewport))
+    }
+
+    /// True where a graphics processor draws, and has been quick enough so far.
+    fn is_quick(&self, viewport: &Viewport) -> bool {
+        viewport.has_graphics() && !self.refresh.has_been_slow()
     }
 
     fn draw_scene(
@@ -184,7 +190,7 @@ impl LessonView {
                 },
                 world_from_tooth: lesson_scene.workpiece.world_from_tooth,
                 palette: &lesson_scene.palette,
-                enamel_depth: lesson_scene.enamel_depth(&lesson.scenario.tissues),
+                unworked_tooth: Some(lesson_scene.unworked_tooth(&lesson.scenario.tissues)),
                 mode: lesson_scene.render_mode(mode),
             }),
             solids: solids(lesson, lesson_scene, settings, &viewpoint, self.bur.turn),
@@ -195,6 +201,7 @@ impl LessonView {
             shadows: self
                 .has_shadows(settings, viewport)
                 .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),
+            has_relief: self.is_quick(viewport),
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
             is_antialiased: settings.is_smooth(viewport.has_graphics()),
         };

@@ -63,7 +63,7 @@ impl PreviewView {
                 changes: if has_volume { Changes::Bricks(&[]) } else { Changes::All },
                 world_from_tooth: build.workpiece.world_from_tooth,
                 palette: &preview.palette,
-                enamel_depth: Some(&build.enamel_depth),
+                unworked_tooth: Some(&build.unworked_tooth),
                 mode: preview.render_mode(),
             }),
             solids: if preview.shows_surroundings { preview.surroundings.clone() } else { Vec::new() },

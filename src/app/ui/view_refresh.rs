@@ -38,8 +38,9 @@ pub struct ViewInputs {
     pub second_size: [u32; 2],
     pub is_smooth: bool,
     pub has_shadows: bool,
+    pub has_relief: bool,
     pub is_left_handed: bool,
-    /// Number of particles in sight.
+    /// Number of moving particles.
     pub particle_count: usize,
 }
 
@@ -163,6 +164,7 @@ mod tests {
             second_size: [0, 0],
             is_smooth: false,
             has_shadows: false,
+            has_relief: false,
             is_left_handed: false,
             particle_count: 0,
         }

@@ -78,7 +78,7 @@ pub fn measure_tooth(tooth: &Volume) -> Result<FrameTimings, String> {
                 changes,
                 world_from_tooth: upright,
                 palette: &palette,
-                enamel_depth: None,
+                unworked_tooth: None,
                 mode: mode.clone(),
             }),
             is_antialiased,
@@ -100,7 +100,7 @@ pub fn measure_tooth(tooth: &Volume) -> Result<FrameTimings, String> {
 pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<StereoTimings, String> {
     let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();
     let palette = scene::tissue_palette(&scenario.tissues, true);
-    let enamel_depth = scene::enamel_depth(&workpiece.volume, &scenario.tissues);
+    let unworked_tooth = scene::unworked_tooth(workpiece, &scenario.tissues);
     let function = Arc::new(TransferFunction::tissue(&palette));
     let solids: Vec<MeshInstance> = match Mouth::around(workpiece, &scenario.tissues) {
         Some(mouth) => mouth.solids(scene::WORKING_OPENING_DEG),
@@ -115,12 +115,13 @@ pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<St
                 changes,
                 world_from_tooth: workpiece.world_from_tooth,
                 palette: &palette,
-                enamel_depth: Some(&enamel_depth),
+                unworked_tooth: Some(&unworked_tooth),
                 mode: mode.clone(),
             }),
             solids: solids.clone(),
             lights: Lights { chair: Lamp::chair_toward(eye, orbit.middle), head: Lamp::head(eye), ..Lights::default() },
             shadows,
+            has_relief: shadows.is_some(),
             is_antialiased: true,
             ..RenderScene::empty()
         })

@@ -142,6 +142,7 @@ impl Workpiece {
             drawn: Vec::new(),
             surroundings: Vec::new(),
             own_jaw: false,
+            rubber_dam: false,
             neighbours: Vec::new(),
             periodontium: None,
             arch: Default::default(),

@@ -227,6 +227,10 @@ pub struct JawFile {
     /// True for the tongue, which gives way and can be hurt. Beside lower premolars and molars.
     #[serde(default)]
     pub tongue: bool,
+    /// True for a rubber dam, from which the treated tooth and the three teeth on each side of it stand out. It is drawn only: the
+    /// gingiva under it is felt and scored as without it.
+    #[serde(default)]
+    pub rubber_dam: bool,
     /// Positions of the teeth in both jaws.
     #[serde(default)]
     pub arch: ArchFile,

@@ -143,6 +143,8 @@ pub struct Scene {
     pub surroundings: Option<Vec<Collider>>,
     /// True if these are a jaw of the exercise's own, in place of the generated one.
     pub own_jaw: bool,
+    /// True if a rubber dam covers the jaw, all but the tooth and those beside it.
+    pub rubber_dam: bool,
     /// Gingiva with pockets; `None` outside a jaw.
     pub pockets: Option<Pockets>,
     pub arch: DentalArches,

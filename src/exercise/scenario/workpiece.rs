@@ -42,6 +42,8 @@ pub struct Workpiece {
     pub surroundings: Vec<Collider>,
     /// True if they are a jaw of the exercise's own, in place of the generated one.
     pub own_jaw: bool,
+    /// True if a rubber dam covers the jaw; it cannot be touched.
+    pub rubber_dam: bool,
     /// Those neighbouring teeth among them that have the form of their kind.
     pub neighbours: Vec<NeighbourTooth>,
     /// Gingiva with a sulcus; `None` without pockets.
@@ -216,6 +218,7 @@ impl Workpiece {
             drawn,
             surroundings: around,
             own_jaw: scenario.scene.own_jaw,
+            rubber_dam: scenario.scene.rubber_dam,
             neighbours,
             periodontium,
             arch,

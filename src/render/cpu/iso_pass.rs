@@ -22,8 +22,7 @@ pub fn iso_pass(sampler: &VolumeSampler, view: &CpuView, framebuffer: &mut Frame
         }
         let at = ray.at(z);
         let normal = sampler.normal(at, -direction);
-        let open = sampler.openness(at, normal);
-        pixel.colour = view.shade(sampler.appearance(at), open, view.eye.position + direction * z, normal);
+        pixel.colour = sampler.shade(view, at, view.eye.position + direction * z, normal);
         pixel.depth = depth;
     });
 }

@@ -20,6 +20,7 @@ pub use stereo_pass::stereo_pass;
 use super::drawn_volume::DrawnVolume;
 use super::eye::Eye;
 use super::mirror::{self, PlaneMirror};
+use super::relief::Relief;
 use super::scene::{Appearance, Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
 use super::shading::LitPoint;
 use super::surface_colours::SurfaceColours;
@@ -127,7 +128,8 @@ impl CpuRenderer {
         eye: &Eye,
         [width, height]: [u32; 2],
     ) -> RgbaImage {
-        let view = CpuView { eye: *eye, lights: scene.lights, width, height, shadows: shadows.clone() };
+        let relief = scene.has_relief.then(|| Relief::seen_by(eye, width));
+        let view = CpuView { eye: *eye, lights: scene.lights, width, height, shadows: shadows.clone(), relief };
         let mut framebuffer = Framebuffer::with_background(&scene.background, width, height);
         for solid in &scene.solids {
             surface_pass::solid(solid, &view, &mut framebuffer);
@@ -158,6 +160,7 @@ struct CpuView {
     width: u32,
     height: u32,
     shadows: Option<Arc<LampDepths>>,
+    relief: Option<Relief>,
 }
 
 impl CpuView {

@@ -5,7 +5,7 @@ use super::{Framebuffer, Pixel};
 use typodont_core::parallel::{available_threads, par_rows};
 
 /// Number of values that vary over a triangle: see `surface_pass`.
-pub const VARYING: usize = 10;
+pub const VARYING: usize = 11;
 
 #[derive(Clone, Copy)]
 pub struct ShadedVertex {

@@ -60,7 +60,7 @@ impl LampDepths {
     ) -> Option<LampDepths> {
         let eye = shadow::chair_eye(scene)?;
         let (width, height) = (shadow::MAP_SIZE, shadow::MAP_SIZE);
-        let view = CpuView { eye, lights: scene.lights, width, height, shadows: None };
+        let view = CpuView { eye, lights: scene.lights, width, height, shadows: None, relief: None };
         let mut framebuffer = Framebuffer::with_background(&Background::plain([0.0; 3]), width, height);
         for solid in scene.solids.iter().filter(|solid| solid.casts_shadow) {
             surface_pass::solid_depths(solid, &view, &mut framebuffer);

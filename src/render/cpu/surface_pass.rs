@@ -3,7 +3,7 @@
 use super::raster::{self, ShadedVertex};
 use super::volume_sampler::VolumeSampler;
 use super::{CpuView, Framebuffer};
-use crate::scene::{Appearance, MeshInstance, VolumeInstance};
+use crate::scene::{Appearance, MeshInstance, Rgb, VolumeInstance};
 use crate::surface_mesh;
 use crate::vertex::Vertex;
 use typodont_core::frame::{Pose, Vec3};
@@ -12,23 +12,20 @@ use typodont_core::volume::{Volume, surface};
 pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer) {
     let vertices = surface_mesh::instance_vertices(solid);
     let own = solid.appearance;
-    triangles(
-        &vertices,
-        &solid.mesh.triangles,
-        solid.world_from_solid,
-        view,
-        framebuffer,
-        |_, normal, finish, point| {
-            let colour = std::array::from_fn(|c| finish.colour[c] * own.colour[c]);
-            view.shade(Appearance { colour, gloss: finish.gloss * own.gloss }, 1.0, point, normal)
-        },
-    );
+    triangles(&vertices, &solid.mesh.triangles, solid.world_from_solid, view, framebuffer, |seen| {
+        let SurfacePoint { own: place, normal, finish, stippling, point } = seen;
+        let colour = std::array::from_fn(|c| finish.colour[c] * own.colour[c]);
+        let normal = view.relief.map_or(normal, |relief| {
+            relief.stippled(point, normal, place, stippling, |v| solid.world_from_solid.rotate(v))
+        });
+        view.shade(Appearance { colour, gloss: finish.gloss * own.gloss }, 1.0, point, normal)
+    });
 }
 
 /// The depths of a solid alone, for shadows.
 pub fn solid_depths(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer) {
     let vertices = surface_mesh::instance_vertices(solid);
-    triangles(&vertices, &solid.mesh.triangles, solid.world_from_solid, view, framebuffer, |_, _, _, _| [0.0; 3]);
+    triangles(&vertices, &solid.mesh.triangles, solid.world_from_solid, view, framebuffer, |_| [0.0; 3]);
 }
 
 /// The depths of the tooth alone, for shadows.
@@ -38,7 +35,7 @@ pub fn tooth_depths(
     view: &CpuView,
     framebuffer: &mut Framebuffer,
 ) {
-    triangles(vertices, corners, tooth.world_from_tooth, view, framebuffer, |_, _, _, _| [0.0; 3]);
+    triangles(vertices, corners, tooth.world_from_tooth, view, framebuffer, |_| [0.0; 3]);
 }
 
 /// Surface of the tooth, in tooth space.
@@ -62,21 +59,33 @@ pub fn tooth(surface: &SurfaceTriangles, sampler: &VolumeSampler, view: &CpuView
         sampler.world_from_tooth,
         view,
         framebuffer,
-        |own, normal, _, point| {
+        |SurfacePoint { own, normal, point, .. }| {
             let at = grid.from_tooth(own);
-            view.shade(sampler.appearance(at), sampler.openness(at, normal), point, normal)
+            sampler.shade(view, at, point, normal)
         },
     );
 }
 
-/// Draws triangles; `shade` is given the place in the solid's space, the unit normal, the finish and the place in the world.
+/// A place on a triangle.
+struct SurfacePoint {
+    /// In the solid's own space.
+    own: Vec3,
+    /// Unit, world space.
+    normal: Vec3,
+    finish: Appearance,
+    stippling: f32,
+    /// World space.
+    point: Vec3,
+}
+
+/// Draws triangles.
 fn triangles(
     vertices: &[Vertex],
     triangles: &[[u32; 3]],
     world_from_solid: Pose,
     view: &CpuView,
     framebuffer: &mut Framebuffer,
-    shade: impl Fn(Vec3, Vec3, Appearance, Vec3) -> [f32; 3] + Sync,
+    shade: impl Fn(SurfacePoint) -> Rgb + Sync,
 ) {
     let clip_from_world = view.eye.clip_from_world();
     let corner = |vertex: &Vertex| {
@@ -88,13 +97,14 @@ fn triangles(
             let [x, y, z, w] = clip_from_world.map(|column| column[row]);
             x * point.x + y * point.y + z * point.z + w
         });
-        let vary = [own.x, own.y, own.z, normal.x, normal.y, normal.z, r, g, b, vertex.gloss()];
+        let vary = [own.x, own.y, own.z, normal.x, normal.y, normal.z, r, g, b, vertex.gloss(), vertex.stippling()];
         ShadedVertex { clip, varying: vary }
     };
     let corners: Vec<ShadedVertex> = vertices.iter().map(corner).collect();
-    raster::draw(&corners, triangles, framebuffer, |[x, y, z, nx, ny, nz, r, g, b, gloss]| {
+    raster::draw(&corners, triangles, framebuffer, |[x, y, z, nx, ny, nz, r, g, b, gloss, stippling]| {
         let own = Vec3::new(x, y, z);
         let normal = Vec3::new(nx, ny, nz).normalize_or_zero();
-        shade(own, normal, Appearance { colour: [r, g, b], gloss }, world_from_solid * own)
+        let finish = Appearance { colour: [r, g, b], gloss };
+        shade(SurfacePoint { own, normal, finish, stippling, point: world_from_solid * own })
     });
 }

@@ -93,7 +93,7 @@ mod tests {
             colour: [[0.5; 3], [0.95, 0.94, 0.9], [0.9, 0.81, 0.6], [0.75, 0.3, 0.3]][label.min(3)],
             gloss: 0.2,
         });
-        LabelPalette { appearances, is_decay: [false; 256], translucent: None, under_translucent: None }
+        LabelPalette { appearances, ..LabelPalette::from_colours(|_| [1.0; 3], 0.2) }
     }
 
     /// Reads and bytes per pixel of a crown that fills the picture, with smoothed edges, and the reads of each texture.
@@ -110,7 +110,7 @@ mod tests {
                 changes: Changes::All,
                 world_from_tooth: upright,
                 palette,
-                enamel_depth: None,
+                unworked_tooth: None,
                 mode,
             }),
             lights: Lights::along(&viewpoint),

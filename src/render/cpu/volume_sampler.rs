@@ -6,7 +6,7 @@ use crate::ambient_occlusion::OcclusionVolume;
 use crate::bounds_of_matter;
 use crate::empty_space;
 use crate::empty_space::{BrickEntry, EmptySpaceMap};
-use crate::scene::{Appearance, VolumeInstance};
+use crate::scene::{Appearance, Rgb, VolumeInstance};
 use crate::surface_colours::SurfaceColours;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Vec3};
@@ -115,6 +115,17 @@ impl<'a> VolumeSampler<'a> {
         let outward = self.world_from_tooth.inverse().rotate(normal) / self.volume.grid().spacing;
         self.reads.count(Texture::Occlusion, 1);
         self.occlusion.openness(at, outward)
+    }
+
+    /// Shaded colour of the surface at a place, which is a point of world space.
+    pub fn shade(&self, view: &CpuView, at: Vec3, point: Vec3, normal: Vec3) -> Rgb {
+        let finish = self.appearance(at);
+        let open = self.openness(at, normal);
+        let own = at * self.volume.grid().spacing;
+        let marked = view.relief.map_or(normal, |relief| {
+            relief.marked(point, normal, own, finish.gloss, |v| self.world_from_tooth.rotate(v))
+        });
+        view.shade(finish, open, point, marked)
     }
 
     /// Colour and gloss of the surface at a place.

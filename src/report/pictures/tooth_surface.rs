@@ -4,18 +4,19 @@ use crate::raycast::{GBuffer, PixelBuffer};
 use typodont_core::frame::Pose;
 use typodont_core::volume::Volume;
 use typodont_exercise::catalog::TissueTable;
-use typodont_render::{Changes, EnamelDepth, LabelPalette, RenderMode, SurfaceColours, VolumeInstance};
-use typodont_scene::{enamel_depth, tissue_palette};
+use typodont_exercise::scenario::Workpiece;
+use typodont_render::{Changes, LabelPalette, RenderMode, SurfaceColours, UnworkedTooth, VolumeInstance};
+use typodont_scene::{tissue_palette, unworked_tooth};
 
-/// Colours of a tooth's tissues, with decay shown, and the thickness of its enamel before the work.
+/// Colours of a tooth's tissues, with decay shown, and the tooth before anybody worked on it.
 pub struct ToothMaterial {
     palette: LabelPalette,
-    enamel_depth: EnamelDepth,
+    unworked_tooth: UnworkedTooth,
 }
 
 impl ToothMaterial {
-    pub fn of(tissues: &TissueTable, before: &Volume) -> ToothMaterial {
-        ToothMaterial { palette: tissue_palette(tissues, true), enamel_depth: enamel_depth(before, tissues) }
+    pub fn of(tissues: &TissueTable, workpiece: &Workpiece) -> ToothMaterial {
+        ToothMaterial { palette: tissue_palette(tissues, true), unworked_tooth: unworked_tooth(workpiece, tissues) }
     }
 
     /// The surface of the tooth at a stage of the work.
@@ -25,7 +26,7 @@ impl ToothMaterial {
             changes: Changes::All,
             world_from_tooth: Pose::IDENTITY,
             palette: &self.palette,
-            enamel_depth: Some(&self.enamel_depth),
+            unworked_tooth: Some(&self.unworked_tooth),
             mode: RenderMode::Surface,
         });
         ToothSurface { volume, colours }
@@ -41,6 +42,6 @@ pub struct ToothSurface<'a> {
 impl ToothSurface<'_> {
     /// A view of this volume, in colour.
     pub fn paint(&self, view: &GBuffer) -> PixelBuffer {
-        view.paint(|point| self.colours.at(self.volume.grid().from_tooth(point)))
+        view.paint_with_relief(|point| self.colours.at(self.volume.grid().from_tooth(point)))
     }
 }

@@ -17,7 +17,7 @@ use ray::RayMarcher;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::{available_threads, par_rows};
 use typodont_core::volume::{Label, Volume};
-use typodont_render::Appearance;
+use typodont_render::{Appearance, marked_normal};
 
 /// Samples along each side of a pixel where the picture has an edge; elsewhere one does.
 const SUPERSAMPLES: u32 = 3;
@@ -131,7 +131,12 @@ fn edge_pixels(hits: &[Option<Hit>], width: usize, pixel: f32) -> Vec<usize> {
 impl GBuffer {
     /// The surface that was seen, lit; `finish` is asked for points of the surface in tooth space. Nothing stays transparent.
     pub fn paint(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
-        self.paint_with(finish, available_threads())
+        self.paint_with(finish, false, available_threads())
+    }
+
+    /// The same with the fine relief of dull places: the marks of burs, and rough decay.
+    pub fn paint_with_relief(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
+        self.paint_with(finish, true, available_threads())
     }
 
     /// The same in the colours of voxels.
@@ -139,11 +144,19 @@ impl GBuffer {
         self.paint(|point| Appearance { colour: surface_colour(volume, point, &colour), gloss: FAINT_GLOSS })
     }
 
-    fn paint_with(&self, finish: impl Fn(Vec3) -> Appearance + Sync, threads: usize) -> PixelBuffer {
+    fn paint_with(&self, finish: impl Fn(Vec3) -> Appearance + Sync, has_relief: bool, threads: usize) -> PixelBuffer {
         let lamps = light::lamps();
+        let pixel = 2.0 * self.camera.half_height / self.height as f32;
         let mut picture = PixelBuffer::transparent(self.width, self.height);
         let shade = |hit: &Option<Hit>| match hit {
-            Some(hit) => light::lit_colour(&lamps, &self.camera, finish(hit.point), hit),
+            Some(hit) => {
+                let finish = finish(hit.point);
+                let normal = match has_relief {
+                    true => marked_normal(hit.normal, hit.point, finish.gloss, pixel),
+                    false => hit.normal,
+                };
+                light::lit_colour(&lamps, &self.camera, finish, &Hit { normal, ..*hit })
+            }
             None => [0.0; 4],
         };
         par_rows(&mut picture.pixels, self.width, threads, |y, row| {
@@ -244,7 +257,7 @@ mod tests {
             height: 61,
         };
         let finish = |p: Vec3| Appearance { colour: [0.5 + 0.4 * p.x, 0.4, 0.2], gloss: 0.2 };
-        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(finish, threads);
+        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(finish, true, threads);
         assert_eq!(picture(1), picture(3));
     }
 

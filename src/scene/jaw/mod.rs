@@ -4,12 +4,15 @@
 //! jaw follows the gingiva and neighbours that can be touched, so that the picture agrees with the contact. Where a whole
 //! arch can be touched, its gingiva is drawn as it is felt.
 
+mod rubber_dam;
+
+use self::rubber_dam::{ISOLATED_BESIDE, RubberDam};
 use super::lips::Lips;
 use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
 use typodont_anatomy::jaw::{
-    ArchPlan, DentalArch, FittedTooth, GumForm, Jaw, Occlusion, TintedMesh, ToothSeat, WORKING_OPENING_DEG,
+    ArchPlan, DentalArch, FittedTooth, GumForm, Jaw, Occlusion, Tint, TintedMesh, ToothSeat, WORKING_OPENING_DEG,
 };
 use typodont_anatomy::periodontium::Periodontium;
 use typodont_anatomy::teeth::distal_sign;
@@ -19,7 +22,7 @@ use typodont_core::touch::{Collider, ColliderGeometry};
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::{MouthArches, ToothBounds, Workpiece};
-use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb, Viewpoint};
+use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb, VertexTint, Viewpoint};
 
 /// Gloss of wet gingiva and enamel, 0 to 1.
 const GUM_GLOSS: f32 = 0.19;
@@ -61,6 +64,8 @@ pub struct Mouth {
     /// Cheek and tongue.
     yielding: Vec<YieldingSurface>,
     lips: Option<Lips>,
+    /// True under a rubber dam, which covers the lips.
+    has_dam: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -83,11 +88,16 @@ impl JawMeshes {
     }
 }
 
+/// The tint of an anatomical surface as it is drawn.
+pub(super) fn vertex_tint(Tint { colour, stippling }: Tint) -> VertexTint {
+    VertexTint { colour, stippling }
+}
+
 /// A mesh with tints, and the finish they are multiplied with.
 #[derive(Clone, Debug)]
 struct FinishedMesh {
     mesh: Arc<Mesh>,
-    vertex_colours: Arc<Vec<Rgb>>,
+    vertex_tints: Arc<Vec<VertexTint>>,
     appearance: Appearance,
 }
 
@@ -95,14 +105,14 @@ impl FinishedMesh {
     fn new(made: TintedMesh, colour: Rgb, gloss: f32) -> FinishedMesh {
         FinishedMesh {
             mesh: Arc::new(made.mesh),
-            vertex_colours: Arc::new(made.tints),
+            vertex_tints: Arc::new(made.tints.into_iter().map(vertex_tint).collect()),
             appearance: Appearance { colour, gloss },
         }
     }
 
     fn instance(&self, world_from_solid: Pose) -> MeshInstance {
         MeshInstance {
-            vertex_colours: self.vertex_colours.clone(),
+            vertex_tints: self.vertex_tints.clone(),
             ..MeshInstance::plain(self.mesh.clone(), world_from_solid, self.appearance)
         }
     }
@@ -138,6 +148,7 @@ impl Mouth {
             occlusion: workpiece.arch.occlusion(&near, &other),
             felt_opening: None,
             touched: Vec::new(),
+            has_dam: false,
             yielding: Vec::new(),
             lips: None,
         }
@@ -166,6 +177,7 @@ impl Mouth {
             occlusion: workpiece.arch.occlusion(&arches.near, &arches.opposite),
             felt_opening: Some(WORKING_OPENING_DEG),
             touched: Vec::new(),
+            has_dam: false,
             yielding: yielding.collect(),
             lips: None,
         })
@@ -192,6 +204,7 @@ impl Mouth {
             occlusion: plan.occlusion(&near, &plan.of_jaw(jaw.other(), [])),
             felt_opening: None,
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
+            has_dam: false,
             yielding: yielding.collect(),
             lips: None,
         })
@@ -226,8 +239,13 @@ impl Mouth {
             near_from_tooth,
         };
         let is_neighbour = |fdi: u8| neighbours.iter().any(|neighbour| neighbour.fdi == fdi);
+        let is_isolated = |side: f32, index: usize| {
+            let place = |side: f32, index: usize| side * (index as f32 + 0.5);
+            !workpiece.rubber_dam || (place(side, index) - place(sign, number - 1)).abs() <= ISOLATED_BESIDE
+        };
         let is_left_out = |side: f32, index: usize, seat: &ToothSeat| {
             plan.missing.contains(&jaw.fdi(side, index))
+                || !is_isolated(side, index)
                 || (side == sign && index + 1 == number)
                 || (!is_neighbour(jaw.fdi(side, index)) && geometry.occupies(seat, side))
         };
@@ -235,23 +253,40 @@ impl Mouth {
             let is_soft = tissues.role(shape.label) == Some(TissueRole::Soft);
             // Neighbours with the form of their kind are drawn with the jaw's teeth.
             let is_drawn_with_jaw = neighbours.iter().any(|neighbour| neighbour.collider == *index);
-            surroundings::is_visible(shape, tissues) && !is_drawn_with_jaw && (!is_soft || has_own_surface(shape))
+            let is_under_dam = is_soft && workpiece.rubber_dam;
+            surroundings::is_visible(shape, tissues)
+                && !is_drawn_with_jaw
+                && !is_under_dam
+                && (!is_soft || has_own_surface(shape))
         };
         let touched = workpiece.surroundings.iter().enumerate().filter(is_drawn).map(|(_, shape)| shape);
         let form = if is_in_bend { GumForm::Touched } else { GumForm::Drawn };
+        let dam = workpiece.rubber_dam.then(|| {
+            RubberDam::over(&near, sign, &|side, index| {
+                is_isolated(side, index) && !plan.missing.contains(&jaw.fdi(side, index))
+            })
+        });
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
+        let crowns = near.crowns(&is_left_out);
+        let meshes = match &dam {
+            Some(dam) => JawMeshes { gum: dam.sheet.clone(), ..JawMeshes::new(crowns, TintedMesh::default(), tissues) },
+            None => JawMeshes::new(crowns, near.gum(form, &|p| geometry.sink_within_tooth(p)), tissues),
+        };
+        let world_from_near = workpiece.world_from_tooth * near_from_tooth.inverse();
+        let clamp =
+            dam.and_then(|dam| dam.clamp).map(|clamp| MeshInstance { world_from_solid: world_from_near, ..clamp });
         Some(Mouth {
-            near: JawMeshes::new(
-                near.crowns(&is_left_out),
-                near.gum(form, &|p| geometry.sink_within_tooth(p)),
-                tissues,
-            ),
+            near: meshes,
             opposite: Some(opposite_jaw(workpiece, &other, tissues)),
             jaw,
-            world_from_near: workpiece.world_from_tooth * near_from_tooth.inverse(),
+            world_from_near,
             occlusion: plan.occlusion(&near, &other),
             felt_opening: None,
-            touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
+            touched: touched
+                .map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues))
+                .chain(clamp)
+                .collect(),
+            has_dam: workpiece.rubber_dam,
             yielding: yielding.collect(),
             lips: None,
         })
@@ -278,7 +313,8 @@ impl Mouth {
     fn with_lips(self) -> Mouth {
         let arches = [self.world_from_near, self.world_from_opposite(WORKING_OPENING_DEG)];
         let front = arches.iter().map(|arch| arch.rotate(Vec3::NEG_Y)).sum::<Vec3>().normalize_or(Vec3::Z);
-        let lips = self.opposite.is_some().then(|| Lips::around(arches.map(|arch| arch.position), front));
+        let lips =
+            (self.opposite.is_some() && !self.has_dam).then(|| Lips::around(arches.map(|arch| arch.position), front));
         Mouth { lips, ..self }
     }
 
@@ -369,7 +405,7 @@ impl StandaloneJaw {
         let arch = DentalArch::new(jaw, 7, None, &ArchPlan { age, ..ArchPlan::default() });
         let TintedMesh { mesh, tints } = arch.gum(GumForm::Drawn, &|p| p);
         let pink = tissues.by_name("gingiva").map_or(PINK, |e| e.rgb());
-        let gum_colours = tints.iter().map(|tint| std::array::from_fn(|c| pink[c] * tint[c])).collect();
+        let gum_colours = tints.iter().map(|tint| std::array::from_fn(|c| pink[c] * tint.colour[c])).collect();
         StandaloneJaw { gum: mesh, gum_colours, teeth: arch.teeth() }
     }
 }

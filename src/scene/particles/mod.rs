@@ -1,9 +1,11 @@
-//! The operating field: the dust that a bur throws, the water that cools it, and the suction that takes both away.
+//! The operating field: the dust that a bur throws, the water that cools it, the blood of an opened pulp, and the suction that takes
+//! all of them away.
 //!
 //! Takes removed voxels, the pose of the working end and the elapsed time. Gives particles to draw. Never reads a
 //! clock, and never affects a tick, a recording or a score: it uses a copy of the volume. The same edits and times give
 //! the same particles.
 
+mod bleeding;
 mod xorshift;
 mod dust;
 mod collision;
@@ -15,13 +17,14 @@ pub use collision::CollisionWorld;
 pub use suction::{saliva_ejector, suction_tube};
 pub use syringe::syringe;
 
+use self::bleeding::Bleeding;
 use self::dust::Dust;
 use self::suction::Suction;
 use self::water::Water;
 use self::xorshift::Xorshift32;
 use super::instrument::head_height;
 use typodont_core::frame::{Pose, Vec3};
-use typodont_core::volume::{Edit, Grid};
+use typodont_core::volume::{Edit, Grid, Label};
 use typodont_exercise::catalog::InstrumentEntry;
 use typodont_exercise::scenario::OperatingField;
 use typodont_render::{LabelPalette, Particle, Viewpoint};
@@ -45,6 +48,7 @@ pub struct ParticleField {
     suction: Option<Suction>,
     dust: Dust,
     water: Water,
+    bleeding: Bleeding,
     rng: Xorshift32,
     /// Time that is not yet a whole step, s.
     pending_time: f32,
@@ -81,10 +85,16 @@ pub enum AssistantAction {
 }
 
 impl ParticleField {
-    /// An empty field. `suction_inlet` is the position of a suction tip, if there is one, world space, mm.
+    /// An empty field. `suction_inlet` is the position of a suction tip, if there is one, world space, mm; `pulp` is the label of
+    /// what bleeds when it is cut, if there is any.
     ///
     /// This function allocates; the other methods do not.
-    pub fn new(options: OperatingField, tray: &[InstrumentEntry], suction_inlet: Option<Vec3>) -> ParticleField {
+    pub fn new(
+        options: OperatingField,
+        tray: &[InstrumentEntry],
+        suction_inlet: Option<Vec3>,
+        pulp: Option<Label>,
+    ) -> ParticleField {
         let drill = |entry: &InstrumentEntry| DrillGeometry {
             cuts: entry.is_bur(),
             radius: entry.to_instrument().head_radius(),
@@ -96,6 +106,7 @@ impl ParticleField {
             suction: suction_inlet.filter(|_| options.suction).map(Suction::new),
             dust: Dust::new(),
             water: Water::new(),
+            bleeding: Bleeding::of(pulp),
             rng: Xorshift32::new(),
             pending_time: 0.0,
         }
@@ -109,7 +120,11 @@ impl ParticleField {
 
     /// Records a changed voxel for the next [`ParticleField::advance`].
     pub fn record_removal(&mut self, edit: &Edit, grid: &Grid) {
-        if self.options.dust && edit.removes() {
+        if !edit.removes() {
+            return;
+        }
+        self.bleeding.record_removal(edit, grid);
+        if self.options.dust {
             self.dust.add_carved(edit, grid);
         }
     }
@@ -123,7 +138,7 @@ impl ParticleField {
         world: &CollisionWorld,
         palette: &LabelPalette,
     ) {
-        let ParticleField { options, suction, dust, water, rng, pending_time, .. } = self;
+        let ParticleField { options, suction, dust, water, bleeding, rng, pending_time, .. } = self;
         let held = match assistant {
             Some(AssistantAction::Draw { inlet }) => Some(Suction::new(inlet)),
             _ => None,
@@ -140,6 +155,7 @@ impl ParticleField {
             if let Some(AssistantAction::Spray { nozzle, aim }) = assistant {
                 water.jet(nozzle, aim, rng);
             }
+            bleeding.step(water, world, rng);
             water.step_flying(world, suction, dust, rng);
             water.step_lying(world, suction);
             dust.step(world, suction);
@@ -149,9 +165,9 @@ impl ParticleField {
         }
     }
 
-    /// Number of particles in flight.
-    pub fn count(&self) -> usize {
-        self.dust.particles().count() + self.water.particles().count()
+    /// Number of particles that are to be drawn anew in the next picture, or 1 while blood flows: none for blood that has come to rest.
+    pub fn moving_count(&self) -> usize {
+        self.dust.particles().count() + self.water.moving_count() + usize::from(self.bleeding.is_flowing())
     }
 }
 
@@ -202,7 +218,7 @@ fn apply_drag(velocity: Vec3, air: Vec3, time: f32) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use typodont_core::volume::{Label, Volume, Voxel};
+    use typodont_core::volume::{Volume, Voxel};
     use typodont_exercise::catalog::InstrumentTable;
     use typodont_formats::Library;
 
@@ -281,7 +297,7 @@ mod tests {
     fn dust_leaves_the_rim_the_way_it_turns_and_up_the_flutes() {
         // Aim: momentum. Method: seen from the handpiece a bur turns clockwise; what it cuts at its +x side, seen from above
         // with the user at +z, must leave toward the user, and upward.
-        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
+        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None, None));
         let bur = field.bur(0, upright(Vec3::new(5.0, 0.2, 0.0))).unwrap();
         carve(&mut volume, &mut field, Vec3::new(5.7, -0.2, 0.0), 0.5);
         field.advance(0.0, (Some(&bur), None), &ground(&volume), &palette());
@@ -293,7 +309,7 @@ mod tests {
     fn dust_has_the_colour_in_which_its_tissue_is_shown() {
         // Aim: decay that an exercise hides does not give itself away by its dust. Method: the palette decides, and chips are
         // paler than it by a little, as powder is.
-        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
+        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None, None));
         let bur = field.bur(0, upright(AT_WORK)).unwrap();
         carve(&mut volume, &mut field, AT_WORK, 1.0);
         field.advance(0.0, (Some(&bur), None), &ground(&volume), &palette());
@@ -309,7 +325,7 @@ mod tests {
     #[test]
     fn dust_comes_to_lie_on_the_tooth_and_falls_when_that_is_carved_away() {
         // Aim: chips stay on surfaces, never inside them, and only while there is one.
-        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
+        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None, None));
         grind(&mut volume, &mut field);
         let lying: Vec<Vec3> = field.dust.resting_positions().collect();
         assert!(lying.len() > 30, "{} chips lie", lying.len());
@@ -331,7 +347,7 @@ mod tests {
     fn a_syringe_washes_away_the_dust_that_hides_the_work() {
         // Aim: an assistant's water is matter: it clears what rests on the tooth, and nothing does without it. Method: dust of
         // dry grinding; half a second without water, then a syringe over it for a second, and two more in which it runs off.
-        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None));
+        let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None, None));
         grind(&mut volume, &mut field);
         let lying = |field: &ParticleField| {
             field.dust.resting_positions().filter(|place| place.distance(AT_WORK) < 3.0).count()
@@ -356,7 +372,7 @@ mod tests {
         // Aim: a bound on number and on memory. Method: far more is carved and sprayed than there is room for.
         let far_off = Some(Vec3::new(30.0, 0.0, 0.0));
         let volume = slab();
-        let [mut wet, mut dry] = [ALL, DUST].map(|options| ParticleField::new(options, &tray(), far_off));
+        let [mut wet, mut dry] = [ALL, DUST].map(|options| ParticleField::new(options, &tray(), far_off, None));
         // Matter that stood over the plane, in no order.
         let grid = *volume.grid();
         let over: Vec<usize> = (0..grid.len()).filter(|i| grid.centre(grid.cell(*i)).y > 0.3).collect();
@@ -390,7 +406,7 @@ mod tests {
         // without; when the drill stops, the water stays without suction and goes with it.
         let worked = |options: OperatingField| {
             let (mut volume, mut field) =
-                (slab(), ParticleField::new(options, &tray(), Some(Vec3::new(4.0, 3.5, 0.0))));
+                (slab(), ParticleField::new(options, &tray(), Some(Vec3::new(4.0, 3.5, 0.0)), None));
             grind(&mut volume, &mut field);
             let in_pit =
                 |field: &ParticleField| field.dust.resting_positions().filter(|p| p.distance(AT_WORK) < 2.5).count();
@@ -417,10 +433,38 @@ mod tests {
     }
 
     #[test]
+    fn an_opened_pulp_bleeds_into_the_cavity_until_the_blood_clots() {
+        // Aim: who opens the pulp sees it, and who does not sees no blood. Method: the same cut through matter that is pulp and
+        // that is not; blood gathers in the pit, is the same after a minute as after half of it, and is thinned and washed out by a
+        // spray.
+        const NONE: OperatingField = OperatingField { dust: false, water_spray: false, suction: false };
+        let bled = |pulp: Label| {
+            let options = OperatingField { water_spray: true, ..NONE };
+            let (mut volume, mut field) = (slab(), ParticleField::new(options, &tray(), None, Some(pulp)));
+            carve(&mut volume, &mut field, AT_WORK, 0.8);
+            let spraying = field.bur(0, upright(AT_WORK)).unwrap();
+            let mut after = |seconds: usize, bur: Option<&RunningBur>| {
+                (0..10 * seconds).for_each(|_| field.advance(0.1, (bur, None), &ground(&volume), &palette()));
+                let red = visible(&field).translucent().iter().filter(|p| p.appearance.colour[1] < 0.2).count();
+                (field.water.lying_blood_mm3(), red, field.moving_count())
+            };
+            [after(2, None), after(28, None), after(30, None), after(10, Some(&spraying))]
+        };
+        let sound = bled(Label(2));
+        assert!(sound.iter().all(|(blood, red, _)| *blood == 0.0 && *red == 0), "{sound:?}");
+        let [(soon, seen, flowing), (later, ..), (last, _, at_rest), (washed, ..)] = bled(Label(1));
+        println!("{soon}, {later}, {last} and {washed} mm³ of blood; {seen} patches and drops at first");
+        assert!(soon > 0.5 && seen > 0 && flowing > 0, "{soon} mm³, {seen} to be seen, {flowing} moving");
+        assert!(later > 2.0 * soon && (last - later).abs() < 0.02 * later, "{soon}, {later}, {last} mm³");
+        assert_eq!(at_rest, 0, "a clot needs no new picture");
+        assert!(washed < 0.7 * last, "{washed} of {last} mm³ under water");
+    }
+
+    #[test]
     fn suction_takes_dust_that_is_near_its_mouth() {
         let mouth = Vec3::new(2.0, 1.0, 0.0);
         let left = |options| {
-            let (mut volume, mut field) = (slab(), ParticleField::new(options, &tray(), Some(mouth)));
+            let (mut volume, mut field) = (slab(), ParticleField::new(options, &tray(), Some(mouth), None));
             grind(&mut volume, &mut field);
             field.dust.resting_positions().filter(|place| place.distance(mouth) < 3.5).count()
         };
@@ -432,7 +476,8 @@ mod tests {
     fn the_same_edits_and_times_give_the_same_specks() {
         // Aim: nothing looks at a clock or at true chance. Method: twice the same; then the same time in other pictures.
         let run = |times: &[f32]| {
-            let (mut volume, mut field) = (slab(), ParticleField::new(ALL, &tray(), Some(Vec3::new(9.0, 3.0, 0.0))));
+            let (mut volume, mut field) =
+                (slab(), ParticleField::new(ALL, &tray(), Some(Vec3::new(9.0, 3.0, 0.0)), None));
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             carve(&mut volume, &mut field, AT_WORK, 1.0);
             times.iter().for_each(|s| field.advance(*s, (Some(&bur), None), &ground(&volume), &palette()));
@@ -447,7 +492,7 @@ mod tests {
 
     #[test]
     fn an_explorer_neither_turns_nor_sprays() {
-        let field = ParticleField::new(ALL, &tray(), None);
+        let field = ParticleField::new(ALL, &tray(), None, None);
         assert_eq!(field.bur(1, Pose::IDENTITY), None);
         assert!(field.bur(0, Pose::IDENTITY).is_some_and(|bur| bur.radius > 0.5 && bur.height > 5.0));
     }

@@ -1,4 +1,4 @@
-//! The handpiece's water: droplets on their way to the bur, splashes, and the film and pools they leave.
+//! The handpiece's water and the blood of an opened pulp: droplets, splashes, and the film and pools they leave.
 
 use super::collision::{CollisionWorld, Sweep};
 use super::dust::Dust;
@@ -83,7 +83,14 @@ const LONG_STEP: f32 = UPDATE_INTERVAL as f32 * STEP;
 const SURFACE_OFFSET: f32 = 0.05;
 const SURFACE_SEARCH: f32 = 0.5;
 
+/// Share of blood from which a patch clots instead of drying.
+const CLOTTING_SHARE: f32 = 0.5;
+
+/// Speed at which drops of blood leave an opening, mm/s: they well up.
+const BLEEDING_SPEED: f32 = 12.0;
+
 const WATER: Appearance = Appearance { colour: [0.80, 0.89, 0.95], gloss: 0.7 };
+const BLOOD: Appearance = Appearance { colour: [0.60, 0.02, 0.02], gloss: 0.12 };
 const MIST: Appearance = Appearance { colour: [0.93, 0.96, 0.98], gloss: 0.0 };
 
 pub struct Water {
@@ -103,6 +110,8 @@ struct Droplet {
     velocity: Vec3,
     radius: f32,
     kind: DropletKind,
+    /// Share of blood in it.
+    blood: f32,
     /// s
     age: f32,
 }
@@ -122,11 +131,22 @@ struct WaterPatch {
     normal: Vec3,
     /// mm³
     volume: f32,
+    /// Share of blood in it.
+    blood: f32,
+    /// True once it has come to rest.
+    is_held: bool,
 }
 
 impl WaterPatch {
     fn radius(&self) -> f32 {
         libm::cbrtf(SPREAD_FACTOR * self.volume)
+    }
+
+    /// Takes up other water.
+    fn add(&mut self, other: &WaterPatch) {
+        let volume = self.volume + other.volume;
+        self.blood = (self.blood * self.volume + other.blood * other.volume) / volume.max(1e-9);
+        self.volume = volume;
     }
 
     /// 0 for a film, which clings, 1 for a pool, which is level.
@@ -161,8 +181,15 @@ impl Water {
             // They leave all through the step, not in waves.
             let place = port + velocity * (STEP * rng.next_f32());
             let radius = rng.in_range(RADII[0], RADII[1]);
-            push_bounded(&mut self.flying, MAX_FLYING, Droplet { place, velocity, radius, kind, age: 0.0 });
+            push_bounded(&mut self.flying, MAX_FLYING, Droplet { place, velocity, radius, kind, blood: 0.0, age: 0.0 });
         }
+    }
+
+    /// A drop of blood that leaves an opening.
+    pub fn bleed(&mut self, place: Vec3, rng: &mut Xorshift32) {
+        let (velocity, radius) = (rng.in_cube() * BLEEDING_SPEED, rng.in_range(RADII[0], RADII[1]));
+        let drop = Droplet { place, velocity, radius, kind: DropletKind::Jet, blood: 1.0, age: 0.0 };
+        push_bounded(&mut self.flying, MAX_FLYING, drop);
     }
 
     /// Water that leaves a syringe in one step, toward a place.
@@ -176,7 +203,7 @@ impl Water {
             let velocity = (toward + rng.in_cube() * SPREAD) * (SPEED * rng.in_range(0.8, 1.2));
             let place = nozzle + velocity * (STEP * rng.next_f32());
             let radius = rng.in_range(RADII[0], RADII[1]);
-            let drop = Droplet { place, velocity, radius, kind: DropletKind::Jet, age: 0.0 };
+            let drop = Droplet { place, velocity, radius, kind: DropletKind::Jet, blood: 0.0, age: 0.0 };
             push_bounded(&mut self.flying, MAX_FLYING, drop);
         }
     }
@@ -214,11 +241,15 @@ impl Water {
                 Sweep::Hit { place, normal: out } => {
                     let bounced = drop.velocity - out * (2.0 * drop.velocity.dot(out));
                     drop.velocity = (bounced + rng.in_cube() * SPRAY_SPEED * 0.5) * SPLASH_SPEED;
-                    let reach = add_water(lying, WaterPatch { place, normal: out, volume: DEPOSIT_VOLUME });
+                    let reach = add_water(
+                        lying,
+                        WaterPatch { place, normal: out, volume: DEPOSIT_VOLUME, blood: drop.blood, is_held: false },
+                    );
                     dust.wash(place + out * SURFACE_OFFSET, drop.velocity, reach);
                     (drop.place, drop.kind, drop.age) = (place + out * SURFACE_OFFSET, DropletKind::Splash, 0.0);
                     drop.radius *= 0.6;
-                    return rng.next_f32() < SPLASH_SHARE;
+                    // Blood wells up and does not splash.
+                    return drop.blood == 0.0 && rng.next_f32() < SPLASH_SHARE;
                 }
             }
             true
@@ -236,7 +267,8 @@ impl Water {
             }
             let air = suction.map_or(0.0, |suction| suction.air_velocity(patch.place).length());
             let drawn = if air > SUCTION_AIR_SPEED { air / SUCTION_AIR_SPEED } else { 0.0 };
-            patch.volume -= patch.volume * ((DRYING_RATE + drawn) * LONG_STEP).min(1.0);
+            let drying = if patch.blood > CLOTTING_SHARE { 0.0 } else { DRYING_RATE };
+            patch.volume -= patch.volume * ((drying + drawn) * LONG_STEP).min(1.0);
             let most = if patch.volume < MAX_FILM_VOLUME || is_enclosed(patch, world) {
                 MAX_POOL_VOLUME
             } else {
@@ -262,7 +294,8 @@ impl Water {
                     // The larger takes the smaller, and stays where it is.
                     let (gains, loses) =
                         if near.volume > self.lying[place].volume { (other, place) } else { (place, other) };
-                    self.lying[gains].volume += self.lying[loses].volume;
+                    let taken = self.lying[loses];
+                    self.lying[gains].add(&taken);
                     self.lying[loses].volume = 0.0;
                     if loses == place {
                         break;
@@ -273,24 +306,38 @@ impl Water {
     }
 
     pub fn particles(&self) -> impl Iterator<Item = Particle> + '_ {
-        /// Of a droplet, a puff, a film and a pool.
-        const OPACITY: [f32; 4] = [0.70, 0.17, 0.12, 0.22];
+        /// Opacity of a puff of mist.
+        const MIST_OPACITY: f32 = 0.17;
         let flying = self.flying.iter().map(|drop| {
-            let fading = (1.0 - drop.age / MIST_LIFETIME).max(0.0);
-            let (radius, finish, opacity) = match drop.kind {
-                DropletKind::Mist => (0.2 + MIST_GROWTH * drop.age, MIST, OPACITY[1] * fading),
-                _ => (drop.radius, WATER, OPACITY[0]),
+            let (radius, (appearance, opacity)) = match drop.kind {
+                DropletKind::Mist => {
+                    let fading = (1.0 - drop.age / MIST_LIFETIME).max(0.0);
+                    (0.2 + MIST_GROWTH * drop.age, (MIST, MIST_OPACITY * fading))
+                }
+                _ => (drop.radius, look_of(drop.blood, [0.70, 0.95])),
             };
-            Particle { position: drop.place, radius, facing: None, appearance: finish, opacity }
+            Particle { position: drop.place, radius, facing: None, appearance, opacity }
         });
         let lying = self.lying.iter().filter(|patch| patch.volume > 0.0).map(|patch| {
             let pool = patch.pool_share();
             let facing = patch.normal.lerp(Vec3::Y, pool).normalize_or(Vec3::Y);
-            let place = patch.place + facing * (SURFACE_OFFSET + HEIGHT_SHARE * patch.radius() * pool);
-            let opacity = OPACITY[2] + (OPACITY[3] - OPACITY[2]) * pool;
-            Particle { position: place, radius: patch.radius(), facing: Some(facing), appearance: WATER, opacity }
+            let position = patch.place + facing * (SURFACE_OFFSET + HEIGHT_SHARE * patch.radius() * pool);
+            let (appearance, opacity) = look_of(patch.blood, [mix(0.12, 0.22, pool), mix(0.8, 0.97, pool)]);
+            Particle { position, radius: patch.radius(), facing: Some(facing), appearance, opacity }
         });
         flying.chain(lying)
+    }
+
+    /// Number of droplets and patches that move or dry; blood that has come to rest does neither.
+    pub fn moving_count(&self) -> usize {
+        let clotted = |patch: &&WaterPatch| patch.is_held && patch.blood > CLOTTING_SHARE;
+        self.flying.len() + self.lying.len() - self.lying.iter().filter(clotted).count()
+    }
+
+    /// All the blood that lies, mm³.
+    #[cfg(test)]
+    pub fn lying_blood_mm3(&self) -> f32 {
+        self.lying.iter().map(|patch| patch.volume * patch.blood).sum()
     }
 
     /// All the water that lies, mm³.
@@ -298,6 +345,18 @@ impl Water {
     pub fn lying_mm3(&self) -> f32 {
         self.lying.iter().map(|patch| patch.volume).sum()
     }
+}
+
+/// Appearance and opacity of water with a share of blood, given the opacities of water and of blood. A little blood colours much
+/// water.
+fn look_of(blood: f32, [clear, red]: [f32; 2]) -> (Appearance, f32) {
+    let share = blood.sqrt();
+    let colour = std::array::from_fn(|c| mix(WATER.colour[c], BLOOD.colour[c], share));
+    (Appearance { colour, gloss: mix(WATER.gloss, BLOOD.gloss, share) }, mix(clear, red, share))
+}
+
+fn mix(a: f32, b: f32, share: f32) -> f32 {
+    a + (b - a) * share
 }
 
 /// Adds an element to a bounded queue; if the queue is full, the oldest element is dropped.
@@ -316,7 +375,7 @@ fn add_water(lying: &mut VecDeque<WaterPatch>, new: WaterPatch) -> f32 {
     };
     match lying.iter_mut().find(is_near) {
         Some(patch) => {
-            patch.volume += new.volume;
+            patch.add(&new);
             patch.radius()
         }
         None => {
@@ -341,8 +400,8 @@ fn flow(patch: &mut WaterPatch, world: &CollisionWorld) -> bool {
     let downhill = Vec3::NEG_Y + patch.normal * patch.normal.y;
     let slope = downhill.length();
     let pace = FLOW_SPEED * (0.3 + patch.pool_share());
-    let is_held = slope < FILM_SLOPE * (1.0 - patch.pool_share()) + 0.02;
-    let goal = if is_held { patch.place } else { patch.place + downhill * (pace * LONG_STEP) };
+    patch.is_held = slope < FILM_SLOPE * (1.0 - patch.pool_share()) + 0.02;
+    let goal = if patch.is_held { patch.place } else { patch.place + downhill * (pace * LONG_STEP) };
     match world.sweep(goal + patch.normal * SURFACE_SEARCH, goal - patch.normal * SURFACE_SEARCH) {
         Sweep::Hit { place, normal: out } => {
             patch.place = place;

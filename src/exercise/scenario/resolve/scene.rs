@@ -129,8 +129,25 @@ impl Resolver<'_> {
             file::SceneFile::Jaw(jaw) => self.soft_neighbours(jaw),
             _ => Vec::new(),
         };
+        let rubber_dam = matches!(scene, file::SceneFile::Jaw(jaw) if self.has_rubber_dam(jaw));
         let teeth = teeth.into_iter().collect::<Option<_>>()?;
-        Some(Scene { layout, teeth, surroundings: around, own_jaw, pockets, arch, soft_neighbours })
+        Some(Scene { layout, teeth, surroundings: around, own_jaw, rubber_dam, pockets, arch, soft_neighbours })
+    }
+
+    /// Returns true if a jaw has a rubber dam, and reports what cannot be under one.
+    fn has_rubber_dam(&mut self, jaw: &file::JawFile) -> bool {
+        let hidden = [
+            (jaw.cheek, "cheek", "it is touched"),
+            (jaw.tongue, "tongue", "it is touched"),
+            (jaw.other_teeth.is_some(), "other_teeth", "they are examined"),
+            (jaw.around.is_some(), "around", "it is touched"),
+        ];
+        for (_, name, why) in hidden.into_iter().filter(|(is_there, ..)| jaw.rubber_dam && *is_there) {
+            let message = format!("a rubber dam would hide \"{name}\", although {why}");
+            let help = format!("remove \"rubber_dam\" or \"{name}\"");
+            self.complain("/scene/jaw/rubber_dam", "hidden-by-dam", message, &help);
+        }
+        jaw.rubber_dam
     }
 
     /// Returns the cheek and the tongue of a jaw, and reports those that are not beside the tooth or have no tissue.

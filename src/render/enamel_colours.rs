@@ -1,17 +1,7 @@
-//! Enamel as a translucent layer: how thick it is, and what colour it has over dentine.
-//!
-//! Takes a tooth as it was before anybody worked on it. Gives the distance from each place to the dentine, and the colour of
-//! enamel of such a thickness: whitish at the cusps, warm at the neck, where dentine shines through.
+//! Enamel as a translucent layer: the colour that it has over dentine, by its thickness: whitish at the cusps, warm at the neck,
+//! where dentine shines through.
 
-use typodont_core::frame::Vec3;
-use typodont_core::parallel::par_map;
-use typodont_core::volume::{Grid, Label, Volume, distance};
-
-/// Spacing of the places at which the thickness is kept, mm: finer than it changes.
-const SPACING: f32 = 0.25;
-
-/// Greatest thickness that is distinguished, mm; also that of a tooth without dentine.
-const THICKEST: f32 = 4.0;
+use super::unworked_tooth::THICKEST;
 
 /// Scattering by human enamel, Kubelka and Munk's S, per mm at 525 nm. Wet enamel of 1 mm lets 48.1 % of this light through
 /// (Brodbelt and others, Journal of Dental Research 60, 1981); a layer without absorption lets 1 / (1 + S · 1 mm) through.
@@ -23,78 +13,6 @@ const WAVELENGTHS: [f32; 3] = [610.0, 545.0, 465.0];
 /// Power of the wavelength with which scattering falls. Fried and others (Applied Optics 34, 1995) measured 3.7 from 543 to
 /// 632 nm and 2.7 from there to 1053 nm; 2.8 gives the opalescence of human enamel.
 const WAVELENGTH_POWER: f32 = 2.8;
-
-/// Thickness of a tooth's enamel over its dentine, by place in tooth space.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EnamelDepth {
-    grid: Grid,
-    /// mm, x fastest.
-    depths: Vec<f32>,
-}
-
-impl EnamelDepth {
-    /// Measures the distance from each place to the nearest matter under the enamel: dentine, and what is in it.
-    pub fn of(volume: &Volume, is_under_enamel: impl Fn(Label) -> bool + Sync) -> EnamelDepth {
-        let fine = volume.grid();
-        let edge = ((SPACING / fine.spacing.max_element()) as u32).max(1);
-        let grid = Grid {
-            dims: fine.dims.map(|n| n.div_ceil(edge)),
-            spacing: fine.spacing * edge as f32,
-            origin: fine.origin + fine.spacing * (0.5 * (edge as f32 - 1.0)),
-        };
-        let row_of_shares = |row: usize| -> Vec<f32> {
-            let [y, z] = [row as u32 % grid.dims[1], row as u32 / grid.dims[1]];
-            (0..grid.dims[0]).map(|x| share_under_enamel(volume, [x, y, z], edge, &is_under_enamel)).collect()
-        };
-        let shares = par_map(grid.dims[1] as usize * grid.dims[2] as usize, row_of_shares).concat();
-        // The border runs through the nearest cell, the nearer the more of that is filled. Across an oblique
-        // border, a fuller cell behind the nearest one may be closer.
-        let spacing = libm::cbrtf(grid.spacing.element_product());
-        let distance_to_cells_of = |least: f32| {
-            let (distances, nearest) = distance::to_nearest(&grid, |i| shares[i] > least);
-            distances
-                .into_iter()
-                .zip(nearest)
-                .map(|(distance, cell)| distance - (shares[cell as usize] - 0.5) * spacing)
-        };
-        let depths =
-            distance_to_cells_of(0.0).zip(distance_to_cells_of(0.5)).map(|(a, b)| a.min(b).min(THICKEST)).collect();
-        let depths = smoothed(&grid, depths);
-        EnamelDepth { grid, depths }
-    }
-
-    /// Thickness under a place in tooth space, mm; not above 0 in dentine.
-    pub fn at(&self, point_in_tooth: Vec3) -> f32 {
-        self.grid.trilinear(&self.depths, point_in_tooth)
-    }
-}
-
-/// Means of each value and its neighbours, with weights of a quarter, a half and a quarter along each axis.
-fn smoothed(grid: &Grid, mut values: Vec<f32>) -> Vec<f32> {
-    let [nx, ny, _] = grid.dims.map(|n| n as usize);
-    for (axis, stride) in [1, nx, nx * ny].into_iter().enumerate() {
-        let last = grid.dims[axis] - 1;
-        let mean = |i: usize| {
-            let place = grid.cell(i)[axis];
-            let (before, after) = (if place > 0 { i - stride } else { i }, if place < last { i + stride } else { i });
-            0.25 * (values[before] + values[after]) + 0.5 * values[i]
-        };
-        values = (0..values.len()).map(mean).collect();
-    }
-    values
-}
-
-/// Share of a cell of `edge` voxels along each axis that is matter under enamel.
-fn share_under_enamel(volume: &Volume, cell: [u32; 3], edge: u32, is_under_enamel: &impl Fn(Label) -> bool) -> f32 {
-    let grid = volume.grid();
-    let [xs, ys, zs] = std::array::from_fn(|a| cell[a] * edge..((cell[a] + 1) * edge).min(grid.dims[a]));
-    let mut count = 0;
-    for [y, z] in zs.clone().flat_map(|z| ys.clone().map(move |y| [y, z])) {
-        let row = grid.index([xs.start, y, z]);
-        count += (row..row + xs.len()).filter(|&i| is_under_enamel(volume.tissue(i))).count();
-    }
-    count as f32 / (xs.len() * ys.len() * zs.len()) as f32
-}
 
 /// Thickness of enamel on most of a crown, mm.
 const ON_A_CROWN: f32 = 2.0;
@@ -176,29 +94,6 @@ impl Slab {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn depths_are_those_of_a_slab_at_every_size_of_voxels() {
-        // Aim: continuous to a tenth of a millimetre. Method: dentine below a slanted border, measured along its normal; without
-        // dentine the enamel is as thick as can be.
-        let under = Label(2);
-        let normal = Vec3::new(0.3, 0.1, 1.0).normalize();
-        for spacing in [Vec3::splat(0.3), Vec3::splat(0.1), Vec3::splat(0.06), Vec3::new(0.1, 0.12, 0.25)] {
-            let dims = std::array::from_fn(|a| ([6.0, 5.0, 7.0][a] / spacing[a]) as u32);
-            let label = |p: Vec3| if p.dot(normal) < 0.0 { under } else { Label(1) };
-            let volume = Volume::from_distance(Grid::centred(dims, spacing), 0.3, |p| (-1.0, label(p)));
-            assert_eq!(EnamelDepth::of(&volume, |_| false).at(Vec3::ZERO), THICKEST);
-            let depth = EnamelDepth::of(&volume, |label| label == under);
-            for i in 0..40 {
-                let place = Vec3::new(0.02 * i as f32 - 0.4, 0.3, 0.05 * i as f32);
-                let (measured, expected) = (depth.at(place), place.dot(normal));
-                assert!(
-                    (measured - expected).abs() < 0.1 + 0.2 * spacing.max_element(),
-                    "{spacing}: {measured} for {expected}"
-                );
-            }
-        }
-    }
 
     /// CIE L*, a* and b* (D65) of linear red, green and blue.
     fn lab(rgb: [f32; 3]) -> [f32; 3] {

@@ -1,0 +1,72 @@
+// Fine relief of surfaces: it tilts their normals, and moves nothing. Compiled after view.wgsl.
+// CPU twin: src/render/relief.rs.
+
+// False in pipelines for scenes without relief: in software, a branch costs time even where it is not taken.
+override has_relief: bool = false;
+
+// Width of a dimple of stippled gingiva, and by how much it is lower or higher than the mean, mm.
+const STIPPLE_WIDTH: f32 = 0.55;
+const STIPPLE_DEPTH: f32 = 0.05;
+// Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher, mm.
+const MARK_WIDTH: vec3f = vec3f(0.32, 0.32, 0.13);
+const MARK_DEPTH: f32 = 0.012;
+// Gloss of tissue that is smooth, and of tissue with all of the marks.
+const SMOOTH: f32 = 0.19;
+const GROUND: f32 = 0.13;
+// Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
+const FADE: vec2f = vec2f(0.3, 0.8);
+
+// Random value of a lattice point, -1 to 1 (the finalizer of MurmurHash3).
+fn lattice_value(x: u32, y: u32, z: u32) -> f32 {
+    var hash = x ^ y ^ z;
+    hash = (hash ^ (hash >> 16u)) * 0x85EBCA6Bu;
+    hash = (hash ^ (hash >> 13u)) * 0xC2B2AE35u;
+    return f32(hash >> 8u) * (2.0 / 16777216.0) - 1.0;
+}
+
+// Gradient of random values on a lattice of whole numbers, interpolated between them.
+fn noise_gradient(at: vec3f) -> vec3f {
+    let base = floor(at);
+    let part = at - base;
+    let share = part * part * (3.0 - 2.0 * part);
+    let rise = 6.0 * part * (1.0 - part);
+    let corner = bitcast<vec3u>(vec3i(base));
+    let x = vec2u(corner.x, corner.x + 1u) * 0x9E3779B1u;
+    let y = vec2u(corner.y, corner.y + 1u) * 0x85EBCA77u;
+    let z = vec2u(corner.z, corner.z + 1u) * 0xC2B2AE3Du;
+    let a = lattice_value(x.x, y.x, z.x);
+    let b = lattice_value(x.y, y.x, z.x);
+    let c = lattice_value(x.x, y.y, z.x);
+    let d = lattice_value(x.y, y.y, z.x);
+    let e = lattice_value(x.x, y.x, z.y);
+    let f = lattice_value(x.y, y.x, z.y);
+    let g = lattice_value(x.x, y.y, z.y);
+    let h = lattice_value(x.y, y.y, z.y);
+    let along_x = mix(mix(b - a, d - c, share.y), mix(f - e, h - g, share.y), share.z);
+    let rows = mix(vec4f(a, c, e, g), vec4f(b, d, f, h), share.x);
+    let along_y = mix(rows.y - rows.x, rows.w - rows.z, share.z);
+    let along_z = mix(rows.z, rows.w, share.y) - mix(rows.x, rows.y, share.y);
+    return rise * vec3f(along_x, along_y, along_z);
+}
+
+// Share of a relief of a width, mm, that is drawn at a point: none where pixels are too large for it.
+fn resolved(point: vec3f, width: f32) -> f32 {
+    let pixel = length(point - view.position.xyz) * (view.window.y - view.window.x) / view.size.x;
+    return 1.0 - smoothstep(FADE.x, FADE.y, pixel / width);
+}
+
+// Unit normal of a surface with a relief, given the gradient of its height.
+fn tilted(normal: vec3f, gradient: vec3f) -> vec3f {
+    return normalize(normal - gradient + normal * dot(gradient, normal));
+}
+
+// Gradient of the height of stippled gingiva at a place of its own space, mm.
+fn stipple_gradient(at: vec3f) -> vec3f {
+    return noise_gradient(at / STIPPLE_WIDTH) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
+}
+
+// Gradient of the height of a tooth's surface with a gloss at a place of its own space, mm: bur marks, and rough decay.
+fn mark_gradient(at: vec3f, gloss: f32) -> vec3f {
+    let share = clamp((SMOOTH - gloss) / (SMOOTH - GROUND), 0.0, 1.0);
+    return noise_gradient(at / MARK_WIDTH) / MARK_WIDTH * (MARK_DEPTH * share);
+}

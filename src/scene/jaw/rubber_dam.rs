@@ -1,0 +1,77 @@
+//! A rubber dam with the clamp that holds it.
+
+use super::{FinishedMesh, MeshInstance};
+use crate::instrument::{STEEL, tube};
+use std::sync::Arc;
+use typodont_anatomy::jaw::{DentalArch, ToothSeat};
+use typodont_core::frame::{Pose, Vec3};
+use typodont_core::mesh::Mesh;
+use typodont_render::Rgb;
+
+/// Number of teeth on each side of the treated one that stand out.
+pub const ISOLATED_BESIDE: f32 = 3.0;
+
+/// Colour of blue latex, and its gloss.
+const LATEX: Rgb = [0.33, 0.50, 0.66];
+const LATEX_GLOSS: f32 = 0.12;
+
+/// Radius of the clamp's wire, mm.
+const WIRE: f32 = 0.6;
+
+pub struct RubberDam {
+    pub sheet: FinishedMesh,
+    /// Arch space; `None` without an isolated tooth.
+    pub clamp: Option<MeshInstance>,
+}
+
+impl RubberDam {
+    /// A dam over a jaw. `is_isolated`: by side of x and place from the midline; `side`: that of the treated tooth.
+    pub fn over(jaw: &DentalArch, side: f32, is_isolated: &dyn Fn(f32, usize) -> bool) -> RubberDam {
+        let last = (0..8).rev().filter(|&index| is_isolated(side, index)).find_map(|index| jaw.seat(side, index));
+        let clamp = last.map(|seat| MeshInstance::plain(Arc::new(clamp(seat, side)), Pose::IDENTITY, STEEL));
+        let mut sheet = jaw.rubber_dam(is_isolated);
+        let under = Mesh {
+            positions: sheet.mesh.positions.clone(),
+            normals: sheet.mesh.normals.iter().map(|normal| -*normal).collect(),
+            triangles: sheet.mesh.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(),
+        };
+        sheet.mesh.append(under);
+        sheet.tints = Vec::new();
+        RubberDam { sheet: FinishedMesh::new(sheet, LATEX, LATEX_GLOSS), clamp }
+    }
+}
+
+/// A clamp around a tooth: its jaws lie at the neck on both sides, its bow passes behind the crown.
+fn clamp(seat: &ToothSeat, side: f32) -> Mesh {
+    /// Places on the cheek side: shares of the tooth's length across and along, and height over the neck, mm.
+    const HALF: [[f32; 3]; 5] =
+        [[0.50, -0.30, 1.2], [0.56, 0.0, 0.9], [0.54, 0.30, 1.4], [0.50, 0.62, 5.0], [0.30, 0.85, 8.6]];
+    const TOP: [f32; 3] = [0.0, 0.93, 9.4];
+    /// Places between two of the above.
+    const FINER: usize = 6;
+    let length = seat.to - seat.from;
+    let place = |[across, along, height]: [f32; 3]| {
+        let place = seat.neck() + seat.buccal * (across * length) + seat.distal * (along * length) + Vec3::Z * height;
+        place * Vec3::new(side, 1.0, 1.0)
+    };
+    let tongue_side = HALF.into_iter().rev().map(|[across, along, height]| [-across, along, height]);
+    let knots: Vec<Vec3> = HALF.into_iter().chain([TOP]).chain(tongue_side).map(place).collect();
+    let knot = |i: isize| knots[i.clamp(0, knots.len() as isize - 1) as usize];
+    let line: Vec<Vec3> = (0..(knots.len() - 1) * FINER + 1)
+        .map(|n| {
+            let (i, t) = ((n / FINER) as isize, (n % FINER) as f32 / FINER as f32);
+            let [a, b, c, d] = [-1, 0, 1, 2].map(|step| knot(i + step));
+            // Catmull and Rom.
+            0.5 * (2.0 * b
+                + (c - a) * t
+                + (2.0 * a - 5.0 * b + 4.0 * c - d) * (t * t)
+                + (3.0 * (b - c) + d - a) * (t * t * t))
+        })
+        .collect();
+    let way = |i: usize| (line[(i + 1).min(line.len() - 1)] - line[i.saturating_sub(1)]).normalize_or(Vec3::Z);
+    let mut rings: Vec<(Vec3, Vec3, f32)> = (0..line.len()).map(|i| (line[i], way(i), WIRE)).collect();
+    // Round ends.
+    rings[0].2 = 0.5 * WIRE;
+    rings[line.len() - 1].2 = 0.5 * WIRE;
+    tube(&rings)
+}
