@@ -10,10 +10,10 @@ use typodont_core::volume::{Edit, Grid, Label};
 const MAX_OPENINGS: usize = 8;
 const OPENING_DISTANCE: f32 = 0.5;
 
-/// One drop in so many steps of 4 ms, half a cubic millimetre in a second, and the number of drops after which the blood has clotted: it
+/// One drop in so many steps of 4 ms, half a cubic millimetre in a second, and the number of steps after which the blood has clotted, and
 /// fills a small cavity. Blood of a healthy pulp clots within minutes; this is shorter, so that the lesson goes on.
 const DROP_INTERVAL: usize = 2;
-const MAX_DROPS: usize = 2000;
+const MAX_STEPS: usize = 4000;
 
 /// Bleeding of the tissue with one label.
 pub struct Bleeding {
@@ -23,12 +23,11 @@ pub struct Bleeding {
     openings: [Vec3; MAX_OPENINGS],
     opening_count: usize,
     step_count: usize,
-    drop_count: usize,
 }
 
 impl Bleeding {
     pub fn of(label: Option<Label>) -> Bleeding {
-        Bleeding { label, openings: [Vec3::ZERO; MAX_OPENINGS], opening_count: 0, step_count: 0, drop_count: 0 }
+        Bleeding { label, openings: [Vec3::ZERO; MAX_OPENINGS], opening_count: 0, step_count: 0 }
     }
 
     /// Opens the pulp where a voxel of it was removed.
@@ -46,7 +45,7 @@ impl Bleeding {
 
     /// True while drops leave an opening.
     pub fn is_flowing(&self) -> bool {
-        self.opening_count > 0 && self.drop_count < MAX_DROPS
+        self.opening_count > 0 && self.step_count < MAX_STEPS
     }
 
     /// One step: a drop leaves one of the openings.
@@ -58,7 +57,6 @@ impl Bleeding {
         if self.step_count.is_multiple_of(DROP_INTERVAL) {
             let opening = self.openings[self.step_count / DROP_INTERVAL % self.opening_count];
             if let Some(place) = world.nearest_free(world.world_from_tooth * opening) {
-                self.drop_count += 1;
                 water.bleed(place, rng);
             }
         }
