@@ -1,4 +1,4 @@
-//! What is not in every mouth: a rubber dam, and the blood of an opened pulp.
+//! Additions to a mouth: a rubber dam, and the blood of an opened pulp.
 
 use crate::fixed_scenes::{FIXED_VIEWS, FixedCase};
 use crate::render::{adapter, is_close, keep};

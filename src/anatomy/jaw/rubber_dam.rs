@@ -62,29 +62,28 @@ pub fn rubber_dam(sides: &[HalfJaw; 2], is_isolated: &dyn Fn(f32, usize) -> bool
 }
 
 impl HalfJaw<'_> {
-    /// Share by which the sheet is down at a position along the arch: 1 beside isolated teeth, 0 over others. `is_down_at_midline`: both front teeth are
-    /// isolated, so that the sheet is down on the midline, too.
+    /// Share by which the sheet is down at a position along the arch: 1 beside isolated teeth, 0 over others.
+    /// `is_down_at_midline`: both front teeth are isolated, so that the sheet is down on the midline, too.
     fn isolation(&self, position: f32, is_isolated: &dyn Fn(usize) -> bool, is_down_at_midline: bool) -> f32 {
-        let seats = self.half.seats.iter().enumerate().filter(|(index, _)| is_isolated(*index));
-        let depth = |(index, from, to): (usize, f32, f32)| {
-            let before = if index == 0 && is_down_at_midline { f32::INFINITY } else { position - from };
-            before.min(to - position)
+        let seats = &self.half.seats;
+        let is_beside = |index: usize| index < seats.len() && is_isolated(index);
+        let way_inside = |index: usize| {
+            // Between two isolated teeth nothing rises.
+            let before = match index {
+                0 if is_down_at_midline => f32::INFINITY,
+                0 => 0.0,
+                _ if is_beside(index - 1) => RISE,
+                _ => 0.0,
+            };
+            let behind = match index + 1 {
+                next if next == seats.len() => UNDER_BOW,
+                next if is_beside(next) => RISE,
+                _ => 0.5 * RISE,
+            };
+            (position - seats[index].from + before).min(seats[index].to + behind - position)
         };
-        let is_next = |index: usize| index < self.half.seats.len() && is_isolated(index);
-        let deepest = seats
-            .map(|(index, seat)| {
-                // Between two isolated teeth nothing rises.
-                let from = if index > 0 && is_next(index - 1) { seat.from - RISE } else { seat.from };
-                let to = seat.to
-                    + match index + 1 == self.half.seats.len() {
-                        true => UNDER_BOW,
-                        false if is_next(index + 1) => RISE,
-                        false => 0.5 * RISE,
-                    };
-                depth((index, from, to))
-            })
-            .fold(f32::NEG_INFINITY, f32::max);
-        smooth_step(deepest / RISE)
+        let isolated = (0..seats.len()).filter(|&index| is_isolated(index));
+        smooth_step(isolated.map(way_inside).fold(f32::NEG_INFINITY, f32::max) / RISE)
     }
 
     /// Places from the frame over the teeth to the midline. `front`: the least y of those on the inner side.
@@ -138,9 +137,6 @@ mod tests {
                 let [a, b, c] = corners.map(|i| mesh.positions[i as usize]);
                 corners.iter().all(inside) && (b - a).cross(c - a).z < -1e-3 * a.distance(b) * a.distance(c)
             });
-            for t in folded.clone().take(12) {
-                println!("{:?}", mesh.positions[t[0] as usize]);
-            }
             assert_eq!(folded.count(), 0, "{jaw:?}: the sheet is folded");
             for (side, index) in [1.0, -1.0].into_iter().flat_map(|side| (0..7).map(move |index| (side, index))) {
                 let seat = arch.seat(side, index).unwrap();

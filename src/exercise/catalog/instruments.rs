@@ -207,7 +207,7 @@ impl BentExplorerEntry {
 }
 
 /// Returns a line through corners with its bends rounded (Catmull and Rom's spline), in steps of at most `step` mm.
-fn catmull_rom(corners: &[Vec3], step: f32) -> Vec<Vec3> {
+pub fn catmull_rom(corners: &[Vec3], step: f32) -> Vec<Vec3> {
     let at = |i: isize| corners[i.clamp(0, corners.len() as isize - 1) as usize];
     let mut line = Vec::new();
     for i in 0..corners.len() as isize - 1 {

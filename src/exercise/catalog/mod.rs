@@ -14,7 +14,7 @@ pub use coefficient::CoefficientName;
 pub use hand_instruments::{BladeEntry, CleoidEntry, PluggerEntry, SpoonEntry};
 pub use instruments::{
     BentExplorerEntry, InstrumentEntry, InstrumentTable, MirrorEntry, PackingActionEntry, ProbeEntry, ToolKind,
-    WorkingEndEntry,
+    WorkingEndEntry, catmull_rom,
 };
 pub use shape::{CuttingPartEntry, LengthUnitEntry, SampledEnd, ShapeEntry};
 pub use tissues::{PackingEntry, TissueEntry, TissueRole, TissueTable, parse_color};

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use typodont_anatomy::jaw::{DentalArch, ToothSeat};
 use typodont_core::frame::{Pose, Vec3};
 use typodont_core::mesh::Mesh;
+use typodont_exercise::catalog::catmull_rom;
 use typodont_render::Rgb;
 
 /// Number of teeth on each side of the treated one that stand out.
@@ -47,8 +48,8 @@ fn clamp(seat: &ToothSeat, side: f32) -> Mesh {
     const HALF: [[f32; 3]; 5] =
         [[0.50, -0.30, 1.2], [0.56, 0.0, 0.9], [0.54, 0.30, 1.4], [0.50, 0.62, 5.0], [0.30, 0.85, 8.6]];
     const TOP: [f32; 3] = [0.0, 0.93, 9.4];
-    /// Places between two of the above.
-    const FINER: usize = 6;
+    /// Greatest distance between two rings of the wire, mm.
+    const FINENESS: f32 = 0.6;
     let length = seat.to - seat.from;
     let place = |[across, along, height]: [f32; 3]| {
         let place = seat.neck() + seat.buccal * (across * length) + seat.distal * (along * length) + Vec3::Z * height;
@@ -56,18 +57,7 @@ fn clamp(seat: &ToothSeat, side: f32) -> Mesh {
     };
     let tongue_side = HALF.into_iter().rev().map(|[across, along, height]| [-across, along, height]);
     let knots: Vec<Vec3> = HALF.into_iter().chain([TOP]).chain(tongue_side).map(place).collect();
-    let knot = |i: isize| knots[i.clamp(0, knots.len() as isize - 1) as usize];
-    let line: Vec<Vec3> = (0..(knots.len() - 1) * FINER + 1)
-        .map(|n| {
-            let (i, t) = ((n / FINER) as isize, (n % FINER) as f32 / FINER as f32);
-            let [a, b, c, d] = [-1, 0, 1, 2].map(|step| knot(i + step));
-            // Catmull and Rom.
-            0.5 * (2.0 * b
-                + (c - a) * t
-                + (2.0 * a - 5.0 * b + 4.0 * c - d) * (t * t)
-                + (3.0 * (b - c) + d - a) * (t * t * t))
-        })
-        .collect();
+    let line = catmull_rom(&knots, FINENESS);
     let way = |i: usize| (line[(i + 1).min(line.len() - 1)] - line[i.saturating_sub(1)]).normalize_or(Vec3::Z);
     let mut rings: Vec<(Vec3, Vec3, f32)> = (0..line.len()).map(|i| (line[i], way(i), WIRE)).collect();
     // Round ends.
