@@ -32,6 +32,13 @@ struct Met {
 
 // Bulge of a disc of water: outward inclination of the normal at its rim.
 const BULGE: f32 = 0.7;
+// By how much of its radius a disc of water is narrower at places.
+const LOBES: f32 = 0.16;
+// Turn of a disc's outline with its place, radians per mm.
+const LOBE_TURN: vec3f = vec3f(0.31, 0.23, 0.37);
+// Greatest tilt of a disc's normal by ripples, and their wave numbers, radians per mm.
+const RIPPLE: f32 = 0.16;
+const RIPPLE_WAVES: mat2x2f = mat2x2f(vec2f(4.3, -3.1), vec2f(2.9, 5.2));
 // A ray more parallel to a disc than this does not meet it.
 const EDGE_ON: f32 = 1e-4;
 
@@ -40,8 +47,21 @@ fn room(to: vec3f, z: f32, radius: f32) -> f32 {
     return 1.02 * length(to) / z * min(z / max(z - radius, 1e-6), 2.0);
 }
 
+// Radius of a disc's outline in the direction of a place beside its middle, as a share of the greatest.
+fn outline(aside: vec3f, middle: vec3f) -> f32 {
+    let turn = dot(middle, LOBE_TURN);
+    let level = vec2f(cos(turn), sin(turn));
+    let way = aside.xz / max(length(aside), 1e-6);
+    let a = dot(way, level);
+    let b = dot(way, vec2f(-level.y, level.x));
+    let waves = 0.5 * (2.0 * a * a - 1.0) + 0.5 * (4.0 * b * b - 3.0) * b;
+    return 1.0 - LOBES * (0.5 - 0.5 * waves);
+}
+
 // The front of a ball, or a disc.
-fn meet(to: vec3f, radius: f32, facing: vec3f, way: vec3f) -> Met {
+fn meet(place: vec4f, facing: vec3f, way: vec3f) -> Met {
+    let to = place.xyz - view.position.xyz;
+    let radius = place.w;
     if all(facing == vec3f(0.0)) {
         let nearest = dot(to, way) / dot(way, way);
         let past = way * nearest - to;
@@ -57,13 +77,14 @@ fn meet(to: vec3f, radius: f32, facing: vec3f, way: vec3f) -> Met {
         return Met(-1.0, vec3f(0.0), 0.0);
     }
     let z = dot(to, facing) / slope;
-    let aside = (way * z - to) / radius;
+    let aside = (way * z - to) / (radius * outline(way * z - to, place.xyz));
     let out = dot(aside, aside);
     if out > 1.0 {
         return Met(-1.0, vec3f(0.0), 0.0);
     }
     let toward_eye = select(facing, -facing, slope > 0.0);
-    return Met(z, normalize(toward_eye + aside * (BULGE * out)), 1.0 - out * out);
+    let tilt = sin(RIPPLE_WAVES * (place.xz + way.xz * z - to.xz)) * RIPPLE;
+    return Met(z, normalize(toward_eye + aside * (BULGE * out) + vec3f(tilt.x, 0.0, tilt.y)), 1.0 - out * out);
 }
 
 @vertex
@@ -80,7 +101,7 @@ fn speck_vertex(@builtin(vertex_index) index: u32, speck: Speck) -> Varying {
 @fragment
 fn grain_fragment(in: Varying) -> Seen {
     let way = ray(in.pixel.xy);
-    let met = meet(in.place.xyz - view.position.xyz, in.place.w, in.facing.xyz, way);
+    let met = meet(in.place, in.facing.xyz, way);
     if met.z < view.position.w {
         discard;
     }
@@ -92,7 +113,7 @@ fn grain_fragment(in: Varying) -> Seen {
 @fragment
 fn drop_fragment(in: Varying) -> Seen {
     let way = ray(in.pixel.xy);
-    let met = meet(in.place.xyz - view.position.xyz, in.place.w, in.facing.xyz, way);
+    let met = meet(in.place, in.facing.xyz, way);
     if met.z < view.position.w {
         discard;
     }

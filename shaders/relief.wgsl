@@ -8,8 +8,10 @@ override has_relief: bool = false;
 const STIPPLE_WIDTH: f32 = 0.55;
 const STIPPLE_DEPTH: f32 = 0.05;
 // Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher, mm.
-const MARK_WIDTH: vec3f = vec3f(0.32, 0.32, 0.13);
-const MARK_DEPTH: f32 = 0.012;
+const MARK_WIDTH: vec3f = vec3f(0.38, 0.38, 0.17);
+const MARK_DEPTH: f32 = 0.005;
+// Rise of the marks across the tooth's axis, mm per mm.
+const MARK_SLOPE: vec2f = vec2f(0.35, -0.22);
 // Gloss of tissue that is smooth, and of tissue with all of the marks.
 const SMOOTH: f32 = 0.19;
 const GROUND: f32 = 0.13;
@@ -68,5 +70,7 @@ fn stipple_gradient(at: vec3f) -> vec3f {
 // Gradient of the height of a tooth's surface with a gloss at a place of its own space, mm: bur marks, and rough decay.
 fn mark_gradient(at: vec3f, gloss: f32) -> vec3f {
     let share = clamp((SMOOTH - gloss) / (SMOOTH - GROUND), 0.0, 1.0);
-    return noise_gradient(at / MARK_WIDTH) / MARK_WIDTH * (MARK_DEPTH * share);
+    let inclined = vec3f(at.xy, at.z + dot(MARK_SLOPE, at.xy));
+    let gradient = noise_gradient(inclined / MARK_WIDTH) / MARK_WIDTH;
+    return (gradient + gradient.z * vec3f(MARK_SLOPE, 0.0)) * (MARK_DEPTH * share);
 }

@@ -58,9 +58,17 @@ fn tooth_vertex(corner: Corner) -> Varying {
     return placed(corner, tooth.world_from_tooth);
 }
 
+// Cosine between the normal of a tooth's surface and the way to the eye below which the normal is turned to the eye.
+const EDGE_ON: f32 = 0.25;
+
+// Unit normal of a place that an eye sees: at the sharp rim of a cut, the gradient of voxels may turn away from the eye.
+fn turned_to_eye(normal: vec3f, to_eye: vec3f) -> vec3f {
+    return normalize(normal + to_eye * max(EDGE_ON - dot(normal, to_eye), 0.0));
+}
+
 @fragment
 fn tooth_fragment(in: Varying) -> @location(0) vec4f {
-    let normal = normalize(in.normal);
+    let normal = turned_to_eye(normalize(in.normal), normalize(view.position.xyz - in.point));
     let at = (tooth.voxel_from_world * vec4f(in.point, 1.0)).xyz;
     let seen = finish(at);
     return vec4f(screen(lit(seen, openness(at, normal), in.point, marked(at, in.point, normal, seen.a))), 1.0);

@@ -15,7 +15,7 @@ const WAVELENGTHS: [f32; 3] = [610.0, 545.0, 465.0];
 const WAVELENGTH_POWER: f32 = 2.8;
 
 /// Thickness of enamel on most of a crown, mm.
-const ON_A_CROWN: f32 = 2.0;
+pub(super) const ON_A_CROWN: f32 = 2.0;
 
 /// Colours of enamel over dentine, by thickness.
 #[derive(Clone, Debug)]

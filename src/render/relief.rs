@@ -14,10 +14,13 @@ pub const SOURCE: &str = include_str!("../../shaders/relief.wgsl");
 const STIPPLE_WIDTH: f32 = 0.55;
 const STIPPLE_DEPTH: f32 = 0.05;
 
-/// Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher than the mean, mm: wider and deeper than they are, so that they are
-/// seen at the magnification of a lesson.
-const MARK_WIDTH: Vec3 = Vec3::new(0.32, 0.32, 0.13);
-const MARK_DEPTH: f32 = 0.012;
+/// Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher than the mean, mm: wider than they are, so that they are seen at the
+/// magnification of a lesson, and faint.
+const MARK_WIDTH: Vec3 = Vec3::new(0.38, 0.38, 0.17);
+const MARK_DEPTH: f32 = 0.005;
+
+/// Rise of the marks across the tooth's axis, mm per mm: a hand does not hold a bur upright.
+const MARK_SLOPE: [f32; 2] = [0.35, -0.22];
 
 /// Gloss of tissue that is smooth, and of tissue with all of the marks.
 const SMOOTH: f32 = 0.19;
@@ -74,7 +77,10 @@ pub fn marked_normal(normal: Vec3, place: Vec3, gloss: f32, pixel: f32) -> Vec3 
 /// Gradient of the height of a tooth's surface at a place.
 fn mark_gradient(place: Vec3, gloss: f32, pixel: f32) -> Vec3 {
     let share = ((SMOOTH - gloss) / (SMOOTH - GROUND)).clamp(0.0, 1.0);
-    noise_gradient(place / MARK_WIDTH) / MARK_WIDTH * (MARK_DEPTH * share * resolved(pixel, MARK_WIDTH.z))
+    let inclined = place.with_z(place.z + MARK_SLOPE[0] * place.x + MARK_SLOPE[1] * place.y);
+    let gradient = noise_gradient(inclined / MARK_WIDTH) / MARK_WIDTH;
+    let gradient = gradient + gradient.z * Vec3::new(MARK_SLOPE[0], MARK_SLOPE[1], 0.0);
+    gradient * (MARK_DEPTH * share * resolved(pixel, MARK_WIDTH.z))
 }
 
 /// Share of a relief of a width, mm, that a picture whose pixels are so wide, mm, shows.
@@ -158,6 +164,7 @@ mod tests {
             format!("STIPPLE_DEPTH: f32 = {STIPPLE_DEPTH:?};"),
             format!("MARK_WIDTH: vec3f = vec3f({:?}, {:?}, {:?});", MARK_WIDTH.x, MARK_WIDTH.y, MARK_WIDTH.z),
             format!("MARK_DEPTH: f32 = {MARK_DEPTH:?};"),
+            format!("MARK_SLOPE: vec2f = vec2f({:?}, {:?});", MARK_SLOPE[0], MARK_SLOPE[1]),
             format!("SMOOTH: f32 = {SMOOTH:?};"),
             format!("GROUND: f32 = {GROUND:?};"),
             format!("FADE: vec2f = vec2f({:?}, {:?});", FADE[0], FADE[1]),

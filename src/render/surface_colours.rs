@@ -4,7 +4,7 @@
 //! the renderers interpolate. Decay has a soft border: from sound tissue over a white spot (in enamel) and amber to its own
 //! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
 
-use super::enamel_colours::EnamelLayers;
+use super::enamel_colours::{EnamelLayers, ON_A_CROWN};
 use super::relief::GROUND;
 use super::scene::{Appearance, LabelPalette, VolumeInstance};
 use super::unworked_tooth::UnworkedTooth;
@@ -40,6 +40,13 @@ const AMBER: Vec3 = Vec3::new(0.80, 0.60, 0.33);
 /// Gloss of hard tissue where it is cut, and the depths under the tooth's own surface, mm, between which it is taken for cut.
 const CUT_GLOSS: f32 = GROUND;
 const CUT_DEPTHS: [f32; 2] = [0.15, 0.4];
+
+/// Tint of enamel deep in a fissure, where it stains with time, as on the neighbours' crowns.
+const FISSURE: [f32; 3] = [0.93, 0.885, 0.81];
+
+/// Thickness of the enamel that an eye looks through where it is cut, as a multiple of the distance from dentine: at a wall it looks
+/// along the layer, over a floor across it. A mean of both, up to the thickness on most of a crown; an estimate.
+const THROUGH_CUT: f32 = 1.7;
 
 /// Distance between the values of the noise that mottles decay, mm.
 const MOTTLE: [f32; 2] = [0.55, 0.21];
@@ -368,19 +375,28 @@ impl TranslucentEnamel {
 }
 
 impl Mixer {
-    /// True if matter looks different where enamel is thin, or where it is cut.
+    /// True if matter looks different where enamel is thin or in a fissure, or where it is cut.
     fn depends_on_place(&self, matter: &Matter) -> bool {
-        matter.dulling > 0.0 || matter.enamel > 0.0 && self.enamel.is_some()
+        matter.dulling > 0.0 || matter.enamel > 0.0
     }
 
     /// Matter as it looks at a place in tooth space: its enamel as thick as it is there, and dull where it is cut.
     fn seen_at(&self, matter: &Matter, unworked: &UnworkedTooth, place: Vec3) -> Matter {
+        let cut = rise(CUT_DEPTHS[0], CUT_DEPTHS[1], unworked.depth_of(place));
         let mut seen = match &self.enamel {
-            Some(enamel) if matter.enamel > 0.0 => enamel.seen_through(matter, unworked.enamel_under(place)),
+            Some(enamel) if matter.enamel > 0.0 => {
+                let across = unworked.enamel_under(place);
+                let along = (across * THROUGH_CUT).min(ON_A_CROWN).max(across);
+                enamel.seen_through(matter, across + (along - across) * cut)
+            }
             _ => *matter,
         };
-        if matter.dulling > 0.0 {
-            seen.sound[3] -= matter.dulling * rise(CUT_DEPTHS[0], CUT_DEPTHS[1], unworked.depth_of(place));
+        seen.sound[3] -= matter.dulling * cut;
+        if matter.enamel > 0.0 && cut < 1.0 {
+            let stain = matter.enamel / matter.sound_amount.max(1e-6) * (1.0 - cut) * unworked.groove_depth(place);
+            for (sum, tint) in seen.sound.iter_mut().zip(FISSURE) {
+                *sum *= 1.0 + (tint - 1.0) * stain;
+            }
         }
         seen
     }
@@ -460,7 +476,9 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
     // Both shares are one half at the border of decay. The first makes it soft; the second still shows a single voxel.
     let [far, own] = [wide.decayed_share(), near.decayed_share()];
     let share = far + OWN_WEIGHT * own * (1.0 - far);
-    let uneven = (share + 1.3 * mottle * share * (1.0 - share)).clamp(0.0, 1.0);
+    // Within these bounds, more decay never looks like less, and a little of it is seen everywhere.
+    let unevenness = (2.2 * mottle).clamp(-0.6, 0.9);
+    let uneven = share + unevenness * share * (1.0 - share);
     let mean = |sum: [f32; 4], amount: f32| (Vec3::new(sum[0], sum[1], sum[2]) / amount, sum[3] / amount);
     let (decay, decay_gloss) = mean(wide.decay, wide.decay_amount);
     let decay = decay * (1.0 + 0.22 * mottle);
@@ -472,9 +490,9 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
     let spot = sound.lerp(Vec3::ONE, WHITE_SPOT * enamel.min(1.0));
     let amber = decay.lerp(AMBER, 0.6);
     let colour = sound
-        .lerp(spot, rise(0.02, 0.2, uneven))
-        .lerp(amber, rise(0.12, 0.65, uneven))
-        .lerp(decay, rise(0.4, 0.95, uneven));
+        .lerp(spot, rise(0.0, 0.12, uneven))
+        .lerp(amber, rise(0.1, 0.8, uneven))
+        .lerp(decay, rise(0.5, 1.0, uneven));
     let gloss = sound_gloss + (decay_gloss - sound_gloss) * rise(0.03, 0.6, uneven);
     texel([colour.x, colour.y, colour.z, gloss].map(|v| v.clamp(0.0, 1.0)), 1.0)
 }
@@ -640,6 +658,52 @@ mod tests {
         assert!((values.iter().sum::<f32>() / values.len() as f32).abs() < 0.05);
         assert!(values.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.12));
         assert!(values.iter().any(|v| *v > 0.4) && values.iter().any(|v| *v < -0.4));
+    }
+
+    #[test]
+    fn a_little_decay_is_seen_wherever_it_is_and_more_of_it_no_less() {
+        // Aim: what is scored can be seen, whatever the noise is there. Method: clumps of three and of five cells at many places.
+        let palette = palette();
+        let grid = Grid::centred([40; 3], Vec3::splat(0.1));
+        let seen = |corner: u32, size: u32| {
+            let mut volume = Volume::from_distance(grid, 0.2, |p| (p.z - 1.0, DENTINE));
+            let top = grid.from_tooth(Vec3::Z * 0.95).z as u32;
+            for cell in (Grid { dims: [size; 3], ..grid }).cells() {
+                let cell = [corner + cell[0], corner + cell[1], top - cell[2]];
+                let voxel = volume.voxel(grid.index(cell));
+                volume.set_cell(cell, Voxel { label: DECAY, ..voxel });
+            }
+            let unworked = UnworkedTooth::of(&volume, &[]);
+            let middle = corner as f32 + 0.5 * (size as f32 - 1.0);
+            let place = Vec3::new(middle, middle, grid.from_tooth(Vec3::Z).z);
+            let colours = SurfaceColours::new(&tooth(&volume, &palette, &unworked));
+            Vec3::from(colours.at(place).colour).distance(Vec3::from(palette.appearance(DENTINE).colour))
+        };
+        let all: Vec<[f32; 2]> = (5..30).map(|corner| [3, 5].map(|size| seen(corner, size))).collect();
+        for [few, many] in &all {
+            assert!(*few > 0.15 && *many > *few, "{all:?}");
+        }
+    }
+
+    #[test]
+    fn enamel_at_a_wall_is_whiter_near_dentine_than_as_thin_a_layer() {
+        // Aim: the border between enamel and dentine is seen in a cavity. Method: the same wall through both, once cut into a
+        // larger block, once as the block's own side: 0.4 mm from dentine blue, which dentine lacks, differs.
+        let grid = Grid::centred([60, 60, 60], Vec3::splat(0.1));
+        let block = |p: Vec3| (p.abs() - 2.0).max_element();
+        let label = |p: Vec3| if p.z > 0.0 { Label(1) } else { DENTINE };
+        let whole = Volume::from_distance(grid, 0.2, |p| (block(p), label(p)));
+        let cut = Volume::from_distance(grid, 0.2, |p| (block(p).max(p.x), label(p)));
+        let mut palette = palette();
+        palette.appearances[usize::from(DENTINE.0)].colour = [0.8, 0.7, 0.5];
+        let wall = |unworked: &UnworkedTooth, height: f32| {
+            let colours = SurfaceColours::new(&tooth(&cut, &palette, unworked));
+            colours.at(grid.from_tooth(Vec3::new(0.0, 0.0, height))).colour[2]
+        };
+        let [through_layer, along_wall] = [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), 0.4));
+        assert!(along_wall > through_layer + 0.01, "{along_wall} and {through_layer}");
+        let [own, deep] = [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), -0.4));
+        assert!((own - deep).abs() < 0.005, "dentine: {own} and {deep}");
     }
 
     #[test]

@@ -186,11 +186,13 @@ fn explorer_mesh(wire: &BentExplorerEntry) -> Mesh {
     mesh
 }
 
-/// A tube along rings: middle, way, radius.
+/// A tube along rings: middle, way (unit), radius.
 pub(super) fn tube(rings: &[(Vec3, Vec3, f32)]) -> Mesh {
     let mut mesh = Mesh::default();
+    let mut side = rings.first().map_or(Vec3::X, |(_, direction, _)| direction.cross(Vec3::Y).normalize_or(Vec3::X));
     for (at, direction, radius) in rings {
-        let side = direction.cross(Vec3::Y).normalize_or(Vec3::X);
+        // From ring to ring it turns with the way, so that the tube is not twisted.
+        side = side.reject_from_normalized(*direction).normalize_or(side);
         let up = direction.cross(side);
         for i in 0..=SIDES {
             let angle = TAU * i as f32 / SIDES as f32;
@@ -207,6 +209,15 @@ pub(super) fn tube(rings: &[(Vec3, Vec3, f32)]) -> Mesh {
         }
     }
     mesh
+}
+
+/// A wire along a line, with round ends.
+pub(super) fn wire(line: &[Vec3], radius: f32) -> Mesh {
+    let way = |i: usize| (line[(i + 1).min(line.len() - 1)] - line[i.saturating_sub(1)]).normalize_or(Vec3::Z);
+    let is_end = |i: usize| i == 0 || i + 1 == line.len();
+    let rings: Vec<(Vec3, Vec3, f32)> =
+        (0..line.len()).map(|i| (line[i], way(i), if is_end(i) { 0.5 * radius } else { radius })).collect();
+    tube(&rings)
 }
 
 /// The reflecting face of a mouth mirror held in a place; `None` for every other instrument.

@@ -26,6 +26,7 @@ pub mod particles;
 mod instrument;
 mod jaw;
 mod lips;
+mod oral_cavity;
 mod palette;
 mod soft_tissue;
 pub mod pointing;

@@ -1,13 +1,16 @@
-//! Lips of the open mouth and the skin around them, which fades into the dark: from far off they tell where one is.
+//! Lips of the open mouth and the skin around them, which fades into the dark: from far off they tell where one is. Retractors hold
+//! their corners aside.
 
+use super::instrument::{STEEL, wire};
 use glam::Mat3;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
+use typodont_exercise::catalog::catmull_rom;
 use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint, Viewpoint};
 
-/// Half the width of the opening, held aside by retractors, mm.
+/// Half the width of the opening, its corners held aside, mm.
 const HALF_WIDTH: f32 = 37.0;
 
 /// Distance by which the opening reaches beyond the incisors' edges of each jaw, mm: their whole crowns are seen.
@@ -71,13 +74,13 @@ pub struct Lips {
 }
 
 impl Lips {
-    /// Around the edges of the incisors of both jaws, world space, mm; `front`: unit vector out of the mouth.
-    pub fn around([near, opposite]: [Vec3; 2], front: Vec3) -> Lips {
-        let up = (opposite - near).reject_from_normalized(front).normalize_or(Vec3::Y);
-        let half_height = 0.5 * (opposite - near).dot(up).abs() + BEYOND_EDGES;
+    /// Around the edges of the incisors of the lower and the upper jaw, world space, mm; `front`: unit vector out of the mouth.
+    pub fn around([lower, upper]: [Vec3; 2], front: Vec3) -> Lips {
+        let up = (upper - lower).reject_from_normalized(front).normalize_or(Vec3::Y);
+        let half_height = 0.5 * (upper - lower).dot(up).abs() + BEYOND_EDGES;
         // Before the edge that is farther in front.
-        let ahead = near.dot(front).max(opposite.dot(front)) + IN_FRONT;
-        let middle = near.midpoint(opposite);
+        let ahead = lower.dot(front).max(upper.dot(front)) + IN_FRONT;
+        let middle = lower.midpoint(upper);
         let middle = middle + front * (ahead - middle.dot(front));
         let orientation = Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize();
         let (mesh, tints) = lip_mesh(half_height);
@@ -86,6 +89,36 @@ impl Lips {
         let plain = MeshInstance::plain(Arc::new(mesh), Pose { position: middle, orientation }, appearance);
         let solid = MeshInstance { vertex_tints: Arc::new(tints), casts_shadow: false, ..plain };
         Lips { solid, half_height }
+    }
+
+    /// Retractors of wire that hold the corners of the mouth aside.
+    pub fn retractors(&self) -> MeshInstance {
+        /// One retractor's upper half: from its handle over the lip and behind its corner, the lips' own space, mm.
+        const HALF: [[f32; 3]; 9] = [
+            [84.0, 1.6, -36.0],
+            [72.0, 2.2, -26.0],
+            [60.0, 3.5, -17.0],
+            [46.0, 8.5, -9.0],
+            [38.0, 14.0, -5.0],
+            [32.5, 16.0, -2.0],
+            [29.5, 15.5, -7.0],
+            [30.5, 12.5, -13.0],
+            [34.0, 6.0, -17.0],
+        ];
+        const CORNER: [f32; 3] = [35.0, 0.0, -18.0];
+        /// Radius of the wire, and the greatest distance between two of its rings, mm.
+        const WIRE: f32 = 1.3;
+        const FINENESS: f32 = 0.8;
+        let lower = HALF.into_iter().rev().map(|[x, y, z]| [x, -y, z]);
+        let knots: Vec<[f32; 3]> = HALF.into_iter().chain([CORNER]).chain(lower).collect();
+        let wire_on = |side: f32| {
+            let knots: Vec<Vec3> = knots.iter().map(|[x, y, z]| Vec3::new(side * x, *y, *z)).collect();
+            wire(&catmull_rom(&knots, FINENESS), WIRE)
+        };
+        let mut mesh = wire_on(1.0);
+        mesh.append(wire_on(-1.0));
+        let plain = MeshInstance::plain(Arc::new(mesh), self.solid.world_from_solid, STEEL);
+        MeshInstance { casts_shadow: false, ..plain }
     }
 
     /// The lips, unless they would stand between an eye and what it looks at.
@@ -168,6 +201,10 @@ mod tests {
         assert!(!looks(Vec3::new(0.0, 150.0, 30.0), middle), "from above, past the upper lip");
         assert!(!looks(Vec3::new(120.0, 20.0, 10.0), middle), "through the cheek");
         assert!(!looks(Vec3::new(0.0, 20.0, 2.0), middle), "from within");
+        let wire = lips.retractors().mesh;
+        let [behind, before] = [f32::min, f32::max].map(|of| wire.positions.iter().map(|p| p.z).reduce(of).unwrap());
+        assert!(behind < -15.0 && before > -2.0, "retractors go around the lip: {behind} to {before} mm");
+        assert!(wire.positions.iter().all(|p| p.x.abs() > 27.0), "and stay beside the teeth");
         let mesh = &lips.solid.mesh;
         let forward = mesh.normals.iter().filter(|normal| normal.z > 0.0).count();
         assert!(forward * 10 > 7 * mesh.normals.len(), "{forward} of {} look forward", mesh.normals.len());

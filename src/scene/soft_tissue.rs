@@ -43,11 +43,15 @@ impl YieldingSurface {
         let sampled = Volume::from_distance(grid, 2.0 * SPACING, |place| (shape.distance(place), Label(1)));
         let mut mesh = surface::extract(&sampled);
         mesh.smooth_normals(SMOOTHING);
-        let tints = mesh.positions.iter().map(|place| VertexTint::smooth(tint(*place))).collect();
+        let tints = mesh.positions.iter().map(|place| VertexTint::smooth(mucosa_tint(*place))).collect();
         let appearance = Appearance { colour: entry.rgb(), gloss: GLOSS };
         let plain = MeshInstance::plain(Arc::new(mesh), workpiece.world_from_tooth, appearance);
         let at_rest = MeshInstance { vertex_tints: Arc::new(tints), ..plain };
         Some(YieldingSurface { at_rest, felt: shape.clone(), is_cheek: entry.name == CHEEK })
+    }
+
+    pub fn is_tongue(&self) -> bool {
+        !self.is_cheek
     }
 
     fn in_tooth(&self, place_in_world: Vec3) -> Vec3 {
@@ -97,7 +101,7 @@ impl YieldingSurface {
 }
 
 /// Tint of mucosa at a place, mm: a little redder here and paler there, over some millimetres.
-fn tint(place: Vec3) -> Rgb {
+pub(super) fn mucosa_tint(place: Vec3) -> Rgb {
     let wave = |steps: Vec3, phase: f32| libm::sinf(place.dot(steps) + phase);
     let bent = place + 2.0 * Vec3::new(wave(Vec3::new(0.2, 0.5, 0.3), 0.0), wave(Vec3::new(0.6, 0.1, -0.4), 1.0), 0.0);
     let wave = |steps: Vec3, phase: f32| libm::sinf(bent.dot(steps) + phase);

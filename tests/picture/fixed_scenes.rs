@@ -85,7 +85,7 @@ impl FixedCase {
             solids: mouth
                 .solids(WORKING_OPENING_DEG)
                 .into_iter()
-                .chain(mouth.lips(&viewpoint, WORKING_OPENING_DEG))
+                .chain(mouth.front_solids(&viewpoint, WORKING_OPENING_DEG))
                 .collect(),
             lights: Lights::along(&viewpoint),
             shadows: is_full.then(|| shadow_region(&self.workpiece, &orbit)),
@@ -100,6 +100,7 @@ impl FixedCase {
 /// Cuts a cavity over the first lesion, most of the way through it, as a round bur does: in overlapping balls.
 fn prepare(volume: &mut Volume, workpiece: &Workpiece) {
     const RADIUS: f32 = 0.7;
+    const TURNS: u32 = 36;
     let lesion = &workpiece.lesions[0];
     let top = workpiece.teeth[0].crown.high.z;
     let floor = lesion.centre.z - lesion.radii.map_or(2.2, |r| 0.5 * r.z);
@@ -107,8 +108,8 @@ fn prepare(volume: &mut Volume, workpiece: &Workpiece) {
     for level in 0..=levels {
         let z = floor + 0.2 * level as f32;
         carve(volume, Vec3::new(lesion.centre.x, lesion.centre.y, z), RADIUS);
-        for turn in 0..10u32 {
-            let (sin, cos) = (turn as f32 * std::f32::consts::TAU / 10.0).sin_cos();
+        for turn in 0..TURNS {
+            let (sin, cos) = (turn as f32 * std::f32::consts::TAU / TURNS as f32).sin_cos();
             carve(volume, Vec3::new(lesion.centre.x + 0.8 * cos, lesion.centre.y + 1.1 * sin, z), RADIUS);
         }
     }

@@ -80,10 +80,29 @@ fn cheek_and_tongue_are_beside_the_teeth_where_they_are_in_a_mouth() {
 }
 
 #[test]
+fn retractors_need_lips() {
+    // Aim: an author learns that nothing of what was asked for is drawn. Method: an exercise with retractors, in the generated jaw and in
+    // one of its own.
+    let text = include_str!("../../scenarios/14-amalgam.json");
+    for (jaw, complaints) in [("\"retractors\": true", 0), ("\"own_jaw\": true, \"retractors\": true", 1)] {
+        let source = SourceText::new("14-amalgam.json", text.replace("\"rubber_dam\": true", jaw));
+        let found = scenario::resolve(source, &Library::shipped(), ResolveMode::MakeWorkpiece);
+        let count = found.err().map_or(0, |found| found.iter().filter(|each| each.code == "no-lips").count());
+        assert_eq!(count, complaints, "{jaw}");
+    }
+}
+
+#[test]
 fn a_rubber_dam_hides_nothing_that_has_to_be_seen() {
     // Aim: an author cannot cover what the exercise asks for. Method: the shipped exercise with a dam, with each thing beside it.
     let text = include_str!("../../scenarios/14-amalgam.json");
-    let others = [("", 0), ("\"cheek\": true,", 1), ("\"tongue\": true,", 1), ("\"other_teeth\": {},", 1)];
+    let others = [
+        ("", 0),
+        ("\"cheek\": true,", 1),
+        ("\"tongue\": true,", 1),
+        ("\"other_teeth\": {},", 1),
+        ("\"retractors\": true,", 1),
+    ];
     for (other, complaints) in others {
         let text = text.replace("\"rubber_dam\": true", &format!("{other} \"rubber_dam\": true"));
         let source = SourceText::new("14-amalgam.json", text);

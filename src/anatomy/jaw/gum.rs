@@ -31,6 +31,14 @@ impl GumForm {
             GumForm::Drawn => 0.5,
         }
     }
+
+    /// Length behind the last molar, mm: as it is drawn, the ridge goes on behind its pad, so that its end is out of sight.
+    fn beyond(self) -> f32 {
+        match self {
+            GumForm::Touched => PAD,
+            GumForm::Drawn => 2.0 * PAD,
+        }
+    }
 }
 
 /// Means of normals over neighbouring places: creases between columns fade, the margin stays.
@@ -140,7 +148,7 @@ pub(super) fn column_positions(sides: &[HalfJaw; 2], spacing: f32, beyond: f32) 
 
 /// Columns of places from the midline back, for each half.
 fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: GumForm) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
-    let positions = column_positions(sides, form.column(), PAD);
+    let positions = column_positions(sides, form.column(), form.beyond());
     std::array::from_fn(|number| {
         let side = &sides[number];
         let front = side.ridge(jaw, form, 0.0).pop().map_or(Vec3::ZERO, |row| row.0);
@@ -359,7 +367,12 @@ impl HalfJaw<'_> {
         } else {
             0.5 * (neck_of(seat) + neck_of(&seats[beside]) + PAPILLA * (seat.crown + seats[beside].crown))
         };
-        let pad = ((arc_length - self.half.length()) / PAD).clamp(0.0, 1.0);
+        let behind = (arc_length - self.half.length()) / PAD;
+        let pad = match form {
+            GumForm::Touched => behind.clamp(0.0, 1.0),
+            // The ridge goes on behind it without a kink.
+            GumForm::Drawn => smooth_step(behind / 1.25),
+        };
         let neck = between_seats(&|i| neck_of(&seats[i])) - 2.0 * pad * pad;
         let [buccal, lingual, beside] = [ProbingSite::Buccal, ProbingSite::Lingual, ProbingSite::MesioBuccal]
             .map(|site| self.recession[site as usize]);

@@ -238,7 +238,7 @@ fn solids(
     if lesson.display_mode != DisplayMode::Xray {
         solids.extend(scene.surroundings.iter().cloned());
         solids.extend(suction_and_syringe(lesson, scene));
-        solids.extend(scene.mouth.as_ref().and_then(|mouth| mouth.lips(viewpoint, scene.mouth_opening)));
+        solids.extend(scene.mouth.iter().flat_map(|mouth| mouth.front_solids(viewpoint, scene.mouth_opening)));
     }
     if let Some(mouth) = &scene.mouth {
         let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));

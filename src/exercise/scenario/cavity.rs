@@ -143,6 +143,7 @@ impl Workpiece {
             surroundings: Vec::new(),
             own_jaw: false,
             rubber_dam: false,
+            retractors: false,
             neighbours: Vec::new(),
             periodontium: None,
             arch: Default::default(),

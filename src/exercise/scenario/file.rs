@@ -231,6 +231,9 @@ pub struct JawFile {
     /// gingiva under it is felt and scored as without it.
     #[serde(default)]
     pub rubber_dam: bool,
+    /// True for two retractors at the corners of the mouth. They are drawn only, while one looks into the mouth from in front.
+    #[serde(default)]
+    pub retractors: bool,
     /// Positions of the teeth in both jaws.
     #[serde(default)]
     pub arch: ArchFile,

@@ -145,6 +145,8 @@ pub struct Scene {
     pub own_jaw: bool,
     /// True if a rubber dam covers the jaw, all but the tooth and those beside it.
     pub rubber_dam: bool,
+    /// True if retractors hold the corners of the mouth.
+    pub retractors: bool,
     /// Gingiva with pockets; `None` outside a jaw.
     pub pockets: Option<Pockets>,
     pub arch: DentalArches,

@@ -44,6 +44,8 @@ pub struct Workpiece {
     pub own_jaw: bool,
     /// True if a rubber dam covers the jaw; it cannot be touched.
     pub rubber_dam: bool,
+    /// True if retractors hold the corners of the mouth; they cannot be touched.
+    pub retractors: bool,
     /// Those neighbouring teeth among them that have the form of their kind.
     pub neighbours: Vec<NeighbourTooth>,
     /// Gingiva with a sulcus; `None` without pockets.
@@ -219,6 +221,7 @@ impl Workpiece {
             surroundings: around,
             own_jaw: scenario.scene.own_jaw,
             rubber_dam: scenario.scene.rubber_dam,
+            retractors: scenario.scene.retractors,
             neighbours,
             periodontium,
             arch,

@@ -61,9 +61,18 @@ pub fn tooth(surface: &SurfaceTriangles, sampler: &VolumeSampler, view: &CpuView
         framebuffer,
         |SurfacePoint { own, normal, point, .. }| {
             let at = grid.from_tooth(own);
-            sampler.shade(view, at, point, normal)
+            sampler.shade(view, at, point, turned_to_eye(normal, (view.eye.position - point).normalize()))
         },
     );
+}
+
+/// Cosine between the normal of a tooth's surface and the way to the eye below which the normal is turned to the eye.
+const EDGE_ON: f32 = 0.25;
+
+/// Unit normal of a place that an eye sees. At the sharp rim of a cut, the gradient of voxels may turn away from the eye, which would
+/// show as dark teeth along the rim.
+fn turned_to_eye(normal: Vec3, to_eye: Vec3) -> Vec3 {
+    (normal + to_eye * (EDGE_ON - normal.dot(to_eye)).max(0.0)).normalize()
 }
 
 /// A place on a triangle.

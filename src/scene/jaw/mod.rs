@@ -8,6 +8,7 @@ mod rubber_dam;
 
 use self::rubber_dam::{ISOLATED_BESIDE, RubberDam};
 use super::lips::Lips;
+use super::oral_cavity::OralCavity;
 use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
@@ -63,9 +64,17 @@ pub struct Mouth {
     touched: Vec<MeshInstance>,
     /// Cheek and tongue.
     yielding: Vec<YieldingSurface>,
-    lips: Option<Lips>,
-    /// True under a rubber dam, which covers the lips.
+    /// What is seen around the jaws from in front.
+    face: Option<Face>,
+    /// True under a rubber dam, which covers the face.
     has_dam: bool,
+}
+
+#[derive(Clone, Debug)]
+struct Face {
+    lips: Lips,
+    retractors: Option<MeshInstance>,
+    cavity: OralCavity,
 }
 
 #[derive(Clone, Debug)]
@@ -133,7 +142,7 @@ impl Mouth {
             (None, [tooth]) => Mouth::around_tooth(workpiece, tooth, tissues),
             _ => None,
         };
-        mouth.map(Mouth::with_lips)
+        mouth.map(|mouth| mouth.with_face(workpiece.retractors))
     }
 
     /// The gingiva of an arch whose teeth are all worked on.
@@ -150,7 +159,7 @@ impl Mouth {
             touched: Vec::new(),
             has_dam: false,
             yielding: Vec::new(),
-            lips: None,
+            face: None,
         }
     }
 
@@ -179,7 +188,7 @@ impl Mouth {
             touched: Vec::new(),
             has_dam: false,
             yielding: yielding.collect(),
-            lips: None,
+            face: None,
         })
     }
 
@@ -206,7 +215,7 @@ impl Mouth {
             touched: touched.map(|shape| surroundings::solid_of_shape(shape, workpiece, tissues)).collect(),
             has_dam: false,
             yielding: yielding.collect(),
-            lips: None,
+            face: None,
         })
     }
 
@@ -288,7 +297,7 @@ impl Mouth {
                 .collect(),
             has_dam: workpiece.rubber_dam,
             yielding: yielding.collect(),
-            lips: None,
+            face: None,
         })
     }
 
@@ -303,19 +312,34 @@ impl Mouth {
         self.near.instances(self.world_from_near).chain(opposite).chain(touched).collect()
     }
 
-    /// The lips of the mouth, unless they would be in the way of the eye; `None` around a jaw by itself, and where the mouth is open
-    /// otherwise than during treatment. `open`: as in [`Mouth::solids`].
-    pub fn lips(&self, viewpoint: &Viewpoint, open: f32) -> Option<MeshInstance> {
-        self.lips.as_ref().filter(|_| open == WORKING_OPENING_DEG)?.seen_from(viewpoint)
+    /// What an eye in front of the mouth sees around the jaws: lips with their retractors, cheeks, throat and the tongue at rest.
+    /// Nothing where the lips would be in the way of the eye, around a jaw by itself, and where the mouth is open otherwise than
+    /// during treatment. `open`: as in [`Mouth::solids`].
+    pub fn front_solids(&self, viewpoint: &Viewpoint, open: f32) -> Vec<MeshInstance> {
+        let face = self.face.as_ref().filter(|_| open == WORKING_OPENING_DEG);
+        let Some((face, lips)) = face.and_then(|face| Some((face, face.lips.seen_from(viewpoint)?))) else {
+            return Vec::new();
+        };
+        let has_tongue = !self.yielding.iter().any(YieldingSurface::is_tongue);
+        std::iter::once(lips).chain(face.retractors.clone()).chain(face.cavity.solids(has_tongue)).collect()
     }
 
-    /// Puts lips around both jaws, if both are drawn.
-    fn with_lips(self) -> Mouth {
+    /// Puts a face around both jaws, if both are drawn.
+    fn with_face(self, has_retractors: bool) -> Mouth {
         let arches = [self.world_from_near, self.world_from_opposite(WORKING_OPENING_DEG)];
         let front = arches.iter().map(|arch| arch.rotate(Vec3::NEG_Y)).sum::<Vec3>().normalize_or(Vec3::Z);
-        let lips =
-            (self.opposite.is_some() && !self.has_dam).then(|| Lips::around(arches.map(|arch| arch.position), front));
-        Mouth { lips, ..self }
+        let [lower, upper] = if self.jaw == Jaw::Lower { arches } else { [arches[1], arches[0]] };
+        let face = (self.opposite.is_some() && !self.has_dam).then(|| {
+            let lips = Lips::around([lower, upper].map(|arch| arch.position), front);
+            let retractors = has_retractors.then(|| lips.retractors());
+            let crowns = [Some(&self.near), self.opposite.as_ref()]
+                .into_iter()
+                .flatten()
+                .flat_map(|jaw| &jaw.teeth.mesh.positions);
+            let teeth = crowns.fold([0.0, 0.0], |[aside, back]: [f32; 2], p| [aside.max(p.x.abs()), back.max(p.y)]);
+            Face { lips, retractors, cavity: OralCavity::between(lower, upper, front, teeth) }
+        });
+        Mouth { face, ..self }
     }
 
     /// Fits the mouth's solids, made for an opening, to a picture: without the opposite jaw, the cheek or the tongue where they hide the work, and with the

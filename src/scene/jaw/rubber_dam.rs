@@ -1,7 +1,7 @@
 //! A rubber dam with the clamp that holds it.
 
 use super::{FinishedMesh, MeshInstance};
-use crate::instrument::{STEEL, tube};
+use crate::instrument::{STEEL, wire};
 use std::sync::Arc;
 use typodont_anatomy::jaw::{DentalArch, ToothSeat};
 use typodont_core::frame::{Pose, Vec3};
@@ -57,11 +57,5 @@ fn clamp(seat: &ToothSeat, side: f32) -> Mesh {
     };
     let tongue_side = HALF.into_iter().rev().map(|[across, along, height]| [-across, along, height]);
     let knots: Vec<Vec3> = HALF.into_iter().chain([TOP]).chain(tongue_side).map(place).collect();
-    let line = catmull_rom(&knots, FINENESS);
-    let way = |i: usize| (line[(i + 1).min(line.len() - 1)] - line[i.saturating_sub(1)]).normalize_or(Vec3::Z);
-    let mut rings: Vec<(Vec3, Vec3, f32)> = (0..line.len()).map(|i| (line[i], way(i), WIRE)).collect();
-    // Round ends.
-    rings[0].2 = 0.5 * WIRE;
-    rings[line.len() - 1].2 = 0.5 * WIRE;
-    tube(&rings)
+    wire(&catmull_rom(&knots, FINENESS), WIRE)
 }

@@ -16,7 +16,7 @@ pub const MAX_CHIPS: usize = 2000;
 const MAX_PENDING: usize = 96;
 
 /// Matter for each chip that is drawn, mm³. True dust is a thousand times finer.
-const CHIP_VOLUME: f32 = 0.004;
+pub const CHIP_VOLUME: f32 = 0.004;
 
 /// Radii of chips, mm.
 const RADII: [f32; 2] = [0.045, 0.10];
@@ -86,6 +86,8 @@ struct Chip {
     colour: Rgb,
     /// True for a chip bound by water, which carries it away after a while.
     is_wet: bool,
+    /// True once water has taken up its powder.
+    has_clouded: bool,
     /// Time that a wet chip still rests, s.
     wet_time_left: f32,
     /// Unit normal of the surface on which the chip rests; `None` while it flies.
@@ -140,6 +142,7 @@ impl Dust {
                 radius: rng.in_range(RADII[0], RADII[1]),
                 colour,
                 is_wet,
+                has_clouded: false,
                 wet_time_left: rng.in_range(WET_CHIP_TIME[0], WET_CHIP_TIME[1]),
                 resting_normal: None,
             });
@@ -201,15 +204,19 @@ impl Dust {
     }
 
     /// Effect of a falling drop: chips near it are carried away, and chips within the water that it joins become wet.
-    /// `reach` is the radius of that water, mm.
-    pub fn wash(&mut self, place: Vec3, velocity: Vec3, reach: f32) {
+    /// `reach` is the radius of that water, mm. Gives the dust that the water takes up, mm³.
+    pub fn wash(&mut self, place: Vec3, velocity: Vec3, reach: f32) -> f32 {
+        let mut washed = 0.0;
         for chip in self.chips.iter_mut().filter(|chip| chip.resting_normal.is_some()) {
             let away = chip.place.distance_squared(place);
             chip.is_wet |= away < reach * reach;
             if away < WASH_RADIUS * WASH_RADIUS {
                 (chip.velocity, chip.resting_normal, chip.is_wet) = (velocity, None, true);
+                washed += if chip.has_clouded { 0.0 } else { CHIP_VOLUME };
+                chip.has_clouded = true;
             }
         }
+        washed
     }
 
     pub fn particles(&self) -> impl Iterator<Item = Particle> + '_ {

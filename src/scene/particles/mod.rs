@@ -433,6 +433,28 @@ mod tests {
     }
 
     #[test]
+    fn dust_clouds_the_water_that_washes_it_away_and_fresh_water_thins_it() {
+        // Aim: slurry where something was cut under spray, and clear water elsewhere. Method: the same pit under spray with its dust
+        // and without; then as long again without cutting.
+        let after = |dust: bool| {
+            let options = OperatingField { dust, water_spray: true, suction: false };
+            let (mut volume, mut field) = (slab(), ParticleField::new(options, &tray(), None, None));
+            grind(&mut volume, &mut field);
+            let bur = field.bur(0, upright(AT_WORK)).unwrap();
+            let carved = visible(&field).opaque().len() as f32 * dust::CHIP_VOLUME;
+            [5, 60].map(|frames| {
+                (0..frames).for_each(|_| field.advance(0.1, (Some(&bur), None), &ground(&volume), &palette()));
+                let lying = field.water.lying_dust_mm3();
+                assert!(lying <= carved, "{lying} of {carved} mm³");
+                lying / field.water.lying_mm3()
+            })
+        };
+        let [[soon, later], clear] = [true, false].map(after);
+        assert!(soon > 0.01 && later < 0.5 * soon, "{soon}, then {later}");
+        assert_eq!(clear, [0.0; 2]);
+    }
+
+    #[test]
     fn an_opened_pulp_bleeds_into_the_cavity_until_the_blood_clots() {
         // Aim: who opens the pulp sees it, and who does not sees no blood. Method: the same cut through matter that is pulp and
         // that is not; blood gathers in the pit, is the same after a minute as after half of it, and is thinned and washed out by a

@@ -1,4 +1,4 @@
-//! The handpiece's water and the blood of an opened pulp: droplets, splashes, and the film and pools they leave.
+//! The handpiece's water and the blood of an opened pulp: droplets, splashes, and the film and pools they leave, clouded by dust.
 
 use super::collision::{CollisionWorld, Sweep};
 use super::dust::Dust;
@@ -86,11 +86,16 @@ const SURFACE_SEARCH: f32 = 0.5;
 /// Share of blood from which a patch clots instead of drying.
 const CLOTTING_SHARE: f32 = 0.5;
 
+/// Most dust that water holds, as a share.
+const MAX_DUST_SHARE: f32 = 0.6;
+
 /// Speed at which drops of blood leave an opening, mm/s: they well up.
 const BLEEDING_SPEED: f32 = 12.0;
 
 const WATER: Appearance = Appearance { colour: [0.80, 0.89, 0.95], gloss: 0.7 };
-const BLOOD: Appearance = Appearance { colour: [0.60, 0.02, 0.02], gloss: 0.12 };
+const BLOOD: Appearance = Appearance { colour: [0.55, 0.015, 0.015], gloss: 0.2 };
+/// Wet powder of enamel and dentine.
+const SLURRY: Appearance = Appearance { colour: [0.88, 0.84, 0.74], gloss: 0.2 };
 const MIST: Appearance = Appearance { colour: [0.93, 0.96, 0.98], gloss: 0.0 };
 
 pub struct Water {
@@ -133,6 +138,8 @@ struct WaterPatch {
     volume: f32,
     /// Share of blood in it.
     blood: f32,
+    /// Share of dust in it: with much of it, it is slurry.
+    dust: f32,
     /// True once it has come to rest.
     is_held: bool,
 }
@@ -145,8 +152,14 @@ impl WaterPatch {
     /// Takes up other water.
     fn add(&mut self, other: &WaterPatch) {
         let volume = self.volume + other.volume;
-        self.blood = (self.blood * self.volume + other.blood * other.volume) / volume.max(1e-9);
+        let mean = |own: f32, others: f32| (own * self.volume + others * other.volume) / volume.max(1e-9);
+        (self.blood, self.dust) = (mean(self.blood, other.blood), mean(self.dust, other.dust));
         self.volume = volume;
+    }
+
+    /// Takes up dust, mm³.
+    fn cloud(&mut self, dust: f32) {
+        self.dust = (self.dust + dust / self.volume.max(1e-9)).min(MAX_DUST_SHARE);
     }
 
     /// 0 for a film, which clings, 1 for a pool, which is level.
@@ -241,11 +254,10 @@ impl Water {
                 Sweep::Hit { place, normal: out } => {
                     let bounced = drop.velocity - out * (2.0 * drop.velocity.dot(out));
                     drop.velocity = (bounced + rng.in_cube() * SPRAY_SPEED * 0.5) * SPLASH_SPEED;
-                    let reach = add_water(
-                        lying,
-                        WaterPatch { place, normal: out, volume: DEPOSIT_VOLUME, blood: drop.blood, is_held: false },
-                    );
-                    dust.wash(place + out * SURFACE_OFFSET, drop.velocity, reach);
+                    let (volume, blood) = (DEPOSIT_VOLUME, drop.blood);
+                    let new = WaterPatch { place, normal: out, volume, blood, dust: 0.0, is_held: false };
+                    let patch = add_water(lying, new);
+                    patch.cloud(dust.wash(place + out * SURFACE_OFFSET, drop.velocity, patch.radius()));
                     (drop.place, drop.kind, drop.age) = (place + out * SURFACE_OFFSET, DropletKind::Splash, 0.0);
                     drop.radius *= 0.6;
                     // Blood wells up and does not splash.
@@ -314,7 +326,7 @@ impl Water {
                     let fading = (1.0 - drop.age / MIST_LIFETIME).max(0.0);
                     (0.2 + MIST_GROWTH * drop.age, (MIST, MIST_OPACITY * fading))
                 }
-                _ => (drop.radius, look_of(drop.blood, [0.70, 0.95])),
+                _ => (drop.radius, look_of([drop.blood, 0.0], [0.70, 0.95, 0.95])),
             };
             Particle { position: drop.place, radius, facing: None, appearance, opacity }
         });
@@ -322,7 +334,8 @@ impl Water {
             let pool = patch.pool_share();
             let facing = patch.normal.lerp(Vec3::Y, pool).normalize_or(Vec3::Y);
             let position = patch.place + facing * (SURFACE_OFFSET + HEIGHT_SHARE * patch.radius() * pool);
-            let (appearance, opacity) = look_of(patch.blood, [mix(0.12, 0.22, pool), mix(0.8, 0.97, pool)]);
+            let opacities = [mix(0.12, 0.22, pool), mix(0.8, 0.97, pool), mix(0.6, 0.9, pool)];
+            let (appearance, opacity) = look_of([patch.blood, patch.dust], opacities);
             Particle { position, radius: patch.radius(), facing: Some(facing), appearance, opacity }
         });
         flying.chain(lying)
@@ -340,6 +353,12 @@ impl Water {
         self.lying.iter().map(|patch| patch.volume * patch.blood).sum()
     }
 
+    /// All the dust in the water that lies, mm³.
+    #[cfg(test)]
+    pub fn lying_dust_mm3(&self) -> f32 {
+        self.lying.iter().map(|patch| patch.volume * patch.dust).sum()
+    }
+
     /// All the water that lies, mm³.
     #[cfg(test)]
     pub fn lying_mm3(&self) -> f32 {
@@ -347,12 +366,14 @@ impl Water {
     }
 }
 
-/// Appearance and opacity of water with a share of blood, given the opacities of water and of blood. A little blood colours much
-/// water.
-fn look_of(blood: f32, [clear, red]: [f32; 2]) -> (Appearance, f32) {
-    let share = blood.sqrt();
-    let colour = std::array::from_fn(|c| mix(WATER.colour[c], BLOOD.colour[c], share));
-    (Appearance { colour, gloss: mix(WATER.gloss, BLOOD.gloss, share) }, mix(clear, red, share))
+/// Appearance and opacity of water with shares of blood and dust, given the opacities of water, of blood and of slurry. A little of
+/// either colours much water.
+fn look_of([blood, dust]: [f32; 2], [clear, red, cloudy]: [f32; 3]) -> (Appearance, f32) {
+    let mixed = |(from, opacity): (Appearance, f32), (to, its_opacity): (Appearance, f32), share: f32| {
+        let colour = std::array::from_fn(|c| mix(from.colour[c], to.colour[c], share));
+        (Appearance { colour, gloss: mix(from.gloss, to.gloss, share) }, mix(opacity, its_opacity, share))
+    };
+    mixed(mixed((WATER, clear), (SLURRY, cloudy), dust.sqrt()), (BLOOD, red), blood.sqrt())
 }
 
 fn mix(a: f32, b: f32, share: f32) -> f32 {
@@ -367,22 +388,23 @@ fn push_bounded<T>(queue: &mut VecDeque<T>, most: usize, one: T) {
     queue.push_back(one);
 }
 
-/// Water comes down: to a patch that is there, or as a new one. Gives that patch's radius, mm.
-fn add_water(lying: &mut VecDeque<WaterPatch>, new: WaterPatch) -> f32 {
-    let is_near = |patch: &&mut WaterPatch| {
+/// Water comes down: to a patch that is there, or as a new one. Gives that patch.
+fn add_water(lying: &mut VecDeque<WaterPatch>, new: WaterPatch) -> &mut WaterPatch {
+    let is_near = |patch: &WaterPatch| {
         let reach = 0.7 * patch.radius();
         patch.volume > 0.0 && patch.place.distance_squared(new.place) < reach * reach
     };
-    match lying.iter_mut().find(is_near) {
-        Some(patch) => {
-            patch.add(&new);
-            patch.radius()
+    let place = match lying.iter().position(is_near) {
+        Some(place) => {
+            lying[place].add(&new);
+            place
         }
         None => {
             push_bounded(lying, MAX_LYING, new);
-            new.radius()
+            lying.len() - 1
         }
-    }
+    };
+    &mut lying[place]
 }
 
 /// True where walls stand around a patch, or the ground goes on under it, on all four sides.

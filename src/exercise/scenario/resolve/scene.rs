@@ -130,8 +130,19 @@ impl Resolver<'_> {
             _ => Vec::new(),
         };
         let rubber_dam = matches!(scene, file::SceneFile::Jaw(jaw) if self.has_rubber_dam(jaw));
+        let retractors = matches!(scene, file::SceneFile::Jaw(jaw) if self.has_retractors(jaw));
         let teeth = teeth.into_iter().collect::<Option<_>>()?;
-        Some(Scene { layout, teeth, surroundings: around, own_jaw, rubber_dam, pockets, arch, soft_neighbours })
+        Some(Scene {
+            layout,
+            teeth,
+            surroundings: around,
+            own_jaw,
+            rubber_dam,
+            retractors,
+            pockets,
+            arch,
+            soft_neighbours,
+        })
     }
 
     /// Returns true if a jaw has a rubber dam, and reports what cannot be under one.
@@ -141,6 +152,7 @@ impl Resolver<'_> {
             (jaw.tongue, "tongue", "it is touched"),
             (jaw.other_teeth.is_some(), "other_teeth", "they are examined"),
             (jaw.around.is_some(), "around", "it is touched"),
+            (jaw.retractors, "retractors", "they would be seen"),
         ];
         for (_, name, why) in hidden.into_iter().filter(|(is_there, ..)| jaw.rubber_dam && *is_there) {
             let message = format!("a rubber dam would hide \"{name}\", although {why}");
@@ -148,6 +160,15 @@ impl Resolver<'_> {
             self.complain("/scene/jaw/rubber_dam", "hidden-by-dam", message, &help);
         }
         jaw.rubber_dam
+    }
+
+    /// Returns true if a jaw has retractors, and reports them where there are no lips.
+    fn has_retractors(&mut self, jaw: &file::JawFile) -> bool {
+        if jaw.retractors && jaw.own_jaw {
+            let message = "retractors hold lips, and none are drawn around a jaw of one's own";
+            self.complain("/scene/jaw/retractors", "no-lips", message, "remove \"retractors\" or \"own_jaw\"");
+        }
+        jaw.retractors
     }
 
     /// Returns the cheek and the tongue of a jaw, and reports those that are not beside the tooth or have no tissue.

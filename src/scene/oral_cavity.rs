@@ -1,0 +1,277 @@
+//! The inside of the open mouth behind the teeth, as it is seen from in front: the cheeks, the throat, and the tongue at rest.
+//!
+//! Takes the arch spaces of both jaws in world space, mm. Forms and colours are estimates from photographs of open mouths; none of it
+//! is touched.
+
+use super::soft_tissue::mucosa_tint;
+use glam::Mat3;
+use std::f32::consts::PI;
+use std::sync::Arc;
+use typodont_core::frame::{Pose, Quat, Vec3, smooth_step};
+use typodont_core::mesh::Mesh;
+use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint};
+
+/// Outline of the cheeks and the throat in plan, from the corner of the mouth to the midline: the distance from the midline and behind
+/// the incisors' edges, mm, and how bright it is. Over the fold before the throat it is bright once more.
+const WALL: [[f32; 3]; 14] = [
+    [44.0, 15.0, 0.80],
+    [40.5, 18.0, 0.85],
+    [38.0, 22.0, 0.85],
+    [37.3, 28.0, 0.80],
+    [37.0, 34.0, 0.70],
+    [36.5, 46.0, 0.60],
+    [34.0, 56.0, 0.50],
+    [28.0, 62.0, 0.45],
+    [21.0, 63.5, 0.46],
+    [17.0, 64.0, 0.44],
+    [15.0, 67.0, 0.28],
+    [12.0, 72.0, 0.14],
+    [6.0, 76.0, 0.07],
+    [0.0, 77.0, 0.05],
+];
+
+/// How far teeth of average arches reach aside and back, mm: those of wider and longer ones move the wall.
+const AVERAGE_TEETH: [f32; 2] = [32.0, 50.0];
+
+/// Half the height of the wall at the lips and at the throat, mm, and by how much the soft palate hangs before the throat and leans
+/// forward toward the hard one.
+const HALF_HEIGHTS: [f32; 2] = [46.0, 30.0];
+const LEAN: [f32; 2] = [10.0, 12.0];
+
+/// Height at which the soft palate ends, as a share of half the wall's height; half the width of the uvula, mm, and how much lower it
+/// reaches.
+const PALATE_ENDS: f32 = 0.12;
+const UVULA: [f32; 2] = [3.6, 0.3];
+
+/// Distances from the midline up to which the throat is open, and from which on it is closed, mm.
+const THROAT: [f32; 2] = [8.0, 17.0];
+
+/// Rows of the wall from below upward.
+const WALL_ROWS: usize = 64;
+
+/// Columns between two places of the wall's outline.
+const WALL_STEPS: usize = 8;
+
+/// Outline of the tongue from its tip backward: the distance behind the incisors' edges, half its width and the height of its back
+/// over the occlusal plane of the lower jaw, mm.
+const TONGUE: [[f32; 3]; 8] = [
+    [9.0, 0.3, -9.0],
+    [9.7, 5.0, -6.8],
+    [12.0, 8.0, -4.6],
+    [18.0, 11.5, -2.4],
+    [28.0, 15.5, 0.2],
+    [40.0, 18.5, 3.2],
+    [52.0, 20.5, 5.5],
+    [70.0, 20.5, 3.0],
+];
+
+/// Height of the tongue's edges below its back, as a share of half its width, and the lowest that is drawn, mm.
+const TONGUE_ROUND: f32 = 0.72;
+const TONGUE_LOWEST: f32 = -17.0;
+
+/// Columns between two places of the tongue's outline, and places across it.
+const TONGUE_STEPS: usize = 6;
+const TONGUE_ROWS: usize = 33;
+
+/// Depth of the furrow along the tongue's middle and half its width, mm.
+const FURROW: [f32; 2] = [1.1, 2.2];
+
+const MUCOSA: Rgb = [0.76, 0.39, 0.37];
+const TONGUE_SIDE: Rgb = [0.76, 0.42, 0.41];
+/// The papillae of its back are pale.
+const TONGUE_BACK: Rgb = [0.80, 0.52, 0.50];
+
+/// Gloss of the tongue under saliva, and of what lies in the dark behind it.
+const GLOSS: f32 = 0.22;
+const WALL_GLOSS: f32 = 0.08;
+
+/// Solids behind the teeth, world space.
+#[derive(Clone, Debug)]
+pub struct OralCavity {
+    wall: MeshInstance,
+    tongue: MeshInstance,
+}
+
+impl OralCavity {
+    /// `front`: unit vector out of the mouth. `teeth`: how far the teeth of both jaws reach aside and back, arch space, mm.
+    pub fn between(world_from_lower: Pose, world_from_upper: Pose, front: Vec3, teeth: [f32; 2]) -> OralCavity {
+        let edges = [world_from_lower, world_from_upper].map(|arch| arch.position);
+        let up = (edges[1] - edges[0]).reject_from_normalized(front).normalize_or(Vec3::Y);
+        let orientation = Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize();
+        let middle = Pose { position: edges[0].midpoint(edges[1]), orientation };
+        OralCavity {
+            wall: solid(wall_mesh(teeth), middle, WALL_GLOSS),
+            tongue: solid(tongue_mesh(), world_from_lower, GLOSS),
+        }
+    }
+
+    /// All of it, or without the tongue.
+    pub fn solids(&self, has_tongue: bool) -> impl Iterator<Item = MeshInstance> {
+        std::iter::once(self.wall.clone()).chain(has_tongue.then(|| self.tongue.clone()))
+    }
+}
+
+fn solid((mesh, tints): (Mesh, Vec<VertexTint>), world_from_solid: Pose, gloss: f32) -> MeshInstance {
+    let plain = MeshInstance::plain(Arc::new(mesh), world_from_solid, Appearance { colour: [1.0; 3], gloss });
+    MeshInstance { vertex_tints: Arc::new(tints), casts_shadow: false, ..plain }
+}
+
+/// Places on a smooth line through given ones, `steps` from each to the next.
+fn refined(line: &[[f32; 3]], steps: usize) -> Vec<[f32; 3]> {
+    let place = |i: usize| Vec3::from(line[i.min(line.len() - 1)]);
+    let mut finer: Vec<[f32; 3]> = (0..(line.len() - 1) * steps)
+        .map(|n| {
+            let (i, part) = (n / steps, (n % steps) as f32 / steps as f32);
+            let [before, from, to, after] = [place(i.saturating_sub(1)), place(i), place(i + 1), place(i + 2)];
+            let (rise_from, rise_to) = (0.5 * (to - before), 0.5 * (after - from));
+            let (square, cube) = (part * part, part * part * part);
+            let at = from * (2.0 * cube - 3.0 * square + 1.0)
+                + rise_from * (cube - 2.0 * square + part)
+                + to * (3.0 * square - 2.0 * cube)
+                + rise_to * (cube - square);
+            at.to_array()
+        })
+        .collect();
+    finer.push(line[line.len() - 1]);
+    finer
+}
+
+/// Cheeks and throat as a curtain around the jaws, from the left corner of the mouth to the right one: x aside, y up, z out of the
+/// mouth.
+fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
+    let [wider, longer] = [0, 1].map(|i| (teeth[i] - AVERAGE_TEETH[i]).max(0.0));
+    let outline = WALL.map(|[aside, behind, light]| {
+        // Neither the corners of the mouth nor the throat are wider.
+        let beside = smooth_step((behind - 12.0) / 10.0) * smooth_step(aside / 30.0);
+        [aside + wider * beside, behind + longer * smooth_step((behind - 30.0) / 20.0), light]
+    });
+    let half = refined(&outline, WALL_STEPS);
+    let left = half.iter().map(|[aside, behind, light]| [-aside, *behind, *light]);
+    let outline: Vec<[f32; 3]> = left.chain(half.iter().rev().skip(1).copied()).collect();
+    let (mut positions, mut tints) = (Vec::new(), Vec::new());
+    for &[x, behind, light] in &outline {
+        let back = smooth_step((behind - 30.0) / 35.0);
+        let half_height = HALF_HEIGHTS[0] + (HALF_HEIGHTS[1] - HALF_HEIGHTS[0]) * back;
+        for row in 0..=WALL_ROWS {
+            let height = 2.0 * row as f32 / WALL_ROWS as f32 - 1.0;
+            // The soft palate hangs down to the throat, farthest in the middle, where it ends in the uvula.
+            let hangs = UVULA[1] * libm::expf(-(x / UVULA[0]) * (x / UVULA[0]));
+            let above = smooth_step((height + hangs - PALATE_ENDS) / 0.2);
+            // Beside the throat it goes over into folds.
+            let beside = smooth_step((x.abs() - THROAT[0]) / (THROAT[1] - THROAT[0]));
+            let palate = back * above.max(beside);
+            // Between the molars only: behind them the cheek stays where it is.
+            let between = 1.0 - smooth_step((x.abs() - THROAT[1]) / 10.0);
+            let lean = between
+                * (LEAN[0] * palate + LEAN[1] * back * smooth_step((height - PALATE_ENDS) / (1.0 - PALATE_ENDS)));
+            let place = Vec3::new(x, half_height * height, lean - behind);
+            positions.push(place);
+            let light = light + palate * (0.85 - light).max(0.0);
+            let tint = mucosa_tint(place);
+            tints.push(VertexTint::smooth(std::array::from_fn(|c| MUCOSA[c] * tint[c] * light)));
+        }
+    }
+    (sheet(positions, outline.len(), WALL_ROWS + 1), tints)
+}
+
+/// The tongue in the lower jaw's arch space.
+fn tongue_mesh() -> (Mesh, Vec<VertexTint>) {
+    let outline = refined(&TONGUE, TONGUE_STEPS);
+    let (mut positions, mut tints) = (Vec::new(), Vec::new());
+    for &[y, half_width, top] in &outline {
+        for row in 0..TONGUE_ROWS {
+            // From one lower edge over the back to the other; the back is flatter than a circle.
+            let turn = PI * (row as f32 / (TONGUE_ROWS - 1) as f32 - 0.5) * 1.25;
+            let (sin, cos) = (libm::sinf(turn), libm::cosf(turn));
+            let x = -half_width * libm::copysignf(libm::powf(sin.abs(), 0.85), sin);
+            let drop = TONGUE_ROUND * half_width * (1.0 - libm::copysignf(libm::powf(cos.abs(), 0.7), cos));
+            let [depth, width] = FURROW;
+            let behind_tip = smooth_step((y - 11.0) / 14.0) * (1.0 - 0.8 * smooth_step((y - 34.0) / 16.0));
+            let furrow = depth * behind_tip * libm::expf(-(x / width) * (x / width));
+            positions.push(Vec3::new(x, y, (top - drop - furrow).max(TONGUE_LOWEST)));
+            let coat = smooth_step((cos - 0.25) / 0.6) * smooth_step((y - 10.0) / 10.0);
+            let dark = 1.0 - 0.75 * smooth_step((y - 30.0) / 32.0);
+            let colour = std::array::from_fn(|c| (TONGUE_SIDE[c] + (TONGUE_BACK[c] - TONGUE_SIDE[c]) * coat) * dark);
+            tints.push(VertexTint { colour, stippling: 0.9 * coat });
+        }
+    }
+    (sheet(positions, outline.len(), TONGUE_ROWS), tints)
+}
+
+/// Columns of places as a sheet. Of three places, two in a column and the one beside the first in the next, the normal's side sees them
+/// turn clockwise.
+fn sheet(positions: Vec<Vec3>, columns: usize, rows: usize) -> Mesh {
+    let corner = |column: usize, row: usize| (column * rows + row) as u32;
+    let cells = (0..columns - 1).flat_map(|column| (0..rows - 1).map(move |row| (column, row)));
+    let triangles = cells
+        .flat_map(|(column, row)| {
+            let [a, b] = [corner(column, row), corner(column + 1, row)];
+            // Both halves of the wall alike.
+            if column < columns / 2 { [[a, b, b + 1], [a, b + 1, a + 1]] } else { [[a, b, a + 1], [a + 1, b, b + 1]] }
+        })
+        .collect();
+    let mut mesh = Mesh { positions, normals: Vec::new(), triangles };
+    mesh.compute_normals();
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use typodont_anatomy::jaw::{ArchPlan, DentalArch, Jaw, Occlusion, WORKING_OPENING_DEG};
+
+    #[test]
+    fn cheeks_stand_beside_the_teeth_and_the_tongue_lies_between_them() {
+        // Aim: neither is in the way of a tooth, however wide the arch is, and both are lit from where they are seen. Method: both jaws
+        // open as during treatment, of average form and of the widest with third molars. In each slice of 3 mm behind the
+        // incisors, the cheeks are farther aside than any crown, and the tongue less far than the lower ones; and the way they face.
+        for (count, width) in [(7, None), (8, Some(62.0))] {
+            let plan = ArchPlan { width, ..ArchPlan::default() };
+            let arches = [Jaw::Lower, Jaw::Upper].map(|jaw| DentalArch::new(jaw, count, None, &plan));
+            let crowns = arches.each_ref().map(|arch| arch.crowns(&|_, _, _| false).mesh.positions);
+            let reach = |of: &dyn Fn(&Vec3) -> f32| crowns.iter().flatten().map(of).fold(0.0, f32::max);
+            let teeth = [reach(&|p| p.x.abs()), reach(&|p| p.y)];
+            let lower_from_upper = Occlusion::new(&arches[0], &arches[1], 0.0).near_from_opposite(WORKING_OPENING_DEG);
+            let poses = [Pose::IDENTITY, lower_from_upper];
+            let front = poses.map(|arch| arch.rotate(Vec3::NEG_Y)).iter().sum::<Vec3>().normalize();
+            let cavity = OralCavity::between(poses[0], poses[1], front, teeth);
+            assert_eq!(cavity.solids(false).count(), 1);
+            let [wall, tongue] = [true, false].map(|is_wall| cavity.solids(true).nth(usize::from(!is_wall)).unwrap());
+            let aside = |places: &mut dyn Iterator<Item = Vec3>, slice: f32, of: fn(f32, f32) -> f32| {
+                places.filter(|p| (p.z + slice).abs() < 1.5).map(|p| p.x.abs()).reduce(of)
+            };
+            // In the wall's own space, which looks out of the mouth.
+            let from_lower = wall.world_from_solid.inverse();
+            for slice in (15..60).step_by(3).map(|slice| slice as f32) {
+                // The cheek, not the palate between the teeth.
+                let cheeks = &mut wall.mesh.positions.iter().copied().filter(|p| p.x.abs() > 28.0 && p.y.abs() < 12.0);
+                let beside = aside(cheeks, slice, f32::min);
+                for (places, arch) in crowns.iter().zip(poses) {
+                    let own = &mut places.iter().map(|p| from_lower * (arch * *p));
+                    if let (Some(wall), Some(crown)) = (beside, aside(own, slice, f32::max)) {
+                        assert!(wall > crown, "{slice} mm behind: cheek at {wall}, crown at {crown} mm");
+                    }
+                }
+                let own = &mut crowns[0].iter().filter(|p| p.z > -6.0).map(|p| Vec3::new(p.x, 0.0, -p.y));
+                let inner = aside(own, slice, f32::min).filter(|_| slice < 50.0);
+                let tongue =
+                    aside(&mut tongue.mesh.positions.iter().map(|p| Vec3::new(p.x, 0.0, -p.y)), slice, f32::max);
+                if let (Some(crown), Some(tongue)) = (inner, tongue) {
+                    assert!(tongue < crown, "{slice} mm behind: tongue at {tongue}, crown at {crown} mm");
+                }
+            }
+            let facing = |solid: &MeshInstance, toward: &dyn Fn(Vec3) -> Vec3| {
+                let mesh = &solid.mesh;
+                let turned = |(place, normal): (&Vec3, &Vec3)| {
+                    solid.world_from_solid.rotate(*normal).dot(toward(solid.world_from_solid * *place)) > 0.0
+                };
+                let count = mesh.positions.iter().zip(&mesh.normals).filter(|corner| turned(*corner)).count();
+                count as f32 / mesh.positions.len() as f32
+            };
+            let into_mouth = |place: Vec3| Vec3::new(0.0, 20.0, place.z) - place;
+            assert!(facing(&wall, &into_mouth) > 0.9, "{}", facing(&wall, &into_mouth));
+            let outward = |place: Vec3| place - Vec3::new(0.0, place.y, -14.0);
+            assert!(facing(&tongue, &outward) > 0.9, "{}", facing(&tongue, &outward));
+        }
+    }
+}
