@@ -57,13 +57,13 @@ impl UnworkedTooth {
         self.grid.trilinear(&self.depths, point_in_tooth)
     }
 
-    /// How far a place of the surface lies in a fissure: 0 where it is flat or bulges, 1 deep in one.
+    /// Depth of a place of the surface in a fissure: 0 where it is flat or bulges, 1 deep in one.
     pub fn groove_depth(&self, point_in_tooth: Vec3) -> f32 {
         self.grid.trilinear(&self.grooves, point_in_tooth)
     }
 }
 
-/// How far each cell near the surface lies in a fissure: by the matter around it, as the neighbours' crowns are tinted.
+/// Depth of each cell near the surface in a fissure, 0 to 1: by the matter around it, as the neighbours' crowns are tinted.
 fn grooves_of(grid: &Grid, outside: &[f32], depths: &[f32]) -> Vec<f32> {
     /// Distance from a place at which matter is looked for, mm.
     const AROUND: f32 = 0.9;

@@ -3,7 +3,6 @@
 //! Takes the arch spaces of both jaws in world space, mm. Forms and colours are estimates from photographs of open mouths; none of it
 //! is touched.
 
-use super::soft_tissue::mucosa_tint;
 use glam::Mat3;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -30,7 +29,7 @@ const WALL: [[f32; 3]; 14] = [
     [0.0, 77.0, 0.05],
 ];
 
-/// How far teeth of average arches reach aside and back, mm: those of wider and longer ones move the wall.
+/// Reach of the teeth of average arches aside and back, mm: those of wider and longer ones move the wall.
 const AVERAGE_TEETH: [f32; 2] = [32.0, 50.0];
 
 /// Half the height of the wall at the lips and at the throat, mm, and by how much the soft palate hangs before the throat and leans
@@ -93,7 +92,7 @@ pub struct OralCavity {
 }
 
 impl OralCavity {
-    /// `front`: unit vector out of the mouth. `teeth`: how far the teeth of both jaws reach aside and back, arch space, mm.
+    /// `front`: unit vector out of the mouth. `teeth`: their reach aside and back in both jaws, arch space, mm.
     pub fn between(world_from_lower: Pose, world_from_upper: Pose, front: Vec3, teeth: [f32; 2]) -> OralCavity {
         let edges = [world_from_lower, world_from_upper].map(|arch| arch.position);
         let up = (edges[1] - edges[0]).reject_from_normalized(front).normalize_or(Vec3::Y);
@@ -196,6 +195,17 @@ fn tongue_mesh() -> (Mesh, Vec<VertexTint>) {
         }
     }
     (sheet(positions, outline.len(), TONGUE_ROWS), tints)
+}
+
+/// Tint of mucosa at a place, mm: a little redder here and paler there, over some millimetres.
+pub(super) fn mucosa_tint(place: Vec3) -> Rgb {
+    let wave = |steps: Vec3, phase: f32| libm::sinf(place.dot(steps) + phase);
+    let bent = place + 2.0 * Vec3::new(wave(Vec3::new(0.2, 0.5, 0.3), 0.0), wave(Vec3::new(0.6, 0.1, -0.4), 1.0), 0.0);
+    let wave = |steps: Vec3, phase: f32| libm::sinf(bent.dot(steps) + phase);
+    let coarse = wave(Vec3::new(0.31, 0.47, 0.19), 0.4) * wave(Vec3::new(-0.23, 0.29, 0.41), 1.7);
+    let fine = wave(Vec3::new(0.9, -0.7, 1.1), 0.0) * wave(Vec3::new(-0.6, 1.0, 0.8), 2.2);
+    let pale = 0.06 * coarse + 0.03 * fine;
+    [0.96 + 0.5 * pale, 0.93 + 1.4 * pale, 0.93 + 1.3 * pale]
 }
 
 /// Columns of places as a sheet. Of three places, two in a column and the one beside the first in the next, the normal's side sees them

@@ -1,5 +1,6 @@
 //! Cheek and tongue as they are drawn: with the dent that a working end presses into them.
 
+use super::oral_cavity::mucosa_tint;
 use super::surroundings::SMOOTHING;
 use std::sync::Arc;
 use typodont_core::frame::Vec3;
@@ -8,7 +9,7 @@ use typodont_core::touch::{Collider, ColliderGeometry};
 use typodont_core::volume::{Grid, Label, Volume, surface};
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint};
+use typodont_render::{Appearance, MeshInstance, VertexTint};
 
 /// Names of the tissues that are drawn in this way.
 const CHEEK: &str = "cheek";
@@ -98,17 +99,6 @@ impl YieldingSurface {
         mesh.smooth_normals(SMOOTHING);
         Some(MeshInstance { mesh: Arc::new(mesh), ..self.at_rest.clone() })
     }
-}
-
-/// Tint of mucosa at a place, mm: a little redder here and paler there, over some millimetres.
-pub(super) fn mucosa_tint(place: Vec3) -> Rgb {
-    let wave = |steps: Vec3, phase: f32| libm::sinf(place.dot(steps) + phase);
-    let bent = place + 2.0 * Vec3::new(wave(Vec3::new(0.2, 0.5, 0.3), 0.0), wave(Vec3::new(0.6, 0.1, -0.4), 1.0), 0.0);
-    let wave = |steps: Vec3, phase: f32| libm::sinf(bent.dot(steps) + phase);
-    let coarse = wave(Vec3::new(0.31, 0.47, 0.19), 0.4) * wave(Vec3::new(-0.23, 0.29, 0.41), 1.7);
-    let fine = wave(Vec3::new(0.9, -0.7, 1.1), 0.0) * wave(Vec3::new(-0.6, 1.0, 0.8), 2.2);
-    let pale = 0.06 * coarse + 0.03 * fine;
-    [0.96 + 0.5 * pale, 0.93 + 1.4 * pale, 0.93 + 1.3 * pale]
 }
 
 #[cfg(test)]

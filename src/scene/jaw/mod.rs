@@ -64,7 +64,7 @@ pub struct Mouth {
     touched: Vec<MeshInstance>,
     /// Cheek and tongue.
     yielding: Vec<YieldingSurface>,
-    /// What is seen around the jaws from in front.
+    /// Solids around the jaws that are seen from in front.
     face: Option<Face>,
     /// True under a rubber dam, which covers the face.
     has_dam: bool,
@@ -312,7 +312,7 @@ impl Mouth {
         self.near.instances(self.world_from_near).chain(opposite).chain(touched).collect()
     }
 
-    /// What an eye in front of the mouth sees around the jaws: lips with their retractors, cheeks, throat and the tongue at rest.
+    /// Solids around the jaws that an eye in front of the mouth sees: lips with their retractors, cheeks, throat and the tongue at rest.
     /// Nothing where the lips would be in the way of the eye, around a jaw by itself, and where the mouth is open otherwise than
     /// during treatment. `open`: as in [`Mouth::solids`].
     pub fn front_solids(&self, viewpoint: &Viewpoint, open: f32) -> Vec<MeshInstance> {
