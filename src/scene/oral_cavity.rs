@@ -208,8 +208,7 @@ pub(super) fn mucosa_tint(place: Vec3) -> Rgb {
     [0.96 + 0.5 * pale, 0.93 + 1.4 * pale, 0.93 + 1.3 * pale]
 }
 
-/// Columns of places as a sheet. Of three places, two in a column and the one beside the first in the next, the normal's side sees them
-/// turn clockwise.
+/// Columns of places as a sheet. Its normals point along the cross product of the way to the next column and that to the next row.
 fn sheet(positions: Vec<Vec3>, columns: usize, rows: usize) -> Mesh {
     let corner = |column: usize, row: usize| (column * rows + row) as u32;
     let cells = (0..columns - 1).flat_map(|column| (0..rows - 1).map(move |row| (column, row)));
