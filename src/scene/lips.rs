@@ -76,13 +76,12 @@ pub struct Lips {
 impl Lips {
     /// Around the edges of the incisors of the lower and the upper jaw, world space, mm; `front`: unit vector out of the mouth.
     pub fn around([lower, upper]: [Vec3; 2], front: Vec3) -> Lips {
-        let up = (upper - lower).reject_from_normalized(front).normalize_or(Vec3::Y);
-        let half_height = 0.5 * (upper - lower).dot(up).abs() + BEYOND_EDGES;
+        let orientation = orientation_of_mouth([lower, upper], front);
+        let half_height = 0.5 * (upper - lower).dot(orientation * Vec3::Y).abs() + BEYOND_EDGES;
         // Before the edge that is farther in front.
         let ahead = lower.dot(front).max(upper.dot(front)) + IN_FRONT;
         let middle = lower.midpoint(upper);
         let middle = middle + front * (ahead - middle.dot(front));
-        let orientation = Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize();
         let (mesh, tints) = lip_mesh(half_height);
         let tints = tints.into_iter().map(VertexTint::smooth).collect();
         let appearance = Appearance { colour: [1.0; 3], gloss: GLOSS };
@@ -134,6 +133,12 @@ impl Lips {
         let share = libm::hypotf(through.x / HALF_WIDTH, through.y / self.half_height);
         (share < CLEAR).then(|| self.solid.clone())
     }
+}
+
+/// Orientation of the open mouth: y from the lower to the upper incisors' edges, z forward. `front`: unit vector out of the mouth.
+pub(super) fn orientation_of_mouth([lower, upper]: [Vec3; 2], front: Vec3) -> Quat {
+    let up = (upper - lower).reject_from_normalized(front).normalize_or(Vec3::Y);
+    Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize()
 }
 
 /// A ring of sections around an oval opening in the plane z = 0, which looks toward +z, and its colours.

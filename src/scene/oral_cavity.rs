@@ -3,11 +3,12 @@
 //! Takes the arch spaces of both jaws in world space, mm. Forms and colours are estimates from photographs of open mouths; none of it
 //! is touched.
 
-use glam::Mat3;
+use super::lips::orientation_of_mouth;
 use std::f32::consts::PI;
 use std::sync::Arc;
-use typodont_core::frame::{Pose, Quat, Vec3, smooth_step};
+use typodont_core::frame::{Pose, Vec3, smooth_step};
 use typodont_core::mesh::Mesh;
+use typodont_exercise::catalog::catmull_rom;
 use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint};
 
 /// Outline of the cheeks and the throat in plan, from the corner of the mouth to the midline: the distance from the midline and behind
@@ -48,8 +49,8 @@ const THROAT: [f32; 2] = [8.0, 17.0];
 /// Rows of the wall from below upward.
 const WALL_ROWS: usize = 64;
 
-/// Columns between two places of the wall's outline.
-const WALL_STEPS: usize = 8;
+/// Greatest distance between two columns of the wall, mm.
+const WALL_STEP: f32 = 1.0;
 
 /// Outline of the tongue from its tip backward: the distance behind the incisors' edges, half its width and the height of its back
 /// over the occlusal plane of the lower jaw, mm.
@@ -68,8 +69,8 @@ const TONGUE: [[f32; 3]; 8] = [
 const TONGUE_ROUND: f32 = 0.72;
 const TONGUE_LOWEST: f32 = -17.0;
 
-/// Columns between two places of the tongue's outline, and places across it.
-const TONGUE_STEPS: usize = 6;
+/// Greatest distance between two columns of the tongue, mm, and the places across it.
+const TONGUE_STEP: f32 = 1.5;
 const TONGUE_ROWS: usize = 33;
 
 /// Depth of the furrow along the tongue's middle and half its width, mm.
@@ -94,10 +95,8 @@ pub struct OralCavity {
 impl OralCavity {
     /// `front`: unit vector out of the mouth. `teeth`: their reach aside and back in both jaws, arch space, mm.
     pub fn between(world_from_lower: Pose, world_from_upper: Pose, front: Vec3, teeth: [f32; 2]) -> OralCavity {
-        let edges = [world_from_lower, world_from_upper].map(|arch| arch.position);
-        let up = (edges[1] - edges[0]).reject_from_normalized(front).normalize_or(Vec3::Y);
-        let orientation = Quat::from_mat3(&Mat3::from_cols(up.cross(front), up, front)).normalize();
-        let middle = Pose { position: edges[0].midpoint(edges[1]), orientation };
+        let [lower, upper] = [world_from_lower, world_from_upper].map(|arch| arch.position);
+        let middle = Pose { position: lower.midpoint(upper), orientation: orientation_of_mouth([lower, upper], front) };
         OralCavity {
             wall: solid(wall_mesh(teeth), middle, WALL_GLOSS),
             tongue: solid(tongue_mesh(), world_from_lower, GLOSS),
@@ -115,26 +114,6 @@ fn solid((mesh, tints): (Mesh, Vec<VertexTint>), world_from_solid: Pose, gloss: 
     MeshInstance { vertex_tints: Arc::new(tints), casts_shadow: false, ..plain }
 }
 
-/// Places on a smooth line through given ones, `steps` from each to the next.
-fn refined(line: &[[f32; 3]], steps: usize) -> Vec<[f32; 3]> {
-    let place = |i: usize| Vec3::from(line[i.min(line.len() - 1)]);
-    let mut finer: Vec<[f32; 3]> = (0..(line.len() - 1) * steps)
-        .map(|n| {
-            let (i, part) = (n / steps, (n % steps) as f32 / steps as f32);
-            let [before, from, to, after] = [place(i.saturating_sub(1)), place(i), place(i + 1), place(i + 2)];
-            let (rise_from, rise_to) = (0.5 * (to - before), 0.5 * (after - from));
-            let (square, cube) = (part * part, part * part * part);
-            let at = from * (2.0 * cube - 3.0 * square + 1.0)
-                + rise_from * (cube - 2.0 * square + part)
-                + to * (3.0 * square - 2.0 * cube)
-                + rise_to * (cube - square);
-            at.to_array()
-        })
-        .collect();
-    finer.push(line[line.len() - 1]);
-    finer
-}
-
 /// Cheeks and throat as a curtain around the jaws, from the left corner of the mouth to the right one: x aside, y up, z out of the
 /// mouth.
 fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
@@ -142,13 +121,13 @@ fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
     let outline = WALL.map(|[aside, behind, light]| {
         // Neither the corners of the mouth nor the throat are wider.
         let beside = smooth_step((behind - 12.0) / 10.0) * smooth_step(aside / 30.0);
-        [aside + wider * beside, behind + longer * smooth_step((behind - 30.0) / 20.0), light]
+        Vec3::new(aside + wider * beside, behind + longer * smooth_step((behind - 30.0) / 20.0), light)
     });
-    let half = refined(&outline, WALL_STEPS);
-    let left = half.iter().map(|[aside, behind, light]| [-aside, *behind, *light]);
-    let outline: Vec<[f32; 3]> = left.chain(half.iter().rev().skip(1).copied()).collect();
+    let half = catmull_rom(&outline, WALL_STEP);
+    let left = half.iter().map(|place| place.with_x(-place.x));
+    let outline: Vec<Vec3> = left.chain(half.iter().rev().skip(1).copied()).collect();
     let (mut positions, mut tints) = (Vec::new(), Vec::new());
-    for &[x, behind, light] in &outline {
+    for &Vec3 { x, y: behind, z: light } in &outline {
         let back = smooth_step((behind - 30.0) / 35.0);
         let half_height = HALF_HEIGHTS[0] + (HALF_HEIGHTS[1] - HALF_HEIGHTS[0]) * back;
         for row in 0..=WALL_ROWS {
@@ -175,9 +154,9 @@ fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
 
 /// The tongue in the lower jaw's arch space.
 fn tongue_mesh() -> (Mesh, Vec<VertexTint>) {
-    let outline = refined(&TONGUE, TONGUE_STEPS);
+    let outline = catmull_rom(&TONGUE.map(Vec3::from), TONGUE_STEP);
     let (mut positions, mut tints) = (Vec::new(), Vec::new());
-    for &[y, half_width, top] in &outline {
+    for &Vec3 { x: y, y: half_width, z: top } in &outline {
         for row in 0..TONGUE_ROWS {
             // From one lower edge over the back to the other; the back is flatter than a circle.
             let turn = PI * (row as f32 / (TONGUE_ROWS - 1) as f32 - 0.5) * 1.25;
