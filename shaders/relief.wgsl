@@ -6,15 +6,23 @@ override has_relief: bool = false;
 
 // Width of a dimple of stippled gingiva, and by how much it is lower or higher than the mean, mm.
 const STIPPLE_WIDTH: f32 = 0.55;
-const STIPPLE_DEPTH: f32 = 0.05;
+const STIPPLE_DEPTH: f32 = 0.04;
+// Rotation of the lattice of dimples: no row of them lies along the arch.
+const STIPPLE_TURN: mat3x3f = mat3x3f(vec3f(0.36, -0.8, 0.48), vec3f(0.48, 0.6, 0.64), vec3f(-0.8, 0.0, 0.6));
 // Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher, mm.
 const MARK_WIDTH: vec3f = vec3f(0.38, 0.38, 0.17);
-const MARK_DEPTH: f32 = 0.005;
+const MARK_DEPTH: f32 = 0.007;
 // Rise of the marks across the tooth's axis, mm per mm.
 const MARK_SLOPE: vec2f = vec2f(0.35, -0.22);
 // Gloss of tissue that is smooth, and of tissue with all of the marks.
 const SMOOTH: f32 = 0.19;
 const GROUND: f32 = 0.13;
+// Width of the ridges of enamel that nobody cut (perikymata) across the tooth's axis and along it, and by how much they are lower or
+// higher, mm; the gloss of such enamel, and the difference from it at which there are none.
+const RIDGE_WIDTH: vec3f = vec3f(1.1, 1.1, 0.13);
+const RIDGE_DEPTH: f32 = 0.0013;
+const UNCUT: f32 = 0.2;
+const UNCUT_RANGE: f32 = 0.01;
 // Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
 const FADE: vec2f = vec2f(0.3, 0.8);
 
@@ -64,13 +72,19 @@ fn tilted(normal: vec3f, gradient: vec3f) -> vec3f {
 
 // Gradient of the height of stippled gingiva at a place of its own space, mm.
 fn stipple_gradient(at: vec3f) -> vec3f {
-    return noise_gradient(at / STIPPLE_WIDTH) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
+    return noise_gradient(STIPPLE_TURN * at / STIPPLE_WIDTH) * STIPPLE_TURN * (STIPPLE_DEPTH / STIPPLE_WIDTH);
 }
 
-// Gradient of the height of a tooth's surface with a gloss at a place of its own space, mm: bur marks, and rough decay.
-fn mark_gradient(at: vec3f, gloss: f32) -> vec3f {
-    let share = clamp((SMOOTH - gloss) / (SMOOTH - GROUND), 0.0, 1.0);
-    let inclined = vec3f(at.xy, at.z + dot(MARK_SLOPE, at.xy));
-    let gradient = noise_gradient(inclined / MARK_WIDTH) / MARK_WIDTH;
-    return (gradient + gradient.z * vec3f(MARK_SLOPE, 0.0)) * (MARK_DEPTH * share);
+// Gradient of the height of a tooth's surface with a gloss at a place of its own space, mm: bur marks and rough decay, or ridges of
+// enamel. Those that are too fine for the pixels at a point are left out.
+fn tooth_gradient(at: vec3f, gloss: f32, point: vec3f) -> vec3f {
+    let marks = clamp((SMOOTH - gloss) / (SMOOTH - GROUND), 0.0, 1.0);
+    let ridges = 1.0 - clamp(abs(gloss - UNCUT) / UNCUT_RANGE, 0.0, 1.0);
+    let is_marked = marks > 0.0;
+    let width = select(RIDGE_WIDTH, MARK_WIDTH, is_marked);
+    let slope = select(vec2f(0.0), MARK_SLOPE, is_marked);
+    let depth = select(RIDGE_DEPTH * ridges, MARK_DEPTH * marks, is_marked) * resolved(point, width.z);
+    let inclined = vec3f(at.xy, at.z + dot(slope, at.xy));
+    let gradient = noise_gradient(inclined / width) / width;
+    return (gradient + gradient.z * vec3f(slope, 0.0)) * depth;
 }

@@ -59,7 +59,7 @@ fn tooth_vertex(corner: Corner) -> Varying {
 }
 
 // Cosine between the normal of a tooth's surface and the way to the eye below which the normal is turned to the eye.
-const EDGE_ON: f32 = 0.25;
+const EDGE_ON: f32 = 0.4;
 
 // Unit normal of a place that an eye sees: at the sharp rim of a cut, the gradient of voxels may turn away from the eye.
 fn turned_to_eye(normal: vec3f, to_eye: vec3f) -> vec3f {
@@ -74,6 +74,17 @@ fn tooth_fragment(in: Varying) -> @location(0) vec4f {
     return vec4f(screen(lit(seen, openness(at, normal), in.point, marked(at, in.point, normal, seen.a))), 1.0);
 }
 
+// Another tooth, whose enamel is as that of the carved one.
+@fragment
+fn enamel_fragment(in: Varying) -> @location(0) vec4f {
+    var normal = normalize(in.normal);
+    if has_relief {
+        let gradient = tooth_gradient(in.own.xyz, UNCUT, in.point);
+        normal = tilted(normal, (solid.world_from_solid * vec4f(gradient, 0.0)).xyz);
+    }
+    return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normal)), 1.0);
+}
+
 // Behind everything: a triangle that covers the picture.
 @vertex
 fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
@@ -84,5 +95,11 @@ fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) ve
 fn background_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let from_middle = (pixel.xy / view.size.xy - 0.5) * 2.0;
     let share = 0.5 * dot(from_middle, from_middle);
-    return vec4f(screen(mix(view.background_middle.rgb, view.background_edge.rgb, share)), 1.0);
+    let even = mix(view.background_middle.rgb, view.background_edge.rgb, share);
+    if all(view.background_middle.rgb == view.background_edge.rgb) {
+        return vec4f(screen(even), 1.0);
+    }
+    // Against bands: noise of one step of a screen's brightness (Jimenez's interleaved gradient noise, 2014).
+    let noise = fract(52.9829189 * fract(dot(floor(pixel.xy), vec2f(0.06711056, 0.00583715))));
+    return vec4f(screen(even + (noise - 0.5) / 255.0), 1.0);
 }

@@ -115,7 +115,7 @@ fn marked(at: vec3f, point: vec3f, normal: vec3f, gloss: f32) -> vec3f {
     if !has_relief {
         return normal;
     }
-    let gradient = mark_gradient(at * tooth.spacing.xyz, gloss) * resolved(point, MARK_WIDTH.z);
+    let gradient = tooth_gradient(at * tooth.spacing.xyz, gloss, point);
     return tilted(normal, (tooth.world_from_tooth * vec4f(gradient, 0.0)).xyz);
 }
 

@@ -27,7 +27,7 @@ pub struct RenderScene<'a> {
     pub lights: Lights,
     /// Region in which the chair lamp casts shadows; `None` for no shadows.
     pub shadows: Option<ShadowRegion>,
-    /// True when fine relief is drawn: stippled gingiva, and the marks of burs where a tooth is dull.
+    /// True when fine relief is drawn: stippled gingiva, the ridges of enamel, and the marks of burs where a tooth is dull.
     pub has_relief: bool,
     pub background: Background,
     /// True when the finished image is antialiased.
@@ -156,6 +156,8 @@ pub struct MeshInstance {
     pub vertex_tints: Arc<Vec<VertexTint>>,
     pub world_from_solid: Pose,
     pub appearance: Appearance,
+    /// True for another tooth: where a scene has relief, it has the ridges of enamel.
+    pub is_enamel: bool,
     /// False for what would block the lamp only because the lamp is not aimed as a dentist would aim it.
     pub casts_shadow: bool,
 }
@@ -163,7 +165,14 @@ pub struct MeshInstance {
 impl MeshInstance {
     /// Creates an instance of one colour.
     pub fn plain(mesh: Arc<Mesh>, world_from_solid: Pose, appearance: Appearance) -> MeshInstance {
-        MeshInstance { mesh, vertex_tints: Arc::default(), world_from_solid, appearance, casts_shadow: true }
+        MeshInstance {
+            mesh,
+            vertex_tints: Arc::default(),
+            world_from_solid,
+            appearance,
+            is_enamel: false,
+            casts_shadow: true,
+        }
     }
 }
 

@@ -48,6 +48,9 @@ const FISSURE: [f32; 3] = [0.93, 0.885, 0.81];
 /// along the layer, over a floor across it. A mean of both, up to the thickness on most of a crown; an estimate.
 const THROUGH_CUT: f32 = 1.7;
 
+/// Gloss that the moistest decay has more than the rest of it.
+const MOIST: f32 = 0.12;
+
 /// Distance between the values of the noise that mottles decay, mm.
 const MOTTLE: [f32; 2] = [0.55, 0.21];
 
@@ -481,7 +484,9 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
     let uneven = share + unevenness * share * (1.0 - share);
     let mean = |sum: [f32; 4], amount: f32| (Vec3::new(sum[0], sum[1], sum[2]) / amount, sum[3] / amount);
     let (decay, decay_gloss) = mean(wide.decay, wide.decay_amount);
-    let decay = decay * (1.0 + 0.22 * mottle);
+    // Leathery: dark and dull here, paler and moist there.
+    let decay = if mottle < 0.0 { decay * (1.0 + 0.55 * mottle) } else { decay.lerp(AMBER, 0.7 * mottle) };
+    let decay_gloss = decay_gloss + MOIST * mottle.max(0.0);
     let (sound, sound_gloss) = match [near, wide].into_iter().find(|matter| matter.sound_amount > 1e-4) {
         Some(matter) => mean(matter.sound, matter.sound_amount),
         None => (decay, decay_gloss),

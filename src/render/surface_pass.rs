@@ -29,8 +29,8 @@ pub struct SurfacePass {
     pub background: wgpu::RenderPipeline,
     pub tooth: wgpu::RenderPipeline,
     solid: wgpu::RenderPipeline,
-    /// For meshes with stippling; `None` without relief.
-    stippled: Option<wgpu::RenderPipeline>,
+    /// For meshes with stippling and for teeth; `None` without relief.
+    in_relief: Option<[wgpu::RenderPipeline; 2]>,
     pub layout: wgpu::BindGroupLayout,
     cached_meshes: Vec<CachedMesh>,
     /// One entry per mesh instance of a scene, in its order.
@@ -54,6 +54,7 @@ struct MeshDraw {
     /// Index of the cached mesh.
     mesh: usize,
     world_from_solid: Pose,
+    is_enamel: bool,
     casts_shadow: bool,
 }
 
@@ -97,8 +98,10 @@ impl SurfacePass {
                 DepthMode::Disabled,
             ),
             tooth: pass("tooth", "tooth_vertex", "tooth_fragment", &with_tooth, &corners, DepthMode::ReadWrite),
-            stippled: detail.has_relief.then(|| {
-                pass("stippled", "solid_vertex", "stippled_fragment", &with_solid, &corners, DepthMode::ReadWrite)
+            in_relief: detail.has_relief.then(|| {
+                [("stippled", "stippled_fragment"), ("enamel", "enamel_fragment")].map(|(label, fragment)| {
+                    pass(label, "solid_vertex", fragment, &with_solid, &corners, DepthMode::ReadWrite)
+                })
             }),
             solid: pass("solid", "solid_vertex", "solid_fragment", &with_solid, &corners, DepthMode::ReadWrite),
             layout,
@@ -127,11 +130,12 @@ impl SurfacePass {
             if i == self.draws.len() {
                 let uniform = resources::uniform_buffer(device, "solid", size_of::<gpu::SolidUniform>());
                 let group = resources::group(device, &self.layout, [uniform.as_entire_binding()]);
-                let (world_from_solid, casts_shadow) = (solid.world_from_solid, solid.casts_shadow);
-                self.draws.push(MeshDraw { uniform, group, mesh, world_from_solid, casts_shadow });
+                let &MeshInstance { world_from_solid, is_enamel, casts_shadow, .. } = solid;
+                self.draws.push(MeshDraw { uniform, group, mesh, world_from_solid, is_enamel, casts_shadow });
             }
             self.draws[i].mesh = new_indices[mesh];
             self.draws[i].world_from_solid = solid.world_from_solid;
+            self.draws[i].is_enamel = solid.is_enamel;
             self.draws[i].casts_shadow = solid.casts_shadow;
             let [r, g, b] = solid.appearance.colour;
             let uniform = gpu::SolidUniform {
@@ -178,13 +182,17 @@ impl SurfacePass {
 
     /// Draws all prepared mesh instances that an eye may see; the view's bind group must be set.
     pub fn draw_solids(&self, pass: &mut wgpu::RenderPass, eye: &Eye) {
-        let is_stippled = |draw: &MeshDraw| self.stippled.is_some() && self.cached_meshes[draw.mesh].is_stippled;
         pass.set_pipeline(&self.solid);
-        self.draw_each(pass, eye, |draw| !is_stippled(draw));
-        if let Some(stippled) = &self.stippled {
-            pass.set_pipeline(stippled);
-            self.draw_each(pass, eye, is_stippled);
-        }
+        let Some([stippled, enamel]) = &self.in_relief else {
+            self.draw_each(pass, eye, |_| true);
+            return;
+        };
+        let is_stippled = |draw: &MeshDraw| !draw.is_enamel && self.cached_meshes[draw.mesh].is_stippled;
+        self.draw_each(pass, eye, |draw| !draw.is_enamel && !is_stippled(draw));
+        pass.set_pipeline(stippled);
+        self.draw_each(pass, eye, is_stippled);
+        pass.set_pipeline(enamel);
+        self.draw_each(pass, eye, |draw| draw.is_enamel);
     }
 
     /// Draws all prepared mesh instances that cast shadows and that a lamp may see, with the pipeline that is set.

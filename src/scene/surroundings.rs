@@ -56,7 +56,8 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
     let mesh = Arc::new(shape_mesh(shape, workpiece));
     let tints = modelled_gum(shape, workpiece).map(|(_, gum)| gum_tints(gum, workpiece, &mesh));
     let plain = MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS });
-    MeshInstance { vertex_tints: Arc::new(tints.unwrap_or_default()), ..plain }
+    let is_enamel = tissues.role(shape.label) == Some(TissueRole::Neighbour);
+    MeshInstance { vertex_tints: Arc::new(tints.unwrap_or_default()), is_enamel, ..plain }
 }
 
 /// Gingiva with a modelled margin: its field as it is felt, and its form; `None` for another shape.

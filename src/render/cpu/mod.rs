@@ -192,6 +192,12 @@ struct Pixel {
     depth: f32,
 }
 
+/// Noise of one step of a screen's brightness, against bands where a colour changes slowly (Jimenez's interleaved gradient noise, 2014).
+fn dither(x: u32, y: u32) -> f32 {
+    let along = x as f32 * 0.067_110_56 + y as f32 * 0.005_837_15;
+    ((52.982_918 * along.fract()).fract() - 0.5) / 255.0
+}
+
 impl Framebuffer {
     fn with_background(background: &Background, width: u32, height: u32) -> Framebuffer {
         let mut pixels = vec![Pixel { colour: background.middle, depth: 1.0 }; (width * height) as usize];
@@ -199,8 +205,11 @@ impl Framebuffer {
             let across = 2.0 * ((i as u32 % width) as f32 + 0.5) / width as f32 - 1.0;
             let down = 2.0 * ((i as u32 / width) as f32 + 0.5) / height as f32 - 1.0;
             let share = 0.5 * (across * across + down * down);
-            pixel.colour =
-                std::array::from_fn(|c| background.middle[c] + (background.edge[c] - background.middle[c]) * share);
+            let noise =
+                if background.middle == background.edge { 0.0 } else { dither(i as u32 % width, i as u32 / width) };
+            pixel.colour = std::array::from_fn(|c| {
+                background.middle[c] + (background.edge[c] - background.middle[c]) * share + noise
+            });
         }
         Framebuffer { width, height, pixels }
     }

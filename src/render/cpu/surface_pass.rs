@@ -15,8 +15,10 @@ pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer
     triangles(&vertices, &solid.mesh.triangles, solid.world_from_solid, view, framebuffer, |seen| {
         let SurfacePoint { own: place, normal, finish, stippling, point } = seen;
         let colour = std::array::from_fn(|c| finish.colour[c] * own.colour[c]);
-        let normal = view.relief.map_or(normal, |relief| {
-            relief.stippled(point, normal, place, stippling, |v| solid.world_from_solid.rotate(v))
+        let to_world = |v| solid.world_from_solid.rotate(v);
+        let normal = view.relief.map_or(normal, |relief| match solid.is_enamel {
+            true => relief.of_enamel(point, normal, place, to_world),
+            false => relief.stippled(point, normal, place, stippling, to_world),
         });
         view.shade(Appearance { colour, gloss: finish.gloss * own.gloss }, 1.0, point, normal)
     });
@@ -67,7 +69,7 @@ pub fn tooth(surface: &SurfaceTriangles, sampler: &VolumeSampler, view: &CpuView
 }
 
 /// Cosine between the normal of a tooth's surface and the way to the eye below which the normal is turned to the eye.
-const EDGE_ON: f32 = 0.25;
+const EDGE_ON: f32 = 0.4;
 
 /// Unit normal of a place that an eye sees. At the sharp rim of a cut, the gradient of voxels may turn away from the eye, which would
 /// show as dark teeth along the rim.

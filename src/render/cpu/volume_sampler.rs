@@ -123,7 +123,7 @@ impl<'a> VolumeSampler<'a> {
         let open = self.openness(at, normal);
         let own = at * self.volume.grid().spacing;
         let marked = view.relief.map_or(normal, |relief| {
-            relief.marked(point, normal, own, finish.gloss, |v| self.world_from_tooth.rotate(v))
+            relief.of_tooth(point, normal, own, finish.gloss, |v| self.world_from_tooth.rotate(v))
         });
         view.shade(finish, open, point, marked)
     }

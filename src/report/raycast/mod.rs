@@ -17,7 +17,7 @@ use ray::RayMarcher;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::{available_threads, par_rows};
 use typodont_core::volume::{Label, Volume};
-use typodont_render::{Appearance, marked_normal};
+use typodont_render::{Appearance, tooth_normal};
 
 /// Samples along each side of a pixel where the picture has an edge; elsewhere one does.
 const SUPERSAMPLES: u32 = 3;
@@ -134,7 +134,7 @@ impl GBuffer {
         self.paint_with(finish, false, available_threads())
     }
 
-    /// The same with the fine relief of dull places: the marks of burs, and rough decay.
+    /// The same with the tooth's fine relief: ridges of enamel, the marks of burs, and rough decay.
     pub fn paint_with_relief(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
         self.paint_with(finish, true, available_threads())
     }
@@ -152,7 +152,7 @@ impl GBuffer {
             Some(hit) => {
                 let finish = finish(hit.point);
                 let normal = match has_relief {
-                    true => marked_normal(hit.normal, hit.point, finish.gloss, pixel),
+                    true => tooth_normal(hit.normal, hit.point, finish.gloss, pixel),
                     false => hit.normal,
                 };
                 light::lit_colour(&lamps, &self.camera, finish, &Hit { normal, ..*hit })

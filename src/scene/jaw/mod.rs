@@ -27,7 +27,7 @@ use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb, VertexTint, Viewp
 
 /// Gloss of wet gingiva and enamel, 0 to 1.
 const GUM_GLOSS: f32 = 0.19;
-const TOOTH_GLOSS: f32 = 0.22;
+const TOOTH_GLOSS: f32 = 0.2;
 
 /// Distances from the carved tooth's box, mm: up to the first, the gingiva is drawn as it is touched; from the second
 /// on, as the jaw has it. Among the front teeth the arch bends away from the straight ridge that is touched, so the
@@ -87,7 +87,10 @@ impl JawMeshes {
     fn new(teeth: TintedMesh, gum: TintedMesh, tissues: &TissueTable) -> JawMeshes {
         let colour = |name: &str, otherwise: Rgb| tissues.by_name(name).map_or(otherwise, |e| e.rgb());
         JawMeshes {
-            teeth: FinishedMesh::new(teeth, colour("neighbour", IVORY), TOOTH_GLOSS),
+            teeth: FinishedMesh {
+                is_enamel: true,
+                ..FinishedMesh::new(teeth, colour("neighbour", IVORY), TOOTH_GLOSS)
+            },
             gum: FinishedMesh::new(gum, colour("gingiva", PINK), GUM_GLOSS),
         }
     }
@@ -108,6 +111,7 @@ struct FinishedMesh {
     mesh: Arc<Mesh>,
     vertex_tints: Arc<Vec<VertexTint>>,
     appearance: Appearance,
+    is_enamel: bool,
 }
 
 impl FinishedMesh {
@@ -116,12 +120,14 @@ impl FinishedMesh {
             mesh: Arc::new(made.mesh),
             vertex_tints: Arc::new(made.tints.into_iter().map(vertex_tint).collect()),
             appearance: Appearance { colour, gloss },
+            is_enamel: false,
         }
     }
 
     fn instance(&self, world_from_solid: Pose) -> MeshInstance {
         MeshInstance {
             vertex_tints: self.vertex_tints.clone(),
+            is_enamel: self.is_enamel,
             ..MeshInstance::plain(self.mesh.clone(), world_from_solid, self.appearance)
         }
     }
