@@ -30,7 +30,7 @@ const ROUNDNESS: f32 = 1.8;
 
 /// Outline of a section through lip and skin, from the inside of the lip outward: the distance beyond the opening's edge and the way
 /// forward, mm, how much of it is lip rather than skin, and how bright it is.
-const SECTION: [[f32; 4]; 20] = [
+const SECTION: [[f32; 4]; 21] = [
     [4.0, -9.0, 1.0, 0.25],
     [1.2, -6.5, 1.0, 0.45],
     [-0.2, -4.0, 1.0, 0.7],
@@ -51,6 +51,7 @@ const SECTION: [[f32; 4]; 20] = [
     [46.0, -6.5, 0.0, 0.2],
     [60.0, -10.0, 0.0, 0.08],
     [78.0, -16.0, 0.0, 0.0],
+    [150.0, -40.0, 0.0, 0.0],
 ];
 
 /// The row of the section at which the lip ends.

@@ -12,39 +12,45 @@ use typodont_exercise::catalog::catmull_rom;
 use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint};
 
 /// Outline of the cheeks and the throat in plan, from the corner of the mouth to the midline: the distance from the midline and behind
-/// the incisors' edges, mm, and how bright it is. Over the fold before the throat it is bright once more.
-const WALL: [[f32; 3]; 14] = [
+/// the incisors' edges, mm, and how bright it is.
+const WALL: [[f32; 3]; 12] = [
     [44.0, 15.0, 0.80],
-    [40.5, 18.0, 0.85],
-    [38.0, 22.0, 0.85],
-    [37.3, 28.0, 0.80],
-    [37.0, 34.0, 0.70],
-    [36.5, 46.0, 0.60],
-    [34.0, 56.0, 0.50],
-    [28.0, 62.0, 0.45],
-    [21.0, 63.5, 0.46],
-    [17.0, 64.0, 0.44],
-    [15.0, 67.0, 0.28],
-    [12.0, 72.0, 0.14],
-    [6.0, 76.0, 0.07],
-    [0.0, 77.0, 0.05],
+    [40.5, 18.0, 0.90],
+    [38.0, 22.0, 1.00],
+    [37.3, 28.0, 1.00],
+    [37.0, 34.0, 0.95],
+    [36.0, 46.0, 0.80],
+    [33.0, 56.0, 0.62],
+    [28.0, 61.0, 0.56],
+    [22.0, 63.2, 0.62],
+    [16.0, 64.6, 0.74],
+    [8.0, 65.6, 0.84],
+    [0.0, 66.0, 0.86],
 ];
 
 /// Reach of the teeth of average arches aside and back, mm: those of wider and longer ones move the wall.
 const AVERAGE_TEETH: [f32; 2] = [32.0, 50.0];
 
-/// Half the height of the wall at the lips and at the throat, mm, and by how much the soft palate hangs before the throat and leans
-/// forward toward the hard one.
+/// Half the height of the wall at the lips and at the throat, mm, and by how much the soft palate arches forward to the hard one.
 const HALF_HEIGHTS: [f32; 2] = [46.0, 30.0];
-const LEAN: [f32; 2] = [10.0, 12.0];
+const LEAN: f32 = 22.0;
+
+/// By how much the cheek bulges between the rows of teeth, and half the height of the bulge; by how much it turns in toward the gums,
+/// and the heights over the middle between which it does, mm.
+const BULGE: [f32; 2] = [4.0, 6.0];
+const TURNS_IN: f32 = 5.0;
+const TURNING: [f32; 2] = [16.0, 36.0];
 
 /// Height at which the soft palate ends, as a share of half the wall's height; half the width of the uvula, mm, and how much lower it
 /// reaches.
 const PALATE_ENDS: f32 = 0.12;
-const UVULA: [f32; 2] = [3.6, 0.3];
+const UVULA: [f32; 2] = [3.4, 0.34];
 
-/// Distances from the midline up to which the throat is open, and from which on it is closed, mm.
-const THROAT: [f32; 2] = [8.0, 17.0];
+/// The arch under which the throat opens: half its width, mm, the height of its middle and half its height, as shares of half the
+/// wall's; the depth of the throat behind it, mm, and how bright that is.
+const ARCH: [f32; 3] = [17.0, -0.55, 0.70];
+const THROAT_DEPTH: f32 = 12.0;
+const THROAT_LIGHT: f32 = 0.22;
 
 /// Rows of the wall from below upward.
 const WALL_ROWS: usize = 64;
@@ -77,6 +83,8 @@ const TONGUE_ROWS: usize = 33;
 const FURROW: [f32; 2] = [1.1, 2.2];
 
 const MUCOSA: Rgb = [0.76, 0.39, 0.37];
+/// The soft palate goes over into the hard one's colour.
+const HARD_PALATE: Rgb = [0.83, 0.51, 0.47];
 const TONGUE_SIDE: Rgb = [0.76, 0.42, 0.41];
 /// The papillae of its back are pale.
 const TONGUE_BACK: Rgb = [0.80, 0.52, 0.50];
@@ -127,29 +135,39 @@ fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
     let left = half.iter().map(|place| place.with_x(-place.x));
     let outline: Vec<Vec3> = left.chain(half.iter().rev().skip(1).copied()).collect();
     let (mut positions, mut tints) = (Vec::new(), Vec::new());
-    for &Vec3 { x, y: behind, z: light } in &outline {
-        let back = smooth_step((behind - 30.0) / 35.0);
-        let half_height = HALF_HEIGHTS[0] + (HALF_HEIGHTS[1] - HALF_HEIGHTS[0]) * back;
+    for &on_outline in &outline {
         for row in 0..=WALL_ROWS {
-            let height = 2.0 * row as f32 / WALL_ROWS as f32 - 1.0;
-            // The soft palate hangs down to the throat, farthest in the middle, where it ends in the uvula.
-            let hangs = UVULA[1] * libm::expf(-(x / UVULA[0]) * (x / UVULA[0]));
-            let above = smooth_step((height + hangs - PALATE_ENDS) / 0.2);
-            // Beside the throat it goes over into folds.
-            let beside = smooth_step((x.abs() - THROAT[0]) / (THROAT[1] - THROAT[0]));
-            let palate = back * above.max(beside);
-            // Between the molars only: behind them the cheek stays where it is.
-            let between = 1.0 - smooth_step((x.abs() - THROAT[1]) / 10.0);
-            let lean = between
-                * (LEAN[0] * palate + LEAN[1] * back * smooth_step((height - PALATE_ENDS) / (1.0 - PALATE_ENDS)));
-            let place = Vec3::new(x, half_height * height, lean - behind);
+            let (place, colour) = wall_corner(on_outline, 2.0 * row as f32 / WALL_ROWS as f32 - 1.0);
             positions.push(place);
-            let light = light + palate * (0.85 - light).max(0.0);
-            let tint = mucosa_tint(place);
-            tints.push(VertexTint::smooth(std::array::from_fn(|c| MUCOSA[c] * tint[c] * light)));
+            tints.push(VertexTint::smooth(colour));
         }
     }
     (sheet(positions, outline.len(), WALL_ROWS + 1), tints)
+}
+
+/// Place and colour of the wall over a place of its outline, at a height from −1 below to 1 above.
+fn wall_corner(Vec3 { x, y: behind, z: light }: Vec3, height: f32) -> (Vec3, Rgb) {
+    let back = smooth_step((behind - 30.0) / 35.0);
+    let y = height * (HALF_HEIGHTS[0] + (HALF_HEIGHTS[1] - HALF_HEIGHTS[0]) * back);
+    // The throat opens under an arch, in whose middle the uvula hangs.
+    let [half_width, middle, arch_height] = ARCH;
+    let from_middle = libm::hypotf(x / half_width, (height - middle) / arch_height);
+    let beside_uvula =
+        1.0 - libm::expf(-(x / UVULA[0]) * (x / UVULA[0])) * smooth_step((height - PALATE_ENDS + UVULA[1]) / 0.14);
+    let throat = back * beside_uvula * (1.0 - smooth_step((from_middle - 0.8) / 0.3));
+    // The soft palate arches between the molars: upright where it hangs, level where it meets the hard palate.
+    let soft = back * (1.0 - smooth_step((x.abs() - 10.0) / 22.0));
+    let up_palate = ((height - PALATE_ENDS) / (1.0 - PALATE_ENDS)).clamp(0.0, 1.0);
+    let forward = LEAN * soft * (1.0 - (1.0 - up_palate * up_palate).sqrt()) - THROAT_DEPTH * throat;
+    let cheek = smooth_step((behind - 16.0) / 8.0) * (1.0 - smooth_step((behind - 46.0) / 12.0));
+    let turn = cheek * smooth_step((y.abs() - TURNING[0]) / (TURNING[1] - TURNING[0]));
+    let inward = BULGE[0] * cheek * libm::expf(-(y / BULGE[1]) * (y / BULGE[1])) + TURNS_IN * turn;
+    let place = Vec3::new(x - x.signum() * inward, y, forward - behind);
+    // What turns to the gums or looks down is in the shade.
+    let shade = (1.0 - 0.3 * turn) * (1.0 - 0.28 * soft * smooth_step(up_palate / 0.9));
+    let light = (light + (THROAT_LIGHT - light) * throat) * shade;
+    let (tint, pale) = (mucosa_tint(place), up_palate * soft);
+    (place, std::array::from_fn(|c| (MUCOSA[c] + (HARD_PALATE[c] - MUCOSA[c]) * pale) * tint[c] * light))
 }
 
 /// The tongue in the lower jaw's arch space.
