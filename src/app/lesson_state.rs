@@ -30,7 +30,7 @@ use typodont_formats::Library;
 use typodont_lesson::InterruptedSession;
 use typodont_lesson::live::LiveEvent;
 use typodont_render::Orbit;
-use typodont_scene::particles::{AssistantAction, CollisionWorld};
+use typodont_scene::particles::{AssistantAction, CollisionWorld, Tools};
 use typodont_scene::{self as scene};
 use web_time::{Duration, Instant};
 
@@ -362,19 +362,22 @@ impl LessonState {
         let assistant = self.snapshot.and_then(|seen| seen.assistant);
         let snapshot = self.snapshot.filter(|_| does_drill_run);
         let is_still = self.is_standing_still();
+        let world_from_tip = |seen: LessonSnapshot| Pose { position: seen.tip, orientation: seen.orientation };
+        let mirror = self.snapshot.and_then(|seen| {
+            scene::mirror_face(self.scenario.instruments.get(seen.instrument as usize)?, world_from_tip(seen))
+        });
         let Some(LessonScene { particles: Some(field), volume, workpiece, palette, .. }) = &mut self.scene else {
             return;
         };
         if is_still {
             return;
         }
-        let world_from_tip = |seen: LessonSnapshot| Pose { position: seen.tip, orientation: seen.orientation };
         let bur = snapshot.and_then(|seen| field.bur(seen.instrument as usize, world_from_tip(seen)));
         let ground =
             CollisionWorld { volume, world_from_tooth: workpiece.world_from_tooth, obstacles: &workpiece.surroundings };
         let aim = workpiece.world_from_tooth * workpiece.crown_bounds().centre();
         let assistant = assistant.and_then(|tool| assistant_action(&tool, aim));
-        field.advance(elapsed, (bur.as_ref(), assistant), &ground, palette);
+        field.advance(elapsed, Tools { bur, assistant, mirror }, &ground, palette);
     }
 
     fn apply_event(&mut self, event: LessonEvent) {

@@ -6,7 +6,7 @@ use crate::scenes::carve;
 use typodont_core::frame::Vec3;
 use typodont_exercise::scenario::OperatingField;
 use typodont_render::{Lights, OffscreenRenderer, Orbit, RenderMode, RenderScene, RgbaImage};
-use typodont_scene::particles::{CollisionWorld, ParticleField, VisibleParticles};
+use typodont_scene::particles::{CollisionWorld, ParticleField, Tools, VisibleParticles};
 use typodont_scene::work_view;
 
 const SIZE: [u32; 2] = [800, 500];
@@ -71,7 +71,7 @@ fn an_opened_pulp_is_wet_and_bleeds_in_the_picture() {
             world_from_tooth: case.workpiece.world_from_tooth,
             obstacles: &case.workpiece.surroundings,
         };
-        (0..10 * seconds).for_each(|_| field.advance(0.1, (None, None), &world, &case.palette));
+        (0..10 * seconds).for_each(|_| field.advance(0.1, Tools::default(), &world, &case.palette));
         // From above, into the cavity.
         let usual = work_view(&case.workpiece);
         let viewpoint = Orbit { elevation: 1.35, distance: 0.4 * usual.distance, ..usual }.viewpoint();

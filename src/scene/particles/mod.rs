@@ -9,6 +9,7 @@ mod bleeding;
 mod xorshift;
 mod dust;
 mod collision;
+mod mirror_drops;
 mod suction;
 mod syringe;
 mod water;
@@ -19,6 +20,7 @@ pub use syringe::syringe;
 
 use self::bleeding::Bleeding;
 use self::dust::Dust;
+use self::mirror_drops::MirrorDrops;
 use self::suction::Suction;
 use self::water::Water;
 use self::xorshift::Xorshift32;
@@ -27,13 +29,16 @@ use typodont_core::frame::{Pose, Vec3};
 use typodont_core::volume::{Edit, Grid, Label};
 use typodont_exercise::catalog::InstrumentEntry;
 use typodont_exercise::scenario::OperatingField;
-use typodont_render::{LabelPalette, Particle, Viewpoint};
+use typodont_render::{LabelPalette, Particle, PlaneMirror, Viewpoint};
 
 /// Length of a step, s: short enough that no chip passes through enamel. The fastest chip moves 2 mm in one step.
 const STEP: f32 = 0.004;
 
 /// Longest time between two frames that is simulated, s. A window that was frozen does not catch up.
 const MAX_ELAPSED: f32 = 0.1;
+
+/// Water sits so far over its surface, mm.
+const WATER_OFFSET: f32 = 0.05;
 
 /// Gravity, mm/s², world space. Down is down on the screen.
 const GRAVITY: Vec3 = Vec3::new(0.0, -9810.0, 0.0);
@@ -48,6 +53,7 @@ pub struct ParticleField {
     suction: Option<Suction>,
     dust: Dust,
     water: Water,
+    mirror_drops: MirrorDrops,
     bleeding: Bleeding,
     rng: Xorshift32,
     /// Time that is not yet a whole step, s.
@@ -73,6 +79,14 @@ pub struct RunningBur {
     pub radius: f32,
     /// From the tip to where the water comes from, mm.
     pub height: f32,
+}
+
+/// Tools in use during a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tools {
+    pub bur: Option<RunningBur>,
+    pub assistant: Option<AssistantAction>,
+    pub mirror: Option<PlaneMirror>,
 }
 
 /// Effect of an assistant's tool on dust and water, world space, mm.
@@ -106,6 +120,7 @@ impl ParticleField {
             suction: suction_inlet.filter(|_| options.suction).map(Suction::new),
             dust: Dust::new(),
             water: Water::new(),
+            mirror_drops: MirrorDrops::new(),
             bleeding: Bleeding::of(pulp),
             rng: Xorshift32::new(),
             pending_time: 0.0,
@@ -129,16 +144,17 @@ impl ParticleField {
         }
     }
 
-    /// Advances the field by a time, s. `bur` is the running bur, if there is one, and `assistant` what an assistant does. Chips
-    /// take the colours of `palette`.
+    /// Advances the field by a time, s. Chips take the colours of `palette`.
     pub fn advance(
         &mut self,
         seconds: f32,
-        (bur, assistant): (Option<&RunningBur>, Option<AssistantAction>),
+        Tools { bur, assistant, mirror }: Tools,
         world: &CollisionWorld,
         palette: &LabelPalette,
     ) {
-        let ParticleField { options, suction, dust, water, bleeding, rng, pending_time, .. } = self;
+        let ParticleField { options, suction, dust, water, mirror_drops, bleeding, rng, pending_time, .. } = self;
+        let bur = bur.as_ref();
+        mirror_drops.hold(mirror);
         let held = match assistant {
             Some(AssistantAction::Draw { inlet }) => Some(Suction::new(inlet)),
             _ => None,
@@ -156,7 +172,8 @@ impl ParticleField {
                 water.jet(nozzle, aim, rng);
             }
             bleeding.step(water, world, rng);
-            water.step_flying(world, suction, dust, rng);
+            water.step_flying(world, suction, (&mut *dust, &mut *mirror_drops), rng);
+            mirror_drops.step(|place| air_velocity(place, suction, assistant));
             water.step_lying(world, suction);
             dust.step(world, suction);
             if let Some(bur) = bur {
@@ -167,7 +184,10 @@ impl ParticleField {
 
     /// Number of particles that are to be drawn anew in the next picture, or 1 while blood flows: none for blood that has come to rest.
     pub fn moving_count(&self) -> usize {
-        self.dust.particles().count() + self.water.moving_count() + usize::from(self.bleeding.is_flowing())
+        self.dust.particles().count()
+            + self.water.moving_count()
+            + self.mirror_drops.moving_count()
+            + usize::from(self.bleeding.is_flowing())
     }
 }
 
@@ -181,7 +201,7 @@ impl Default for VisibleParticles {
     fn default() -> VisibleParticles {
         VisibleParticles {
             opaque: Vec::with_capacity(dust::MAX_CHIPS),
-            translucent: Vec::with_capacity(water::MAX_PARTICLES),
+            translucent: Vec::with_capacity(water::MAX_PARTICLES + mirror_drops::MAX_DROPS),
         }
     }
 }
@@ -192,7 +212,7 @@ impl VisibleParticles {
         self.opaque.clear();
         self.opaque.extend(field.dust.particles());
         self.translucent.clear();
-        self.translucent.extend(field.water.particles());
+        self.translucent.extend(field.water.particles().chain(field.mirror_drops.particles()));
         let forward = viewpoint.focus - viewpoint.position;
         let depth = |particle: &Particle| (particle.position - viewpoint.position).dot(forward);
         self.translucent.sort_unstable_by(|a, b| depth(b).total_cmp(&depth(a)));
@@ -206,6 +226,15 @@ impl VisibleParticles {
     /// The water, the farthest first.
     pub fn translucent(&self) -> &[Particle] {
         &self.translucent
+    }
+}
+
+/// Velocity of the air that suction and an assistant's syringe move, mm/s.
+fn air_velocity(place: Vec3, suction: Option<&Suction>, assistant: Option<AssistantAction>) -> Vec3 {
+    let drawn = suction.map_or(Vec3::ZERO, |suction| suction.air_velocity(place));
+    match assistant {
+        Some(AssistantAction::Spray { nozzle, aim }) => drawn + syringe::air_velocity(nozzle, aim, place),
+        _ => drawn,
     }
 }
 
@@ -286,10 +315,10 @@ mod tests {
             let bur = field.bur(0, upright(AT_WORK + aside)).unwrap();
             carve(volume, field, AT_WORK + aside, 1.0);
             field.dust.emit(Some(&bur), false, &ground(volume), &palette(), &mut field.rng);
-            field.advance(0.05, (None, None), &ground(volume), &palette());
+            field.advance(0.05, Tools::default(), &ground(volume), &palette());
         }
         for _ in 0..10 {
-            field.advance(0.1, (None, None), &ground(volume), &palette());
+            field.advance(0.1, Tools::default(), &ground(volume), &palette());
         }
     }
 
@@ -300,7 +329,7 @@ mod tests {
         let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None, None));
         let bur = field.bur(0, upright(Vec3::new(5.0, 0.2, 0.0))).unwrap();
         carve(&mut volume, &mut field, Vec3::new(5.7, -0.2, 0.0), 0.5);
-        field.advance(0.0, (Some(&bur), None), &ground(&volume), &palette());
+        field.advance(0.0, Tools { bur: Some(bur), ..Tools::default() }, &ground(&volume), &palette());
         let mean = field.dust.mean_velocity();
         assert!(mean.z > 100.0 && mean.z > 2.0 * mean.x.abs() && mean.y > 50.0, "{mean}");
     }
@@ -312,7 +341,7 @@ mod tests {
         let (mut volume, mut field) = (slab(), ParticleField::new(DUST, &tray(), None, None));
         let bur = field.bur(0, upright(AT_WORK)).unwrap();
         carve(&mut volume, &mut field, AT_WORK, 1.0);
-        field.advance(0.0, (Some(&bur), None), &ground(&volume), &palette());
+        field.advance(0.0, Tools { bur: Some(bur), ..Tools::default() }, &ground(&volume), &palette());
         let seen = visible(&field);
         assert!(seen.opaque().len() > 20);
         let shown = palette().appearance(Label(1)).colour;
@@ -338,7 +367,7 @@ mod tests {
             volume.set(index, Voxel::AIR);
         }
         for _ in 0..20 {
-            field.advance(0.1, (None, None), &ground(&volume), &palette());
+            field.advance(0.1, Tools::default(), &ground(&volume), &palette());
         }
         assert_eq!(field.dust.resting_positions().count(), 0, "without a tooth all of it has fallen out of the mouth");
     }
@@ -355,12 +384,12 @@ mod tests {
         let before = lying(&field);
         let spray = AssistantAction::Spray { nozzle: AT_WORK + Vec3::new(2.0, 8.0, 0.0), aim: AT_WORK };
         for _ in 0..5 {
-            field.advance(0.1, (None, None), &ground(&volume), &palette());
+            field.advance(0.1, Tools::default(), &ground(&volume), &palette());
         }
         let waited = lying(&field);
         for round in 0..30 {
             let assistant = (round < 10).then_some(spray);
-            field.advance(0.1, (None, assistant), &ground(&volume), &palette());
+            field.advance(0.1, Tools { assistant, ..Tools::default() }, &ground(&volume), &palette());
         }
         let washed = lying(&field);
         assert!(before > 20 && waited * 10 > before * 9, "{before} chips, {waited} after waiting");
@@ -388,7 +417,7 @@ mod tests {
                         let index = over[(round * 104_729 + n * 7919) % over.len()] as u32;
                         field.record_removal(&Edit { index, before, after: Voxel::AIR }, &grid);
                     }
-                    field.advance(0.1, (Some(&bur), None), &ground(&volume), &palette);
+                    field.advance(0.1, Tools { bur: Some(bur), ..Tools::default() }, &ground(&volume), &palette);
                     seen.update(field, &viewpoint);
                 }
             }
@@ -413,11 +442,11 @@ mod tests {
             let before = in_pit(&field);
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             for _ in 0..30 {
-                field.advance(0.1, (Some(&bur), None), &ground(&volume), &palette());
+                field.advance(0.1, Tools { bur: Some(bur), ..Tools::default() }, &ground(&volume), &palette());
             }
             let (after, wet) = (in_pit(&field), field.water.lying_mm3());
             for _ in 0..30 {
-                field.advance(0.1, (None, None), &ground(&volume), &palette());
+                field.advance(0.1, Tools::default(), &ground(&volume), &palette());
             }
             (before, after, wet, field.water.lying_mm3())
         };
@@ -443,7 +472,9 @@ mod tests {
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             let carved = visible(&field).opaque().len() as f32 * dust::CHIP_VOLUME;
             [5, 60].map(|frames| {
-                (0..frames).for_each(|_| field.advance(0.1, (Some(&bur), None), &ground(&volume), &palette()));
+                (0..frames).for_each(|_| {
+                    field.advance(0.1, Tools { bur: Some(bur), ..Tools::default() }, &ground(&volume), &palette())
+                });
                 let lying = field.water.lying_dust_mm3();
                 assert!(lying <= carved, "{lying} of {carved} mm³");
                 lying / field.water.lying_mm3()
@@ -465,12 +496,13 @@ mod tests {
             let (mut volume, mut field) = (slab(), ParticleField::new(options, &tray(), None, Some(pulp)));
             carve(&mut volume, &mut field, AT_WORK, 0.8);
             let spraying = field.bur(0, upright(AT_WORK)).unwrap();
-            let mut after = |seconds: usize, bur: Option<&RunningBur>| {
-                (0..10 * seconds).for_each(|_| field.advance(0.1, (bur, None), &ground(&volume), &palette()));
+            let mut after = |seconds: usize, bur: Option<RunningBur>| {
+                (0..10 * seconds)
+                    .for_each(|_| field.advance(0.1, Tools { bur, ..Tools::default() }, &ground(&volume), &palette()));
                 let red = visible(&field).translucent().iter().filter(|p| p.appearance.colour[1] < 0.2).count();
                 (field.water.lying_blood_mm3(), red, field.moving_count())
             };
-            [after(2, None), after(28, None), after(30, None), after(10, Some(&spraying))]
+            [after(2, None), after(28, None), after(30, None), after(10, Some(spraying))]
         };
         let sound = bled(Label(2));
         assert!(sound.iter().all(|(blood, red, _)| *blood == 0.0 && *red == 0), "{sound:?}");
@@ -502,7 +534,9 @@ mod tests {
                 (slab(), ParticleField::new(ALL, &tray(), Some(Vec3::new(9.0, 3.0, 0.0)), None));
             let bur = field.bur(0, upright(AT_WORK)).unwrap();
             carve(&mut volume, &mut field, AT_WORK, 1.0);
-            times.iter().for_each(|s| field.advance(*s, (Some(&bur), None), &ground(&volume), &palette()));
+            times.iter().for_each(|s| {
+                field.advance(*s, Tools { bur: Some(bur), ..Tools::default() }, &ground(&volume), &palette())
+            });
             let seen = visible(&field);
             (seen.opaque().to_vec(), seen.translucent().to_vec())
         };

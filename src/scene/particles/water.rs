@@ -2,9 +2,10 @@
 
 use super::collision::{CollisionWorld, Sweep};
 use super::dust::Dust;
+use super::mirror_drops::MirrorDrops;
 use super::suction::Suction;
 use super::xorshift::Xorshift32;
-use super::{RunningBur, STEP, WORLD_RADIUS, apply_drag};
+use super::{RunningBur, STEP, WATER_OFFSET, WORLD_RADIUS, apply_drag};
 use std::collections::VecDeque;
 use std::f32::consts::TAU;
 use typodont_core::frame::Vec3;
@@ -34,6 +35,8 @@ const SPREAD_SHARE: f32 = 0.10;
 /// Radii of droplets, mm, and water that one of them leaves where it falls, mm³.
 const RADII: [f32; 2] = [0.06, 0.14];
 const DEPOSIT_VOLUME: f32 = 0.004;
+/// The same of a splash or a puff of mist on a mirror, mm³.
+const FINE_VOLUME: f32 = 0.0005;
 
 /// One droplet in so many is a puff of mist; growth of its radius, mm/s; and its lifetime, s.
 const MIST_INTERVAL: u32 = 3;
@@ -79,8 +82,7 @@ const SUCTION_AIR_SPEED: f32 = 400.0;
 const UPDATE_INTERVAL: usize = 4;
 const LONG_STEP: f32 = UPDATE_INTERVAL as f32 * STEP;
 
-/// A patch sits so far over its surface, mm, and finds it within this reach up and down.
-const SURFACE_OFFSET: f32 = 0.05;
+/// A patch finds its surface within this reach up and down, mm.
 const SURFACE_SEARCH: f32 = 0.5;
 
 /// Share of blood from which a patch clots instead of drying.
@@ -221,12 +223,12 @@ impl Water {
         }
     }
 
-    /// One step of all flying droplets. Droplets that land wash dust away, splash, and leave water.
+    /// One step of all flying droplets. Droplets that land wash dust away, splash, and leave water; those that meet a mirror stay there.
     pub fn step_flying(
         &mut self,
         world: &CollisionWorld,
         suction: Option<&Suction>,
-        dust: &mut Dust,
+        (dust, mirror): (&mut Dust, &mut MirrorDrops),
         rng: &mut Xorshift32,
     ) {
         let Water { flying, lying, .. } = self;
@@ -247,6 +249,10 @@ impl Water {
             if is_gone {
                 return false;
             }
+            let volume = if drop.kind == DropletKind::Jet { DEPOSIT_VOLUME } else { FINE_VOLUME };
+            if mirror.catch(drop.place, goal, volume) {
+                return false;
+            }
             match world.sweep(drop.place, goal) {
                 Sweep::Free => drop.place = goal,
                 Sweep::Inside => return false,
@@ -257,8 +263,8 @@ impl Water {
                     let (volume, blood) = (DEPOSIT_VOLUME, drop.blood);
                     let new = WaterPatch { place, normal: out, volume, blood, dust: 0.0, is_held: false };
                     let patch = add_water(lying, new);
-                    patch.cloud(dust.wash(place + out * SURFACE_OFFSET, drop.velocity, patch.radius()));
-                    (drop.place, drop.kind, drop.age) = (place + out * SURFACE_OFFSET, DropletKind::Splash, 0.0);
+                    patch.cloud(dust.wash(place + out * WATER_OFFSET, drop.velocity, patch.radius()));
+                    (drop.place, drop.kind, drop.age) = (place + out * WATER_OFFSET, DropletKind::Splash, 0.0);
                     drop.radius *= 0.6;
                     // Blood wells up and does not splash.
                     return drop.blood == 0.0 && rng.next_f32() < SPLASH_SHARE;
@@ -333,7 +339,7 @@ impl Water {
         let lying = self.lying.iter().filter(|patch| patch.volume > 0.0).map(|patch| {
             let pool = patch.pool_share();
             let facing = patch.normal.lerp(Vec3::Y, pool).normalize_or(Vec3::Y);
-            let position = patch.place + facing * (SURFACE_OFFSET + HEIGHT_SHARE * patch.radius() * pool);
+            let position = patch.place + facing * (WATER_OFFSET + HEIGHT_SHARE * patch.radius() * pool);
             let opacities = [mix(0.12, 0.22, pool), mix(0.8, 0.97, pool), mix(0.6, 0.9, pool)];
             let (appearance, opacity) = look_of([patch.blood, patch.dust], opacities);
             Particle { position, radius: patch.radius(), facing: Some(facing), appearance, opacity }
@@ -410,7 +416,7 @@ fn add_water(lying: &mut VecDeque<WaterPatch>, new: WaterPatch) -> &mut WaterPat
 /// True where walls stand around a patch, or the ground goes on under it, on all four sides.
 fn is_enclosed(patch: &WaterPatch, world: &CollisionWorld) -> bool {
     let radius = patch.radius();
-    let middle = patch.place + patch.normal * SURFACE_OFFSET + Vec3::Y * (HEIGHT_SHARE * radius);
+    let middle = patch.place + patch.normal * WATER_OFFSET + Vec3::Y * (HEIGHT_SHARE * radius);
     [Vec3::X, Vec3::NEG_X, Vec3::Z, Vec3::NEG_Z].iter().all(|aside| {
         let rim = middle + *aside * radius;
         world.is_blocked(middle, rim) || world.is_blocked(rim, rim - Vec3::Y * radius)
