@@ -10,7 +10,8 @@ use typodont_exercise::scenario;
 use typodont_exercise::scenario::{ResolveMode, Scenario, SceneLayout, ToothSource, Workpiece};
 use typodont_formats::Library;
 use typodont_formats::diagnostic::{Diagnostic, SourceText};
-use typodont_render::UnworkedTooth;
+use typodont_render::{MeshInstance, UnworkedTooth};
+use typodont_scene::{Mouth, WORKING_OPENING_DEG};
 
 /// Voxel spacing of the quick first build, mm; it takes an eighth of the work.
 const QUICK_SPACING: f32 = 0.2;
@@ -43,6 +44,9 @@ pub struct BuildResult {
     pub scenario: Arc<Scenario>,
     pub workpiece: Workpiece,
     pub unworked_tooth: UnworkedTooth,
+    /// The mouth as the trainee sees it; `None` for a tooth on a stand.
+    pub mouth: Option<Mouth>,
+    pub surroundings: Vec<MeshInstance>,
     /// True if it was built with coarse voxels as a first view, which the full one follows. A page has coarse voxels only.
     pub is_quick: bool,
 }
@@ -219,8 +223,15 @@ impl Build {
     /// Builds the workpiece of a variant of the scenario.
     fn build(&self, variant: &Scenario, is_quick: bool) -> Option<BuildResult> {
         let workpiece = Workpiece::make(variant, self.job.seed).ok()?;
-        let unworked_tooth = typodont_scene::unworked_tooth(&workpiece, &variant.tissues);
-        Some(BuildResult { scenario: self.scenario.clone()?, workpiece, unworked_tooth, is_quick })
+        let tissues = &variant.tissues;
+        let unworked_tooth = typodont_scene::unworked_tooth(&workpiece, tissues);
+        let mouth = Mouth::around(&workpiece, tissues).filter(|_| variant.scene.is_in_mouth());
+        let surroundings = match &mouth {
+            Some(mouth) => mouth.solids(WORKING_OPENING_DEG),
+            None => typodont_scene::surrounding_solids(&workpiece, tissues),
+        };
+        let scenario = self.scenario.clone()?;
+        Some(BuildResult { scenario, workpiece, unworked_tooth, mouth, surroundings, is_quick })
     }
 }
 

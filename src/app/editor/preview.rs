@@ -5,7 +5,7 @@ use std::sync::Arc;
 use typodont_core::frame::Vec3;
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::TissueRole;
-use typodont_render::{LabelPalette, MeshInstance, Orbit, RenderMode, TransferFunction};
+use typodont_render::{LabelPalette, Orbit, RenderMode, TransferFunction};
 use typodont_scene as scene;
 
 /// The way in which the tooth is shown.
@@ -36,7 +36,6 @@ pub struct PreviewState {
     /// Number of builds taken over so far.
     pub generation: u64,
     pub palette: LabelPalette,
-    pub surroundings: Vec<MeshInstance>,
     glass: Arc<TransferFunction>,
     decay: Arc<TransferFunction>,
     /// FDI numbers of the teeth; if they change, the camera returns to the usual view.
@@ -55,7 +54,6 @@ impl Default for PreviewState {
             glass: Arc::new(TransferFunction::tissue(&palette)),
             decay: Arc::new(TransferFunction::highlighting(&[], &palette)),
             palette,
-            surroundings: Vec::new(),
             teeth: Vec::new(),
         }
     }
@@ -70,7 +68,6 @@ impl PreviewState {
             tissues.entries().iter().filter(|e| e.role == TissueRole::Decay).map(|e| e.label()).collect();
         self.glass = Arc::new(TransferFunction::tissue(&self.palette));
         self.decay = Arc::new(TransferFunction::highlighting(&decay, &self.palette));
-        self.surroundings = scene::surrounding_solids(&build.workpiece, tissues);
         let teeth: Vec<u8> = build.workpiece.teeth.iter().map(|tooth| tooth.fdi).collect();
         if teeth != self.teeth {
             self.orbit = scene::work_view(&build.workpiece).zoomed(0.8);

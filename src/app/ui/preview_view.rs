@@ -1,9 +1,10 @@
 //! The pictures of the author's screen: the tooth and its three slices, drawn again only when something has changed.
 
-use crate::editor::{EditorState, PreviewMode};
+use crate::editor::{BuildResult, EditorState, PreviewMode};
 use crate::ui::viewport::{EyeWindow, Viewport};
 use eframe::egui;
-use typodont_render::{Changes, Lights, Orbit, RenderError, RenderScene, VolumeInstance};
+use typodont_render::{Changes, Lights, MeshInstance, Orbit, RenderError, RenderScene, Viewpoint, VolumeInstance};
+use typodont_scene as scene;
 
 /// The last pictures of the author's screen.
 #[derive(Default)]
@@ -57,6 +58,7 @@ impl PreviewView {
         }
         let has_volume = last.is_some_and(|(drawn, _)| drawn.generation == inputs.generation);
         let viewpoint = preview.orbit.viewpoint();
+        let has_graphics = viewport.has_graphics();
         let scene = RenderScene {
             tooth: Some(VolumeInstance {
                 volume: &build.workpiece.volume,
@@ -66,12 +68,25 @@ impl PreviewView {
                 unworked_tooth: Some(&build.unworked_tooth),
                 mode: preview.render_mode(),
             }),
-            solids: if preview.shows_surroundings { preview.surroundings.clone() } else { Vec::new() },
+            solids: if preview.shows_surroundings { surroundings(build, &viewpoint) } else { Vec::new() },
             lights: Lights::along(&viewpoint),
+            shadows: has_graphics.then(|| scene::shadow_region(&build.workpiece, &preview.orbit)),
+            has_relief: has_graphics,
+            is_antialiased: has_graphics,
             ..RenderScene::empty()
         };
         let id = viewport.draw(EyeWindow::Main, &scene, &viewpoint, None, size)?;
         self.last = Some((inputs, id));
         Ok(Some(id))
     }
+}
+
+/// Solids around the tooth as a trainee sees them.
+fn surroundings(build: &BuildResult, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
+    let mut solids = build.surroundings.clone();
+    if let Some(mouth) = &build.mouth {
+        solids.extend(mouth.front_solids(viewpoint, scene::WORKING_OPENING_DEG));
+        mouth.fit_to_view(&mut solids, viewpoint, scene::WORKING_OPENING_DEG, None);
+    }
+    solids
 }

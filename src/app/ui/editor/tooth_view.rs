@@ -51,7 +51,7 @@ fn preview_options_ui(ui: &mut egui::Ui, editor: &EditorState, words: &Translati
             }
         });
         shown.response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::ComboBox, true, words.get("author.way")));
-        if !editor.preview.surroundings.is_empty() {
+        if editor.build.as_ref().is_some_and(|build| !build.surroundings.is_empty()) {
             let mut has_around = editor.preview.shows_surroundings;
             if ui.checkbox(&mut has_around, words.get("author.around")).changed() {
                 commands.push(AppCommand::Editor(EditorCommand::ShowSurroundings(has_around)));
