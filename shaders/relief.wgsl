@@ -21,8 +21,8 @@ const GROUND: f32 = 0.13;
 // higher, mm; the gloss of such enamel, and the difference from it at which there are none.
 const RIDGE_WIDTH: vec3f = vec3f(1.1, 1.1, 0.13);
 const RIDGE_DEPTH: f32 = 0.0013;
-const UNCUT: f32 = 0.2;
-const UNCUT_RANGE: f32 = 0.01;
+const ENAMEL_GLOSS: f32 = 0.2;
+const ENAMEL_GLOSS_RANGE: f32 = 0.01;
 // Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
 const FADE: vec2f = vec2f(0.3, 0.8);
 
@@ -79,7 +79,7 @@ fn stipple_gradient(at: vec3f) -> vec3f {
 // enamel. Those that are too fine for the pixels at a point are left out.
 fn tooth_gradient(at: vec3f, gloss: f32, point: vec3f) -> vec3f {
     let marks = clamp((SMOOTH - gloss) / (SMOOTH - GROUND), 0.0, 1.0);
-    let ridges = 1.0 - clamp(abs(gloss - UNCUT) / UNCUT_RANGE, 0.0, 1.0);
+    let ridges = 1.0 - clamp(abs(gloss - ENAMEL_GLOSS) / ENAMEL_GLOSS_RANGE, 0.0, 1.0);
     let is_marked = marks > 0.0;
     let width = select(RIDGE_WIDTH, MARK_WIDTH, is_marked);
     let slope = select(vec2f(0.0), MARK_SLOPE, is_marked);

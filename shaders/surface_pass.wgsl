@@ -79,7 +79,7 @@ fn tooth_fragment(in: Varying) -> @location(0) vec4f {
 fn enamel_fragment(in: Varying) -> @location(0) vec4f {
     var normal = normalize(in.normal);
     if has_relief {
-        let gradient = tooth_gradient(in.own.xyz, UNCUT, in.point);
+        let gradient = tooth_gradient(in.own.xyz, ENAMEL_GLOSS, in.point);
         normal = tilted(normal, (solid.world_from_solid * vec4f(gradient, 0.0)).xyz);
     }
     return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normal)), 1.0);

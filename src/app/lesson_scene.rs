@@ -64,8 +64,7 @@ impl LessonScene {
         let mut volume = Volume::clone(&workpiece.volume);
         volume.take_dirty();
         let palette = scene::tissue_palette(tissues, is_decay_shown);
-        let is_in_jaw = scenario.scene.is_in_mouth();
-        let mouth = Mouth::around(&workpiece, tissues).filter(|_| is_in_jaw);
+        let (mouth, surroundings) = scene::mouth_and_solids(&workpiece, tissues, scenario.scene.is_in_mouth());
         let drawn = scenario.instruments.iter().map(|entry| scene::instrument_solid(entry, library));
         let (instruments, complaints): (Vec<MeshInstance>, Vec<_>) = drawn.unzip();
         let options = scenario.operating_field;
@@ -88,10 +87,7 @@ impl LessonScene {
             volume,
             grey_volume,
             palette,
-            surroundings: match &mouth {
-                Some(mouth) => mouth.solids(scene::WORKING_OPENING_DEG),
-                None => scene::surrounding_solids(&workpiece, tissues),
-            },
+            surroundings,
             mouth,
             mouth_opening: scene::WORKING_OPENING_DEG,
             particles: (options.is_any() || pulp.is_some())

@@ -9,7 +9,7 @@ use typodont_exercise::scenario::{ResolveMode, Scenario, Workpiece};
 use typodont_lesson as lesson;
 use typodont_render::{Changes, Lights, OffscreenRenderer, RenderMode, RenderScene, RgbaImage, VolumeInstance};
 use typodont_report::{PREVIEW_SIZE, preview_png};
-use typodont_scene::{self as scene, Mouth};
+use typodont_scene as scene;
 
 /// Poll interval of a watched file.
 const POLL_INTERVAL: Duration = Duration::from_secs(1);
@@ -88,8 +88,7 @@ fn draw_preview(arguments: &Arguments, output: &Path) -> Result<(), CliError> {
 fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bool) -> Result<RgbaImage, CliError> {
     let palette = scene::tissue_palette(&scenario.tissues, true);
     let unworked_tooth = scene::unworked_tooth(workpiece, &scenario.tissues);
-    let mouth = Mouth::around(workpiece, &scenario.tissues).filter(|_| is_in_mouth);
-    let around = || scene::surrounding_solids(workpiece, &scenario.tissues);
+    let (mouth, around) = scene::mouth_and_solids(workpiece, &scenario.tissues, is_in_mouth);
     let orbit = scene::work_view(workpiece);
     let viewpoint = orbit.viewpoint();
     let picture = RenderScene {
@@ -101,11 +100,10 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
             unworked_tooth: Some(&unworked_tooth),
             mode: RenderMode::Iso,
         }),
-        solids: mouth.map_or_else(around, |mouth| {
-            let mut solids = mouth.solids(scene::WORKING_OPENING_DEG);
-            mouth.fit_to_view(&mut solids, &viewpoint, scene::WORKING_OPENING_DEG, None);
-            solids
-        }),
+        solids: match mouth {
+            Some(mouth) => mouth.seen_from(&around, &viewpoint, scene::WORKING_OPENING_DEG, None),
+            None => around,
+        },
         lights: Lights::along(&viewpoint),
         shadows: Some(scene::shadow_region(workpiece, &orbit)),
         has_relief: true,

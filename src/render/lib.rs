@@ -114,7 +114,7 @@ pub use gpu::{DeviceErrorListener, Gpu};
 pub use gpu_offscreen::GpuOffscreenRenderer;
 pub use mirror::PlaneMirror;
 pub use offscreen::OffscreenRenderer;
-pub use relief::tooth_normal;
+pub use relief::{ENAMEL_GLOSS, tooth_normal};
 #[cfg(feature = "gpu")]
 pub use renderer::{RenderTarget, Renderer};
 pub use scene::{

@@ -30,13 +30,13 @@ const SMOOTH: f32 = 0.19;
 pub(super) const GROUND: f32 = 0.13;
 
 /// Width of the ridges of enamel that nobody cut (perikymata) across the tooth's axis and along it, and by how much they are lower or
-/// higher than the mean, mm. They are 0.03 to 0.15 mm apart and a micrometre high; drawn wider and higher, for the same reason.
+/// higher than the mean, mm. Real ones are 0.03 to 0.15 mm apart and about a micrometre high; these are seen at a lesson's magnification.
 const RIDGE_WIDTH: Vec3 = Vec3::new(1.1, 1.1, 0.13);
 const RIDGE_DEPTH: f32 = 0.0013;
 
-/// Gloss of such enamel, and the difference from it at which there are no ridges.
-const UNCUT: f32 = 0.2;
-const UNCUT_RANGE: f32 = 0.01;
+/// Gloss of such enamel under a film of saliva: what has it has ridges. And the difference from it at which there are none.
+pub const ENAMEL_GLOSS: f32 = 0.2;
+const ENAMEL_GLOSS_RANGE: f32 = 0.01;
 
 /// Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
 const FADE: [f32; 2] = [0.3, 0.8];
@@ -79,7 +79,7 @@ impl Relief {
 
     /// Unit normal at a point of another tooth's enamel. `own`: the point in the mesh's own space.
     pub fn of_enamel(&self, point: Vec3, normal: Vec3, own: Vec3, to_world: impl Fn(Vec3) -> Vec3) -> Vec3 {
-        self.of_tooth(point, normal, own, UNCUT, to_world)
+        self.of_tooth(point, normal, own, ENAMEL_GLOSS, to_world)
     }
 
     /// Width of a pixel at a point, mm.
@@ -99,7 +99,7 @@ pub fn tooth_normal(normal: Vec3, place: Vec3, gloss: f32, pixel: f32) -> Vec3 {
 /// Gradient of the height of a tooth's surface at a place: zero where it is smooth or pixels are too wide.
 fn tooth_gradient(place: Vec3, gloss: f32, pixel: f32) -> Vec3 {
     let marks = ((SMOOTH - gloss) / (SMOOTH - GROUND)).clamp(0.0, 1.0);
-    let ridges = 1.0 - ((gloss - UNCUT).abs() / UNCUT_RANGE).clamp(0.0, 1.0);
+    let ridges = 1.0 - ((gloss - ENAMEL_GLOSS).abs() / ENAMEL_GLOSS_RANGE).clamp(0.0, 1.0);
     let (width, slope, depth) = match marks > 0.0 {
         true => (MARK_WIDTH, MARK_SLOPE, MARK_DEPTH * marks),
         false => (RIDGE_WIDTH, [0.0; 2], RIDGE_DEPTH * ridges),
@@ -203,8 +203,8 @@ mod tests {
             format!("GROUND: f32 = {GROUND:?};"),
             format!("RIDGE_WIDTH: vec3f = vec3f({:?}, {:?}, {:?});", RIDGE_WIDTH.x, RIDGE_WIDTH.y, RIDGE_WIDTH.z),
             format!("RIDGE_DEPTH: f32 = {RIDGE_DEPTH:?};"),
-            format!("UNCUT: f32 = {UNCUT:?};"),
-            format!("UNCUT_RANGE: f32 = {UNCUT_RANGE:?};"),
+            format!("ENAMEL_GLOSS: f32 = {ENAMEL_GLOSS:?};"),
+            format!("ENAMEL_GLOSS_RANGE: f32 = {ENAMEL_GLOSS_RANGE:?};"),
             format!("FADE: vec2f = vec2f({:?}, {:?});", FADE[0], FADE[1]),
         ] {
             assert!(SOURCE.contains(&line), "{line}");

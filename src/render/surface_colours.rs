@@ -48,8 +48,8 @@ const FISSURE: [f32; 3] = [0.93, 0.885, 0.81];
 /// along the layer, over a floor across it. A mean of both, up to the thickness on most of a crown; an estimate.
 const THROUGH_CUT: f32 = 1.7;
 
-/// Gloss that the moistest decay has more than the rest of it.
-const MOIST: f32 = 0.12;
+/// Gloss that the moistest decay has more than the rest of it: less than sound tissue.
+const MOIST: f32 = 0.08;
 
 /// Distance between the values of the noise that mottles decay, mm.
 const MOTTLE: [f32; 2] = [0.55, 0.21];

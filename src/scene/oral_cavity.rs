@@ -266,6 +266,18 @@ mod tests {
                     assert!(tongue < crown, "{slice} mm behind: tongue at {tongue}, crown at {crown} mm");
                 }
             }
+            // Under its arch the throat is deeper than beside it and over it, beside the uvula.
+            let depth = |x: f32, y: f32| {
+                let aside = |p: &&Vec3| (p.x.abs() - x).hypot(p.y - y);
+                let near = wall.mesh.positions.iter().filter(|p| p.z < -40.0);
+                near.min_by(|a, b| aside(a).total_cmp(&aside(b))).map_or(0.0, |p| -p.z)
+            };
+            let throat = depth(8.0, -10.0);
+            for (name, beside) in
+                [("wall", depth(24.0, -10.0)), ("palate", depth(8.0, 12.0)), ("uvula", depth(0.0, -4.0))]
+            {
+                assert!(throat > beside + 5.0, "{name} at {beside}, throat at {throat} mm");
+            }
             let facing = |solid: &MeshInstance, toward: &dyn Fn(Vec3) -> Vec3| {
                 let mesh = &solid.mesh;
                 let turned = |(place, normal): (&Vec3, &Vec3)| {

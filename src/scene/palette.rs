@@ -3,10 +3,11 @@
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Appearance, LabelPalette, UnworkedTooth};
+use typodont_render::{Appearance, ENAMEL_GLOSS, LabelPalette, UnworkedTooth};
 
-/// Gloss of tissue under a film of saliva, of dull decay and deposits, and of the wet pulp; see [`Appearance`](typodont_render::Appearance).
-pub(super) const GLOSS: f32 = 0.2;
+/// Gloss of dentine and materials under a film of saliva, of dull decay and deposits, and of the wet pulp; see
+/// [`Appearance`](typodont_render::Appearance). Enamel's own says that it has ridges.
+pub(super) const GLOSS: f32 = 0.22;
 const DULL: f32 = 0.1;
 const WET: f32 = 0.3;
 
@@ -19,6 +20,7 @@ pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalet
     let appearances = std::array::from_fn(|label| {
         let entry = entry(label as u8);
         let gloss = match entry.map(|entry| entry.role) {
+            _ if entry.map(|entry| entry.label()) == enamel.map(|enamel| enamel.label()) => ENAMEL_GLOSS,
             Some(TissueRole::Decay | TissueRole::Deposit) => DULL,
             Some(TissueRole::Vulnerable) => WET,
             _ => GLOSS,

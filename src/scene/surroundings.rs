@@ -1,10 +1,10 @@
 //! Solids around the tooth, drawn as they are touched.
 
-use super::jaw::vertex_tint;
+use super::jaw::{Mouth, vertex_tint};
 use super::palette::GLOSS;
 use super::soft_tissue::YieldingSurface;
 use std::sync::Arc;
-use typodont_anatomy::jaw::{Jaw, RidgeSide, ridge_tint};
+use typodont_anatomy::jaw::{Jaw, RidgeSide, WORKING_OPENING_DEG, ridge_tint};
 use typodont_anatomy::periodontium::Periodontium;
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::Vec3;
@@ -13,7 +13,7 @@ use typodont_core::touch::{Collider, ColliderGeometry, Compliance, SdfGrid};
 use typodont_core::volume::{Grid, ISO, Label, Volume, surface};
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Appearance, MeshInstance, VertexTint};
+use typodont_render::{Appearance, ENAMEL_GLOSS, MeshInstance, VertexTint};
 
 /// Distance between samples of a solid, mm: its curvature radii are larger.
 const SPACING: f32 = 0.4;
@@ -30,6 +30,21 @@ const FADE: f32 = 2.2;
 
 /// Distance from the tooth up to which a mesh around it is drawn, mm.
 const REACH: f32 = 12.0;
+
+/// The mouth of an exercise, if it plays in one and the teeth worked on have a place there, and the solids around these teeth: the mouth's,
+/// open as during treatment, or those that are touched.
+pub fn mouth_and_solids(
+    workpiece: &Workpiece,
+    tissues: &TissueTable,
+    is_in_mouth: bool,
+) -> (Option<Mouth>, Vec<MeshInstance>) {
+    let mouth = if is_in_mouth { Mouth::around(workpiece, tissues) } else { None };
+    let solids = match &mouth {
+        Some(mouth) => mouth.solids(WORKING_OPENING_DEG),
+        None => surrounding_solids(workpiece, tissues),
+    };
+    (mouth, solids)
+}
 
 /// Gingiva and neighbouring teeth as they are touched, world space; without the gingiva under a rubber dam.
 pub fn surrounding_solids(workpiece: &Workpiece, tissues: &TissueTable) -> Vec<MeshInstance> {
@@ -55,8 +70,9 @@ pub(super) fn solid_of_shape(shape: &Collider, workpiece: &Workpiece, tissues: &
     let colour = tissues.by_label(shape.label).map_or([0.8; 3], |e| e.rgb());
     let mesh = Arc::new(shape_mesh(shape, workpiece));
     let tints = modelled_gum(shape, workpiece).map(|(_, gum)| gum_tints(gum, workpiece, &mesh));
-    let plain = MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss: GLOSS });
     let is_enamel = tissues.role(shape.label) == Some(TissueRole::Neighbour);
+    let gloss = if is_enamel { ENAMEL_GLOSS } else { GLOSS };
+    let plain = MeshInstance::plain(mesh, workpiece.world_from_tooth, Appearance { colour, gloss });
     MeshInstance { vertex_tints: Arc::new(tints.unwrap_or_default()), is_enamel, ..plain }
 }
 

@@ -42,7 +42,7 @@ impl App {
                 exercise_list.scroll_to_selected = false;
             }
             Screen::Editor(editor) => {
-                crate::ui::editor::editor_ui(ui, editor, views, words, commands);
+                crate::ui::editor::editor_ui(ui, editor, settings, views, words, commands);
             }
             Screen::Briefing => {
                 if let Some(Ok(scenario)) = exercise_list.selected_exercise().map(|exercise| &exercise.scenario) {

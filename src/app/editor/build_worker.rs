@@ -11,7 +11,7 @@ use typodont_exercise::scenario::{ResolveMode, Scenario, SceneLayout, ToothSourc
 use typodont_formats::Library;
 use typodont_formats::diagnostic::{Diagnostic, SourceText};
 use typodont_render::{MeshInstance, UnworkedTooth};
-use typodont_scene::{Mouth, WORKING_OPENING_DEG};
+use typodont_scene::Mouth;
 
 /// Voxel spacing of the quick first build, mm; it takes an eighth of the work.
 const QUICK_SPACING: f32 = 0.2;
@@ -46,6 +46,7 @@ pub struct BuildResult {
     pub unworked_tooth: UnworkedTooth,
     /// The mouth as the trainee sees it; `None` for a tooth on a stand.
     pub mouth: Option<Mouth>,
+    /// Solids around the teeth worked on; those of the mouth, if there is one.
     pub surroundings: Vec<MeshInstance>,
     /// True if it was built with coarse voxels as a first view, which the full one follows. A page has coarse voxels only.
     pub is_quick: bool,
@@ -225,11 +226,8 @@ impl Build {
         let workpiece = Workpiece::make(variant, self.job.seed).ok()?;
         let tissues = &variant.tissues;
         let unworked_tooth = typodont_scene::unworked_tooth(&workpiece, tissues);
-        let mouth = Mouth::around(&workpiece, tissues).filter(|_| variant.scene.is_in_mouth());
-        let surroundings = match &mouth {
-            Some(mouth) => mouth.solids(WORKING_OPENING_DEG),
-            None => typodont_scene::surrounding_solids(&workpiece, tissues),
-        };
+        let is_in_mouth = variant.scene.is_in_mouth();
+        let (mouth, surroundings) = typodont_scene::mouth_and_solids(&workpiece, tissues, is_in_mouth);
         let scenario = self.scenario.clone()?;
         Some(BuildResult { scenario, workpiece, unworked_tooth, mouth, surroundings, is_quick })
     }

@@ -9,7 +9,6 @@ mod editor_section;
 mod editor_state;
 mod preview;
 
-pub use build_worker::BuildResult;
 pub use editor_command::EditorCommand;
 pub use editor_section::EditorSection;
 pub use editor_state::{ARCH_TEETH, Dialog, EditorState, OpenMode};

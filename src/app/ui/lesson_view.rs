@@ -236,13 +236,12 @@ fn solids(
     // On a radiograph neither gingiva nor neighbours cover the tooth; the instrument stays.
     let mut solids = Vec::new();
     if lesson.display_mode != DisplayMode::Xray {
-        solids.extend(scene.surroundings.iter().cloned());
-        solids.extend(suction_and_syringe(lesson, scene));
-        solids.extend(scene.mouth.iter().flat_map(|mouth| mouth.front_solids(viewpoint, scene.mouth_opening)));
-    }
-    if let Some(mouth) = &scene.mouth {
         let ball = lesson.snapshot.as_ref().map(|seen| (seen.tip, scene.head_radius(seen.instrument)));
-        mouth.fit_to_view(&mut solids, viewpoint, scene.mouth_opening, ball);
+        solids = match &scene.mouth {
+            Some(mouth) => mouth.seen_from(&scene.surroundings, viewpoint, scene.mouth_opening, ball),
+            None => scene.surroundings.clone(),
+        };
+        solids.extend(suction_and_syringe(lesson, scene));
     }
     let Some(seen) = &lesson.snapshot else { return solids };
     let index = seen.instrument as usize;

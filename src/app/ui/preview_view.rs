@@ -1,9 +1,10 @@
 //! The pictures of the author's screen: the tooth and its three slices, drawn again only when something has changed.
 
-use crate::editor::{BuildResult, EditorState, PreviewMode};
+use crate::editor::{EditorState, PreviewMode};
+use crate::settings::Settings;
 use crate::ui::viewport::{EyeWindow, Viewport};
 use eframe::egui;
-use typodont_render::{Changes, Lights, MeshInstance, Orbit, RenderError, RenderScene, Viewpoint, VolumeInstance};
+use typodont_render::{Changes, Lights, Orbit, RenderError, RenderScene, VolumeInstance};
 use typodont_scene as scene;
 
 /// The last pictures of the author's screen.
@@ -19,6 +20,8 @@ struct PreviewInputs {
     orbit: Orbit,
     mode: PreviewMode,
     shows_surroundings: bool,
+    has_shadows: bool,
+    is_smooth: bool,
     size: [u32; 2],
     generation: u64,
 }
@@ -39,15 +42,18 @@ impl PreviewView {
     pub fn draw(
         &mut self,
         editor: &EditorState,
+        settings: &Settings,
         viewport: &mut Viewport,
         size: [u32; 2],
     ) -> Result<Option<egui::TextureId>, RenderError> {
         let Some(build) = &editor.build else { return Ok(None) };
-        let preview = &editor.preview;
+        let (preview, has_graphics) = (&editor.preview, viewport.has_graphics());
         let inputs = PreviewInputs {
             orbit: preview.orbit,
             mode: preview.mode,
             shows_surroundings: preview.shows_surroundings,
+            has_shadows: settings.has_shadows(has_graphics),
+            is_smooth: settings.is_smooth(has_graphics),
             size,
             generation: preview.generation,
         };
@@ -58,7 +64,6 @@ impl PreviewView {
         }
         let has_volume = last.is_some_and(|(drawn, _)| drawn.generation == inputs.generation);
         let viewpoint = preview.orbit.viewpoint();
-        let has_graphics = viewport.has_graphics();
         let scene = RenderScene {
             tooth: Some(VolumeInstance {
                 volume: &build.workpiece.volume,
@@ -68,25 +73,19 @@ impl PreviewView {
                 unworked_tooth: Some(&build.unworked_tooth),
                 mode: preview.render_mode(),
             }),
-            solids: if preview.shows_surroundings { surroundings(build, &viewpoint) } else { Vec::new() },
+            solids: match &build.mouth {
+                _ if !preview.shows_surroundings => Vec::new(),
+                Some(mouth) => mouth.seen_from(&build.surroundings, &viewpoint, scene::WORKING_OPENING_DEG, None),
+                None => build.surroundings.clone(),
+            },
             lights: Lights::along(&viewpoint),
-            shadows: has_graphics.then(|| scene::shadow_region(&build.workpiece, &preview.orbit)),
+            shadows: inputs.has_shadows.then(|| scene::shadow_region(&build.workpiece, &preview.orbit)),
             has_relief: has_graphics,
-            is_antialiased: has_graphics,
+            is_antialiased: inputs.is_smooth,
             ..RenderScene::empty()
         };
         let id = viewport.draw(EyeWindow::Main, &scene, &viewpoint, None, size)?;
         self.last = Some((inputs, id));
         Ok(Some(id))
     }
-}
-
-/// Solids around the tooth as a trainee sees them.
-fn surroundings(build: &BuildResult, viewpoint: &Viewpoint) -> Vec<MeshInstance> {
-    let mut solids = build.surroundings.clone();
-    if let Some(mouth) = &build.mouth {
-        solids.extend(mouth.front_solids(viewpoint, scene::WORKING_OPENING_DEG));
-        mouth.fit_to_view(&mut solids, viewpoint, scene::WORKING_OPENING_DEG, None);
-    }
-    solids
 }

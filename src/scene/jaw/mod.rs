@@ -23,11 +23,10 @@ use typodont_core::touch::{Collider, ColliderGeometry};
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
 use typodont_exercise::scenario::{MouthArches, ToothBounds, Workpiece};
-use typodont_render::{Appearance, MeshInstance, Quadrant, Rgb, VertexTint, Viewpoint};
+use typodont_render::{Appearance, ENAMEL_GLOSS, MeshInstance, Quadrant, Rgb, VertexTint, Viewpoint};
 
-/// Gloss of wet gingiva and enamel, 0 to 1.
+/// Gloss of wet gingiva, 0 to 1.
 const GUM_GLOSS: f32 = 0.19;
-const TOOTH_GLOSS: f32 = 0.2;
 
 /// Distances from the carved tooth's box, mm: up to the first, the gingiva is drawn as it is touched; from the second
 /// on, as the jaw has it. Among the front teeth the arch bends away from the straight ridge that is touched, so the
@@ -89,7 +88,7 @@ impl JawMeshes {
         JawMeshes {
             teeth: FinishedMesh {
                 is_enamel: true,
-                ..FinishedMesh::new(teeth, colour("neighbour", IVORY), TOOTH_GLOSS)
+                ..FinishedMesh::new(teeth, colour("neighbour", IVORY), ENAMEL_GLOSS)
             },
             gum: FinishedMesh::new(gum, colour("gingiva", PINK), GUM_GLOSS),
         }
@@ -348,15 +347,22 @@ impl Mouth {
         Mouth { face, ..self }
     }
 
-    /// Fits the mouth's solids, made for an opening, to a picture: without the opposite jaw, the cheek or the tongue where they hide the work, and with the
-    /// dent of a working end's ball in soft tissue, its middle in world space and its radius, mm.
-    pub fn fit_to_view(
+    /// The mouth's solids, made for an opening, as one picture shows them: with those that are seen from in front; without the opposite
+    /// jaw, the cheek or the tongue where they hide the work; and with the dent of a working end's ball in soft tissue, its middle in world
+    /// space and its radius, mm.
+    pub fn seen_from(
         &self,
-        solids: &mut Vec<MeshInstance>,
+        solids: &[MeshInstance],
         viewpoint: &Viewpoint,
         open: f32,
         ball: Option<(Vec3, f32)>,
-    ) {
+    ) -> Vec<MeshInstance> {
+        let mut seen: Vec<MeshInstance> = solids.iter().cloned().chain(self.front_solids(viewpoint, open)).collect();
+        self.fit_to_view(&mut seen, viewpoint, open, ball);
+        seen
+    }
+
+    fn fit_to_view(&self, solids: &mut Vec<MeshInstance>, viewpoint: &Viewpoint, open: f32, ball: Option<(Vec3, f32)>) {
         if let Some(opposite) = self.opposite.as_ref().filter(|_| self.way_past_opposite(viewpoint, open).is_some()) {
             let is_opposite = |solid: &MeshInstance| {
                 [&opposite.gum, &opposite.teeth].iter().any(|own| Arc::ptr_eq(&own.mesh, &solid.mesh))

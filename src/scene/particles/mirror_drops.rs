@@ -7,16 +7,19 @@ use typodont_render::{Appearance, Particle, PlaneMirror};
 /// Drops on one mirror, at most; more spray joins the nearest.
 pub const MAX_DROPS: usize = 60;
 
-/// A drop of volume V on rhodium covers a disc of this share of V, cubed: as one that meets the glass at 55° does (an estimate).
+/// The cube of a drop's radius is this times its volume, as of one that meets the rhodium at 55° (an estimate).
 const SPREAD_FACTOR: f32 = 1.1;
+
+/// Most water in one drop, mm³; more runs off the face.
+const MAX_VOLUME: f32 = 12.0;
 
 /// Volume from which a drop runs down an upright mirror, mm³, and its speed, mm/s.
 const RUNNING_VOLUME: f32 = 2.0;
 const RUNNING_SPEED: f32 = 20.0;
 
-/// Air speed along the face from which it drives drops, mm/s: from a syringe within a centimetre or two, or suction held to the face;
-/// the share of it that they take on, and their greatest speed, mm/s.
-const DRIVING_AIR: f32 = 5000.0;
+/// Air speed from which it drives drops, mm/s, as from a syringe within a centimetre; the share of that along the face that they take on,
+/// and their greatest speed, mm/s.
+const DRIVING_AIR: f32 = 9000.0;
 const DRIVEN_SHARE: f32 = 0.02;
 const GREATEST_SPEED: f32 = 120.0;
 
@@ -37,6 +40,8 @@ struct MirrorDrop {
     /// mm³
     volume: f32,
     is_moving: bool,
+    /// True if it has got water since the last step.
+    has_grown: bool,
 }
 
 impl MirrorDrop {
@@ -50,7 +55,7 @@ impl MirrorDrops {
         MirrorDrops { mirror: None, drops: Vec::with_capacity(MAX_DROPS) }
     }
 
-    /// Holds a mirror in its new pose. One that is taken up is dry.
+    /// Holds a mirror in its new pose. It is dry if something else was held before.
     pub fn hold(&mut self, mirror: Option<PlaneMirror>) {
         self.mirror = mirror;
         if mirror.is_none() {
@@ -70,26 +75,27 @@ impl MirrorDrops {
         if place.length_squared() > mirror.radius * mirror.radius {
             return false;
         }
-        let new = MirrorDrop { place, volume, is_moving: false };
+        let new = MirrorDrop { place, volume, is_moving: false, has_grown: true };
         let distance = |drop: &MirrorDrop| drop.place.distance(place) - drop.radius();
         let is_full = self.drops.len() == MAX_DROPS;
         let nearest = self.drops.iter_mut().min_by(|a, b| distance(a).total_cmp(&distance(b)));
         match nearest.filter(|drop| is_full || distance(drop) < new.radius()) {
-            Some(drop) => drop.volume += volume,
+            Some(drop) => (drop.volume, drop.has_grown) = ((drop.volume + volume).min(MAX_VOLUME), true),
             None => self.drops.push(new),
         }
         true
     }
 
-    /// One step. `air`: its velocity at a place, world space, mm/s.
-    pub fn step(&mut self, air: impl Fn(Vec3) -> Vec3) {
+    /// One step. `air`: its velocity at a place, world space, mm/s; `is_drawn`: whether suction takes what is there.
+    pub fn step(&mut self, air: impl Fn(Vec3) -> Vec3, is_drawn: impl Fn(Vec3) -> bool) {
         let Some(PlaneMirror { world_from_mirror, radius, .. }) = self.mirror else { return };
         let own_from_world = world_from_mirror.inverse();
         let downhill = own_from_world.rotate(Vec3::NEG_Y).with_z(0.0);
-        for drop in &mut self.drops {
-            let wind = own_from_world.rotate(air(world_from_mirror * drop.place)).with_z(0.0);
+        self.drops.retain_mut(|drop| {
+            let place = world_from_mirror * drop.place;
+            let wind = own_from_world.rotate(air(place));
             let velocity = if wind.length() > DRIVING_AIR {
-                (wind * DRIVEN_SHARE).clamp_length_max(GREATEST_SPEED)
+                (wind.with_z(0.0) * DRIVEN_SHARE).clamp_length_max(GREATEST_SPEED)
             } else if drop.volume * downhill.length() > RUNNING_VOLUME {
                 downhill * RUNNING_SPEED
             } else {
@@ -97,25 +103,28 @@ impl MirrorDrops {
             };
             drop.is_moving = velocity != Vec3::ZERO;
             drop.place += velocity * STEP;
-        }
-        self.drops.retain(|drop| drop.place.length_squared() <= radius * radius);
-        self.join_moving();
+            drop.place.length_squared() <= radius * radius && !is_drawn(place)
+        });
+        self.join();
     }
 
-    /// Drops on the way take up those that they touch.
-    fn join_moving(&mut self) {
+    /// Drops that move or have grown take up those that they touch.
+    fn join(&mut self) {
         let mut at = 0;
         while at < self.drops.len() {
-            let drop = self.drops[at];
-            let touched = |other: &MirrorDrop| other.place.distance(drop.place) < drop.radius();
-            let met = (0..self.drops.len()).find(|&other| other != at && touched(&self.drops[other]));
-            match met.filter(|_| drop.is_moving) {
+            let MirrorDrop { place, is_moving, has_grown, .. } = self.drops[at];
+            let radius = self.drops[at].radius();
+            let touched = |other: usize| other != at && self.drops[other].place.distance(place) < radius;
+            match (0..self.drops.len()).find(|&other| (is_moving || has_grown) && touched(other)) {
                 Some(other) => {
-                    self.drops[at].volume += self.drops[other].volume;
+                    self.drops[at].volume = (self.drops[at].volume + self.drops[other].volume).min(MAX_VOLUME);
                     self.drops.swap_remove(other);
                     at = 0;
                 }
-                None => at += 1,
+                None => {
+                    self.drops[at].has_grown = false;
+                    at += 1;
+                }
             }
         }
     }
@@ -181,7 +190,7 @@ mod tests {
             assert!(!drops.catch(pose * Vec3::from(from), pose * Vec3::from(to), 1.0));
         }
         let before = volume(&drops);
-        (0..500).for_each(|_| drops.step(|_| Vec3::ZERO));
+        (0..500).for_each(|_| drops.step(|_| Vec3::ZERO, |_| false));
         assert!(drops.drops.len() > 20 && drops.moving_count() == 0);
         assert_eq!(volume(&drops), before);
         for particle in drops.particles() {
@@ -199,9 +208,9 @@ mod tests {
         let [from, to] = [1.0, -1.0].map(|z| held.world_from_mirror * Vec3::new(0.0, 5.0, z));
         assert!(drops.catch(from, to, 3.0));
         let (count, before) = (drops.drops.len(), volume(&drops));
-        drops.step(|_| Vec3::ZERO);
+        drops.step(|_| Vec3::ZERO, |_| false);
         assert_eq!(drops.moving_count(), 1, "only the large one");
-        (0..400).for_each(|_| drops.step(|_| Vec3::ZERO));
+        (0..400).for_each(|_| drops.step(|_| Vec3::ZERO, |_| false));
         assert_eq!(drops.moving_count(), 0, "it is gone");
         assert!(drops.drops.len() < count && volume(&drops) < before - 3.0, "with those on its way");
         assert!(drops.drops.len() * 2 > count, "the others stay");
@@ -211,9 +220,9 @@ mod tests {
     fn air_drives_drops_off_and_a_breath_does_not() {
         let mut drops = sprayed(mirror(false));
         let count = drops.drops.len();
-        (0..500).for_each(|_| drops.step(|_| Vec3::X * 500.0));
+        (0..500).for_each(|_| drops.step(|_| Vec3::X * 500.0, |_| false));
         assert_eq!(drops.drops.len(), count);
-        (0..500).for_each(|_| drops.step(|_| Vec3::new(12_000.0, -30_000.0, 0.0)));
+        (0..500).for_each(|_| drops.step(|_| Vec3::new(12_000.0, -30_000.0, 0.0), |_| false));
         assert!(drops.drops.is_empty(), "{} are left", drops.drops.len());
     }
 }

@@ -250,7 +250,7 @@ impl Water {
                 return false;
             }
             let volume = if drop.kind == DropletKind::Jet { DEPOSIT_VOLUME } else { FINE_VOLUME };
-            if mirror.catch(drop.place, goal, volume) {
+            if drop.blood == 0.0 && mirror.catch(drop.place, goal, volume) {
                 return false;
             }
             match world.sweep(drop.place, goal) {

@@ -22,6 +22,7 @@ mod tooth_view;
 use crate::command::AppCommand;
 use crate::editor::{EditorCommand, EditorState};
 use crate::i18n::Translations;
+use crate::settings::Settings;
 use crate::ui::views::Views;
 use eframe::egui;
 use serde_json::Value;
@@ -47,6 +48,7 @@ impl FormContext<'_> {
 pub fn editor_ui(
     ui: &mut egui::Ui,
     editor: &EditorState,
+    settings: &Settings,
     views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
@@ -66,7 +68,7 @@ pub fn editor_ui(
         });
     let view = egui::Frame::NONE.inner_margin(0);
     egui::Panel::right("author view").exact_size(0.42 * width).resizable(false).frame(view).show(ui, |ui| {
-        tooth_view::tooth_view_ui(ui, editor, views, words, commands);
+        tooth_view::tooth_view_ui(ui, editor, settings, views, words, commands);
     });
     let middle = egui::Frame::NONE.inner_margin(14);
     egui::CentralPanel::default().frame(middle).show(ui, |ui| {

@@ -6,6 +6,7 @@ use crate::editor::EditorSection;
 use crate::editor::EditorState;
 use crate::editor::PreviewMode;
 use crate::i18n::Translations;
+use crate::settings::Settings;
 use crate::ui::editor::decay;
 use crate::ui::editor::slice_views::slices_ui;
 use crate::ui::ui_anchors::anchor;
@@ -21,6 +22,7 @@ const SLICES_SHARE: f32 = 0.36;
 pub fn tooth_view_ui(
     ui: &mut egui::Ui,
     editor: &EditorState,
+    settings: &Settings,
     views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
@@ -34,7 +36,7 @@ pub fn tooth_view_ui(
     egui::Panel::bottom("author cuts").exact_size(height).resizable(false).frame(frame).show(ui, |ui| {
         slices_ui(ui, editor, &mut views.preview.slices, words, commands);
     });
-    egui::CentralPanel::no_frame().show(ui, |ui| tooth_ui(ui, editor, views, words, commands));
+    egui::CentralPanel::no_frame().show(ui, |ui| tooth_ui(ui, editor, settings, views, words, commands));
 }
 
 /// Display options of the preview, in one row while there is room.
@@ -70,6 +72,7 @@ fn preview_options_ui(ui: &mut egui::Ui, editor: &EditorState, words: &Translati
 fn tooth_ui(
     ui: &mut egui::Ui,
     editor: &EditorState,
+    settings: &Settings,
     views: &mut Views,
     words: &Translations,
     commands: &mut Vec<AppCommand>,
@@ -83,7 +86,7 @@ fn tooth_ui(
     let scale = ui.pixels_per_point();
     let size = [rect.width(), rect.height()].map(|points| (points * scale).round().max(1.0) as u32);
     let Views { viewport, preview, .. } = views;
-    match viewport.as_mut().map(|viewport| preview.draw(editor, viewport, size)) {
+    match viewport.as_mut().map(|viewport| preview.draw(editor, settings, viewport, size)) {
         Some(Ok(Some(id))) => {
             let whole = Rect::from_min_max(Pos2::ZERO, Pos2::new(1.0, 1.0));
             ui.painter().image(id, rect, whole, Color32::WHITE);
