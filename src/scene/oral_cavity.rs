@@ -89,8 +89,8 @@ const TONGUE_SIDE: Rgb = [0.76, 0.42, 0.41];
 /// The papillae of its back are pale.
 const TONGUE_BACK: Rgb = [0.80, 0.52, 0.50];
 
-/// Gloss of the tongue under saliva, and of what lies in the dark behind it.
-const GLOSS: f32 = 0.22;
+/// Gloss of the tongue, whose papillae make it matt, and of what lies in the dark behind it.
+const GLOSS: f32 = 0.11;
 const WALL_GLOSS: f32 = 0.08;
 
 /// Solids behind the teeth, world space.

@@ -192,10 +192,9 @@ struct Pixel {
     depth: f32,
 }
 
-/// Noise of one step of a screen's brightness, against bands where a colour changes slowly (Jimenez's interleaved gradient noise, 2014).
+/// Noise of one step of a screen's brightness, against bands where a colour changes slowly (Roberts's R2 sequence, 2018).
 fn dither(x: u32, y: u32) -> f32 {
-    let along = x as f32 * 0.067_110_56 + y as f32 * 0.005_837_15;
-    ((52.982_918 * along.fract()).fract() - 0.5) / 255.0
+    (((x as f32 + 0.5) * 0.754_877_7 + (y as f32 + 0.5) * 0.569_840_3).fract() - 0.5) / 255.0
 }
 
 impl Framebuffer {
