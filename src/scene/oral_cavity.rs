@@ -84,7 +84,7 @@ const FURROW: [f32; 2] = [1.1, 2.2];
 
 const MUCOSA: Rgb = [0.76, 0.39, 0.37];
 /// The soft palate goes over into the hard one's colour.
-const HARD_PALATE: Rgb = [0.83, 0.51, 0.47];
+const HARD_PALATE: Rgb = [0.72, 0.50, 0.46];
 const TONGUE_SIDE: Rgb = [0.76, 0.42, 0.41];
 /// The papillae of its back are pale.
 const TONGUE_BACK: Rgb = [0.80, 0.52, 0.50];
@@ -163,8 +163,8 @@ fn wall_corner(Vec3 { x, y: behind, z: light }: Vec3, height: f32) -> (Vec3, Rgb
     let turn = cheek * smooth_step((y.abs() - TURNING[0]) / (TURNING[1] - TURNING[0]));
     let inward = BULGE[0] * cheek * libm::expf(-(y / BULGE[1]) * (y / BULGE[1])) + TURNS_IN * turn;
     let place = Vec3::new(x - x.signum() * inward, y, forward - behind);
-    // What turns to the gums or looks down is in the shade.
-    let shade = (1.0 - 0.3 * turn) * (1.0 - 0.28 * soft * smooth_step(up_palate / 0.9));
+    // The fold toward the gums is in the shade.
+    let shade = (1.0 - 0.3 * turn) * (1.0 + 0.1 * soft * smooth_step(up_palate / 0.8));
     let light = (light + (THROAT_LIGHT - light) * throat) * shade;
     let (tint, pale) = (mucosa_tint(place), up_palate * soft);
     (place, std::array::from_fn(|c| (MUCOSA[c] + (HARD_PALATE[c] - MUCOSA[c]) * pale) * tint[c] * light))
