@@ -223,9 +223,10 @@ mod tests {
                 eye(20.0).stippled(Vec3::ZERO, Vec3::Z, own, 1.0, |v| v),
                 eye(20.0).of_tooth(Vec3::ZERO, Vec3::Z, own, 0.1, |v| v),
             ];
-            let enamel = eye(20.0).of_enamel(Vec3::ZERO, Vec3::Z, own, |v| v);
-            assert!(enamel.is_normalized() && enamel.z > 0.99, "{enamel}");
-            most_tilted = most_tilted.min(enamel.z);
+            // The ridges of a crown's side lie across the tooth's axis.
+            let enamel = eye(20.0).of_enamel(Vec3::ZERO, Vec3::X, own, |v| v);
+            assert!(enamel.is_normalized() && enamel.x > 0.99, "{enamel}");
+            most_tilted = most_tilted.min(enamel.x);
             for normal in near {
                 assert!(normal.is_normalized() && normal.z > 0.85, "{normal}");
                 mean += normal / 8000.0;
