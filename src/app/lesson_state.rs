@@ -17,7 +17,7 @@ use crate::snapshot::LessonSnapshot;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use typodont_audio::{self as audio, PlaybackOptions, PlayerEvent, SoundPlayer, SoundSender};
-use typodont_core::frame::{Pose, Vec3};
+use typodont_core::frame::Vec3;
 use typodont_core::sim::{Command as Tell, HandFrame};
 use typodont_core::touch::{Coefficient, Materials};
 use typodont_core::volume::Label;
@@ -29,7 +29,7 @@ use typodont_exercise::session::{
 use typodont_formats::Library;
 use typodont_lesson::InterruptedSession;
 use typodont_lesson::live::LiveEvent;
-use typodont_render::Orbit;
+use typodont_render::{Orbit, PlaneMirror};
 use typodont_scene::particles::{AssistantAction, CollisionWorld, Tools};
 use typodont_scene::{self as scene};
 use web_time::{Duration, Instant};
@@ -356,23 +356,26 @@ impl LessonState {
         self.is_paused || self.pause_reason.is_some()
     }
 
+    /// The face of the mirror in use, if the instrument is one.
+    pub fn mirror(&self) -> Option<PlaneMirror> {
+        let seen = self.snapshot.as_ref()?;
+        scene::mirror_face(self.scenario.instruments.get(seen.instrument as usize)?, seen.world_from_tip())
+    }
+
     /// Advances dust and water by `elapsed`, s, while the lesson runs.
     fn step_particles(&mut self, elapsed: f32) {
         let does_drill_run = self.stage().is_some_and(|stage| stage.cutting);
         let assistant = self.snapshot.and_then(|seen| seen.assistant);
         let snapshot = self.snapshot.filter(|_| does_drill_run);
         let is_still = self.is_standing_still();
-        let world_from_tip = |seen: LessonSnapshot| Pose { position: seen.tip, orientation: seen.orientation };
-        let mirror = self.snapshot.and_then(|seen| {
-            scene::mirror_face(self.scenario.instruments.get(seen.instrument as usize)?, world_from_tip(seen))
-        });
+        let mirror = self.mirror();
         let Some(LessonScene { particles: Some(field), volume, workpiece, palette, .. }) = &mut self.scene else {
             return;
         };
         if is_still {
             return;
         }
-        let bur = snapshot.and_then(|seen| field.bur(seen.instrument as usize, world_from_tip(seen)));
+        let bur = snapshot.and_then(|seen| field.bur(seen.instrument as usize, seen.world_from_tip()));
         let ground =
             CollisionWorld { volume, world_from_tooth: workpiece.world_from_tooth, obstacles: &workpiece.surroundings };
         let aim = workpiece.world_from_tooth * workpiece.crown_bounds().centre();

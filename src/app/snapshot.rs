@@ -1,6 +1,6 @@
 //! Snapshot of a running session for the window: the newest tick, in a mailbox in which the newest value wins.
 
-use typodont_core::frame::{Quat, Vec3};
+use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::sim::Step;
 use typodont_core::volume::Label;
 use typodont_devices::servo::{AssistantTool, SecondHandRole, TimingSummary};
@@ -98,6 +98,11 @@ const NO_SHARE: f32 = -1.0;
 const NO_LIMIT: u32 = u32::MAX;
 
 impl LessonSnapshot {
+    /// Pose of the instrument's tip.
+    pub fn world_from_tip(&self) -> Pose {
+        Pose { position: self.tip, orientation: self.orientation }
+    }
+
     pub fn new(
         step: &Step,
         orientation: Quat,

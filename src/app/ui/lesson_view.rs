@@ -4,7 +4,7 @@ use crate::command::{AppCommand, PracticeCommand};
 use crate::lesson_scene::{DisplayMode, LessonScene, VolumeSource};
 use crate::lesson_state::LessonState;
 use crate::settings::Settings;
-use crate::snapshot::{InstrumentPose, LessonSnapshot};
+use crate::snapshot::InstrumentPose;
 use crate::ui::section_view::SectionImage;
 use crate::ui::view_refresh::{Redraw, ViewInputs, ViewRefresh};
 use crate::ui::viewport::{EyeWindow, Viewport};
@@ -180,7 +180,6 @@ impl LessonView {
         if let Some(field) = &lesson_scene.particles {
             self.particles.update(field, &viewpoint);
         }
-        let entry = |seen: LessonSnapshot| lesson.scenario.instruments.get(seen.instrument as usize);
         let mut scene = RenderScene {
             tooth: Some(VolumeInstance {
                 volume: lesson_scene.volume_of(source),
@@ -196,7 +195,7 @@ impl LessonView {
             solids: solids(lesson, lesson_scene, settings, &viewpoint, self.bur.turn),
             opaque_particles: self.particles.opaque(),
             translucent_particles: self.particles.translucent(),
-            mirror: lesson.snapshot.and_then(|seen| scene::mirror_face(entry(seen)?, world_from_tip(&seen))),
+            mirror: lesson.mirror(),
             lights: Lights::along(&viewpoint),
             shadows: self
                 .has_shadows(settings, viewport)
@@ -221,10 +220,6 @@ fn second_size(settings: &Settings, viewport: &Viewport, main: [u32; 2]) -> [u32
     if settings.has_second_window() { viewport.second_eye_size() } else { main }
 }
 
-fn world_from_tip(seen: &LessonSnapshot) -> Pose {
-    Pose { position: seen.tip, orientation: seen.orientation }
-}
-
 /// Whatever stands around the tooth, and the instrument in use. `bur_turn`: rotation of a bur, as a share of a turn.
 fn solids(
     lesson: &LessonState,
@@ -245,7 +240,7 @@ fn solids(
     }
     let Some(seen) = &lesson.snapshot else { return solids };
     let index = seen.instrument as usize;
-    let world_from_tip = world_from_tip(seen);
+    let world_from_tip = seen.world_from_tip();
     let placed = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip, ..solid.clone() };
     let turn = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_z(TAU * bur_turn) };
     let turned = |solid: &MeshInstance| MeshInstance { world_from_solid: world_from_tip * turn, ..solid.clone() };
