@@ -7,9 +7,25 @@ use crate::{TissueLabels, grid_of_spacing};
 use typodont_core::frame::Vec3;
 use typodont_core::volume::{Label, Volume, surface};
 
-/// Distance between samples, mm: cusps and ridges show, the finest grooves as shallow valleys. From 0.45 on edges fray, below 0.3
-/// a mouth takes longer to draw than it gains.
-const SPACING: f32 = 0.36;
+/// Distance between samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum CrownDetail {
+    /// 0.36 mm: cusps and ridges show, the finest grooves as shallow valleys. From 0.45 mm on edges fray, below 0.3 mm a whole
+    /// mouth takes longer to draw than it gains.
+    Far,
+    /// 0.2 mm: no corner shows in the outline of a tooth beside the one that fills a picture.
+    Near,
+}
+
+impl CrownDetail {
+    /// mm
+    fn spacing(self) -> f32 {
+        match self {
+            CrownDetail::Far => 0.36,
+            CrownDetail::Near => 0.2,
+        }
+    }
+}
 
 /// Length of root in the gingiva below a crown, mm: farther down a leaning root would leave it.
 const ROOT_LENGTH: f32 = 2.5;
@@ -18,8 +34,8 @@ const ROOT_LENGTH: f32 = 2.5;
 /// cusp.
 const SAMPLE_DISTANCE: f32 = 0.9;
 
-/// Half-width, voxels, of the ramp from nothing to matter where the matter around a place is measured.
-const MEASURED_HALF_BAND: f32 = 1.5;
+/// Half-width, mm, of the ramp from nothing to matter where the matter around a place is measured.
+const MEASURED_HALF_BAND: f32 = 0.54;
 
 /// Share of matter around a place that is flat, and above it until a groove is as dark as can be.
 const FLAT: f32 = 0.53;
@@ -32,11 +48,11 @@ const DRAWN_HALF_BAND: f32 = 3.0;
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm. `recession`: length of root above the gingiva.
-pub fn crown(model: &ToothModel, recession: f32) -> TintedMesh {
-    let grid = grid_of_spacing(&model.form, SPACING).above(-recession - ROOT_LENGTH);
+pub fn crown(model: &ToothModel, recession: f32, detail: CrownDetail) -> TintedMesh {
+    let grid = grid_of_spacing(&model.form, detail.spacing()).above(-recession - ROOT_LENGTH);
     let volume = grow_with_ramp(&model.form, grid, &TISSUES, DRAWN_HALF_BAND);
     let mesh = surface::extract(&volume);
-    let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p)).collect();
+    let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p, detail.spacing())).collect();
     TintedMesh { mesh, tints }
 }
 
@@ -48,7 +64,8 @@ const DEEP: Tint = Tint::smooth([0.93, 0.885, 0.81]);
 const CANINE: Tint = Tint::smooth([0.99, 0.98, 0.95]);
 const PLAIN: Tint = Tint::smooth([1.0, 1.0, 1.0]);
 
-fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
+/// `spacing`: of the volume, mm.
+fn tint(model: &ToothModel, volume: &Volume, place: Vec3, spacing: f32) -> Tint {
     let sizes = &model.form.sizes;
     let [mesial, distal] = sizes.neckline_rise;
     let rise = if place.y < 0.0 { mesial } else { distal };
@@ -60,23 +77,23 @@ fn tint(model: &ToothModel, volume: &Volume, place: Vec3) -> Tint {
         ToothKind::Incisor => mixed_tint(on_enamel, EDGE, (height - 0.75) / 0.25),
         ToothKind::Canine => on_enamel,
         ToothKind::Premolar | ToothKind::Molar if height > 0.3 => {
-            mixed_tint(on_enamel, DEEP, groove_depth(volume, place))
+            mixed_tint(on_enamel, DEEP, groove_depth(volume, place, DRAWN_HALF_BAND * spacing))
         }
         ToothKind::Premolar | ToothKind::Molar => on_enamel,
     };
     // Over a sample's width, so that the neckline is a line and not a stair.
-    mixed_tint(ROOT, enamel, 0.5 + (place.z - neckline) / SPACING)
+    mixed_tint(ROOT, enamel, 0.5 + (place.z - neckline) / spacing)
 }
 
-/// 0 on flat or bulging places, 1 deep in a groove.
-fn groove_depth(volume: &Volume, place: Vec3) -> f32 {
+/// 0 on flat or bulging places, 1 deep in a groove. `half_band`: half the width of the volume's density ramp, mm.
+fn groove_depth(volume: &Volume, place: Vec3, half_band: f32) -> f32 {
     const CORNERS: [[f32; 3]; 8] = {
         const S: f32 = 0.577;
         [[S, S, S], [S, S, -S], [S, -S, S], [S, -S, -S], [-S, S, S], [-S, S, -S], [-S, -S, S], [-S, -S, -S]]
     };
     let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
     let directions = axes.into_iter().chain(CORNERS.map(Vec3::from));
-    let share = |density: f32| (0.5 + (density - 0.5) * DRAWN_HALF_BAND / MEASURED_HALF_BAND).clamp(0.0, 1.0);
+    let share = |density: f32| (0.5 + (density - 0.5) * half_band / MEASURED_HALF_BAND).clamp(0.0, 1.0);
     let matter: f32 = directions.map(|way| share(volume.density_at(place + way * SAMPLE_DISTANCE))).sum();
     ((matter / 14.0 - FLAT) / DEEPER).clamp(0.0, 1.0)
 }
@@ -90,8 +107,9 @@ mod tests {
     #[test]
     fn every_crown_is_closed_and_as_large_as_the_table_says() {
         // Aim: a closed surface facing outward, of the table's widths and length to a sample's distance.
-        for model in UPPER.iter().chain(&LOWER) {
-            let TintedMesh { mesh, tints } = crown(model, 0.0);
+        let details = [CrownDetail::Far, CrownDetail::Near];
+        for (model, detail) in UPPER.iter().chain(&LOWER).flat_map(|model| details.map(|detail| (model, detail))) {
+            let TintedMesh { mesh, tints } = crown(model, 0.0, detail);
             let sizes = &model.sizes;
             assert!(ClosedMesh::new(&mesh).is_some(), "{sizes:?} is closed");
             assert!(mesh.volume_mm3() > 50.0, "{sizes:?}");
@@ -100,8 +118,8 @@ mod tests {
             let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
             let found = Vec3::new(high.x - low.x, high.y - low.y, high.z);
             let wanted = Vec3::new(sizes.buccolingual[0], sizes.mesiodistal[0], sizes.crown);
-            assert!((found - wanted).abs().max_element() < SPACING, "{found} not {wanted}");
-            assert!((low.z + ROOT_LENGTH).abs() < 2.0 * SPACING, "the root ends at {}", low.z);
+            assert!((found - wanted).abs().max_element() < detail.spacing(), "{found} not {wanted}");
+            assert!((low.z + ROOT_LENGTH).abs() < 2.0 * detail.spacing(), "the root ends at {}", low.z);
         }
     }
 }

@@ -247,7 +247,8 @@ fn with_arc_length(curve: &[[f32; 2]]) -> Vec<[f32; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{crown, tooth_model};
+    use super::super::crown::{self, CrownDetail};
+    use super::super::tooth_model;
     use super::*;
     use typodont_core::mesh::Mesh;
     use typodont_core::touch::ClosedMesh;
@@ -259,7 +260,8 @@ mod tests {
 
     /// Each crown's surface, arch space.
     fn crowns(half: &HalfArch, models: &[ToothModel]) -> Vec<(Mesh, Pose)> {
-        let crown = |(model, seat): (&ToothModel, &ToothSeat)| (crown::crown(model, 0.0).mesh, seat.arch_from_tooth());
+        let mesh = |model: &ToothModel| crown::crown(model, 0.0, CrownDetail::Far).mesh;
+        let crown = |(model, seat): (&ToothModel, &ToothSeat)| (mesh(model), seat.arch_from_tooth());
         models.iter().zip(&half.seats).map(crown).collect()
     }
 

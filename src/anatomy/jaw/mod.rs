@@ -12,6 +12,7 @@ mod rubber_dam;
 mod tinted_mesh;
 mod tooth_model;
 
+use self::crown::CrownDetail;
 use self::gum::HalfJaw;
 use self::half_arch::{ArchShape, HalfArch};
 use self::tooth_model::{ToothKind, ToothModel};
@@ -110,6 +111,8 @@ pub struct DentalArch {
     age: Option<f32>,
     /// On which side of x the fitted tooth stands: 1 or −1.
     sign: f32,
+    /// Its place from the midline.
+    fitted_index: Option<usize>,
     /// The side with the fitted tooth and the other; each is laid out at x > 0.
     fitted: ArchSide,
     plain: ArchSide,
@@ -133,6 +136,7 @@ impl DentalArch {
             models[number - 1] = fitted_model(&models[number - 1], tooth.crown);
         }
         let sign = fitted.map_or(1.0, |(tooth, _)| distal_sign(tooth.fdi));
+        let fitted_index = fitted.map(|(_, number)| number - 1);
         let average = jaw.average_shape();
         let shape = ArchShape { width: plan.width.unwrap_or(average.width), depth: plan.depth, ..average };
         let row = |mut models: Vec<ToothModel>, side: f32| {
@@ -148,9 +152,9 @@ impl DentalArch {
         };
         if fitted.is_none() && plan.rotated.is_empty() {
             let both = row(plain, -sign);
-            return DentalArch { jaw, age: plan.age, sign, fitted: both.clone(), plain: both };
+            return DentalArch { jaw, age: plan.age, sign, fitted_index, fitted: both.clone(), plain: both };
         }
-        DentalArch { jaw, age: plan.age, sign, fitted: row(models, sign), plain: row(plain, -sign) }
+        DentalArch { jaw, age: plan.age, sign, fitted_index, fitted: row(models, sign), plain: row(plain, -sign) }
     }
 
     /// Pose of the arch in which a fitted tooth's crown, a box in tooth space, stands in its seat: `arch_from_tooth`. `None` for a
@@ -196,22 +200,31 @@ impl DentalArch {
         side(1.0).chain(side(-1.0)).collect()
     }
 
-    /// All crowns but those that are left out, by side of x and place from the midline.
+    /// All crowns but those that are left out, by side of x and place from the midline; those beside the fitted tooth in more detail.
     pub fn crowns(&self, is_left_out: &dyn Fn(f32, usize, &ToothSeat) -> bool) -> TintedMesh {
         let recession = self.recession().into_iter().fold(0.0, f32::max);
-        let model = |index: usize| &self.plain.models[index];
-        let crowns = parallel::par_map(self.plain.models.len(), |index| crown::crown(model(index), recession));
+        let rows = [(&self.fitted, self.sign), (&self.plain, -self.sign)];
+        let teeth = rows
+            .into_iter()
+            .flat_map(|(row, sign)| row.half.seats.iter().enumerate().map(move |(index, seat)| (sign, index, seat)));
+        let drawn: Vec<_> = teeth.filter(|&(sign, index, seat)| !is_left_out(sign, index, seat)).collect();
+        let detail = |sign: f32, index: usize| {
+            let is_beside = sign == self.sign && self.fitted_index.is_some_and(|fitted| fitted.abs_diff(index) == 1);
+            if is_beside { CrownDetail::Near } else { CrownDetail::Far }
+        };
+        // Twins on both sides share a form.
+        let mut forms: Vec<(usize, CrownDetail)> =
+            drawn.iter().map(|&(sign, index, _)| (index, detail(sign, index))).collect();
+        forms.sort_unstable();
+        forms.dedup();
+        let crown = |i: usize| crown::crown(&self.plain.models[forms[i].0], recession, forms[i].1);
+        let crowns = parallel::par_map(forms.len(), crown);
         let mut all = TintedMesh::default();
-        for (index, crown) in crowns.iter().enumerate() {
-            for (row, sign) in [(&self.fitted, self.sign), (&self.plain, -self.sign)] {
-                let seat = &row.half.seats[index];
-                if is_left_out(sign, index, seat) {
-                    continue;
-                }
-                let pose = seat.arch_from_tooth();
-                let side = Vec3::new(sign, 1.0, 1.0);
-                all.append(crown, |p| pose * p * side, |n| pose.rotate(n) * side, sign < 0.0);
-            }
+        for (sign, index, seat) in drawn {
+            let form = forms.binary_search(&(index, detail(sign, index))).unwrap_or_default();
+            let pose = seat.arch_from_tooth();
+            let side = Vec3::new(sign, 1.0, 1.0);
+            all.append(&crowns[form], |p| pose * p * side, |n| pose.rotate(n) * side, sign < 0.0);
         }
         all
     }
