@@ -56,6 +56,8 @@ const POLISHED: f32 = 0.5;
 const EDGE: vec2f = vec2f(0.35, 0.7);
 // Share of the light that hollows lose and their walls throw back, for a white wall.
 const RETURNED: f32 = 0.5;
+// Share of the lamp's light that comes through a white tissue from around its shadow.
+const SHADOW_GLOW: f32 = 0.25;
 // Brightness up to which the tone map changes nothing, and the rate at which brighter light turns white.
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;
@@ -257,12 +259,12 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
         // Light spreads farther in a tissue the less of it is absorbed: red in gingiva. The total stays the same.
         let wrap = lamp.position.w * albedo;
         let scattered = max((dot(normal, to_lamp) + wrap) / ((1.0 + wrap) * (1.0 + wrap)), vec3f(0.0));
-        var strength = lamp.colour.xyz;
+        var seen = 1.0;
         if has_shadows && i == 0 && any(scattered > vec3f(0.0)) {
-            strength *= lamp_share(point, normal);
+            seen = lamp_share(point, normal);
         }
-        light += strength * scattered;
-        shine += strength * coat(finish.a, normal, to_lamp, to_eye);
+        light += lamp.colour.xyz * scattered * mix(SHADOW_GLOW * albedo, vec3f(1.0), seen);
+        shine += lamp.colour.xyz * (seen * coat(finish.a, normal, to_lamp, to_eye));
     }
     let reached = open / (1.0 - RETURNED * albedo * (1.0 - open));
     return sqrt(tone(albedo * light * reached * (1.0 - mirrored) + shine * open));

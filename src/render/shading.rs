@@ -17,6 +17,9 @@ const POLISHED: f32 = 0.5;
 const EDGE: [f32; 2] = [0.35, 0.7];
 /// Share of the light that hollows lose and their walls throw back, for a white wall: so fissures are warm, not grey.
 const RETURNED: f32 = 0.5;
+/// Share of the lamp's light that comes through a white tissue from around its shadow: enamel of 1 mm lets half of the light through,
+/// so shadows on teeth and gingiva are neither black nor grey. The share is an estimate.
+const SHADOW_GLOW: f32 = 0.25;
 /// Brightness up to which the tone map changes nothing, and the rate at which brighter light turns white.
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;
@@ -60,9 +63,10 @@ impl Lights {
             let beyond = Vec3::ONE + wrap;
             let scattered = ((Vec3::splat(normal.dot(to_lamp)) + wrap) / (beyond * beyond)).max(Vec3::ZERO);
             let seen = if is_chair && scattered != Vec3::ZERO { chair_share() } else { 1.0 };
-            let colour = Vec3::from(lamp.colour) * (lamp.strength * seen);
-            light += colour * scattered;
-            shine += colour * coat(finish.gloss, normal, to_lamp, to_eye);
+            let colour = Vec3::from(lamp.colour) * lamp.strength;
+            let through = SHADOW_GLOW * albedo;
+            light += colour * scattered * (through + seen * (Vec3::ONE - through));
+            shine += colour * seen * coat(finish.gloss, normal, to_lamp, to_eye);
         }
         let reached = open / (Vec3::ONE - RETURNED * albedo * (1.0 - open));
         albedo * light * reached * (1.0 - mirrored) + shine * open
