@@ -23,7 +23,7 @@ const IN_FRONT: f32 = 8.0;
 const FACE_RADIUS: f32 = 75.0;
 
 /// Parts around the opening.
-const PARTS: usize = 192;
+const PARTS: usize = 320;
 
 /// Exponent of the opening's outline: below 2 it is pointed toward the corners of the mouth.
 const ROUNDNESS: f32 = 1.8;
@@ -56,6 +56,10 @@ const SECTION: [[f32; 4]; 21] = [
 
 /// The row of the section at which the lip ends.
 const LIP_ENDS: usize = 10;
+
+/// Depth of the deepest furrow across the lips, mm, and the light that it loses.
+const FURROW_DEPTH: f32 = 0.35;
+const FURROW_SHADE: f32 = 0.16;
 
 const LIP: Rgb = [0.64, 0.39, 0.36];
 const SKIN: Rgb = [0.74, 0.58, 0.49];
@@ -121,6 +125,13 @@ impl Lips {
         MeshInstance { casts_shadow: false, ..plain }
     }
 
+    /// Where the inside of the lips ends in a direction from the middle of the opening, radians from +x toward +y: its place in world
+    /// space, and its colour.
+    pub(super) fn inner_edge(&self, turn: f32) -> (Vec3, Rgb) {
+        let (place, colour) = section_at(turn, self.half_height).next().unwrap_or_default();
+        (self.solid.world_from_solid * place, colour)
+    }
+
     /// The lips, unless they would stand between an eye and what it looks at.
     pub fn seen_from(&self, viewpoint: &Viewpoint) -> Option<MeshInstance> {
         /// Share of the opening through which an eye looks past the lips.
@@ -145,26 +156,10 @@ pub(super) fn orientation_of_mouth([lower, upper]: [Vec3; 2], front: Vec3) -> Qu
 /// A ring of sections around an oval opening in the plane z = 0, which looks toward +z, and its colours.
 fn lip_mesh(half_height: f32) -> (Mesh, Vec<Rgb>) {
     let (mut positions, mut colours) = (Vec::new(), Vec::new());
-    let [lip_width, ..] = SECTION[LIP_ENDS];
     for part in 0..PARTS {
-        let turn = TAU * part as f32 / PARTS as f32;
-        let (cos, sin) = (libm::cosf(turn), libm::sinf(turn));
-        let power = |value: f32| libm::powf(value.abs(), ROUNDNESS);
-        let radius = libm::powf(power(cos) + power(sin), -1.0 / ROUNDNESS);
-        let edge = Vec3::new(HALF_WIDTH * cos * radius, half_height * sin * radius, 0.0);
-        // Outward, as the outline of an ellipse runs.
-        let out = Vec3::new(cos / HALF_WIDTH, sin / half_height, 0.0).normalize_or(Vec3::X);
-        let width = lip_share(edge.x, sin);
-        // Fine furrows across the lip.
-        let furrows = 0.018 * libm::sinf(47.0 * turn) + 0.015 * libm::sinf(83.0 * turn + 1.0);
-        for (row, [beyond, forward, lip, light]) in SECTION.into_iter().enumerate() {
-            let narrowed = if row <= LIP_ENDS { beyond * width } else { beyond - lip_width * (1.0 - width) };
-            let place = edge + out * narrowed;
-            // The cheeks lie back from the lips' middle.
-            positions.push(place.with_z(forward * width.sqrt() - place.x * place.x / (2.0 * FACE_RADIUS)));
-            let light = light * (1.0 + lip * furrows);
-            let colour = |i: usize| DARK[i] + light * (SKIN[i] + lip * (LIP[i] - SKIN[i]) - DARK[i]);
-            colours.push([colour(0), colour(1), colour(2)]);
+        for (place, colour) in section_at(TAU * part as f32 / PARTS as f32, half_height) {
+            positions.push(place);
+            colours.push(colour);
         }
     }
     let rows = SECTION.len();
@@ -177,6 +172,37 @@ fn lip_mesh(half_height: f32) -> (Mesh, Vec<Rgb>) {
     let mut mesh = Mesh { positions, normals: Vec::new(), triangles };
     mesh.compute_normals();
     (mesh, colours)
+}
+
+/// Places and colours of the section in a direction from the middle of the opening, radians from +x toward +y; from the inside outward.
+fn section_at(turn: f32, half_height: f32) -> impl Iterator<Item = (Vec3, Rgb)> {
+    let (cos, sin) = (libm::cosf(turn), libm::sinf(turn));
+    let power = |value: f32| libm::powf(value.abs(), ROUNDNESS);
+    let radius = libm::powf(power(cos) + power(sin), -1.0 / ROUNDNESS);
+    let edge = Vec3::new(HALF_WIDTH * cos * radius, half_height * sin * radius, 0.0);
+    // Outward, as the outline of an ellipse runs.
+    let out = Vec3::new(cos / HALF_WIDTH, sin / half_height, 0.0).normalize_or(Vec3::X);
+    let width = lip_share(edge.x, sin);
+    let furrow = furrow_at(turn);
+    let [lip_width, ..] = SECTION[LIP_ENDS];
+    SECTION.into_iter().enumerate().map(move |(row, [beyond, forward, lip, light])| {
+        let narrowed = if row <= LIP_ENDS { beyond * width } else { beyond - lip_width * (1.0 - width) };
+        let place = edge + out * narrowed;
+        let light = light * (1.0 - FURROW_SHADE * lip * furrow);
+        let colour = |i: usize| DARK[i] + light * (SKIN[i] + lip * (LIP[i] - SKIN[i]) - DARK[i]);
+        // The cheeks lie back from the lips' middle.
+        let z = forward * width.sqrt() - place.x * place.x / (2.0 * FACE_RADIUS) - FURROW_DEPTH * lip * furrow;
+        (place.with_z(z), [colour(0), colour(1), colour(2)])
+    })
+}
+
+/// Depth of the furrows across the lips in a direction from the middle of the opening, radians: 0 on the ridges between them to 1, some
+/// close together and some apart.
+fn furrow_at(turn: f32) -> f32 {
+    let bent = turn + 0.035 * libm::sinf(9.0 * turn) + 0.02 * libm::sinf(23.0 * turn + 2.0);
+    let wave = |count: f32, phase: f32| 0.5 + 0.5 * libm::sinf(count * bent + phase);
+    let deep = 0.4 + 0.6 * wave(11.0, 0.7);
+    deep * (0.6 * libm::powf(wave(47.0, 0.0), 3.0) + 0.4 * libm::powf(wave(83.0, 1.0), 2.0))
 }
 
 /// Width of the lip as a share of the section's: narrow toward the corners, above with two peaks beside the middle. `x`: mm beside

@@ -3,7 +3,7 @@
 //! Takes the arch spaces of both jaws in world space, mm. Forms and colours are estimates from photographs of open mouths; none of it
 //! is touched.
 
-use super::lips::orientation_of_mouth;
+use super::lips::{Lips, orientation_of_mouth};
 use std::f32::consts::PI;
 use std::sync::Arc;
 use typodont_core::frame::{Pose, Vec3, smooth_step};
@@ -11,11 +11,11 @@ use typodont_core::mesh::Mesh;
 use typodont_exercise::catalog::catmull_rom;
 use typodont_render::{Appearance, MeshInstance, Rgb, VertexTint};
 
-/// Outline of the cheeks and the throat in plan, from the corner of the mouth to the midline: the distance from the midline and behind
+/// Outline of the cheeks and the throat in plan, from behind the corner of the mouth to the midline: the distance from the midline and behind
 /// the incisors' edges, mm, and how bright it is.
 const WALL: [[f32; 3]; 12] = [
-    [44.0, 15.0, 0.80],
-    [40.5, 18.0, 0.90],
+    [43.0, 15.0, 0.85],
+    [40.5, 18.0, 0.92],
     [38.0, 22.0, 1.00],
     [37.3, 28.0, 1.00],
     [37.0, 34.0, 0.95],
@@ -33,7 +33,7 @@ const AVERAGE_TEETH: [f32; 2] = [32.0, 50.0];
 
 /// Half the height of the wall at the lips and at the throat, mm, and by how much the soft palate arches forward to the hard one.
 const HALF_HEIGHTS: [f32; 2] = [46.0, 30.0];
-const LEAN: f32 = 22.0;
+const LEAN: f32 = 40.0;
 
 /// By how much the cheek bulges between the rows of teeth, and half the height of the bulge; by how much it turns in toward the gums,
 /// and the heights over the middle between which it does, mm.
@@ -54,6 +54,12 @@ const THROAT_LIGHT: f32 = 0.22;
 
 /// Rows of the wall from below upward.
 const WALL_ROWS: usize = 64;
+
+/// The pouch of the cheek between the wall and the inside of the lips: how far around the lips it reaches from the corner of the mouth,
+/// radians, the ways in which its curve leaves the wall and comes to the lips (aside and ahead, mm), and its columns.
+const AT_LIPS: f32 = 1.05;
+const POUCH: [[f32; 2]; 2] = [[8.0, 9.0], [10.0, -4.0]];
+const LIP_STEPS: usize = 10;
 
 /// Greatest distance between two columns of the wall, mm.
 const WALL_STEP: f32 = 1.0;
@@ -83,8 +89,6 @@ const TONGUE_ROWS: usize = 33;
 const FURROW: [f32; 2] = [1.1, 2.2];
 
 const MUCOSA: Rgb = [0.76, 0.39, 0.37];
-/// The soft palate goes over into the hard one's colour.
-const HARD_PALATE: Rgb = [0.72, 0.50, 0.46];
 const TONGUE_SIDE: Rgb = [0.76, 0.42, 0.41];
 /// The papillae of its back are pale.
 const TONGUE_BACK: Rgb = [0.80, 0.52, 0.50];
@@ -101,12 +105,23 @@ pub struct OralCavity {
 }
 
 impl OralCavity {
-    /// `front`: unit vector out of the mouth. `teeth`: their reach aside and back in both jaws, arch space, mm.
-    pub fn between(world_from_lower: Pose, world_from_upper: Pose, front: Vec3, teeth: [f32; 2]) -> OralCavity {
+    /// `lips`: around both jaws. `front`: unit vector out of the mouth. `teeth`: their reach aside and back in both jaws, arch space, mm.
+    pub fn between(
+        world_from_lower: Pose,
+        world_from_upper: Pose,
+        lips: &Lips,
+        front: Vec3,
+        teeth: [f32; 2],
+    ) -> OralCavity {
         let [lower, upper] = [world_from_lower, world_from_upper].map(|arch| arch.position);
         let middle = Pose { position: lower.midpoint(upper), orientation: orientation_of_mouth([lower, upper], front) };
+        let middle_from_world = middle.inverse();
+        let at_lips = |turn: f32| {
+            let (place, colour) = lips.inner_edge(turn);
+            (middle_from_world * place, colour)
+        };
         OralCavity {
-            wall: solid(wall_mesh(teeth), middle, WALL_GLOSS),
+            wall: solid(wall_mesh(teeth, &at_lips), middle, WALL_GLOSS),
             tongue: solid(tongue_mesh(), world_from_lower, GLOSS),
         }
     }
@@ -123,8 +138,8 @@ fn solid((mesh, tints): (Mesh, Vec<VertexTint>), world_from_solid: Pose, gloss: 
 }
 
 /// Cheeks and throat as a curtain around the jaws, from the left corner of the mouth to the right one: x aside, y up, z out of the
-/// mouth.
-fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
+/// mouth. `at_lips`: place and colour of the lips' inner edge in a direction from the middle of the opening, radians from +x toward +y.
+fn wall_mesh(teeth: [f32; 2], at_lips: &dyn Fn(f32) -> (Vec3, Rgb)) -> (Mesh, Vec<VertexTint>) {
     let [wider, longer] = [0, 1].map(|i| (teeth[i] - AVERAGE_TEETH[i]).max(0.0));
     let outline = WALL.map(|[aside, behind, light]| {
         // Neither the corners of the mouth nor the throat are wider.
@@ -134,15 +149,32 @@ fn wall_mesh(teeth: [f32; 2]) -> (Mesh, Vec<VertexTint>) {
     let half = catmull_rom(&outline, WALL_STEP);
     let left = half.iter().map(|place| place.with_x(-place.x));
     let outline: Vec<Vec3> = left.chain(half.iter().rev().skip(1).copied()).collect();
-    let (mut positions, mut tints) = (Vec::new(), Vec::new());
-    for &on_outline in &outline {
-        for row in 0..=WALL_ROWS {
-            let (place, colour) = wall_corner(on_outline, 2.0 * row as f32 / WALL_ROWS as f32 - 1.0);
-            positions.push(place);
-            tints.push(VertexTint::smooth(colour));
-        }
-    }
-    (sheet(positions, outline.len(), WALL_ROWS + 1), tints)
+    let heights = (0..=WALL_ROWS).map(|row| 2.0 * row as f32 / WALL_ROWS as f32 - 1.0);
+    let to_lips = |on_outline: Vec3, share: f32, height: f32| {
+        let (from, from_colour) = wall_corner(on_outline, height);
+        let turn = AT_LIPS * height;
+        let (to, to_colour) = at_lips(if from.x > 0.0 { turn } else { PI - turn });
+        // A cubic curve that goes on as the wall does and comes to the lips from aside.
+        let rest = 1.0 - share;
+        let [wall_way, lips_way] = POUCH.map(|[aside, ahead]| Vec3::new(aside * from.x.signum(), 0.0, ahead));
+        let place = from.lerp(to, share * share * (3.0 - 2.0 * share))
+            + wall_way * (share * rest * rest)
+            + lips_way * (share * share * rest);
+        let mix = |a: f32, b: f32| a + (b - a) * smooth_step(share);
+        (place, std::array::from_fn(|c| mix(from_colour[c], to_colour[c])))
+    };
+    let ends = outline.first().copied().zip(outline.last().copied());
+    let between = |end: Vec3, step: usize| {
+        let share = step as f32 / LIP_STEPS as f32;
+        heights.clone().map(move |height| to_lips(end, share, height))
+    };
+    let before = ends.iter().flat_map(|&(left, _)| (1..=LIP_STEPS).rev().flat_map(move |step| between(left, step)));
+    let after = ends.iter().flat_map(|&(_, right)| (1..=LIP_STEPS).flat_map(move |step| between(right, step)));
+    let wall =
+        outline.iter().flat_map(|&on_outline| heights.clone().map(move |height| wall_corner(on_outline, height)));
+    let (positions, colours): (Vec<Vec3>, Vec<Rgb>) = before.chain(wall).chain(after).unzip();
+    let tints = colours.into_iter().map(VertexTint::smooth).collect();
+    (sheet(positions, outline.len() + 2 * LIP_STEPS, WALL_ROWS + 1), tints)
 }
 
 /// Place and colour of the wall over a place of its outline, at a height from −1 below to 1 above.
@@ -164,10 +196,10 @@ fn wall_corner(Vec3 { x, y: behind, z: light }: Vec3, height: f32) -> (Vec3, Rgb
     let inward = BULGE[0] * cheek * libm::expf(-(y / BULGE[1]) * (y / BULGE[1])) + TURNS_IN * turn;
     let place = Vec3::new(x - x.signum() * inward, y, forward - behind);
     // The fold toward the gums is in the shade.
-    let shade = (1.0 - 0.3 * turn) * (1.0 + 0.1 * soft * smooth_step(up_palate / 0.8));
+    let shade = (1.0 - 0.3 * turn) * (1.0 + 0.15 * soft * smooth_step(up_palate / 0.9));
     let light = (light + (THROAT_LIGHT - light) * throat) * shade;
-    let (tint, pale) = (mucosa_tint(place), up_palate * soft);
-    (place, std::array::from_fn(|c| (MUCOSA[c] + (HARD_PALATE[c] - MUCOSA[c]) * pale) * tint[c] * light))
+    let tint = mucosa_tint(place);
+    (place, std::array::from_fn(|c| MUCOSA[c] * tint[c] * light))
 }
 
 /// The tongue in the lower jaw's arch space.
@@ -240,7 +272,8 @@ mod tests {
             let lower_from_upper = Occlusion::new(&arches[0], &arches[1], 0.0).near_from_opposite(WORKING_OPENING_DEG);
             let poses = [Pose::IDENTITY, lower_from_upper];
             let front = poses.map(|arch| arch.rotate(Vec3::NEG_Y)).iter().sum::<Vec3>().normalize();
-            let cavity = OralCavity::between(poses[0], poses[1], front, teeth);
+            let lips = Lips::around(poses.map(|arch| arch.position), front);
+            let cavity = OralCavity::between(poses[0], poses[1], &lips, front, teeth);
             assert_eq!(cavity.solids(false).count(), 1);
             let [wall, tongue] = [true, false].map(|is_wall| cavity.solids(true).nth(usize::from(!is_wall)).unwrap());
             let aside = |places: &mut dyn Iterator<Item = Vec3>, slice: f32, of: fn(f32, f32) -> f32| {

@@ -1,6 +1,6 @@
 //! Solids around the tooth, drawn as they are touched.
 
-use super::jaw::{Mouth, vertex_tint};
+use super::jaw::{Mouth, gum_tint, vertex_tint};
 use super::palette::GLOSS;
 use super::soft_tissue::YieldingSurface;
 use std::sync::Arc;
@@ -94,7 +94,7 @@ fn gum_tints(gum: &Periodontium, workpiece: &Workpiece, mesh: &Mesh) -> Vec<Vert
         let side = if place.x < middle.x { RidgeSide::Inner } else { RidgeSide::Outer };
         ridge_tint(jaw, side, place.z, [gum.margin(azimuth), gum.neckline(azimuth)], gum.distance_to_tooth(*place))
     };
-    mesh.positions.iter().map(|place| vertex_tint(tint(place))).collect()
+    mesh.positions.iter().map(|place| vertex_tint(gum_tint(tint(place), *place))).collect()
 }
 
 /// A shape's surface in tooth space.

@@ -47,6 +47,9 @@ const SMOOTHING: usize = 4;
 /// Length of the tuberosity or retromolar pad behind the last molar, mm.
 const PAD: f32 = 8.0;
 
+/// Distance before the end of the last tooth, mm, from which its tints go over into those of soft palate and cheeks.
+const BEFORE_SOFT: f32 = 6.0;
+
 /// Height of a jaw's flat base below the occlusal plane, mm.
 const BASE: f32 = -27.0;
 
@@ -228,7 +231,11 @@ impl HalfJaw<'_> {
             };
             rows.push((Vec3::new(x, y, z + relief(jaw, front, x, y)), mixed_tint(tint, inner, 2.5 * share)));
         }
-        rows.iter().map(|&(p, tint)| (Vec3::new(p.x * self.sign, p.y, p.z), tint)).collect()
+        // Behind the teeth it goes over into the mucosa of throat and cheeks.
+        let behind = smooth_step((arc_length - self.half.length() + BEFORE_SOFT) / (PAD + BEFORE_SOFT));
+        rows.iter()
+            .map(|&(p, tint)| (Vec3::new(p.x * self.sign, p.y, p.z), mixed_tint(tint, SOFT_PALATE, behind)))
+            .collect()
     }
 
     /// The ridge's section, from cheek to tongue.
@@ -424,6 +431,7 @@ const SULCUS: Tint = Tint::smooth([0.84, 0.64, 0.63]);
 const LINE: Tint = Tint::smooth([0.97, 0.87, 0.86]);
 const MUCOSA: Tint = Tint::smooth([0.90, 0.70, 0.69]);
 const PALATE: Tint = Tint::stippled([0.98, 0.96, 0.94], 0.4);
+const SOFT_PALATE: Tint = Tint::smooth([0.80, 0.62, 0.60]);
 const FLOOR: Tint = Tint::smooth([0.88, 0.68, 0.67]);
 
 /// Heights below the gingival margin, mm, between which the gingiva is free.
@@ -555,12 +563,12 @@ pub(super) fn open_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
 fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
     let mut made = open_sheet(columns);
     let rows = columns[0].len();
-    let mut flat = |places: &dyn Fn(usize) -> [Vec3; 2], count: usize, normal: Vec3| {
+    let mut flat = |places: &dyn Fn(usize) -> [Vec3; 2], count: usize, normal: Vec3, tint: Tint| {
         let first = made.mesh.positions.len() as u32;
         for i in 0..count {
             made.mesh.positions.extend(places(i));
             made.mesh.normals.extend([normal; 2]);
-            made.tints.extend([MUCOSA; 2]);
+            made.tints.extend([tint; 2]);
         }
         for i in 0..count as u32 - 1 {
             let [a, b, c, d] = [0, 1, 2, 3].map(|n| first + 2 * i + n);
@@ -568,14 +576,15 @@ fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
         }
     };
     let onto_base = |p: Vec3| Vec3::new(p.x, p.y, BASE);
-    flat(&|c| [Vec3::new(0.0, columns[c][0].0.y, BASE), columns[c][0].0].map(onto_base), columns.len(), Vec3::NEG_Z);
+    let base = |c: usize| [Vec3::new(0.0, columns[c][0].0.y, BASE), columns[c][0].0].map(onto_base);
+    flat(&base, columns.len(), Vec3::NEG_Z, MUCOSA);
     let last = columns.len() - 1;
     for (column, is_first) in [(&columns[0], true), (&columns[last], false)] {
         let pair = |r: usize| {
             let [top, foot] = [column[r].0, onto_base(column[r].0)];
             if is_first { [foot, top] } else { [top, foot] }
         };
-        flat(&pair, rows, Vec3::Y);
+        flat(&pair, rows, Vec3::Y, SOFT_PALATE);
     }
     made
 }

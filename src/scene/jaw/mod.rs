@@ -8,7 +8,7 @@ mod rubber_dam;
 
 use self::rubber_dam::{ISOLATED_BESIDE, RubberDam};
 use super::lips::Lips;
-use super::oral_cavity::OralCavity;
+use super::oral_cavity::{OralCavity, mucosa_tint};
 use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
@@ -83,8 +83,11 @@ struct JawMeshes {
 }
 
 impl JawMeshes {
-    fn new(teeth: TintedMesh, gum: TintedMesh, tissues: &TissueTable) -> JawMeshes {
+    fn new(teeth: TintedMesh, mut gum: TintedMesh, tooth_from_arch: Pose, tissues: &TissueTable) -> JawMeshes {
         let colour = |name: &str, otherwise: Rgb| tissues.by_name(name).map_or(otherwise, |e| e.rgb());
+        for (place, tint) in gum.mesh.positions.iter().zip(&mut gum.tints) {
+            *tint = gum_tint(*tint, tooth_from_arch * *place);
+        }
         JawMeshes {
             teeth: FinishedMesh {
                 is_enamel: true,
@@ -102,6 +105,12 @@ impl JawMeshes {
 /// The tint of an anatomical surface as it is drawn.
 pub(super) fn vertex_tint(Tint { colour, stippling }: Tint) -> VertexTint {
     VertexTint { colour, stippling }
+}
+
+/// The tint of gingiva at a place in tooth space, redder here and paler there.
+pub(super) fn gum_tint(Tint { colour, stippling }: Tint, place_in_tooth: Vec3) -> Tint {
+    let local = mucosa_tint(place_in_tooth);
+    Tint { colour: std::array::from_fn(|c| colour[c] * local[c]), stippling }
 }
 
 /// A mesh with tints, and the finish they are multiplied with.
@@ -155,7 +164,7 @@ impl Mouth {
         let near = workpiece.arch.of_jaw(jaw, workpiece.teeth.iter().map(|tooth| tooth.fdi));
         let other = workpiece.arch.of_jaw(jaw.other(), []);
         Mouth {
-            near: JawMeshes::new(TintedMesh::default(), near.gum(GumForm::Touched, &|p| p), tissues),
+            near: JawMeshes::new(TintedMesh::default(), near.gum(GumForm::Touched, &|p| p), tooth_from_arch, tissues),
             opposite: None,
             jaw,
             world_from_near: workpiece.world_from_tooth * tooth_from_arch,
@@ -177,15 +186,15 @@ impl Mouth {
     ) -> Option<Mouth> {
         let numbers: Vec<u8> = workpiece.teeth.iter().map(|tooth| tooth.fdi).collect();
         let arches = MouthArches::around_tooth(&workpiece.arch, tooth, &numbers)?;
-        let drawn = |arch: &DentalArch| {
+        let drawn = |arch: &DentalArch, tooth_from_arch: Pose| {
             let is_there = |fdi: u8| others.iter().any(|tooth| tooth.fdi == fdi);
             let crowns = arch.crowns(&|side, index, _| !is_there(arch.jaw().fdi(side, index)));
-            JawMeshes::new(crowns, arch.gum(GumForm::Touched, &|p| p), tissues)
+            JawMeshes::new(crowns, arch.gum(GumForm::Touched, &|p| p), tooth_from_arch, tissues)
         };
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         Some(Mouth {
-            near: drawn(&arches.near),
-            opposite: Some(drawn(&arches.opposite)),
+            near: drawn(&arches.near, arches.tooth_from_near),
+            opposite: Some(drawn(&arches.opposite, Pose::IDENTITY)),
             jaw: arches.near.jaw(),
             world_from_near: workpiece.world_from_tooth * arches.tooth_from_near,
             occlusion: workpiece.arch.occlusion(&arches.near, &arches.opposite),
@@ -205,7 +214,7 @@ impl Mouth {
         let fitted = FittedTooth { fdi: tooth.fdi, crown: tooth.crown.size() };
         let near = DentalArch::new(jaw, 7, Some(fitted), &plan.plan(jaw));
         let near_from_tooth = near.arch_from_fitted(tooth.fdi, &tooth.crown)?;
-        let nothing = || JawMeshes::new(TintedMesh::default(), TintedMesh::default(), tissues);
+        let nothing = || JawMeshes::new(TintedMesh::default(), TintedMesh::default(), Pose::IDENTITY, tissues);
         let touched = workpiece.surroundings.iter().filter(|shape| {
             surroundings::is_visible(shape, tissues) && YieldingSurface::of(shape, workpiece, tissues).is_none()
         });
@@ -236,6 +245,7 @@ impl Mouth {
         let other = plan.of_jaw(jaw.other(), []);
         let sign = distal_sign(tooth.fdi);
         let near_from_tooth = near.arch_from_fitted(tooth.fdi, &tooth.crown)?;
+        let tooth_from_near = near_from_tooth.inverse();
         let is_in_bend = tooth.fdi % 10 <= LAST_IN_BEND;
         let neighbours = if is_in_bend { &[][..] } else { &workpiece.neighbours[..] };
         for neighbour in neighbours {
@@ -283,10 +293,16 @@ impl Mouth {
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         let crowns = near.crowns(&is_left_out);
         let meshes = match &dam {
-            Some(dam) => JawMeshes { gum: dam.sheet.clone(), ..JawMeshes::new(crowns, TintedMesh::default(), tissues) },
-            None => JawMeshes::new(crowns, near.gum(form, &|p| geometry.sink_within_tooth(p)), tissues),
+            Some(dam) => JawMeshes {
+                gum: dam.sheet.clone(),
+                ..JawMeshes::new(crowns, TintedMesh::default(), tooth_from_near, tissues)
+            },
+            None => {
+                let gum = near.gum(form, &|p| geometry.sink_within_tooth(p));
+                JawMeshes::new(crowns, gum, tooth_from_near, tissues)
+            }
         };
-        let world_from_near = workpiece.world_from_tooth * near_from_tooth.inverse();
+        let world_from_near = workpiece.world_from_tooth * tooth_from_near;
         let clamp =
             dam.and_then(|dam| dam.clamp).map(|clamp| MeshInstance { world_from_solid: world_from_near, ..clamp });
         Some(Mouth {
@@ -342,7 +358,8 @@ impl Mouth {
                 .flatten()
                 .flat_map(|jaw| &jaw.teeth.mesh.positions);
             let teeth = crowns.fold([0.0, 0.0], |[aside, back]: [f32; 2], p| [aside.max(p.x.abs()), back.max(p.y)]);
-            Face { lips, retractors, cavity: OralCavity::between(lower, upper, front, teeth) }
+            let cavity = OralCavity::between(lower, upper, &lips, front, teeth);
+            Face { lips, retractors, cavity }
         });
         Mouth { face, ..self }
     }
@@ -450,7 +467,7 @@ impl StandaloneJaw {
 fn opposite_jaw(workpiece: &Workpiece, arch: &DentalArch, tissues: &TissueTable) -> JawMeshes {
     let missing = &workpiece.arch.missing;
     let crowns = arch.crowns(&|side, index, _| missing.contains(&arch.jaw().fdi(side, index)));
-    JawMeshes::new(crowns, arch.gum(GumForm::Drawn, &|p| p), tissues)
+    JawMeshes::new(crowns, arch.gum(GumForm::Drawn, &|p| p), Pose::IDENTITY, tissues)
 }
 
 /// Colliders around the carved tooth, which the drawn jaw follows.
