@@ -259,12 +259,15 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
         // Light spreads farther in a tissue the less of it is absorbed: red in gingiva. The total stays the same.
         let wrap = lamp.position.w * albedo;
         let scattered = max((dot(normal, to_lamp) + wrap) / ((1.0 + wrap) * (1.0 + wrap)), vec3f(0.0));
-        var seen = 1.0;
+        var scattering = lamp.colour.xyz;
+        var mirroring = lamp.colour.xyz;
         if has_shadows && i == 0 && any(scattered > vec3f(0.0)) {
-            seen = lamp_share(point, normal);
+            let seen = lamp_share(point, normal);
+            scattering *= mix(SHADOW_GLOW * albedo, vec3f(1.0), seen);
+            mirroring *= seen;
         }
-        light += lamp.colour.xyz * scattered * mix(SHADOW_GLOW * albedo, vec3f(1.0), seen);
-        shine += lamp.colour.xyz * (seen * coat(finish.a, normal, to_lamp, to_eye));
+        light += scattering * scattered;
+        shine += mirroring * coat(finish.a, normal, to_lamp, to_eye);
     }
     let reached = open / (1.0 - RETURNED * albedo * (1.0 - open));
     return sqrt(tone(albedo * light * reached * (1.0 - mirrored) + shine * open));
