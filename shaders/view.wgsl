@@ -114,7 +114,7 @@ fn mirrored_surroundings(toward: vec3f) -> vec3f {
 
 // Squared roughness of a coat: rougher where it is duller.
 fn coat_width(gloss: f32) -> f32 {
-    return max(0.42 - 1.5 * gloss, 0.12);
+    return max(0.42 - 1.6 * gloss, 0.1);
 }
 
 // Reflectance of a coat from straight above and at grazing incidence.
@@ -129,8 +129,8 @@ fn coat_albedo(gloss: f32, to_eye: f32) -> f32 {
     let x = 1.0 - to_eye;
     let x2 = x * x;
     let x3 = x2 * x;
-    let above = 1.085 - 0.863 * a - x2 * (0.756 - 0.875 * a) - x2 * x3 * (0.132 - 1.691 * a);
-    let grazing = x3 * (0.450 + a * (1.894 * a - 1.645));
+    let above = 1.084 - 0.847 * a - x2 * (0.715 - 0.775 * a) - x2 * x3 * (0.197 - 1.784 * a);
+    let grazing = x2 * x2 * (1.231 - 0.787 * x) + x3 * a * (2.207 * a - 1.829);
     let reflectance = coat_reflectance(gloss);
     return reflectance.x * above + reflectance.y * grazing;
 }

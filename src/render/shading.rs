@@ -90,7 +90,7 @@ impl Lights {
 
 /// Squared roughness of a coat: rougher where it is duller.
 fn coat_width(gloss: f32) -> f32 {
-    (0.42 - 1.5 * gloss).max(0.12)
+    (0.42 - 1.6 * gloss).max(0.1)
 }
 
 /// Reflectance of a coat from straight above and at grazing incidence. Nothing that mirrors less than 2 % from above, as
@@ -102,14 +102,14 @@ fn coat_reflectance(gloss: f32) -> [f32; 2] {
 }
 
 /// Share of a uniform light that the coat mirrors toward an eye at this cosine: the integral of [`coat`], fitted from 6° of
-/// grazing on. What is mirrored does not enter the tissue, so that no light is made or lost.
+/// grazing on for widths from 0.1 to 0.42. What is mirrored does not enter the tissue, so that no light is made or lost.
 fn coat_albedo(gloss: f32, to_eye: f32) -> f32 {
     let a = coat_width(gloss);
     let x = 1.0 - to_eye;
     let x2 = x * x;
     let x3 = x2 * x;
-    let above = 1.085 - 0.863 * a - x2 * (0.756 - 0.875 * a) - x2 * x3 * (0.132 - 1.691 * a);
-    let grazing = x3 * (0.450 + a * (1.894 * a - 1.645));
+    let above = 1.084 - 0.847 * a - x2 * (0.715 - 0.775 * a) - x2 * x3 * (0.197 - 1.784 * a);
+    let grazing = x2 * x2 * (1.231 - 0.787 * x) + x3 * a * (2.207 * a - 1.829);
     let reflectance = coat_reflectance(gloss);
     reflectance[0] * above + reflectance[1] * grazing
 }
@@ -157,8 +157,13 @@ mod tests {
 
     /// Light that leaves the origin of a surface toward an eye, all of it lit by one lamp.
     fn radiance(chair: Lamp, finish: Appearance, normal: Vec3, to_eye: Vec3) -> Vec3 {
+        shaded_radiance(chair, finish, normal, to_eye, 1.0)
+    }
+
+    /// The same where a share of the lamp is seen.
+    fn shaded_radiance(chair: Lamp, finish: Appearance, normal: Vec3, to_eye: Vec3, seen: f32) -> Vec3 {
         let lights = Lights { ambient: 0.0, chair, head: Lamp::OFF };
-        lights.radiance(finish, LitPoint { point: Vec3::ZERO, normal, to_eye, open: 1.0 }, || 1.0)
+        lights.radiance(finish, LitPoint { point: Vec3::ZERO, normal, to_eye, open: 1.0 }, || seen)
     }
 
     /// A direction at an angle from +z with this cosine.
@@ -208,6 +213,22 @@ mod tests {
             assert!(linear.x >= LINEAR_UP_TO || now == linear, "{linear}: {now}");
             before = now;
         }
+    }
+
+    #[test]
+    fn shadows_glow_on_pale_tissue_and_are_dark_on_dark_tissue() {
+        // Aim: in the lamp's shadow, white tissue keeps the share that comes through it, black none, and neither shines.
+        let lamp = Lamp { position: Vec3::Z * 1e6, wrap: 0.0, ..Lamp::chair() };
+        let share = |grey: f32, gloss: f32| {
+            let [light, shadow] = [1.0, 0.0].map(|seen| {
+                shaded_radiance(lamp, Appearance { colour: [grey; 3], gloss }, Vec3::Z, leaning(0.7, 0.0), seen).y
+            });
+            shadow / light
+        };
+        assert!((share(1.0, 0.0) - SHADOW_GLOW).abs() < 1e-3, "white: {}", share(1.0, 0.0));
+        assert!(share(0.2, 0.0) < 0.02, "dark: {}", share(0.2, 0.0));
+        let mirrored = shaded_radiance(lamp, Appearance { colour: [0.0; 3], gloss: 0.6 }, Vec3::Z, Vec3::Z, 0.0);
+        assert_eq!(mirrored, Vec3::ZERO, "a mirror in the shadow");
     }
 
     #[test]

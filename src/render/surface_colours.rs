@@ -44,10 +44,6 @@ const CUT_DEPTHS: [f32; 2] = [0.15, 0.4];
 /// Tint of enamel deep in a fissure, where it stains with time, as on the neighbours' crowns.
 const FISSURE: [f32; 3] = [0.93, 0.885, 0.81];
 
-/// Thickness of the enamel that an eye looks through where it is cut, as a multiple of the distance from dentine: at a wall it looks
-/// along the layer, over a floor across it. A mean of both, up to the thickness on most of a crown; an estimate.
-const THROUGH_CUT: f32 = 1.7;
-
 /// Gloss that the moistest decay has more than the rest of it: less than sound tissue.
 const MOIST: f32 = 0.08;
 
@@ -268,7 +264,7 @@ impl SurfaceColours {
             return match tooth.unworked_tooth.filter(|_| mixer.depends_on_place(matter)) {
                 None => vec![texel(matter.sound, 1.0); count],
                 Some(unworked) => {
-                    let seen = |i: usize| mixer.seen_at(matter, unworked, in_tooth(cell_at(i)));
+                    let seen = |i: usize| mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)));
                     (0..count).map(|i| texel(seen(i).sound, 1.0)).collect()
                 }
             };
@@ -278,7 +274,7 @@ impl SurfaceColours {
         if let Some(unworked) = tooth.unworked_tooth {
             let all = narrow.iter_mut().enumerate().chain(wide.iter_mut().flatten().enumerate());
             for (i, matter) in all.filter(|(_, matter)| mixer.depends_on_place(matter)) {
-                *matter = mixer.seen_at(matter, unworked, in_tooth(cell_at(i)));
+                *matter = mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)));
             }
         }
         let mut texels = Vec::with_capacity(count);
@@ -384,13 +380,13 @@ impl Mixer {
     }
 
     /// Matter as it looks at a place in tooth space: its enamel as thick as it is there, and dull where it is cut.
-    fn seen_at(&self, matter: &Matter, unworked: &UnworkedTooth, place: Vec3) -> Matter {
+    fn seen_at(&self, matter: &Matter, volume: &Volume, unworked: &UnworkedTooth, place: Vec3) -> Matter {
         let cut = rise(CUT_DEPTHS[0], CUT_DEPTHS[1], unworked.depth_of(place));
         let mut seen = match &self.enamel {
             Some(enamel) if matter.enamel > 0.0 => {
                 let across = unworked.enamel_under(place);
-                let along = (across * THROUGH_CUT).min(ON_A_CROWN).max(across);
-                enamel.seen_through(matter, across + (along - across) * cut)
+                let inward = if cut > 0.0 { thickness_inward(volume, unworked, place, across) } else { across };
+                enamel.seen_through(matter, across + (inward - across) * cut)
             }
             _ => *matter,
         };
@@ -436,6 +432,31 @@ impl Mixer {
             alike: std::iter::once(Label::AIR).chain(alike).collect(),
         }
     }
+}
+
+/// Thickness of the enamel behind a cut surface, mm, from the place inward: over a floor the distance to dentine (`across`), at a wall,
+/// which is seen along the layer, up to the thickness on most of a crown.
+fn thickness_inward(volume: &Volume, unworked: &UnworkedTooth, place: Vec3, across: f32) -> f32 {
+    if across <= 0.0 || across >= ON_A_CROWN {
+        return across;
+    }
+    let voxel = volume.grid().spacing.max_element();
+    let inward = slope(place, voxel, |p| volume.density_at(p));
+    let toward_dentine = -slope(place, unworked.spacing(), |p| unworked.enamel_under(p));
+    let lengths = inward.length() * toward_dentine.length();
+    if lengths < 1e-6 {
+        return across;
+    }
+    // Dentine lies across / cosine away, and where the cut leads away from it, none.
+    let cosine = inward.dot(toward_dentine) / lengths;
+    across / cosine.max(across / ON_A_CROWN)
+}
+
+/// Direction in which a value rises, from four places around one: the gradient times four times the step.
+fn slope(place: Vec3, step: f32, value: impl Fn(Vec3) -> f32) -> Vec3 {
+    const WAYS: [Vec3; 4] =
+        [Vec3::new(1.0, -1.0, -1.0), Vec3::new(-1.0, 1.0, -1.0), Vec3::new(-1.0, -1.0, 1.0), Vec3::new(1.0, 1.0, 1.0)];
+    WAYS.into_iter().map(|way| way * value(place + way * step)).sum()
 }
 
 /// Weighted sums over the surroundings of the cells in the middle of a window, one axis after the other.
@@ -709,6 +730,14 @@ mod tests {
         assert!(along_wall > through_layer + 0.01, "{along_wall} and {through_layer}");
         let [own, deep] = [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), -0.4));
         assert!((own - deep).abs() < 0.005, "dentine: {own} and {deep}");
+        // Over a floor, enamel is as thick as it is.
+        let floor = Volume::from_distance(grid, 0.2, |p| (block(p).max(p.z - 0.4), label(p)));
+        let [thin_layer, cut_down] = [&floor, &whole].map(|first| {
+            let unworked = UnworkedTooth::of(first, &[DENTINE]);
+            let colours = SurfaceColours::new(&tooth(&floor, &palette, &unworked));
+            colours.at(grid.from_tooth(Vec3::new(0.5, 0.5, 0.4))).colour[2]
+        });
+        assert!((thin_layer - cut_down).abs() < 0.01, "over a floor: {thin_layer} and {cut_down}");
     }
 
     #[test]

@@ -47,6 +47,11 @@ impl UnworkedTooth {
         UnworkedTooth { grid, enamel: distances_to_filled_cells(&grid, &shares_of(0)), depths, grooves }
     }
 
+    /// Distance between the places at which the distances are kept, mm.
+    pub(super) fn spacing(&self) -> f32 {
+        self.grid.spacing.max_element()
+    }
+
     /// Thickness of the enamel under a place, mm; not above 0 in dentine.
     pub fn enamel_under(&self, point_in_tooth: Vec3) -> f32 {
         self.grid.trilinear(&self.enamel, point_in_tooth)

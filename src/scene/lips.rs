@@ -31,8 +31,8 @@ const ROUNDNESS: f32 = 1.8;
 /// Outline of a section through lip and skin, from the inside of the lip outward: the distance beyond the opening's edge and the way
 /// forward, mm, how much of it is lip rather than skin, and how bright it is.
 const SECTION: [[f32; 4]; 21] = [
-    [4.0, -9.0, 1.0, 0.25],
-    [1.2, -6.5, 1.0, 0.45],
+    [4.0, -9.0, 1.0, 0.4],
+    [1.2, -6.5, 1.0, 0.5],
     [-0.2, -4.0, 1.0, 0.7],
     [-0.3, -2.0, 1.0, 0.9],
     [0.2, -0.4, 1.0, 1.0],
@@ -125,8 +125,8 @@ impl Lips {
         MeshInstance { casts_shadow: false, ..plain }
     }
 
-    /// Where the inside of the lips ends in a direction from the middle of the opening, radians from +x toward +y: its place in world
-    /// space, and its colour.
+    /// End of the lips' inside in a direction from the middle of the opening, radians from +x toward +y: its place in world space, and
+    /// its colour.
     pub(super) fn inner_edge(&self, turn: f32) -> (Vec3, Rgb) {
         let (place, colour) = section_at(turn, self.half_height).next().unwrap_or_default();
         (self.solid.world_from_solid * place, colour)

@@ -218,7 +218,7 @@ fn tongue_mesh() -> (Mesh, Vec<VertexTint>) {
             let furrow = depth * behind_tip * libm::expf(-(x / width) * (x / width));
             positions.push(Vec3::new(x, y, (top - drop - furrow).max(TONGUE_LOWEST)));
             let coat = smooth_step((cos - 0.25) / 0.6) * smooth_step((y - 10.0) / 10.0);
-            let dark = 1.0 - 0.75 * smooth_step((y - 30.0) / 32.0);
+            let dark = 1.0 - 0.45 * smooth_step((y - 34.0) / 36.0);
             let colour = std::array::from_fn(|c| (TONGUE_SIDE[c] + (TONGUE_BACK[c] - TONGUE_SIDE[c]) * coat) * dark);
             tints.push(VertexTint { colour, stippling: 0.9 * coat });
         }
@@ -297,6 +297,13 @@ mod tests {
                     aside(&mut tongue.mesh.positions.iter().map(|p| Vec3::new(p.x, 0.0, -p.y)), slice, f32::max);
                 if let (Some(crown), Some(tongue)) = (inner, tongue) {
                     assert!(tongue < crown, "{slice} mm behind: tongue at {tongue}, crown at {crown} mm");
+                }
+            }
+            // Both sides end at the lips, wherever an eye stands.
+            for turn in [-0.9, -0.3, 0.0, 0.5, 1.0].map(|turn: f32| turn * AT_LIPS) {
+                for edge in [turn, PI - turn].map(|turn| from_lower * lips.inner_edge(turn).0) {
+                    let nearest = wall.mesh.positions.iter().map(|p| p.distance(edge)).fold(f32::INFINITY, f32::min);
+                    assert!(nearest < 0.7, "{nearest} mm of gap between the cheek and the lips at {edge}");
                 }
             }
             // Under its arch the throat is deeper than beside it and over it, beside the uvula.

@@ -57,8 +57,8 @@ pub fn crown(model: &ToothModel, recession: f32, detail: CrownDetail) -> TintedM
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
-const NECK: Tint = Tint::smooth([0.98, 0.94, 0.86]);
-const ROOT: Tint = Tint::smooth([0.93, 0.83, 0.66]);
+const NECK: Tint = Tint::smooth([0.99, 0.93, 0.85]);
+const ROOT: Tint = Tint::smooth([0.95, 0.82, 0.66]);
 const EDGE: Tint = Tint::smooth([0.945, 0.95, 0.965]);
 const DEEP: Tint = Tint::smooth([0.93, 0.885, 0.81]);
 const CANINE: Tint = Tint::smooth([0.99, 0.98, 0.95]);

@@ -32,11 +32,13 @@ impl GumForm {
         }
     }
 
-    /// Length behind the last molar, mm: as it is drawn, the ridge goes on behind its pad, so that its end is out of sight.
-    fn beyond(self) -> f32 {
-        match self {
-            GumForm::Touched => PAD,
-            GumForm::Drawn => 2.0 * PAD,
+    /// Length behind the last molar, mm: as it is drawn, the ridge goes on behind its pad, so that its end is out of sight, and the palate
+    /// goes on into the throat.
+    fn beyond(self, jaw: Jaw) -> f32 {
+        match (self, jaw) {
+            (GumForm::Touched, _) => PAD,
+            (GumForm::Drawn, Jaw::Lower) => 2.0 * PAD,
+            (GumForm::Drawn, Jaw::Upper) => 3.75 * PAD,
         }
     }
 }
@@ -151,7 +153,7 @@ pub(super) fn column_positions(sides: &[HalfJaw; 2], spacing: f32, beyond: f32) 
 
 /// Columns of places from the midline back, for each half.
 fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: GumForm) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
-    let positions = column_positions(sides, form.column(), form.beyond());
+    let positions = column_positions(sides, form.column(), form.beyond(jaw));
     std::array::from_fn(|number| {
         let side = &sides[number];
         let front = side.ridge(jaw, form, 0.0).pop().map_or(Vec3::ZERO, |row| row.0);
@@ -231,10 +233,15 @@ impl HalfJaw<'_> {
             };
             rows.push((Vec3::new(x, y, z + relief(jaw, front, x, y)), mixed_tint(tint, inner, 2.5 * share)));
         }
-        // Behind the teeth it goes over into the mucosa of throat and cheeks.
-        let behind = smooth_step((arc_length - self.half.length() + BEFORE_SOFT) / (PAD + BEFORE_SOFT));
+        // Behind the teeth it goes over into the mucosa of throat and cheeks, and above, the ridge into the soft palate.
+        let behind = arc_length - self.half.length();
+        let soft = smooth_step((behind + BEFORE_SOFT) / (PAD + BEFORE_SOFT));
+        let sunk = if jaw == Jaw::Upper && form == GumForm::Drawn { smooth_step(behind / (2.0 * PAD)) } else { 0.0 };
         rows.iter()
-            .map(|&(p, tint)| (Vec3::new(p.x * self.sign, p.y, p.z), mixed_tint(tint, SOFT_PALATE, behind)))
+            .map(|&(p, tint)| {
+                let z = p.z - sunk * (p.z - VAULT).max(0.0);
+                (Vec3::new(p.x * self.sign, p.y, z), mixed_tint(tint, SOFT_PALATE, soft))
+            })
             .collect()
     }
 
@@ -368,6 +375,11 @@ impl HalfJaw<'_> {
             // A scallop around each tooth, and a round tip between two.
             GumForm::Drawn => smooth_step(libm::powf(from_middle.abs(), 1.5)),
         };
+        let over_root = match form {
+            GumForm::Touched => 1.0 - from_middle * from_middle,
+            // Without a crease between two roots.
+            GumForm::Drawn => smooth_step(1.0 - from_middle.abs()),
+        };
         let beside = if from_middle < 0.0 { here.saturating_sub(1) } else { (here + 1).min(last) };
         let papilla = if here == last && from_middle > 0.0 {
             neck_of(seat) + 1.2
@@ -391,7 +403,7 @@ impl HalfJaw<'_> {
             margin: risen(neck_of(seat) + MARGIN - buccal, papilla - beside),
             inner_margin: risen(neck_of(seat) + MARGIN + 0.2 - lingual, papilla - 0.5 - beside),
             between_teeth: between,
-            root: 0.6 * (1.0 - from_middle * from_middle) * if here == 2 { 1.6 } else { 1.0 },
+            root: 0.6 * over_root * if here == 2 { 1.6 } else { 1.0 },
             pad,
         }
     }
