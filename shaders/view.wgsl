@@ -55,9 +55,9 @@ const DEEP: vec3f = vec3f(0.42, 0.24, 0.20);
 const POLISHED: f32 = 0.5;
 const EDGE: vec2f = vec2f(0.35, 0.7);
 // Share of the light that hollows lose and their walls throw back, for a white wall.
-const RETURNED: f32 = 0.5;
+const RETURNED: f32 = 0.75;
 // Share of the lamp's light that comes through a white tissue from around its shadow.
-const SHADOW_GLOW: f32 = 0.25;
+const SHADOW_GLOW: f32 = 0.33;
 // Brightness up to which the tone map changes nothing, and the rate at which brighter light turns white.
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;

@@ -212,16 +212,19 @@ mod tests {
         fs::write(&file, "another").unwrap();
         assert_eq!(now.poll_change(&file).unwrap().unwrap(), "another");
         assert_eq!(fs::read_dir(&folder).unwrap().count(), 1, "nothing is left beside it");
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]
     fn a_byte_order_mark_stays_and_is_no_part_of_the_text() {
-        let file = folder("mark").join("a.json");
+        let folder = folder("mark");
+        let file = folder.join("a.json");
         fs::write(&file, "\u{feff}{}").unwrap();
         let (text, stand) = read(&file).unwrap();
         assert_eq!(text, "{}");
         save(&file, "{ }", Overwrite::IfUnchanged(&stand)).unwrap();
         assert_eq!(fs::read_to_string(&file).unwrap(), "\u{feff}{ }");
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]
@@ -235,5 +238,6 @@ mod tests {
             autosave::remove(&folder, path);
             assert_eq!(autosave::load(&folder, path), None);
         }
+        fs::remove_dir_all(&folder).unwrap();
     }
 }

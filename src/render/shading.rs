@@ -16,10 +16,10 @@ const DEEP: Vec3 = Vec3::new(0.42, 0.24, 0.20);
 const POLISHED: f32 = 0.5;
 const EDGE: [f32; 2] = [0.35, 0.7];
 /// Share of the light that hollows lose and their walls throw back, for a white wall: so fissures are warm, not grey.
-const RETURNED: f32 = 0.5;
+const RETURNED: f32 = 0.75;
 /// Share of the lamp's light that comes through a white tissue from around its shadow: enamel of 1 mm lets half of the light through,
 /// so shadows on teeth and gingiva are neither black nor grey. The share is an estimate.
-const SHADOW_GLOW: f32 = 0.25;
+const SHADOW_GLOW: f32 = 0.33;
 /// Brightness up to which the tone map changes nothing, and the rate at which brighter light turns white.
 const LINEAR_UP_TO: f32 = 0.76;
 const WHITENING: f32 = 0.15;
@@ -64,8 +64,8 @@ impl Lights {
             let scattered = ((Vec3::splat(normal.dot(to_lamp)) + wrap) / (beyond * beyond)).max(Vec3::ZERO);
             let seen = if is_chair && scattered != Vec3::ZERO { chair_share() } else { 1.0 };
             let colour = Vec3::from(lamp.colour) * lamp.strength;
-            let through = SHADOW_GLOW * albedo;
-            light += colour * scattered * (through + seen * (Vec3::ONE - through));
+            let glow = SHADOW_GLOW * albedo;
+            light += colour * scattered * if seen < 1.0 { glow + seen * (Vec3::ONE - glow) } else { Vec3::ONE };
             shine += colour * seen * coat(finish.gloss, normal, to_lamp, to_eye);
         }
         let reached = open / (Vec3::ONE - RETURNED * albedo * (1.0 - open));

@@ -258,13 +258,14 @@ impl SurfaceColours {
         };
         let grid = volume.grid();
         let edge = self.cell_voxels as f32;
+        let step = edge * grid.spacing.max_element();
         let in_tooth = |cell: Vec3| grid.origin + (cell * edge + 0.5 * (edge - 1.0)) * grid.spacing;
         if let Some(Label(sole)) = window.sole_label.filter(|_| !window.has_decay) {
             let matter = &mixer.matter[usize::from(sole)];
             return match tooth.unworked_tooth.filter(|_| mixer.depends_on_place(matter)) {
                 None => vec![texel(matter.sound, 1.0); count],
                 Some(unworked) => {
-                    let seen = |i: usize| mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)));
+                    let seen = |i: usize| mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)), step);
                     (0..count).map(|i| texel(seen(i).sound, 1.0)).collect()
                 }
             };
@@ -274,7 +275,7 @@ impl SurfaceColours {
         if let Some(unworked) = tooth.unworked_tooth {
             let all = narrow.iter_mut().enumerate().chain(wide.iter_mut().flatten().enumerate());
             for (i, matter) in all.filter(|(_, matter)| mixer.depends_on_place(matter)) {
-                *matter = mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)));
+                *matter = mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)), step);
             }
         }
         let mut texels = Vec::with_capacity(count);
@@ -379,13 +380,14 @@ impl Mixer {
         matter.dulling > 0.0 || matter.enamel > 0.0
     }
 
-    /// Matter as it looks at a place in tooth space: its enamel as thick as it is there, and dull where it is cut.
-    fn seen_at(&self, matter: &Matter, volume: &Volume, unworked: &UnworkedTooth, place: Vec3) -> Matter {
+    /// Matter as it looks at a place in tooth space: its enamel as thick as it is there, and dull where it is cut. `step`: a cell's
+    /// width, mm.
+    fn seen_at(&self, matter: &Matter, volume: &Volume, unworked: &UnworkedTooth, place: Vec3, step: f32) -> Matter {
         let cut = rise(CUT_DEPTHS[0], CUT_DEPTHS[1], unworked.depth_of(place));
         let mut seen = match &self.enamel {
             Some(enamel) if matter.enamel > 0.0 => {
                 let across = unworked.enamel_under(place);
-                let inward = if cut > 0.0 { thickness_inward(volume, unworked, place, across) } else { across };
+                let inward = if cut > 0.0 { thickness_inward(volume, unworked, place, across, step) } else { across };
                 enamel.seen_through(matter, across + (inward - across) * cut)
             }
             _ => *matter,
@@ -435,13 +437,16 @@ impl Mixer {
 }
 
 /// Thickness of the enamel behind a cut surface, mm, from the place inward: over a floor the distance to dentine (`across`), at a wall,
-/// which is seen along the layer, up to the thickness on most of a crown.
-fn thickness_inward(volume: &Volume, unworked: &UnworkedTooth, place: Vec3, across: f32) -> f32 {
+/// which is seen along the layer, up to the thickness on most of a crown. `step`: distance at which the surface's slope is
+/// measured, mm.
+fn thickness_inward(volume: &Volume, unworked: &UnworkedTooth, place: Vec3, across: f32, step: f32) -> f32 {
     if across <= 0.0 || across >= ON_A_CROWN {
         return across;
     }
-    let voxel = volume.grid().spacing.max_element();
-    let inward = slope(place, voxel, |p| volume.density_at(p));
+    let inward = slope(place, step, |p| volume.density_at(p));
+    if inward == Vec3::ZERO {
+        return across;
+    }
     let toward_dentine = -slope(place, unworked.spacing(), |p| unworked.enamel_under(p));
     let lengths = inward.length() * toward_dentine.length();
     if lengths < 1e-6 {
@@ -516,9 +521,9 @@ fn decayed_texel(near: &Matter, wide: &Matter, mottle: f32) -> [u8; 4] {
     let spot = sound.lerp(Vec3::ONE, WHITE_SPOT * enamel.min(1.0));
     let amber = decay.lerp(AMBER, 0.6);
     let colour = sound
-        .lerp(spot, rise(0.0, 0.12, uneven))
-        .lerp(amber, rise(0.1, 0.8, uneven))
-        .lerp(decay, rise(0.5, 1.0, uneven));
+        .lerp(spot, rise(0.0, 0.16, uneven))
+        .lerp(amber, rise(0.14, 0.95, uneven))
+        .lerp(decay, rise(0.6, 1.2, uneven));
     let gloss = sound_gloss + (decay_gloss - sound_gloss) * rise(0.03, 0.6, uneven);
     texel([colour.x, colour.y, colour.z, gloss].map(|v| v.clamp(0.0, 1.0)), 1.0)
 }
@@ -714,30 +719,34 @@ mod tests {
     #[test]
     fn enamel_at_a_wall_is_whiter_near_dentine_than_as_thin_a_layer() {
         // Aim: the border between enamel and dentine is seen in a cavity. Method: the same wall through both, once cut into a
-        // larger block, once as the block's own side: 0.4 mm from dentine blue, which dentine lacks, differs.
-        let grid = Grid::centred([60, 60, 60], Vec3::splat(0.1));
-        let block = |p: Vec3| (p.abs() - 2.0).max_element();
-        let label = |p: Vec3| if p.z > 0.0 { Label(1) } else { DENTINE };
-        let whole = Volume::from_distance(grid, 0.2, |p| (block(p), label(p)));
-        let cut = Volume::from_distance(grid, 0.2, |p| (block(p).max(p.x), label(p)));
-        let mut palette = palette();
-        palette.appearances[usize::from(DENTINE.0)].colour = [0.8, 0.7, 0.5];
-        let wall = |unworked: &UnworkedTooth, height: f32| {
-            let colours = SurfaceColours::new(&tooth(&cut, &palette, unworked));
-            colours.at(grid.from_tooth(Vec3::new(0.0, 0.0, height))).colour[2]
-        };
-        let [through_layer, along_wall] = [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), 0.4));
-        assert!(along_wall > through_layer + 0.01, "{along_wall} and {through_layer}");
-        let [own, deep] = [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), -0.4));
-        assert!((own - deep).abs() < 0.005, "dentine: {own} and {deep}");
-        // Over a floor, enamel is as thick as it is.
-        let floor = Volume::from_distance(grid, 0.2, |p| (block(p).max(p.z - 0.4), label(p)));
-        let [thin_layer, cut_down] = [&floor, &whole].map(|first| {
-            let unworked = UnworkedTooth::of(first, &[DENTINE]);
-            let colours = SurfaceColours::new(&tooth(&floor, &palette, &unworked));
-            colours.at(grid.from_tooth(Vec3::new(0.5, 0.5, 0.4))).colour[2]
-        });
-        assert!((thin_layer - cut_down).abs() < 0.01, "over a floor: {thin_layer} and {cut_down}");
+        // larger block, once as the block's own side: 0.4 mm from dentine blue, which dentine lacks, differs. Fine voxels share a
+        // cell.
+        for spacing in [0.1, 0.05, 0.03] {
+            let grid = Grid::centred([(4.4 / spacing) as u32; 3], Vec3::splat(spacing));
+            let block = |p: Vec3| (p.abs() - 2.0).max_element();
+            let label = |p: Vec3| if p.z > 0.0 { Label(1) } else { DENTINE };
+            let whole = Volume::from_distance(grid, 1.5 * spacing, |p| (block(p), label(p)));
+            let cut = Volume::from_distance(grid, 1.5 * spacing, |p| (block(p).max(p.x), label(p)));
+            let mut palette = palette();
+            palette.appearances[usize::from(DENTINE.0)].colour = [0.8, 0.7, 0.5];
+            let wall = |unworked: &UnworkedTooth, height: f32| {
+                let colours = SurfaceColours::new(&tooth(&cut, &palette, unworked));
+                colours.at(grid.from_tooth(Vec3::new(0.0, 0.0, height))).colour[2]
+            };
+            let [through_layer, along_wall] =
+                [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), 0.4));
+            assert!(along_wall > through_layer + 0.01, "{spacing}: {along_wall} and {through_layer}");
+            let [own, deep] = [&cut, &whole].map(|first| wall(&UnworkedTooth::of(first, &[DENTINE]), -0.4));
+            assert!((own - deep).abs() < 0.005, "{spacing}, dentine: {own} and {deep}");
+            // Over a floor, enamel is as thick as it is.
+            let floor = Volume::from_distance(grid, 1.5 * spacing, |p| (block(p).max(p.z - 0.4), label(p)));
+            let [thin_layer, cut_down] = [&floor, &whole].map(|first| {
+                let unworked = UnworkedTooth::of(first, &[DENTINE]);
+                let colours = SurfaceColours::new(&tooth(&floor, &palette, &unworked));
+                colours.at(grid.from_tooth(Vec3::new(0.5, 0.5, 0.4))).colour[2]
+            });
+            assert!((thin_layer - cut_down).abs() < 0.01, "{spacing}, over a floor: {thin_layer} and {cut_down}");
+        }
     }
 
     #[test]

@@ -22,8 +22,8 @@ const IN_FRONT: f32 = 8.0;
 /// Radius of the face about the vertical, mm.
 const FACE_RADIUS: f32 = 75.0;
 
-/// Parts around the opening.
-const PARTS: usize = 320;
+/// Parts around the opening: six for each of the finest furrows.
+const PARTS: usize = 432;
 
 /// Exponent of the opening's outline: below 2 it is pointed toward the corners of the mouth.
 const ROUNDNESS: f32 = 1.8;
@@ -59,7 +59,7 @@ const LIP_ENDS: usize = 10;
 
 /// Depth of the deepest furrow across the lips, mm, and the light that it loses.
 const FURROW_DEPTH: f32 = 0.35;
-const FURROW_SHADE: f32 = 0.16;
+const FURROW_SHADE: f32 = 0.11;
 
 const LIP: Rgb = [0.64, 0.39, 0.36];
 const SKIN: Rgb = [0.74, 0.58, 0.49];
@@ -202,7 +202,7 @@ fn furrow_at(turn: f32) -> f32 {
     let bent = turn + 0.035 * libm::sinf(9.0 * turn) + 0.02 * libm::sinf(23.0 * turn + 2.0);
     let wave = |count: f32, phase: f32| 0.5 + 0.5 * libm::sinf(count * bent + phase);
     let deep = 0.4 + 0.6 * wave(11.0, 0.7);
-    deep * (0.6 * libm::powf(wave(47.0, 0.0), 3.0) + 0.4 * libm::powf(wave(83.0, 1.0), 2.0))
+    deep * (0.6 * libm::powf(wave(47.0, 0.0), 3.0) + 0.4 * libm::powf(wave(71.0, 1.0), 2.0))
 }
 
 /// Width of the lip as a share of the section's: narrow toward the corners, above with two peaks beside the middle. `x`: mm beside

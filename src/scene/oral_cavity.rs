@@ -1,4 +1,5 @@
-//! The inside of the open mouth behind the teeth, as it is seen from in front: the cheeks, the throat, and the tongue at rest.
+//! The inside of the open mouth behind the teeth, as it is seen from in front: the cheeks from the lips on, the throat, and the tongue at
+//! rest.
 //!
 //! Takes the arch spaces of both jaws in world space, mm. Forms and colours are estimates from photographs of open mouths; none of it
 //! is touched.
@@ -37,7 +38,7 @@ const LEAN: f32 = 40.0;
 
 /// By how much the cheek bulges between the rows of teeth, and half the height of the bulge; by how much it turns in toward the gums,
 /// and the heights over the middle between which it does, mm.
-const BULGE: [f32; 2] = [4.0, 6.0];
+const BULGE: [f32; 2] = [4.0, 9.0];
 const TURNS_IN: f32 = 5.0;
 const TURNING: [f32; 2] = [16.0, 36.0];
 
@@ -57,7 +58,7 @@ const WALL_ROWS: usize = 64;
 
 /// The pouch of the cheek between the wall and the inside of the lips: how far around the lips it reaches from the corner of the mouth,
 /// radians, the ways in which its curve leaves the wall and comes to the lips (aside and ahead, mm), and its columns.
-const AT_LIPS: f32 = 1.05;
+const LIPS_TURN: f32 = 1.05;
 const POUCH: [[f32; 2]; 2] = [[8.0, 9.0], [10.0, -4.0]];
 const LIP_STEPS: usize = 10;
 
@@ -152,7 +153,7 @@ fn wall_mesh(teeth: [f32; 2], at_lips: &dyn Fn(f32) -> (Vec3, Rgb)) -> (Mesh, Ve
     let heights = (0..=WALL_ROWS).map(|row| 2.0 * row as f32 / WALL_ROWS as f32 - 1.0);
     let to_lips = |on_outline: Vec3, share: f32, height: f32| {
         let (from, from_colour) = wall_corner(on_outline, height);
-        let turn = AT_LIPS * height;
+        let turn = LIPS_TURN * height;
         let (to, to_colour) = at_lips(if from.x > 0.0 { turn } else { PI - turn });
         // A cubic curve that goes on as the wall does and comes to the lips from aside.
         let rest = 1.0 - share;
@@ -163,17 +164,20 @@ fn wall_mesh(teeth: [f32; 2], at_lips: &dyn Fn(f32) -> (Vec3, Rgb)) -> (Mesh, Ve
         let mix = |a: f32, b: f32| a + (b - a) * smooth_step(share);
         (place, std::array::from_fn(|c| mix(from_colour[c], to_colour[c])))
     };
-    let ends = outline.first().copied().zip(outline.last().copied());
-    let between = |end: Vec3, step: usize| {
-        let share = step as f32 / LIP_STEPS as f32;
-        heights.clone().map(move |height| to_lips(end, share, height))
-    };
-    let before = ends.iter().flat_map(|&(left, _)| (1..=LIP_STEPS).rev().flat_map(move |step| between(left, step)));
-    let after = ends.iter().flat_map(|&(_, right)| (1..=LIP_STEPS).flat_map(move |step| between(right, step)));
-    let wall =
-        outline.iter().flat_map(|&on_outline| heights.clone().map(move |height| wall_corner(on_outline, height)));
-    let (positions, colours): (Vec<Vec3>, Vec<Rgb>) = before.chain(wall).chain(after).unzip();
-    let tints = colours.into_iter().map(VertexTint::smooth).collect();
+    let (right, left) = (half[0], half[0].with_x(-half[0].x));
+    let shares = (1..=LIP_STEPS).map(|step| step as f32 / LIP_STEPS as f32);
+    let mut corners: Vec<(Vec3, Rgb)> = Vec::new();
+    for share in shares.clone().rev() {
+        corners.extend(heights.clone().map(|height| to_lips(left, share, height)));
+    }
+    for &on_outline in &outline {
+        corners.extend(heights.clone().map(|height| wall_corner(on_outline, height)));
+    }
+    for share in shares {
+        corners.extend(heights.clone().map(|height| to_lips(right, share, height)));
+    }
+    let tints = corners.iter().map(|(_, colour)| VertexTint::smooth(*colour)).collect();
+    let positions = corners.into_iter().map(|(place, _)| place).collect();
     (sheet(positions, outline.len() + 2 * LIP_STEPS, WALL_ROWS + 1), tints)
 }
 
@@ -191,12 +195,12 @@ fn wall_corner(Vec3 { x, y: behind, z: light }: Vec3, height: f32) -> (Vec3, Rgb
     let soft = back * (1.0 - smooth_step((x.abs() - 10.0) / 22.0));
     let up_palate = ((height - PALATE_ENDS) / (1.0 - PALATE_ENDS)).clamp(0.0, 1.0);
     let forward = LEAN * soft * (1.0 - (1.0 - up_palate * up_palate).sqrt()) - THROAT_DEPTH * throat;
-    let cheek = smooth_step((behind - 16.0) / 8.0) * (1.0 - smooth_step((behind - 46.0) / 12.0));
+    let cheek = smooth_step((behind - 16.0) / 8.0) * (1.0 - smooth_step((behind - 34.0) / 26.0));
     let turn = cheek * smooth_step((y.abs() - TURNING[0]) / (TURNING[1] - TURNING[0]));
     let inward = BULGE[0] * cheek * libm::expf(-(y / BULGE[1]) * (y / BULGE[1])) + TURNS_IN * turn;
     let place = Vec3::new(x - x.signum() * inward, y, forward - behind);
     // The fold toward the gums is in the shade.
-    let shade = (1.0 - 0.3 * turn) * (1.0 + 0.15 * soft * smooth_step(up_palate / 0.9));
+    let shade = (1.0 - 0.3 * turn) * (1.0 - 0.1 * soft * smooth_step(up_palate / 0.9));
     let light = (light + (THROAT_LIGHT - light) * throat) * shade;
     let tint = mucosa_tint(place);
     (place, std::array::from_fn(|c| MUCOSA[c] * tint[c] * light))
@@ -300,7 +304,7 @@ mod tests {
                 }
             }
             // Both sides end at the lips, wherever an eye stands.
-            for turn in [-0.9, -0.3, 0.0, 0.5, 1.0].map(|turn: f32| turn * AT_LIPS) {
+            for turn in [-0.9, -0.3, 0.0, 0.5, 1.0].map(|turn: f32| turn * LIPS_TURN) {
                 for edge in [turn, PI - turn].map(|turn| from_lower * lips.inner_edge(turn).0) {
                     let nearest = wall.mesh.positions.iter().map(|p| p.distance(edge)).fold(f32::INFINITY, f32::min);
                     assert!(nearest < 0.7, "{nearest} mm of gap between the cheek and the lips at {edge}");

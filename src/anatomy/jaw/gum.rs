@@ -49,8 +49,8 @@ const SMOOTHING: usize = 4;
 /// Length of the tuberosity or retromolar pad behind the last molar, mm.
 const PAD: f32 = 8.0;
 
-/// Distance before the end of the last tooth, mm, from which its tints go over into those of soft palate and cheeks.
-const BEFORE_SOFT: f32 = 6.0;
+/// Distance before the end of the last tooth, mm, from which tints go over into those of throat and cheeks.
+const BEFORE_THROAT: f32 = 6.0;
 
 /// Height of a jaw's flat base below the occlusal plane, mm.
 const BASE: f32 = -27.0;
@@ -235,12 +235,13 @@ impl HalfJaw<'_> {
         }
         // Behind the teeth it goes over into the mucosa of throat and cheeks, and above, the ridge into the soft palate.
         let behind = arc_length - self.half.length();
-        let soft = smooth_step((behind + BEFORE_SOFT) / (PAD + BEFORE_SOFT));
-        let sunk = if jaw == Jaw::Upper && form == GumForm::Drawn { smooth_step(behind / (2.0 * PAD)) } else { 0.0 };
+        let throat = smooth_step((behind + BEFORE_THROAT) / (PAD + BEFORE_THROAT));
+        let sunk =
+            if jaw == Jaw::Upper && form == GumForm::Drawn { smooth_step((behind - PAD) / (1.5 * PAD)) } else { 0.0 };
         rows.iter()
             .map(|&(p, tint)| {
                 let z = p.z - sunk * (p.z - VAULT).max(0.0);
-                (Vec3::new(p.x * self.sign, p.y, z), mixed_tint(tint, SOFT_PALATE, soft))
+                (Vec3::new(p.x * self.sign, p.y, z), mixed_tint(tint, THROAT, throat))
             })
             .collect()
     }
@@ -275,7 +276,7 @@ impl HalfJaw<'_> {
                 (-narrow - 1.0, inner_margin - 1.3, ATTACHED),
             ],
             GumForm::Drawn => {
-                // The margin lies on the tooth, and the papilla bridges the space between two.
+                // The margin lies on the tooth, and the papilla bridges the space between two with a round crest.
                 let edge = |out: Vec3, height: f32| {
                     let on_tooth = self.distance_to_teeth(arc_length, middle.with_z(height), out, wide + 2.5);
                     smooth_max(on_tooth, BETWEEN_TEETH * wide)
@@ -286,17 +287,17 @@ impl HalfJaw<'_> {
                 let [first, last] = FREE_BELOW_MARGIN;
                 vec![
                     (outer + 0.85 + 0.5 * root, attached_from(margin, neck), ATTACHED),
-                    (outer + 0.55, margin - last, FREE),
-                    (outer + 0.30, margin - first, FREE),
-                    (outer + 0.04, margin, edge_tint),
-                    (outer - 0.40, margin + 0.15, sulcus_tint),
+                    (outer + 0.55, margin - last - 0.7 * between, FREE),
+                    (outer + 0.30, margin - first - 0.8 * between, FREE),
+                    (outer + 0.04, margin - 0.6 * between, edge_tint),
+                    (outer - 0.40, margin + 0.15 - 0.3 * between, sulcus_tint),
                     (outer - 1.10, crest, sulcus_tint),
                     (0.0, crest, FREE),
                     (1.10 - inner, crest, sulcus_tint),
-                    (0.40 - inner, inner_margin + 0.15, sulcus_tint),
-                    (-inner - 0.04, inner_margin, edge_tint),
-                    (-inner - 0.30, inner_margin - first, FREE),
-                    (-inner - 0.55, inner_margin - last, FREE),
+                    (0.40 - inner, inner_margin + 0.15 - 0.3 * between, sulcus_tint),
+                    (-inner - 0.04, inner_margin - 0.6 * between, edge_tint),
+                    (-inner - 0.30, inner_margin - first - 0.8 * between, FREE),
+                    (-inner - 0.55, inner_margin - last - 0.7 * between, FREE),
                     (-inner - 0.95, attached_from(inner_margin, neck), ATTACHED),
                 ]
             }
@@ -443,7 +444,8 @@ const SULCUS: Tint = Tint::smooth([0.84, 0.64, 0.63]);
 const LINE: Tint = Tint::smooth([0.97, 0.87, 0.86]);
 const MUCOSA: Tint = Tint::smooth([0.90, 0.70, 0.69]);
 const PALATE: Tint = Tint::stippled([0.98, 0.96, 0.94], 0.4);
-const SOFT_PALATE: Tint = Tint::smooth([0.80, 0.62, 0.60]);
+/// Mucosa of throat and cheeks behind the teeth.
+const THROAT: Tint = Tint::smooth([0.80, 0.62, 0.60]);
 const FLOOR: Tint = Tint::smooth([0.88, 0.68, 0.67]);
 
 /// Heights below the gingival margin, mm, between which the gingiva is free.
@@ -471,7 +473,7 @@ pub enum RidgeSide {
 }
 
 /// Tint at a height, mm, on a side of the ridge beside a tooth whose margin and neck lie at other heights: the tint that [`gum`] has
-/// there. `from_tooth`: distance from the tooth, mm; the margin is dark only where it lies on the tooth.
+/// there beside teeth. `from_tooth`: distance from the tooth, mm; the margin is dark only where it lies on the tooth.
 pub fn ridge_tint(jaw: Jaw, side: RidgeSide, height: f32, [margin, neck]: [f32; 2], from_tooth: f32) -> Tint {
     let edge = mixed_tint(EDGE, FREE, from_tooth / 0.4);
     let [first, last] = FREE_BELOW_MARGIN;
@@ -596,7 +598,7 @@ fn closed_sheet(columns: &[Vec<(Vec3, Tint)>]) -> TintedMesh {
             let [top, foot] = [column[r].0, onto_base(column[r].0)];
             if is_first { [foot, top] } else { [top, foot] }
         };
-        flat(&pair, rows, Vec3::Y, SOFT_PALATE);
+        flat(&pair, rows, Vec3::Y, THROAT);
     }
     made
 }

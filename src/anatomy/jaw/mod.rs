@@ -22,6 +22,7 @@ use crate::form::Sizes;
 use crate::periodontium::SiteLengths;
 use crate::teeth::distal_sign;
 use glam::Mat3;
+use std::collections::{BTreeMap, BTreeSet};
 use typodont_core::aabb::Aabb;
 use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
@@ -111,7 +112,7 @@ pub struct DentalArch {
     age: Option<f32>,
     /// On which side of x the fitted tooth stands: 1 or −1.
     sign: f32,
-    /// Its place from the midline.
+    /// The fitted tooth's place from the midline, 0 to 7.
     fitted_index: Option<usize>,
     /// The side with the fitted tooth and the other; each is laid out at x > 0.
     fitted: ArchSide,
@@ -208,23 +209,29 @@ impl DentalArch {
             .into_iter()
             .flat_map(|(row, sign)| row.half.seats.iter().enumerate().map(move |(index, seat)| (sign, index, seat)));
         let drawn: Vec<_> = teeth.filter(|&(sign, index, seat)| !is_left_out(sign, index, seat)).collect();
+        // Places around the arch, counted from one end to the other.
+        let along = |sign: f32, index: usize| if sign < 0.0 { -1 - index as i32 } else { index as i32 };
         let detail = |sign: f32, index: usize| {
-            let is_beside = sign == self.sign && self.fitted_index.is_some_and(|fitted| fitted.abs_diff(index) == 1);
+            let is_beside =
+                self.fitted_index.is_some_and(|fitted| (along(sign, index) - along(self.sign, fitted)).abs() == 1);
             if is_beside { CrownDetail::Near } else { CrownDetail::Far }
         };
         // Twins on both sides share a form.
-        let mut forms: Vec<(usize, CrownDetail)> =
+        let forms: BTreeSet<(usize, CrownDetail)> =
             drawn.iter().map(|&(sign, index, _)| (index, detail(sign, index))).collect();
-        forms.sort_unstable();
-        forms.dedup();
+        let forms: Vec<(usize, CrownDetail)> = forms.into_iter().collect();
         let crown = |i: usize| crown::crown(&self.plain.models[forms[i].0], recession, forms[i].1);
-        let crowns = parallel::par_map(forms.len(), crown);
+        let crowns: BTreeMap<_, _> = forms.iter().zip(parallel::par_map(forms.len(), crown)).collect();
         let mut all = TintedMesh::default();
         for (sign, index, seat) in drawn {
-            let form = forms.binary_search(&(index, detail(sign, index))).unwrap_or_default();
             let pose = seat.arch_from_tooth();
             let side = Vec3::new(sign, 1.0, 1.0);
-            all.append(&crowns[form], |p| pose * p * side, |n| pose.rotate(n) * side, sign < 0.0);
+            all.append(
+                &crowns[&(index, detail(sign, index))],
+                |p| pose * p * side,
+                |n| pose.rotate(n) * side,
+                sign < 0.0,
+            );
         }
         all
     }

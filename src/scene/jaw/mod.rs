@@ -26,7 +26,7 @@ use typodont_exercise::scenario::{MouthArches, ToothBounds, Workpiece};
 use typodont_render::{Appearance, ENAMEL_GLOSS, MeshInstance, Quadrant, Rgb, VertexTint, Viewpoint};
 
 /// Gloss of wet gingiva, 0 to 1.
-const GUM_GLOSS: f32 = 0.19;
+const GUM_GLOSS: f32 = 0.175;
 
 /// Distances from the carved tooth's box, mm: up to the first, the gingiva is drawn as it is touched; from the second
 /// on, as the jaw has it. Among the front teeth the arch bends away from the straight ridge that is touched, so the
@@ -83,6 +83,7 @@ struct JawMeshes {
 }
 
 impl JawMeshes {
+    /// `tooth_from_arch`: to the space in which the gingiva's colour varies; any for a jaw that does not meet the touched gingiva.
     fn new(teeth: TintedMesh, mut gum: TintedMesh, tooth_from_arch: Pose, tissues: &TissueTable) -> JawMeshes {
         let colour = |name: &str, otherwise: Rgb| tissues.by_name(name).map_or(otherwise, |e| e.rgb());
         for (place, tint) in gum.mesh.positions.iter().zip(&mut gum.tints) {
@@ -399,9 +400,9 @@ impl Mouth {
     /// Plane on the cusps of the opposite jaw, world space, as a point and the unit vector into the mouth, if the eye looks through that
     /// jaw, as from above at an upper tooth, which stands upright; `None` if it does not. What is before the plane is not drawn then.
     pub fn way_past_opposite(&self, viewpoint: &Viewpoint, open: f32) -> Option<(Vec3, Vec3)> {
-        /// Extent of a jaw in its arch space, to each side and from before its incisors to behind its molars, mm.
+        /// Extent of a jaw in its arch space, to each side and from before its incisors to the throat, mm.
         const ASIDE: f32 = 38.0;
-        const BACK: [f32; 2] = [-10.0, 62.0];
+        const BACK: [f32; 2] = [-10.0, 76.0];
         /// Height above which nothing of the jaw stands, arch space, mm.
         const CUSPS: f32 = 1.5;
         self.opposite.as_ref()?;
