@@ -31,39 +31,43 @@ fn entry(at: vec3f) -> vec4f {
 }
 
 // Colour and opacity at a place: the entries of the eight labels around it for the density there, by the matter of their
-// voxels, so that no face of a voxel shows where tissues meet. Where all entries are equal, that one, to the last bit.
-fn mixed_entry(at: vec3f) -> vec4f {
+// voxels, so that no face of a voxel shows where tissues meet. Where all entries are equal, that one, to the last bit; and
+// where no tissues meet, that of `sole`. The loops count to zero there instead of standing in a branch, which software
+// executes also where it is not taken.
+fn mixed_entry(at: vec3f, sole: f32, do_tissues_meet: bool) -> vec4f {
     let corner = floor(at);
     let share = at - corner;
-    var around = array<vec2f, 8>();
-    var is_alike = true;
-    for (var i = 0u; i < 8u; i++) {
-        let step = vec3f(f32(i & 1u), f32((i >> 1u) & 1u), f32(i >> 2u));
-        around[i] = voxel(vec3i(corner + step));
-        is_alike = is_alike && around[i].g == around[0].g;
-    }
     let here = density(at);
-    let first = table_entry(here, around[0].g);
-    if is_alike {
-        return first;
+    let first = table_entry(here, sole);
+    var is_alike = true;
+    let labels = select(0u, 8u, do_tissues_meet);
+    for (var i = 0u; i < labels; i++) {
+        is_alike = is_alike && voxel(vec3i(corner) + corner_step(i)).g == sole;
     }
-    is_alike = true;
+    var is_equal = true;
     var matter = 0.0;
     // Colours multiplied by opacity.
     var sum = vec4f(0.0);
-    for (var i = 0u; i < 8u; i++) {
-        let step = vec3f(f32(i & 1u), f32((i >> 1u) & 1u), f32(i >> 2u));
-        let near = mix(1.0 - share, share, step);
-        let weight = near.x * near.y * near.z * around[i].r;
-        let found = table_entry(here, around[i].g);
-        is_alike = is_alike && all(found == first);
+    let entries = select(8u, 0u, is_alike);
+    for (var i = 0u; i < entries; i++) {
+        let step = corner_step(i);
+        let near = mix(1.0 - share, share, vec3f(step));
+        let around = voxel(vec3i(corner) + step);
+        let weight = near.x * near.y * near.z * around.r;
+        let found = table_entry(here, around.g);
+        is_equal = is_equal && all(found == first);
         sum += vec4f(found.rgb * found.a, found.a) * weight;
         matter += weight;
     }
-    if is_alike || matter <= 0.0 {
+    if is_equal || matter <= 0.0 {
         return first;
     }
     return vec4f(sum.rgb / max(sum.a, 1e-9), sum.a / matter);
+}
+
+// Step from the first to another of the eight voxels around a place.
+fn corner_step(i: u32) -> vec3i {
+    return vec3i(i32(i & 1u), i32((i >> 1u) & 1u), i32(i >> 2u));
 }
 
 // From front to back until nothing shines through or the scene ends the ray.
@@ -92,14 +96,11 @@ fn blend(start: vec3f, along: vec3f, pace: f32, behind: f32) -> Blended {
         let samples = select(1.0, max(ceil(out / pace) - number, 1.0), is_even);
         while z < out {
             let place = start + along * z;
-            var found = vec4f(0.0);
-            if is_even {
-                found = entry(place);
-            } else if is_one_tissue {
-                found = table_entry(density(place), f32(known.g) / 255.0);
-            } else {
-                found = mixed_entry(place);
+            var sole = f32(known.g) / 255.0;
+            if !is_one_tissue {
+                sole = voxel(vec3i(floor(place + 0.5))).g;
             }
+            let found = mixed_entry(place, sole, !is_even && !is_one_tissue);
             if found.a > 0.0 {
                 let opacity = select(found.a, 1.0 - pow(1.0 - found.a, samples), is_even);
                 blended.colour += vec4f(found.rgb, 1.0) * (opacity * (1.0 - blended.colour.a));
