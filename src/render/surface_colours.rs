@@ -265,7 +265,9 @@ impl SurfaceColours {
             return match tooth.unworked_tooth.filter(|_| mixer.depends_on_place(matter)) {
                 None => vec![texel(matter.sound, 1.0); count],
                 Some(unworked) => {
-                    let seen = |i: usize| mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)), step);
+                    let place =
+                        |i: usize| mixer.place_at(volume, unworked, in_tooth(cell_at(i)), step, matter.enamel > 0.0);
+                    let seen = |i: usize| mixer.seen_at(matter, &place(i));
                     (0..count).map(|i| texel(seen(i).sound, 1.0)).collect()
                 }
             };
@@ -273,9 +275,16 @@ impl SurfaceColours {
         let mut narrow = blurred(&window.cells, size, &NARROW);
         let mut wide = window.has_decay.then(|| blurred(&window.cells, size, &WIDE));
         if let Some(unworked) = tooth.unworked_tooth {
-            let all = narrow.iter_mut().enumerate().chain(wide.iter_mut().flatten().enumerate());
-            for (i, matter) in all.filter(|(_, matter)| mixer.depends_on_place(matter)) {
-                *matter = mixer.seen_at(matter, volume, unworked, in_tooth(cell_at(i)), step);
+            let mut sums: Vec<&mut Vec<Matter>> = std::iter::once(&mut narrow).chain(wide.as_mut()).collect();
+            for i in 0..count {
+                if !sums.iter().any(|sum| mixer.depends_on_place(&sum[i])) {
+                    continue;
+                }
+                let has_enamel = sums.iter().any(|sum| sum[i].enamel > 0.0);
+                let place = mixer.place_at(volume, unworked, in_tooth(cell_at(i)), step, has_enamel);
+                for sum in &mut sums {
+                    sum[i] = mixer.seen_at(&sum[i], &place);
+                }
             }
         }
         let mut texels = Vec::with_capacity(count);
@@ -354,6 +363,16 @@ struct Mixer {
     alike: Vec<Label>,
 }
 
+/// Properties of a place of the tooth on which the look of its matter depends.
+#[derive(Clone, Copy, Debug, Default)]
+struct Place {
+    /// 0 on the tooth's own surface, 1 where it is cut.
+    cut: f32,
+    /// Thickness of the enamel that is looked through, mm, and depth in a fissure, 0 to 1; both for enamel only.
+    thickness: f32,
+    groove: f32,
+}
+
 /// Enamel through which dentine shines.
 #[derive(Clone, Debug)]
 struct TranslucentEnamel {
@@ -380,21 +399,33 @@ impl Mixer {
         matter.dulling > 0.0 || matter.enamel > 0.0
     }
 
-    /// Matter as it looks at a place in tooth space: its enamel as thick as it is there, and dull where it is cut. `step`: a cell's
-    /// width, mm.
-    fn seen_at(&self, matter: &Matter, volume: &Volume, unworked: &UnworkedTooth, place: Vec3, step: f32) -> Matter {
+    /// Properties of a place in tooth space. `step`: a cell's width, mm; `has_enamel`: false where no enamel is near.
+    fn place_at(&self, volume: &Volume, unworked: &UnworkedTooth, place: Vec3, step: f32, has_enamel: bool) -> Place {
         let cut = rise(CUT_DEPTHS[0], CUT_DEPTHS[1], unworked.depth_of(place));
+        if !has_enamel {
+            return Place { cut, ..Place::default() };
+        }
+        let thickness = || {
+            let across = unworked.enamel_under(place);
+            let inward = if cut > 0.0 { thickness_inward(volume, unworked, place, across, step) } else { across };
+            across + (inward - across) * cut
+        };
+        Place {
+            cut,
+            thickness: if self.enamel.is_some() { thickness() } else { 0.0 },
+            groove: if cut < 1.0 { unworked.groove_depth(place) } else { 0.0 },
+        }
+    }
+
+    /// Matter as it looks at a place: its enamel as thick as it is there, and dull where it is cut.
+    fn seen_at(&self, matter: &Matter, place: &Place) -> Matter {
         let mut seen = match &self.enamel {
-            Some(enamel) if matter.enamel > 0.0 => {
-                let across = unworked.enamel_under(place);
-                let inward = if cut > 0.0 { thickness_inward(volume, unworked, place, across, step) } else { across };
-                enamel.seen_through(matter, across + (inward - across) * cut)
-            }
+            Some(enamel) if matter.enamel > 0.0 => enamel.seen_through(matter, place.thickness),
             _ => *matter,
         };
-        seen.sound[3] -= matter.dulling * cut;
-        if matter.enamel > 0.0 && cut < 1.0 {
-            let stain = matter.enamel / matter.sound_amount.max(1e-6) * (1.0 - cut) * unworked.groove_depth(place);
+        seen.sound[3] -= matter.dulling * place.cut;
+        if matter.enamel > 0.0 && place.cut < 1.0 {
+            let stain = matter.enamel / matter.sound_amount.max(1e-6) * (1.0 - place.cut) * place.groove;
             for (sum, tint) in seen.sound.iter_mut().zip(FISSURE) {
                 *sum *= 1.0 + (tint - 1.0) * stain;
             }
