@@ -110,6 +110,9 @@ pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], form: GumForm, fit: impl Fn(Vec3) -> V
     for (place, _) in columns.iter_mut().flatten() {
         *place = fit(*place);
     }
+    if form == GumForm::Drawn {
+        columns = with_columns_between(&columns);
+    }
     closed_sheet(&columns)
 }
 
@@ -544,6 +547,13 @@ fn subdivide(rows: &[(Vec3, Tint)]) -> Vec<(Vec3, Tint)> {
         finer.push(((place + next) * 0.5625 - (before + after) * 0.0625, mixed_tint(tint, next_tint, 0.5)));
     }
     finer
+}
+
+/// Twice as many columns, so that the crest of a papilla has no corners close by.
+fn with_columns_between(columns: &[Vec<(Vec3, Tint)>]) -> Vec<Vec<(Vec3, Tint)>> {
+    let rows: Vec<Vec<(Vec3, Tint)>> =
+        (0..columns[0].len()).map(|r| subdivide(&columns.iter().map(|column| column[r]).collect::<Vec<_>>())).collect();
+    (0..rows[0].len()).map(|c| rows.iter().map(|row| row[c]).collect()).collect()
 }
 
 /// Columns of places from one end of the arch to the other, each from the outer side to the midline, as a sheet.
