@@ -37,6 +37,13 @@ impl Slot {
     }
 }
 
+/// A tooth's volume, and what has its normals: the smoothed copy, or itself where the copy is coarser.
+#[derive(Clone, Copy)]
+pub struct DrawnTooth<'a> {
+    pub volume: &'a Volume,
+    pub smoothed: &'a Volume,
+}
+
 /// Surface of one brick.
 struct BrickMesh {
     vertices: Vec<Vertex>,
@@ -44,8 +51,8 @@ struct BrickMesh {
 }
 
 impl BrickMesh {
-    fn extract(volume: &Volume, brick: usize) -> BrickMesh {
-        let mesh = surface::extract_brick(volume, brick);
+    fn extract(tooth: DrawnTooth, brick: usize) -> BrickMesh {
+        let mesh = surface::extract_brick(tooth.volume, tooth.smoothed, brick);
         BrickMesh { vertices: surface_mesh::tooth_vertices(&mesh), triangles: mesh.triangles }
     }
 
@@ -61,8 +68,8 @@ impl BrickMesh {
 
 impl BrickSurfaces {
     /// Extracts and uploads the surfaces of all bricks of a volume.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume) -> BrickSurfaces {
-        let parts = par_map(volume.bricks().len(), |brick| BrickMesh::extract(volume, brick));
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, tooth: DrawnTooth) -> BrickSurfaces {
+        let parts = par_map(tooth.volume.bricks().len(), |brick| BrickMesh::extract(tooth, brick));
         let mut slots = Vec::with_capacity(parts.len());
         let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
         for part in &parts {
@@ -81,12 +88,21 @@ impl BrickSurfaces {
     }
 
     /// Extracts again all surfaces that changed bricks can affect. Returns their number.
-    pub fn update(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, volume: &Volume, changed: &[usize]) -> usize {
-        let affected = surface::dirty_neighbourhood(volume, changed);
-        for &brick in &affected {
-            let part = BrickMesh::extract(volume, brick);
-            if !self.slots[brick].fits(&part) {
-                self.move_to_larger_slot(device, queue, brick, &part);
+    pub fn update(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        tooth: DrawnTooth,
+        changed: &[usize],
+    ) -> usize {
+        if changed.is_empty() {
+            return 0;
+        }
+        let affected = surface::dirty_neighbourhood(tooth.volume, changed);
+        let parts = par_map(affected.len(), |i| BrickMesh::extract(tooth, affected[i]));
+        for (&brick, part) in affected.iter().zip(&parts) {
+            if !self.slots[brick].fits(part) {
+                self.move_to_larger_slot(device, queue, brick, part);
             }
             let slot = &self.slots[brick];
             if slot.triangles.is_empty() {

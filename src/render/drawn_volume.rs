@@ -1,5 +1,5 @@
-//! The volume as it is drawn: smoothed over the neighbouring voxels, so that the edge of a cut is a line and not a row of teeth;
-//! or averaged, for GPUs whose textures are too small for it.
+//! The volume as it is drawn: smoothed over the neighbouring voxels, so that rays see the edge of a cut as a line and triangles
+//! have smooth normals; or averaged, for GPUs whose textures are too small for it.
 //!
 //! Flat surfaces stay where they are. An edge is rounded by up to half a voxel, and matter thinner than a voxel disappears.
 

@@ -1,6 +1,6 @@
 //! Renders scenes on a device into a given target.
 
-use super::brick_surfaces::BrickSurfaces;
+use super::brick_surfaces::{BrickSurfaces, DrawnTooth};
 use super::camera::Viewpoint;
 use super::drawn_volume::DrawnVolume;
 use super::error::RenderError;
@@ -20,6 +20,7 @@ use super::tooth::{ToothTextures, Uploads};
 use super::view;
 use super::volume_pass::VolumePass;
 use super::{iso_pass, resources, validate};
+use typodont_core::volume::Volume;
 
 /// All pipelines, and the data kept on the device between frames.
 pub struct Renderer {
@@ -45,7 +46,7 @@ pub struct Renderer {
     mirror_targets: [Option<MirrorTarget>; 2],
     view_layout: wgpu::BindGroupLayout,
     tooth: Option<ToothTextures>,
-    /// The volume as textures and triangles show it.
+    /// The volume as textures show it; triangles have its normals.
     drawn: Option<DrawnVolume>,
     surfaces: Option<BrickSurfaces>,
     eye_targets: [Option<EyeTarget>; 2],
@@ -246,8 +247,9 @@ impl Renderer {
         if uploads.is_full_volume {
             self.surfaces = None;
         }
-        // Triangles keep the original's resolution.
-        uploads.surfaces = self.prepare_surfaces(if factor == 1 { &drawn_tooth } else { tooth });
+        // Triangles keep the original's resolution and its edges.
+        let smoothed = if factor == 1 { &drawn.volume } else { tooth.volume };
+        uploads.surfaces = self.prepare_surfaces(tooth, smoothed);
         self.drawn = Some(drawn);
         uploads
     }
@@ -270,8 +272,8 @@ impl Renderer {
 
     /// Updates the triangles only while they are shown. After a change in another mode they are rebuilt when next
     /// shown.
-    fn prepare_surfaces(&mut self, tooth: &VolumeInstance) -> usize {
-        let volume = tooth.volume;
+    fn prepare_surfaces(&mut self, tooth: &VolumeInstance, smoothed: &Volume) -> usize {
+        let drawn = DrawnTooth { volume: tooth.volume, smoothed };
         if tooth.mode != RenderMode::Surface {
             if tooth.changes != Changes::Bricks(&[]) {
                 self.surfaces = None;
@@ -279,9 +281,9 @@ impl Renderer {
             return 0;
         }
         match (&mut self.surfaces, tooth.changes) {
-            (Some(known), Changes::Bricks(changed)) => known.update(&self.device, &self.queue, volume, changed),
+            (Some(known), Changes::Bricks(changed)) => known.update(&self.device, &self.queue, drawn, changed),
             _ => {
-                self.surfaces = Some(BrickSurfaces::new(&self.device, &self.queue, volume));
+                self.surfaces = Some(BrickSurfaces::new(&self.device, &self.queue, drawn));
                 0
             }
         }

@@ -302,8 +302,8 @@ fn matter_at_the_grids_end_is_drawn_closed() {
         let iso = draw(&mut OffscreenRenderer::cpu(), RenderMode::Iso);
         let covered = |image: &RgbaImage| image.rgba.chunks(4).filter(|p| p[0] > 20).count() as f64;
         assert!(covered(&surface) > 2000.0);
-        // Triangles cut the block's edges off straight where rays see them round.
-        assert!((covered(&iso) / covered(&surface) - 1.0).abs() < 0.05, "{} {}", covered(&iso), covered(&surface));
+        // Rays see the block smoothed: with round edges, and a sixth of a voxel smaller where it touches the grid's end.
+        assert!((covered(&iso) / covered(&surface) - 1.0).abs() < 0.1, "{} {}", covered(&iso), covered(&surface));
         if let Some(gpu) = &mut gpu {
             for shown in [RenderMode::Iso, tissue(&palette)] {
                 let mode = if shown == RenderMode::Iso { "iso" } else { "volume" };

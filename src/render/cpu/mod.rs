@@ -65,11 +65,15 @@ impl CachedVolume {
         }
     }
 
-    fn surface(&self) -> &SurfaceTriangles {
-        self.surface.get_or_init(|| SurfaceTriangles::extract(&self.drawn.volume))
+    fn surface(&self, tooth: &VolumeInstance) -> &SurfaceTriangles {
+        self.surface.get_or_init(|| SurfaceTriangles::extract(tooth.volume, &self.drawn.volume))
     }
 
     fn update(&mut self, tooth: &VolumeInstance, changed: &[usize]) {
+        // Triangles lie on the volume itself, also where smoothing hides a change.
+        if !changed.is_empty() {
+            self.surface = OnceLock::new();
+        }
         let changed = &self.drawn.update(tooth.volume, changed)[..];
         let tooth = &VolumeInstance { volume: &self.drawn.volume, ..tooth.clone() };
         let VolumeInstance { volume, mode, palette, .. } = tooth;
@@ -80,9 +84,6 @@ impl CachedVolume {
             self.colours.update(tooth, changed);
         } else {
             self.colours = SurfaceColours::new(tooth);
-        }
-        if !changed.is_empty() {
-            self.surface = OnceLock::new();
         }
     }
 }
@@ -142,7 +143,7 @@ impl CpuRenderer {
             let sampler = VolumeSampler::new(tooth, known);
             match &tooth.mode {
                 RenderMode::Surface => {
-                    surface_pass::tooth(known.surface(), &sampler, &view, &mut framebuffer);
+                    surface_pass::tooth(known.surface(tooth), &sampler, &view, &mut framebuffer);
                 }
                 RenderMode::Iso => iso_pass::iso_pass(&sampler, &view, &mut framebuffer),
                 RenderMode::Volume(function) => volume_pass::volume_pass(&sampler, function, &view, &mut framebuffer),

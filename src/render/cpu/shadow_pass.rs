@@ -68,7 +68,7 @@ impl LampDepths {
         if let (Some(tooth), Some(known)) = (&scene.tooth, known) {
             match &tooth.mode {
                 RenderMode::Surface => {
-                    surface_pass::tooth_depths(known.surface(), tooth, &view, &mut framebuffer);
+                    surface_pass::tooth_depths(known.surface(tooth), tooth, &view, &mut framebuffer);
                 }
                 RenderMode::Iso => iso_pass::iso_depth_pass(&VolumeSampler::new(tooth, known), &view, &mut framebuffer),
                 RenderMode::Volume(_) => {}

@@ -47,8 +47,9 @@ pub struct SurfaceTriangles {
 }
 
 impl SurfaceTriangles {
-    pub fn extract(volume: &Volume) -> SurfaceTriangles {
-        let mesh = surface::extract(volume);
+    /// From the volume as it is, and smoothed.
+    pub fn extract(volume: &Volume, smoothed: &Volume) -> SurfaceTriangles {
+        let mesh = surface::extract_sharp(volume, smoothed);
         SurfaceTriangles { vertices: surface_mesh::tooth_vertices(&mesh), triangles: mesh.triangles }
     }
 }

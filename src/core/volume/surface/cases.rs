@@ -20,13 +20,40 @@ impl EdgeIndex {
         &CELL_EDGES[usize::from(self.0)]
     }
 
-    /// Returns true if one face of the cell contains both edges.
-    fn shares_face(self, other: EdgeIndex) -> bool {
-        let holds = |edge: EdgeIndex, axis: usize, side: usize| {
-            edge.cell_edge().axis != axis && edge.cell_edge().start[axis] == side
-        };
-        (0..3).any(|axis| [0, 1].into_iter().any(|side| holds(self, axis, side) && holds(other, axis, side)))
+    /// Returns true if the face contains the edge.
+    pub fn lies_in(self, face: CellFace) -> bool {
+        self.cell_edge().axis != face.axis && self.cell_edge().start[face.axis] == face.side
     }
+
+    /// The face of the cell that contains both edges.
+    pub fn shared_face(self, other: EdgeIndex) -> Option<CellFace> {
+        CellFace::ALL.into_iter().find(|&face| self.lies_in(face) && other.lies_in(face))
+    }
+
+    /// Number of this edge in the cell on the other side of a face that contains it.
+    pub fn beyond(self, face: CellFace) -> EdgeIndex {
+        let CellEdge { axis, mut start, .. } = *self.cell_edge();
+        start[face.axis] = 1 - face.side;
+        EdgeIndex::new(axis, start[0] | start[1] << 1 | start[2] << 2)
+    }
+}
+
+/// Face of a cell: the axis across it, and 0 or 1 for its lower or upper side.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellFace {
+    pub axis: usize,
+    pub side: usize,
+}
+
+impl CellFace {
+    const ALL: [CellFace; 6] = [
+        CellFace { axis: 0, side: 0 },
+        CellFace { axis: 0, side: 1 },
+        CellFace { axis: 1, side: 0 },
+        CellFace { axis: 1, side: 1 },
+        CellFace { axis: 2, side: 0 },
+        CellFace { axis: 2, side: 1 },
+    ];
 }
 
 /// The two other axes, in right-handed order.
@@ -75,6 +102,8 @@ pub struct CubeCase {
     /// Edges crossed by the surface.
     pub edges: Vec<EdgeIndex>,
     pub triangles: Vec<[EdgeIndex; 3]>,
+    /// Outlines of the same surface: edges in the order in which lines on the cell's faces join them.
+    pub rings: Vec<Vec<EdgeIndex>>,
 }
 
 /// Cases by the solid corners of the cell: bit `x + 2y + 4z` for each.
@@ -93,7 +122,8 @@ impl CubeCase {
             }
             if !ring.is_empty() {
                 case.triangles.extend(triangulate_ring(&ring).1);
-                case.edges.extend(ring);
+                case.edges.extend(&ring);
+                case.rings.push(ring);
             }
         }
         case
@@ -105,8 +135,8 @@ impl CubeCase {
 fn contour_segments(solid: usize) -> [Option<EdgeIndex>; 12] {
     let is_solid = |corner: usize| solid >> corner & 1 == 1;
     let mut next = [None; 12];
-    for (axis, side) in (0..3).flat_map(|axis| [(axis, 0), (axis, 1)]) {
-        let corners = around_face(axis, side);
+    for face in CellFace::ALL {
+        let corners = around_face(face);
         for (i, &corner) in corners.iter().enumerate() {
             // A run of solid corners begins here: the line goes from the edge before the run to the edge after it.
             let before = corners[(i + 3) % 4];
@@ -121,7 +151,7 @@ fn contour_segments(solid: usize) -> [Option<EdgeIndex>; 12] {
 }
 
 /// Corners of a face, counter-clockwise as seen from outside the cell.
-fn around_face(axis: usize, side: usize) -> [usize; 4] {
+fn around_face(CellFace { axis, side }: CellFace) -> [usize; 4] {
     let (b, c) = other_axes(axis);
     let mut corners = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(u, v)| u << b | v << c | side << axis);
     if side == 0 {
@@ -140,7 +170,7 @@ fn triangulate_ring(ring: &[EdgeIndex]) -> (u32, Vec<[EdgeIndex; 3]>) {
     let mut best: Option<(u32, Vec<[EdgeIndex; 3]>)> = None;
     for middle in 1..ring.len().saturating_sub(1) {
         let apex = ring[middle];
-        let in_face = |is_inner: bool, end: EdgeIndex| u32::from(is_inner && apex.shares_face(end));
+        let in_face = |is_inner: bool, end: EdgeIndex| u32::from(is_inner && apex.shared_face(end).is_some());
         let (left, mut triangles) = triangulate_ring(&ring[..=middle]);
         let (right, others) = triangulate_ring(&ring[middle..]);
         let cost = left + right + in_face(middle > 1, first) + in_face(middle + 2 < ring.len(), last);
@@ -171,7 +201,10 @@ mod tests {
                 let is_line = lines[usize::from(*a)] == Some(EdgeIndex(*b));
                 assert_eq!(edges.iter().filter(|e| *e == &[*a, *b]).count(), 1, "case {solid}");
                 assert_ne!(is_line, edges.contains(&[*b, *a]), "case {solid}: edge {a}–{b}");
-                assert!(is_line || !EdgeIndex(*a).shares_face(EdgeIndex(*b)), "case {solid}: {a}–{b} lies in a face");
+                assert!(
+                    is_line || EdgeIndex(*a).shared_face(EdgeIndex(*b)).is_none(),
+                    "case {solid}: {a}–{b} lies in a face"
+                );
             }
             for (from, to) in lines.iter().enumerate().filter_map(|(from, to)| Some((from as u8, (*to)?))) {
                 assert!(edges.contains(&[from, to.0]), "case {solid}: line {from}–{to:?} is not filled");

@@ -1,7 +1,8 @@
 //! Smoothed surface of a set of voxels that stays true to the set.
 
 use crate::mesh::Mesh;
-use crate::volume::surface::{CellRange, DensityGrid, extract_cells};
+use crate::volume::surface::density_grid::DensityGrid;
+use crate::volume::surface::{CellRange, extract_cells};
 use crate::volume::{Density, Grid, Label, Volume};
 
 /// Smoothing rounds: after four, steps of one voxel are gone, and more rounds change little.
@@ -16,7 +17,7 @@ pub fn of_mask(grid: &Grid, is_inside: impl Fn(usize) -> bool) -> Mesh {
     let Some(part) = PaddedMask::around(grid, is_inside) else { return Mesh::default() };
     let densities = part.smoothed();
     let end = part.grid.dims.map(|n| n as i32);
-    extract_cells(DensityGrid { grid: &part.grid, densities: &densities }, CellRange { low: [-1; 3], end })
+    extract_cells(DensityGrid { grid: &part.grid, densities: &densities }, CellRange { low: [-1; 3], end }, None)
 }
 
 /// The same set with the same smoothing, as a volume with one label on a grid of its own; `None` for an empty set.

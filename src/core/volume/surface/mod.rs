@@ -4,34 +4,45 @@
 //! counter-clockwise triangles facing outward and normals from the smooth gradient. Never leaves a hole: space beyond
 //! the grid counts as empty.
 //!
-//! Method: Lorensen & Cline, *Marching Cubes* (1987), with the case table derived in `cases`.
+//! Method: Lorensen & Cline, *Marching Cubes* (1987), with the case table derived in `cases`; where it is drawn, with
+//! one more vertex in cells that a sharp edge crosses (`sharp_edges`).
 
 mod cases;
+mod density_grid;
 mod mask;
+mod sharp_edges;
 
 pub use mask::{of_mask, volume_of_mask};
 
-use crate::frame::Vec3;
 use crate::mesh::Mesh;
-use crate::volume::{BRICK, CellBox, Density, Grid, Volume};
+use crate::volume::{BRICK, CellBox, Volume};
 use cases::{CASES, CELL_EDGES, CellEdge, CubeCase, EdgeIndex};
+use density_grid::{Crossing, DensityGrid};
+use sharp_edges::{Outline, SharpEdges};
+use std::collections::BTreeMap;
 
 /// Extracts the whole surface.
 pub fn extract(volume: &Volume) -> Mesh {
-    let Some(CellBox { low, high }) = volume.bounding_box() else { return Mesh::default() };
-    let cells = CellRange { low: low.map(|v| v as i32 - 1), end: high.map(|v| v as i32 + 1) };
-    extract_cells(DensityGrid { grid: volume.grid(), densities: volume.densities() }, cells)
+    let Some(cells) = CellRange::around_matter(volume) else { return Mesh::default() };
+    extract_cells(DensityGrid::of(volume), cells, None)
 }
 
-/// Extracts the part of the surface that belongs to a brick. All bricks together give the whole surface; vertices are
-/// shared within a brick only.
-pub fn extract_brick(volume: &Volume, brick: usize) -> Mesh {
+/// Extracts the whole surface as it is drawn: with sharp edges, and with the normals of a smoothed copy of the volume.
+pub fn extract_sharp(volume: &Volume, smoothed: &Volume) -> Mesh {
+    let Some(cells) = CellRange::around_matter(volume) else { return Mesh::default() };
+    extract_cells(DensityGrid::of(volume), cells, Some(SharpEdges::new(volume, smoothed)))
+}
+
+/// Extracts the part of the surface as it is drawn that belongs to a brick. All bricks together give the whole surface;
+/// vertices are shared within a brick only.
+pub fn extract_brick(volume: &Volume, smoothed: &Volume, brick: usize) -> Mesh {
     let corner = volume.bricks().corner(brick).map(|v| v as i32);
     let dims = volume.grid().dims.map(|n| n as i32);
     // The first brick also closes the surface at the lower border of the grid.
     let low = corner.map(|v| if v == 0 { -1 } else { v });
     let end = std::array::from_fn(|a| (corner[a] + BRICK as i32).min(dims[a]));
-    extract_cells(DensityGrid { grid: volume.grid(), densities: volume.densities() }, CellRange { low, end })
+    let edges = SharpEdges::new(volume, smoothed);
+    extract_cells(DensityGrid::of(volume), CellRange { low, end }, Some(edges))
 }
 
 /// Bricks whose part of the surface may change when the `dirty` bricks change: those and their neighbours, in
@@ -54,89 +65,6 @@ pub fn dirty_neighbourhood(volume: &Volume, dirty: &[usize]) -> Vec<usize> {
     found
 }
 
-/// Densities on a grid, zero beyond it.
-#[derive(Clone, Copy)]
-struct DensityGrid<'a> {
-    grid: &'a Grid,
-    densities: &'a [Density],
-}
-
-impl DensityGrid<'_> {
-    fn at(&self, sample: [i32; 3]) -> f32 {
-        let is_inside = (0..3).all(|a| sample[a] >= 0 && (sample[a] as u32) < self.grid.dims[a]);
-        if is_inside { self.densities[self.grid.index(sample.map(|v| v as u32))].unit() } else { 0.0 }
-    }
-
-    /// Density and gradient (central differences per mm) at both ends of the edge from a sample along an axis.
-    fn edge_samples(&self, start: [i32; 3], axis: usize) -> [(f32, Vec3); 2] {
-        let end = shifted_sample(start, axis, 1);
-        let last = self.grid.dims.map(|n| n as i32 - 1);
-        let is_within = (0..3).all(|a| start[a] > 0 && end[a] < last[a]);
-        if !is_within {
-            return [start, end].map(|sample| {
-                let along =
-                    |axis: usize| self.at(shifted_sample(sample, axis, 1)) - self.at(shifted_sample(sample, axis, -1));
-                (self.at(sample), self.per_mm(Vec3::new(along(0), along(1), along(2))))
-            });
-        }
-        // No neighbour lies beyond the grid, so array offsets can be used.
-        let [nx, ny, _] = self.grid.dims.map(|n| n as usize);
-        let steps = [1, nx, nx * ny];
-        let first = self.grid.index(start.map(|v| v as u32));
-        let unit = |place: usize| self.densities[place].unit();
-        [first, first + steps[axis]].map(|place| {
-            let across = Vec3::new(
-                unit(place + 1) - unit(place - 1),
-                unit(place + nx) - unit(place - nx),
-                unit(place + nx * ny) - unit(place - nx * ny),
-            );
-            (unit(place), self.per_mm(across))
-        })
-    }
-
-    fn per_mm(&self, across: Vec3) -> Vec3 {
-        0.5 * across / self.grid.spacing
-    }
-
-    /// Sets one bit per sample of a row: 1 if solid.
-    fn row(&self, low: i32, y: i32, z: i32, bits: &mut [u64], count: usize) {
-        bits.fill(0);
-        let [nx, ny, nz] = self.grid.dims.map(|n| n as i32);
-        if y < 0 || z < 0 || y >= ny || z >= nz {
-            return;
-        }
-        let row = self.grid.index([0, y as u32, z as u32]);
-        let first = low.max(0);
-        let last = (low + count as i32).min(nx);
-        let values = &self.densities[row + first as usize..row + last as usize];
-        let mut at = (first - low) as usize;
-        let (eights, rest) = values.as_chunks::<8>();
-        for eight in eights {
-            let solid = solid_bits(eight);
-            bits[at / 64] |= solid << (at % 64);
-            if at % 64 > 56 {
-                bits[at / 64 + 1] |= solid >> (64 - at % 64);
-            }
-            at += 8;
-        }
-        for density in rest {
-            bits[at / 64] |= u64::from(density.is_solid()) << (at % 64);
-            at += 1;
-        }
-    }
-}
-
-/// One bit per density: its highest bit, gathered by one multiplication.
-fn solid_bits(eight: &[Density; 8]) -> u64 {
-    let highest = u64::from_le_bytes(eight.map(Density::bits)) & 0x8080_8080_8080_8080;
-    (highest >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56
-}
-
-fn shifted_sample(mut sample: [i32; 3], axis: usize, steps: i32) -> [i32; 3] {
-    sample[axis] += steps;
-    sample
-}
-
 /// Range of cells of eight samples each, by their lowest sample: from `low` up to, but excluding, `end`.
 #[derive(Clone, Copy)]
 struct CellRange {
@@ -144,13 +72,20 @@ struct CellRange {
     end: [i32; 3],
 }
 
+impl CellRange {
+    fn around_matter(volume: &Volume) -> Option<CellRange> {
+        let CellBox { low, high } = volume.bounding_box()?;
+        Some(CellRange { low: low.map(|v| v as i32 - 1), end: high.map(|v| v as i32 + 1) })
+    }
+}
+
 /// Extracts the surface within a range of cells. Cells without a surface cost a fraction of an instruction each.
-fn extract_cells(field: DensityGrid, cells: CellRange) -> Mesh {
+fn extract_cells(field: DensityGrid, cells: CellRange, edges: Option<SharpEdges>) -> Mesh {
     let CellRange { low, end } = cells;
     if (0..3).any(|a| low[a] >= end[a]) {
         return Mesh::default();
     }
-    let mut builder = MeshBuilder::new(field, cells);
+    let mut builder = MeshBuilder::new(field, cells, edges);
     let [nx, ny, _] = builder.samples;
     let words = nx.div_ceil(64) + 1;
     let mut planes = [vec![0u64; words * ny], vec![0u64; words * ny]];
@@ -209,13 +144,29 @@ struct MeshBuilder<'a> {
     /// Vertices on the edges from each sample along each axis, for two alternating layers of samples.
     vertex: Vec<[u32; 3]>,
     mesh: Mesh,
+    /// For each vertex, true if a sharp edge is near.
+    is_at_edge: Vec<bool>,
+    edges: Option<SharpEdges<'a>>,
+    /// Numbers of the vertices on sharp edges.
+    edge_vertices: BTreeMap<Outline, u32>,
 }
 
 impl<'a> MeshBuilder<'a> {
-    fn new(field: DensityGrid<'a>, cells: CellRange) -> MeshBuilder<'a> {
+    fn new(field: DensityGrid<'a>, cells: CellRange, edges: Option<SharpEdges<'a>>) -> MeshBuilder<'a> {
         let samples: [usize; 3] = std::array::from_fn(|a| (cells.end[a] - cells.low[a]) as usize + 1);
         let vertex = vec![[0; 3]; 2 * samples[0] * samples[1]];
-        MeshBuilder { field, cases: &CASES, low: cells.low, samples, vertex, mesh: Mesh::default() }
+        let (mesh, is_at_edge) = (Mesh::default(), Vec::new());
+        MeshBuilder {
+            field,
+            cases: &CASES,
+            low: cells.low,
+            samples,
+            vertex,
+            mesh,
+            is_at_edge,
+            edges,
+            edge_vertices: BTreeMap::new(),
+        }
     }
 
     #[inline]
@@ -236,28 +187,81 @@ impl<'a> MeshBuilder<'a> {
             }
             vertices[edge] = self.vertex[slot][axis];
         }
+        if self.edges.is_some() && case.edges.iter().any(|e| self.is_at_edge[vertices[usize::from(e.0)] as usize]) {
+            return self.cell_with_edges(cell, case, &vertices);
+        }
         let corner = |edge: &EdgeIndex| vertices[usize::from(edge.0)];
         self.mesh.triangles.extend(case.triangles.iter().map(|t| [corner(&t[0]), corner(&t[1]), corner(&t[2])]));
     }
 
     fn add_vertex(&mut self, start: [i32; 3], axis: usize) -> u32 {
-        let [(from, slope_from), (to, slope_to)] = self.field.edge_samples(start, axis);
-        let part = (crate::volume::ISO - from) / (to - from);
-        let mut steps = Vec3::from(start.map(|v| v as f32));
-        steps[axis] += part;
-        let slope = slope_from.lerp(slope_to, part);
-        // If the gradient vanishes, the edge gives the outward direction.
-        let out_along_edge = Vec3::AXES[axis] * (from - to).signum();
-        self.mesh.positions.push(self.field.grid.origin + steps * self.field.grid.spacing);
-        self.mesh.normals.push((-slope).try_normalize().unwrap_or(out_along_edge));
+        let (crossing, is_at_edge) = match &mut self.edges {
+            Some(edges) => edges.crossing(&self.field, start, axis),
+            None => (self.field.crossing(start, axis), false),
+        };
+        self.push(crossing, is_at_edge)
+    }
+
+    fn push(&mut self, Crossing { position, normal }: Crossing, is_at_edge: bool) -> u32 {
+        self.mesh.positions.push(position);
+        self.mesh.normals.push(normal);
+        self.is_at_edge.push(is_at_edge);
         self.mesh.positions.len() as u32 - 1
+    }
+
+    /// The surface in a cell near a sharp edge: each outline that an edge crosses is a fan around a vertex on that edge.
+    /// The cell that comes later joins its vertex with that of a cell before, if the edge goes on there.
+    #[cold]
+    fn cell_with_edges(&mut self, cell: [i32; 3], case: &'static CubeCase, vertices: &[u32; 12]) {
+        let vertex = |edge: EdgeIndex| vertices[usize::from(edge.0)];
+        for (number, ring) in case.rings.iter().enumerate() {
+            let Some(apex) = self.edge_vertex((cell, number), case) else {
+                let own = case.triangles.iter().filter(|t| ring.contains(&t[0]));
+                self.mesh.triangles.extend(own.map(|t| t.map(vertex)));
+                continue;
+            };
+            for line in sharp_edges::lines(ring) {
+                let face = line[0].shared_face(line[1]).expect("a line lies on a face");
+                let beyond = sharp_edges::outline_beyond(&self.field, cell, ring, line, face)
+                    .and_then(|(outline, case)| Some((outline, self.edge_vertex(outline, case)?)));
+                let [a, b] = line.map(vertex);
+                match beyond {
+                    None => {
+                        let apex = self.number((cell, number), apex);
+                        self.mesh.triangles.push([a, b, apex]);
+                    }
+                    Some((outline, beyond)) if face.side == 0 => {
+                        let apex = self.number((cell, number), apex);
+                        let beyond = self.number(outline, beyond);
+                        self.mesh.triangles.extend([[a, beyond, apex], [beyond, b, apex]]);
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+    }
+
+    /// The vertex on the sharp edge that crosses an outline.
+    fn edge_vertex(&mut self, outline: Outline, case: &'static CubeCase) -> Option<Crossing> {
+        self.edges.as_mut()?.vertex(&self.field, outline, case)
+    }
+
+    /// Number of an edge's vertex in the mesh, to which it is added when it is first used.
+    fn number(&mut self, outline: Outline, vertex: Crossing) -> u32 {
+        if let Some(&known) = self.edge_vertices.get(&outline) {
+            return known;
+        }
+        let number = self.push(vertex, true);
+        self.edge_vertices.insert(outline, number);
+        number
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::super::{Label, Voxel, phantom};
+    use super::super::{Density, Grid, Label, Voxel, phantom};
     use super::*;
+    use crate::frame::Vec3;
     use std::collections::BTreeMap;
 
     /// Returns true if each directed edge occurs once and so does its reverse.
@@ -309,16 +313,29 @@ pub(super) mod tests {
     fn whatever_the_voxels_hold_the_surface_is_closed() {
         // Aim: no hole and no doubled edge, even where cells are ambiguous and where matter touches the border of the
         // grid.
-        let mesh = extract(&noise());
-        assert!(mesh.triangles.len() > 20_000);
-        assert!(is_watertight(&mesh));
+        let noise = noise();
+        for mesh in [extract(&noise), extract_sharp(&noise, &noise)] {
+            assert!(mesh.triangles.len() > 20_000);
+            assert!(is_watertight(&mesh));
+        }
     }
 
     #[test]
     fn the_bricks_together_are_the_whole() {
-        let volume = noise();
-        let whole = extract(&volume);
-        let bricks: Vec<Mesh> = (0..volume.bricks().len()).map(|b| extract_brick(&volume, b)).collect();
+        for volume in [noise(), notched_ball()] {
+            compare_bricks_with_whole(&volume);
+        }
+    }
+
+    /// A ball with a round groove of sharp edges.
+    fn notched_ball() -> Volume {
+        let grid = Grid::centred([64; 3], Vec3::splat(0.1));
+        Volume::from_distance(grid, 0.15, |p| ((p.length() - 2.5).max(0.6 - p.x.hypot(p.z - 2.4)), Label(1)))
+    }
+
+    fn compare_bricks_with_whole(volume: &Volume) {
+        let whole = extract_sharp(volume, volume);
+        let bricks: Vec<Mesh> = (0..volume.bricks().len()).map(|b| extract_brick(volume, volume, b)).collect();
         assert_eq!(bricks.iter().map(|m| m.triangles.len()).sum::<usize>(), whole.triangles.len());
         let corners = |mesh: &Mesh| -> Vec<[[u32; 3]; 3]> {
             let at = |i: u32| mesh.positions[i as usize].to_array().map(f32::to_bits);
@@ -333,15 +350,15 @@ pub(super) mod tests {
 
     #[test]
     fn only_affected_bricks_look_different_after_a_cut() {
-        let mut volume = phantom::ball([64, 64, 64], Vec3::splat(0.2), 5.0);
-        let before: Vec<Mesh> = (0..volume.bricks().len()).map(|b| extract_brick(&volume, b)).collect();
-        for z in 50..62 {
+        let mut volume = notched_ball();
+        let before: Vec<Mesh> = (0..volume.bricks().len()).map(|b| extract_brick(&volume, &volume, b)).collect();
+        for z in 40..58 {
             volume.set_cell([32, 32, z], Voxel::AIR);
         }
         let dirty = volume.take_dirty();
         let affected = dirty_neighbourhood(&volume, &dirty);
         for (index, before) in before.iter().enumerate() {
-            assert!(affected.contains(&index) || *before == extract_brick(&volume, index), "brick {index}");
+            assert!(affected.contains(&index) || *before == extract_brick(&volume, &volume, index), "brick {index}");
         }
     }
 }
