@@ -3,7 +3,21 @@
 //! Takes densities on a grid, which are zero beyond it. Gives places in tooth space, mm. Never joins them.
 
 use crate::frame::Vec3;
-use crate::volume::{Density, Grid, ISO, Volume};
+use crate::volume::{CellBox, Density, Grid, ISO, Volume};
+
+/// Range of cells of eight samples each, by their lowest sample: from `low` up to, but excluding, `end`.
+#[derive(Clone, Copy)]
+pub struct CellRange {
+    pub low: [i32; 3],
+    pub end: [i32; 3],
+}
+
+impl CellRange {
+    pub fn around_matter(volume: &Volume) -> Option<CellRange> {
+        let CellBox { low, high } = volume.bounding_box()?;
+        Some(CellRange { low: low.map(|v| v as i32 - 1), end: high.map(|v| v as i32 + 1) })
+    }
+}
 
 /// Densities on a grid, zero beyond it.
 #[derive(Clone, Copy)]
@@ -22,31 +36,52 @@ impl<'a> DensityGrid<'a> {
         if is_inside { self.densities[self.grid.index(sample.map(|v| v as u32))].unit() } else { 0.0 }
     }
 
-    /// Density and gradient (central differences per mm) at both ends of the edge from a sample along an axis.
-    fn edge_samples(&self, start: [i32; 3], axis: usize) -> [(f32, Vec3); 2] {
+    /// The samples at both ends of the edge from one along an axis.
+    #[inline(always)]
+    pub fn ends(&self, start: [i32; 3], axis: usize) -> EdgeEnds {
         let end = shifted_sample(start, axis, 1);
-        let last = self.grid.dims.map(|n| n as i32 - 1);
-        let is_within = (0..3).all(|a| start[a] > 0 && end[a] < last[a]);
+        let is_within = (0..3).all(|a| start[a] > 0 && end[a] + 1 < self.grid.dims[a] as i32);
         if !is_within {
-            return [start, end].map(|sample| {
-                let along =
-                    |axis: usize| self.at(shifted_sample(sample, axis, 1)) - self.at(shifted_sample(sample, axis, -1));
-                (self.at(sample), self.per_mm(Vec3::new(along(0), along(1), along(2))))
-            });
+            return EdgeEnds([start, end].map(|sample| self.neighbours_at_border(sample)));
         }
-        // No neighbour lies beyond the grid, so array offsets can be used.
-        let [nx, ny, _] = self.grid.dims.map(|n| n as usize);
-        let steps = [1, nx, nx * ny];
         let first = self.grid.index(start.map(|v| v as u32));
+        let next = first + self.strides()[axis];
+        EdgeEnds([self.neighbours_within(first), self.neighbours_within(next)])
+    }
+
+    /// A sample with its neighbours.
+    #[inline(always)]
+    pub fn neighbours(&self, sample: [i32; 3]) -> Neighbours {
+        let is_within = (0..3).all(|a| sample[a] > 0 && sample[a] + 1 < self.grid.dims[a] as i32);
+        if !is_within {
+            return self.neighbours_at_border(sample);
+        }
+        self.neighbours_within(self.grid.index(sample.map(|v| v as u32)))
+    }
+
+    /// The same where no neighbour lies beyond the grid, so that array offsets can be used.
+    #[inline(always)]
+    fn neighbours_within(&self, place: usize) -> Neighbours {
         let unit = |place: usize| self.densities[place].unit();
-        [first, first + steps[axis]].map(|place| {
-            let across = Vec3::new(
-                unit(place + 1) - unit(place - 1),
-                unit(place + nx) - unit(place - nx),
-                unit(place + nx * ny) - unit(place - nx * ny),
-            );
-            (unit(place), self.per_mm(across))
-        })
+        let [x, y, z] = self.strides();
+        let beside = [
+            [unit(place - x), unit(place + x)],
+            [unit(place - y), unit(place + y)],
+            [unit(place - z), unit(place + z)],
+        ];
+        Neighbours { here: unit(place), beside }
+    }
+
+    /// Steps from a sample to the next along each axis, in the array.
+    fn strides(&self) -> [usize; 3] {
+        let [nx, ny, _] = self.grid.dims.map(|n| n as usize);
+        [1, nx, nx * ny]
+    }
+
+    #[cold]
+    fn neighbours_at_border(&self, sample: [i32; 3]) -> Neighbours {
+        let beside = [0, 1, 2].map(|axis| [-1, 1].map(|steps| self.at(shifted_sample(sample, axis, steps))));
+        Neighbours { here: self.at(sample), beside }
     }
 
     /// The place of a sample, tooth space, mm.
@@ -56,32 +91,10 @@ impl<'a> DensityGrid<'a> {
 
     /// The surface on the edge from a sample along an axis, whose ends are on both sides of it.
     pub fn crossing(&self, start: [i32; 3], axis: usize) -> Crossing {
-        let [(from, slope_from), (to, slope_to)] = self.edge_samples(start, axis);
-        let part = (ISO - from) / (to - from);
-        // If the gradient vanishes, the edge gives the outward direction.
-        let out_along_edge = Vec3::AXES[axis] * (from - to).signum();
-        let normal = (-slope_from.lerp(slope_to, part)).try_normalize().unwrap_or(out_along_edge);
+        let ends = self.ends(start, axis);
+        let part = ends.crossing_part();
+        let normal = ends.normal(part, self.grid.spacing).unwrap_or_else(|| ends.outward_along(axis));
         Crossing { position: self.place_along(start, axis, part), normal }
-    }
-
-    /// Part of the way along an edge at which the surface crosses it.
-    pub fn crossing_part(&self, start: [i32; 3], axis: usize) -> f32 {
-        let around = self.around(start, 1);
-        let (from, to) = (around.at(axis, 0), around.at(axis, 1));
-        (ISO - from) / (to - from)
-    }
-
-    /// Outward unit normal a part of the way along an edge; `None` where the density does not change.
-    pub fn normal(&self, start: [i32; 3], axis: usize, part: f32) -> Option<Vec3> {
-        let [(_, from), (_, to)] = self.edge_samples(start, axis);
-        (-from.lerp(to, part)).try_normalize()
-    }
-
-    /// The samples around one, up to a number of steps along each axis.
-    #[inline]
-    pub fn around(&self, sample: [i32; 3], steps: i32) -> SamplesAround<'a> {
-        let is_within = (0..3).all(|a| sample[a] >= steps && sample[a] + steps < self.grid.dims[a] as i32);
-        SamplesAround { field: *self, sample, index: is_within.then(|| self.grid.index(sample.map(|v| v as u32))) }
     }
 
     /// The place a part of the way from a sample to the next along an axis.
@@ -89,10 +102,6 @@ impl<'a> DensityGrid<'a> {
         let mut steps = Vec3::from(start.map(|v| v as f32));
         steps[axis] += part;
         self.grid.origin + steps * self.grid.spacing
-    }
-
-    fn per_mm(&self, across: Vec3) -> Vec3 {
-        0.5 * across / self.grid.spacing
     }
 
     /// Sets one bit per sample of a row: 1 if solid.
@@ -135,26 +144,42 @@ pub fn shifted_sample(mut sample: [i32; 3], axis: usize, steps: i32) -> [i32; 3]
     sample
 }
 
-/// Densities of a sample and those in line with it along the axes.
-pub struct SamplesAround<'a> {
-    field: DensityGrid<'a>,
-    sample: [i32; 3],
-    /// Array index of the sample, if none of them lies beyond the grid.
-    index: Option<usize>,
+/// Densities of a sample and of those beside it.
+#[derive(Clone, Copy)]
+pub struct Neighbours {
+    pub here: f32,
+    /// The sample before and the one after, along each axis.
+    pub beside: [[f32; 2]; 3],
 }
 
-impl SamplesAround<'_> {
-    /// Density some steps along an axis.
-    #[inline]
-    pub fn at(&self, axis: usize, steps: i32) -> f32 {
-        match self.index {
-            Some(index) => {
-                let [nx, ny, _] = self.field.grid.dims.map(|n| n as isize);
-                let stride = [1, nx, nx * ny][axis];
-                self.field.densities[index.wrapping_add_signed(steps as isize * stride)].unit()
-            }
-            None => self.field.at(shifted_sample(self.sample, axis, steps)),
-        }
+impl Neighbours {
+    /// Central differences, per mm.
+    fn gradient(&self, spacing: Vec3) -> Vec3 {
+        0.5 * Vec3::from(self.beside.map(|[below, above]| above - below)) / spacing
+    }
+}
+
+/// Both ends of an edge.
+#[derive(Clone, Copy)]
+pub struct EdgeEnds(pub [Neighbours; 2]);
+
+impl EdgeEnds {
+    /// Part of the way at which the surface crosses the edge.
+    pub fn crossing_part(&self) -> f32 {
+        let [from, to] = self.0.map(|end| end.here);
+        (ISO - from) / (to - from)
+    }
+
+    /// Outward unit normal a part of the way; `None` where the density does not change.
+    pub fn normal(&self, part: f32, spacing: Vec3) -> Option<Vec3> {
+        let [from, to] = self.0.map(|end| end.gradient(spacing));
+        (-from.lerp(to, part)).try_normalize()
+    }
+
+    /// Direction from the solid end of an edge along an axis to the other.
+    pub fn outward_along(&self, axis: usize) -> Vec3 {
+        let [from, to] = self.0.map(|end| end.here);
+        Vec3::AXES[axis] * (from - to).signum()
     }
 }
 

@@ -1,8 +1,8 @@
 //! Smoothed surface of a set of voxels that stays true to the set.
 
 use crate::mesh::Mesh;
-use crate::volume::surface::density_grid::DensityGrid;
-use crate::volume::surface::{CellRange, extract_cells};
+use crate::volume::surface::density_grid::{CellRange, DensityGrid};
+use crate::volume::surface::extract_cells;
 use crate::volume::{Density, Grid, Label, Volume};
 
 /// Smoothing rounds: after four, steps of one voxel are gone, and more rounds change little.

@@ -10,14 +10,15 @@
 mod cases;
 mod density_grid;
 mod mask;
+mod planes;
 mod sharp_edges;
 
 pub use mask::{of_mask, volume_of_mask};
 
 use crate::mesh::Mesh;
-use crate::volume::{BRICK, CellBox, Volume};
+use crate::volume::{BRICK, Volume};
 use cases::{CASES, CELL_EDGES, CellEdge, CubeCase, EdgeIndex};
-use density_grid::{Crossing, DensityGrid};
+use density_grid::{CellRange, Crossing, DensityGrid};
 use sharp_edges::{Outline, SharpEdges};
 use std::collections::BTreeMap;
 
@@ -30,7 +31,7 @@ pub fn extract(volume: &Volume) -> Mesh {
 /// Extracts the whole surface as it is drawn: with sharp edges, and with the normals of a smoothed copy of the volume.
 pub fn extract_sharp(volume: &Volume, smoothed: &Volume) -> Mesh {
     let Some(cells) = CellRange::around_matter(volume) else { return Mesh::default() };
-    extract_cells(DensityGrid::of(volume), cells, Some(SharpEdges::new(volume, smoothed)))
+    extract_cells(DensityGrid::of(volume), cells, Some(SharpEdges::new(volume, smoothed, &cells)))
 }
 
 /// Extracts the part of the surface as it is drawn that belongs to a brick. All bricks together give the whole surface;
@@ -41,8 +42,8 @@ pub fn extract_brick(volume: &Volume, smoothed: &Volume, brick: usize) -> Mesh {
     // The first brick also closes the surface at the lower border of the grid.
     let low = corner.map(|v| if v == 0 { -1 } else { v });
     let end = std::array::from_fn(|a| (corner[a] + BRICK as i32).min(dims[a]));
-    let edges = SharpEdges::new(volume, smoothed);
-    extract_cells(DensityGrid::of(volume), CellRange { low, end }, Some(edges))
+    let cells = CellRange { low, end };
+    extract_cells(DensityGrid::of(volume), cells, Some(SharpEdges::new(volume, smoothed, &cells)))
 }
 
 /// Bricks whose part of the surface may change when the `dirty` bricks change: those and their neighbours, in
@@ -63,20 +64,6 @@ pub fn dirty_neighbourhood(volume: &Volume, dirty: &[usize]) -> Vec<usize> {
     found.sort_unstable();
     found.dedup();
     found
-}
-
-/// Range of cells of eight samples each, by their lowest sample: from `low` up to, but excluding, `end`.
-#[derive(Clone, Copy)]
-struct CellRange {
-    low: [i32; 3],
-    end: [i32; 3],
-}
-
-impl CellRange {
-    fn around_matter(volume: &Volume) -> Option<CellRange> {
-        let CellBox { low, high } = volume.bounding_box()?;
-        Some(CellRange { low: low.map(|v| v as i32 - 1), end: high.map(|v| v as i32 + 1) })
-    }
 }
 
 /// Extracts the surface within a range of cells. Cells without a surface cost a fraction of an instruction each.
@@ -144,7 +131,7 @@ struct MeshBuilder<'a> {
     /// Vertices on the edges from each sample along each axis, for two alternating layers of samples.
     vertex: Vec<[u32; 3]>,
     mesh: Mesh,
-    /// For each vertex, true if a sharp edge is near.
+    /// For each vertex, true if a sharp edge is near; empty where edges are not sought.
     is_at_edge: Vec<bool>,
     edges: Option<SharpEdges<'a>>,
     /// Numbers of the vertices on sharp edges.
@@ -205,7 +192,9 @@ impl<'a> MeshBuilder<'a> {
     fn push(&mut self, Crossing { position, normal }: Crossing, is_at_edge: bool) -> u32 {
         self.mesh.positions.push(position);
         self.mesh.normals.push(normal);
-        self.is_at_edge.push(is_at_edge);
+        if self.edges.is_some() {
+            self.is_at_edge.push(is_at_edge);
+        }
         self.mesh.positions.len() as u32 - 1
     }
 

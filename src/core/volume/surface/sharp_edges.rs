@@ -9,23 +9,16 @@
 //! across it.
 
 use super::cases::{CASES, CELL_EDGES, CellEdge, CellFace, CubeCase, EdgeIndex};
-use super::density_grid::{Crossing, DensityGrid, shifted_sample};
+use super::density_grid::{CellRange, Crossing, DensityGrid, EdgeEnds, Neighbours, shifted_sample};
+use super::planes::{EvenDensity, SamplePlane, SamplePlanes};
 use crate::frame::{Mat3, Vec3};
 use crate::volume::{BRICK, ISO, Volume};
 use std::collections::BTreeMap;
+use std::sync::LazyLock;
 
 /// Bend of the density over three samples, as a share of its slope at a plane, from which on an edge is sought: a ball
 /// with a radius of three voxels bends by a third.
 const BEND_MIN: f32 = 0.35;
-
-/// Bend up to which three samples lie on one plane.
-const PLANE_BEND_MAX: f32 = 0.25;
-
-/// Deviation from the surface's density of samples whose planes are asked for: 1.2 voxels, beyond which the ramp's end is near.
-const PLANE_DEPTH: f32 = 0.4;
-
-/// Deviation of a plane's slope from that of the ramp, as a share. The distances of carved teeth are within a twentieth.
-const PLANE_SLOPE_TOLERANCE: f32 = 0.1;
 
 /// Cosine of the angle between two sides from which on they are an edge: 35°, more than a wall of the smallest round bur (0.5 mm)
 /// turns by in a cell of 0.1 mm.
@@ -34,12 +27,15 @@ const EDGE_COSINE: f32 = 0.82;
 /// Deviation of a density from the lesser of both sides up to which they explain it: half a voxel of the ramp.
 const SIDES_TOLERANCE: f32 = 0.15;
 
-/// Samples beside an edge that are looked at, from a crossing along each axis: fewer do not lie beside a thin edge, and more
-/// lie on other parts of a round side.
-const REACH: i32 = 2;
+/// Distance from the middle of a cell's edge up to which planes are looked for, voxels: nearer there are none beside a
+/// thin edge of matter, and farther away a round side is another plane.
+const REACH: f32 = 2.1;
+
+/// Steps to the far end of the edges of the cell beyond a cell, in which an edge may go on.
+const CELL_BEYOND: i32 = 1;
 
 // A brick depends on its neighbours only: on the next cell, on samples around the end of its edge, and on two more for the slope.
-const _: () = assert!(2 + REACH + 2 <= BRICK as i32);
+const _: () = assert!(1 + CELL_BEYOND + REACH as i32 + 2 <= BRICK as i32);
 // Normals are taken beyond that cell, from slopes of a copy that is smoothed over one voxel.
 const _: () = assert!(2.0 + BEYOND_CELL + 3.0 <= BRICK as f32);
 
@@ -58,8 +54,9 @@ type EdgeOfCell = ([i32; 3], usize);
 
 /// Sharp edges of one surface.
 pub struct SharpEdges<'a> {
-    /// Slope of the density at a plane, per mm.
-    plane_slope: f32,
+    planes: SamplePlanes,
+    /// Bend of the density from which on an edge is sought, along each axis.
+    bend_min: Vec3,
     smoothed: &'a Volume,
     /// Results that were found already.
     crossings: BTreeMap<EdgeOfCell, NearEdge>,
@@ -78,20 +75,28 @@ enum NearEdge {
 }
 
 impl<'a> SharpEdges<'a> {
-    pub fn new(volume: &Volume, smoothed: &'a Volume) -> SharpEdges<'a> {
-        let plane_slope = 0.5 / volume.half_band();
-        SharpEdges { plane_slope, smoothed, crossings: BTreeMap::new(), vertices: BTreeMap::new() }
+    /// The edges in a range of cells.
+    pub fn new(volume: &Volume, smoothed: &'a Volume, cells: &CellRange) -> SharpEdges<'a> {
+        let slope = 0.5 / volume.half_band();
+        SharpEdges {
+            planes: SamplePlanes::new(cells, CELL_BEYOND + REACH as i32, slope),
+            bend_min: BEND_MIN * slope * volume.grid().spacing,
+            smoothed,
+            crossings: BTreeMap::new(),
+            vertices: BTreeMap::new(),
+        }
     }
 
     /// The crossing on the edge from a sample along an axis, and whether a sharp edge is near.
     pub fn crossing(&mut self, field: &DensityGrid, start: [i32; 3], axis: usize) -> (Crossing, bool) {
-        if let NearEdge::Edge(_, position) = self.near_edge(field, start, axis) {
+        let ends = field.ends(start, axis);
+        if let NearEdge::Edge(_, position) = self.near_edge(field, &ends, (start, axis)) {
             let normal = self.normal(position).unwrap_or_else(|| field.crossing(start, axis).normal);
             return (Crossing { position, normal }, true);
         }
-        let part = field.crossing_part(start, axis);
+        let part = ends.crossing_part();
         let position = field.place_along(start, axis, part);
-        let normal = DensityGrid::of(self.smoothed).normal(start, axis, part);
+        let normal = DensityGrid::of(self.smoothed).ends(start, axis).normal(part, field.grid.spacing);
         (Crossing { position, normal: normal.unwrap_or_else(|| field.crossing(start, axis).normal) }, false)
     }
 
@@ -100,16 +105,13 @@ impl<'a> SharpEdges<'a> {
         (-self.smoothed.density_and_gradient_at(position).1).try_normalize()
     }
 
-    fn near_edge(&mut self, field: &DensityGrid, start: [i32; 3], axis: usize) -> NearEdge {
-        let limit = BEND_MIN * self.plane_slope;
-        if !field.is_bent(start, limit) && !field.is_bent(shifted_sample(start, axis, 1), limit) {
+    fn near_edge(&mut self, field: &DensityGrid, ends: &EdgeEnds, edge: EdgeOfCell) -> NearEdge {
+        if !ends.0.iter().any(|end| end.are_bent(self.bend_min)) {
             return NearEdge::Even;
         }
-        *self.crossings.entry((start, axis)).or_insert_with(|| {
-            match Sides::beside(field, start, axis, self.plane_slope) {
-                Some(sides) => NearEdge::Edge(sides, sides.crossing(field, start, axis)),
-                None => NearEdge::Unknown,
-            }
+        *self.crossings.entry(edge).or_insert_with(|| match Sides::beside(field, ends, edge, &mut self.planes) {
+            Some(sides) => NearEdge::Edge(sides, sides.crossing(field, ends, edge)),
+            None => NearEdge::Unknown,
         })
     }
 
@@ -133,7 +135,8 @@ impl<'a> SharpEdges<'a> {
         for edge in ring {
             let CellEdge { axis, start, .. } = CELL_EDGES[usize::from(edge.0)];
             let start = std::array::from_fn(|a| cell[a] + start[a] as i32);
-            match self.near_edge(field, start, axis) {
+            let ends = field.ends(start, axis);
+            match self.near_edge(field, &ends, (start, axis)) {
                 NearEdge::Edge(sides, place) => {
                     let [a, b] = sides.planes(field, start);
                     normals.push(if a.height(place).abs() < b.height(place).abs() { a.normal } else { b.normal });
@@ -148,7 +151,7 @@ impl<'a> SharpEdges<'a> {
                     places.push(position);
                 }
                 NearEdge::Unknown => {
-                    places.push(field.place_along(start, axis, field.crossing_part(start, axis)));
+                    places.push(field.place_along(start, axis, ends.crossing_part()));
                 }
             }
         }
@@ -222,66 +225,38 @@ pub fn lines(ring: &[EdgeIndex]) -> impl Iterator<Item = [EdgeIndex; 2]> {
     ring.iter().zip(ring.iter().cycle().skip(1)).map(|(&from, &to)| [from, to])
 }
 
-impl DensityGrid<'_> {
-    /// Returns true if the density falls more steeply on one side of a sample than it rises on the other, as across an
-    /// edge of matter.
-    fn is_bent(&self, sample: [i32; 3], limit: f32) -> bool {
-        let around = self.around(sample, 1);
-        let here = around.at(0, 0);
-        here < 1.0
-            && (0..3).any(|axis| {
-                let [below, above] = [-1, 1].map(|steps| around.at(axis, steps));
+impl Neighbours {
+    /// Returns true if the density falls more steeply on one side of the sample than it rises on the other, as across an
+    /// edge of matter: by more than a limit for each axis.
+    fn are_bent(&self, limits: Vec3) -> bool {
+        self.here < 1.0
+            && self.beside.iter().zip(limits.to_array()).any(|([below, above], limit)| {
                 // Deep in matter the ramp has ended, which is no edge.
-                below.max(above) < 1.0 && 2.0 * here - below - above > limit * self.grid.spacing[axis]
+                below.max(*above) < 1.0 && 2.0 * self.here - below - above > limit
             })
     }
-
-    /// The density at a sample on a plane, from the neighbours that lie on it as well.
-    fn even_density(&self, sample: [i32; 3], plane_slope: f32) -> Option<EvenDensity> {
-        let is_within = |density: f32| density > 0.0 && density < 1.0;
-        let around = self.around(sample, 2);
-        let value = around.at(0, 0);
-        if (value - ISO).abs() > PLANE_DEPTH {
-            return None;
-        }
-        let mut slope = Vec3::ZERO;
-        for axis in 0..3 {
-            let limit = PLANE_BEND_MAX * plane_slope * self.grid.spacing[axis];
-            let [below, above] = [-1, 1].map(|steps| around.at(axis, steps));
-            let is_even = is_within(below) && is_within(above) && (below - 2.0 * value + above).abs() <= limit;
-            // On one side only, if the density goes on evenly there until the ramp ends.
-            let goes_on = |near: f32, steps: i32| {
-                let expected = (2.0 * near - value).clamp(0.0, 1.0);
-                is_within(near) && (around.at(axis, steps) - expected).abs() <= limit
-            };
-            let rise = match is_even {
-                true => 0.5 * (above - below),
-                false => match (goes_on(below, -2), goes_on(above, 2)) {
-                    (true, false) => value - below,
-                    (false, true) => above - value,
-                    _ => return None,
-                },
-            };
-            slope[axis] = rise / self.grid.spacing[axis];
-        }
-        let is_ramp = (slope.length() / plane_slope - 1.0).abs() < PLANE_SLOPE_TOLERANCE;
-        is_ramp.then_some(EvenDensity { value, slope })
-    }
 }
 
-/// A density that rises evenly.
-#[derive(Clone, Copy, Debug, Default)]
-struct EvenDensity {
-    /// Value at the sample from which offsets are measured.
-    value: f32,
-    /// Per mm.
-    slope: Vec3,
+/// A sample beside a cell's edge.
+struct WindowSample {
+    /// Steps from the sample at which the edge starts.
+    steps: [i32; 3],
+    /// Weight of the sample's plane.
+    weight: f32,
 }
 
-impl EvenDensity {
-    fn at(&self, offset: Vec3) -> f32 {
-        self.value + self.slope.dot(offset)
-    }
+/// Samples beside an edge along each axis.
+static WINDOWS: LazyLock<[Vec<WindowSample>; 3]> = LazyLock::new(|| [0, 1, 2].map(window));
+
+fn window(axis: usize) -> Vec<WindowSample> {
+    let middle = 0.5 * Vec3::AXES[axis];
+    let steps = || -(REACH as i32)..=REACH.ceil() as i32;
+    let all = steps().flat_map(|z| steps().flat_map(move |y| steps().map(move |x| [x, y, z])));
+    all.filter_map(|steps| {
+        let distance_squared = Vec3::from(steps.map(|v| v as f32)).distance_squared(middle);
+        (distance_squared < REACH * REACH).then(|| WindowSample { steps, weight: (0.25 + distance_squared).powi(-2) })
+    })
+    .collect()
 }
 
 /// A sample on a plane near a crossing.
@@ -301,26 +276,25 @@ struct Seen {
 struct Sides([EvenDensity; 2]);
 
 impl Sides {
-    /// Sides around the edge from a sample along an axis, if there are two.
-    fn beside(field: &DensityGrid, start: [i32; 3], axis: usize, plane_slope: f32) -> Option<Sides> {
-        let last = |a: usize| REACH + i32::from(a == axis);
-        let middle = 0.5 * Vec3::AXES[axis];
-        let mut seen: Vec<Seen> = Vec::with_capacity(64);
-        for z in -REACH..=last(2) {
-            for y in -REACH..=last(1) {
-                for x in -REACH..=last(0) {
-                    let sample = [start[0] + x, start[1] + y, start[2] + z];
-                    let Some(EvenDensity { value, slope }) = field.even_density(sample, plane_slope) else { continue };
-                    let steps = Vec3::from([x, y, z].map(|v| v as f32));
-                    let weight = (0.25 + steps.distance_squared(middle)).powi(-2);
-                    let offset = steps * field.grid.spacing;
-                    let at_start = EvenDensity { value: value - slope.dot(offset), slope };
-                    seen.push(Seen { at_start, inward: slope.normalize(), offset, weight });
-                }
-            }
+    /// Sides around a cell's edge, if there are two.
+    fn beside(
+        field: &DensityGrid,
+        ends: &EdgeEnds,
+        (start, axis): EdgeOfCell,
+        planes: &mut SamplePlanes,
+    ) -> Option<Sides> {
+        let mut seen: Vec<Seen> = Vec::with_capacity(WINDOWS[axis].len());
+        for &WindowSample { steps, weight } in &WINDOWS[axis] {
+            let Some(plane) = planes.at(field, std::array::from_fn(|a| start[a] + steps[a])) else { continue };
+            let SamplePlane { density: EvenDensity { value, slope }, inward } = *plane;
+            let offset = Vec3::from(steps.map(|v| v as f32)) * field.grid.spacing;
+            let at_start = EvenDensity { value: value - slope.dot(offset), slope };
+            seen.push(Seen { at_start, inward, offset, weight });
         }
-        let least_like =
-            |inward: Vec3| seen.iter().map(|s| s.inward).min_by(|a, b| inward.dot(*a).total_cmp(&inward.dot(*b)));
+        let least_like = |inward: Vec3| {
+            let cosines = seen.iter().map(|s| (inward.dot(s.inward), s.inward));
+            cosines.reduce(|least, other| if other.0 < least.0 { other } else { least }).map(|(_, inward)| inward)
+        };
         let first = least_like(seen.first()?.inward)?;
         let second = least_like(first)?;
         if first.dot(second) > EDGE_COSINE {
@@ -328,31 +302,32 @@ impl Sides {
         }
         let mut sums = [(EvenDensity::default(), Vec3::ZERO, 0.0); 2];
         for Seen { at_start, inward, offset, weight } in &seen {
-            let (side, place, total) = &mut sums[usize::from(first.dot(*inward) < second.dot(*inward))];
-            side.value += weight * at_start.value;
-            side.slope += *weight * at_start.slope;
-            *place += *weight * *offset;
-            *total += weight;
+            let is_first = first.dot(*inward) >= second.dot(*inward);
+            for ((side, place, total), is_its) in sums.iter_mut().zip([is_first, !is_first]) {
+                let weight = if is_its { *weight } else { 0.0 };
+                side.value += weight * at_start.value;
+                side.slope += weight * at_start.slope;
+                *place += weight * *offset;
+                *total += weight;
+            }
         }
         let [(a, at_a), (b, at_b)] = sums.map(|(side, place, total)| {
             (EvenDensity { value: side.value / total, slope: side.slope / total }, place / total)
         });
         let is_lesser_of_both = a.at(at_a) < b.at(at_a) && b.at(at_b) < a.at(at_b);
         // A third side, as in a corner, or none at all.
-        let is_explained =
-            [(start, Vec3::ZERO), (shifted_sample(start, axis, 1), Vec3::AXES[axis] * field.grid.spacing)].iter().all(
-                |&(sample, offset)| {
-                    let lesser = a.at(offset).min(b.at(offset)).clamp(0.0, 1.0);
-                    (lesser - field.at(sample)).abs() < SIDES_TOLERANCE
-                },
-            );
+        let offsets = [Vec3::ZERO, Vec3::AXES[axis] * field.grid.spacing];
+        let is_explained = ends.0.iter().zip(offsets).all(|(end, offset)| {
+            let lesser = a.at(offset).min(b.at(offset)).clamp(0.0, 1.0);
+            (lesser - end.here).abs() < SIDES_TOLERANCE
+        });
         (is_lesser_of_both && is_explained).then_some(Sides([a, b]))
     }
 
-    /// The place on the edge from a sample along an axis at which the first of both sides leaves matter; where neither
+    /// The place on a cell's edge at which the first of both sides leaves matter; where neither
     /// does, that of the density itself.
-    fn crossing(&self, field: &DensityGrid, start: [i32; 3], axis: usize) -> Vec3 {
-        let [from, to] = [start, shifted_sample(start, axis, 1)].map(|sample| field.at(sample) - ISO);
+    fn crossing(&self, field: &DensityGrid, ends: &EdgeEnds, (start, axis): EdgeOfCell) -> Vec3 {
+        let [from, to] = ends.0.map(|end| end.here - ISO);
         let along = Vec3::AXES[axis] * field.grid.spacing;
         let is_start_solid = from >= 0.0;
         let leaves = |side: &EvenDensity| {
