@@ -96,8 +96,6 @@ fn background_fragment(@builtin(position) pixel: vec4f) -> @location(0) vec4f {
     let from_middle = (pixel.xy / view.size.xy - 0.5) * 2.0;
     let share = 0.5 * dot(from_middle, from_middle);
     let even = mix(view.background_middle.rgb, view.background_edge.rgb, share);
-    // Against bands: noise of one step of a screen's brightness (Roberts's R2 sequence, 2018), none in a single colour.
-    let noise = fract(dot(pixel.xy, vec2f(0.7548777, 0.5698403))) - 0.5;
     let is_even = all(view.background_middle.rgb == view.background_edge.rgb);
-    return vec4f(screen(even + select(noise / 255.0, 0.0, is_even)), 1.0);
+    return vec4f(screen(even + select(dither(pixel.xy), 0.0, is_even)), 1.0);
 }

@@ -273,6 +273,12 @@ fn lit(finish: vec4f, open: f32, point: vec3f, normal: vec3f) -> vec3f {
     return sqrt(tone(albedo * light * reached * (1.0 - mirrored) + shine * open));
 }
 
+// Noise of one step of a screen's brightness, against bands where a colour changes slowly (Roberts's R2 sequence, 2018). `pixel`: its
+// middle.
+fn dither(pixel: vec2f) -> f32 {
+    return (fract(dot(pixel, vec2f(0.7548777, 0.5698403))) - 0.5) / 255.0;
+}
+
 // Converts an sRGB colour for this target.
 fn screen(colour: vec3f) -> vec3f {
     if view.size.z == 0.0 {

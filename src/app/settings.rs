@@ -41,6 +41,8 @@ pub struct Settings {
     pub smooth_edges: Option<bool>,
     /// True if the lamp casts shadows; without a value, if a graphics processor draws and is quick enough.
     pub shadows: Option<bool>,
+    /// True to blur what is nearer or farther than the teeth worked on.
+    pub depth_of_field: bool,
     /// Share of full scale, 0 to 1.
     pub volume: f32,
     pub high_contrast: bool,
@@ -91,6 +93,7 @@ impl Default for Settings {
             eye_distance_mm: EYE_DISTANCE,
             smooth_edges: None,
             shadows: None,
+            depth_of_field: false,
             volume: VOLUME,
             high_contrast: false,
             font_size: 1.0,

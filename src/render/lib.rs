@@ -65,6 +65,9 @@ mod gpu_offscreen;
 mod ambient_occlusion;
 #[cfg(feature = "gpu")]
 mod iso_pass;
+mod lens;
+#[cfg(feature = "gpu")]
+mod lens_pass;
 #[cfg(feature = "gpu")]
 mod mesh_parts;
 mod mirror;
@@ -118,8 +121,8 @@ pub use relief::{ENAMEL_GLOSS, tooth_normal};
 #[cfg(feature = "gpu")]
 pub use renderer::{RenderTarget, Renderer};
 pub use scene::{
-    Appearance, Background, Changes, LabelPalette, Lamp, Lights, MeshInstance, Particle, RenderMode, RenderScene, Rgb,
-    ShadowRegion, VertexTint, VolumeInstance,
+    Appearance, Background, Changes, LabelPalette, Lamp, Lens, Lights, MeshInstance, Particle, RenderMode, RenderScene,
+    Rgb, ShadowRegion, VertexTint, VolumeInstance,
 };
 pub use shading::LitPoint;
 pub use stereo::{Stereo, StereoLayout};
@@ -162,6 +165,7 @@ pub fn shaders() -> Vec<Shader> {
         shader("volume_pass", volume_pass::SOURCE, &[]),
         shader("particle_pass", particle_pass::SOURCE, &[("Speck", size_of::<particle_pass::gpu::ParticleInstance>())]),
         shader("fxaa_pass", fxaa_pass::SOURCE, &[]),
+        shader("lens_pass", lens::SOURCE, &[("Lens", size_of::<lens_pass::gpu::LensUniform>())]),
         shader("mirror_pass", mirror_pass::SOURCE, &[("Mirror", size_of::<mirror_pass::gpu::MirrorUniform>())]),
         Shader {
             name: "stereo_pass",
@@ -211,6 +215,9 @@ fn validate(
     }
     if scene.shadows.is_some_and(|region| !region.is_valid()) {
         return impossible(format!("invalid region of shadows: {:?}", scene.shadows));
+    }
+    if scene.lens.is_some_and(|lens| !lens.is_valid()) {
+        return impossible(format!("invalid lens: {:?}", scene.lens));
     }
     if scene.mirror.is_some_and(|mirror| !mirror.is_valid()) {
         return impossible(format!("invalid mirror: {:?}", scene.mirror));

@@ -6,6 +6,8 @@ use super::drawn_volume::DrawnVolume;
 use super::error::RenderError;
 use super::eye::Eye;
 use super::fxaa_pass::FxaaPass;
+use super::lens::LensView;
+use super::lens_pass::{LensPass, LensTarget};
 use super::mirror;
 use super::mirror_pass::MirrorPass;
 use super::particle_pass::ParticlePass;
@@ -33,6 +35,7 @@ pub struct Renderer {
     volume_pass: VolumePass,
     particle_pass: ParticlePass,
     fxaa_pass: FxaaPass,
+    lens_pass: LensPass,
     stereo_pass: StereoPass,
     mirror_pass: MirrorPass,
     /// Detail that the pipelines draw.
@@ -79,13 +82,15 @@ struct EyeTarget {
     colour: wgpu::TextureView,
     depth: wgpu::TextureView,
     depth_group: wgpu::BindGroup,
+    /// Present if the last scene had a lens.
+    lens: Option<LensTarget>,
     /// Present once a scene has asked for antialiasing.
     fxaa: Option<FxaaTarget>,
 }
 
 /// Antialiased colours of an eye target.
 struct FxaaTarget {
-    /// Bind group that reads the eye target's colours.
+    /// Bind group that reads the eye target's colours, or those that the lens has blurred.
     group: wgpu::BindGroup,
     colour: wgpu::TextureView,
 }
@@ -93,7 +98,12 @@ struct FxaaTarget {
 impl EyeTarget {
     /// Returns the finished colours of an eye, antialiased if the scene asks for it.
     fn final_colour(&self, scene: &RenderScene) -> &wgpu::TextureView {
-        self.fxaa.as_ref().filter(|_| scene.is_antialiased).map_or(&self.colour, |smooth| &smooth.colour)
+        self.fxaa.as_ref().filter(|_| scene.is_antialiased).map_or(self.blurred(), |smooth| &smooth.colour)
+    }
+
+    /// Returns the colours of an eye, blurred if there is a lens.
+    fn blurred(&self) -> &wgpu::TextureView {
+        self.lens.as_ref().map_or(&self.colour, |lens| &lens.colour)
     }
 }
 
@@ -110,6 +120,7 @@ impl Renderer {
             volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, Detail::default()),
             particle_pass: ParticlePass::new(device, format, &view_layout, Detail::default()),
             fxaa_pass: FxaaPass::new(device, format),
+            lens_pass: LensPass::new(device, format, &view_layout),
             stereo_pass: StereoPass::new(device, format),
             mirror_pass: MirrorPass::new(device, format, &view_layout),
             mirror_targets: [None, None],
@@ -290,10 +301,17 @@ impl Renderer {
     }
 
     fn fit_eye_target(&mut self, side: usize, size: [u32; 2], scene: &RenderScene) {
-        let known = self.eye_targets[side].take().filter(|target| target.size == size);
+        let has_lens = scene.drawn_lens().is_some();
+        let fits = |target: &EyeTarget| target.size == size && target.lens.is_some() == has_lens;
+        let known = self.eye_targets[side].take().filter(fits);
         let mut eye_target = known.unwrap_or_else(|| self.new_eye_target(size));
+        if has_lens && eye_target.lens.is_none() {
+            let sharp = [&eye_target.colour, &eye_target.depth];
+            let blurred = self.attachment("lens", size, self.format);
+            eye_target.lens = Some(self.lens_pass.target(&self.device, sharp, blurred));
+        }
         if scene.is_antialiased && eye_target.fxaa.is_none() {
-            let group = self.fxaa_pass.group(&self.device, &eye_target.colour);
+            let group = self.fxaa_pass.group(&self.device, eye_target.blurred());
             eye_target.fxaa = Some(FxaaTarget { group, colour: self.attachment("fxaa", size, self.format) });
         }
         self.eye_targets[side] = Some(eye_target);
@@ -302,7 +320,8 @@ impl Renderer {
     fn new_eye_target(&self, size: [u32; 2]) -> EyeTarget {
         let depth = self.attachment("depth", size, DEPTH);
         let depth_group = self.volume_pass.group(&self.device, &depth);
-        EyeTarget { size, colour: self.attachment("eye", size, self.format), depth, depth_group, fxaa: None }
+        let colour = self.attachment("eye", size, self.format);
+        EyeTarget { size, colour, depth, depth_group, lens: None, fxaa: None }
     }
 
     fn attachment(&self, label: &str, size: [u32; 2], format: wgpu::TextureFormat) -> wgpu::TextureView {
@@ -342,15 +361,20 @@ impl Renderer {
             reflected = Some(group);
         }
         let view = (eye, &self.views[side]);
-        let Some(FxaaTarget { group, colour }) = eye_target.fxaa.as_ref().filter(|_| scene.is_antialiased) else {
-            return self.draw_scene(encoder, scene, view, eye_target, target.unwrap_or(&eye_target.colour), reflected);
-        };
-        self.draw_scene(encoder, scene, view, eye_target, &eye_target.colour, reflected);
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-        let mut pass = begin_pass(encoder, target.unwrap_or(colour), clear, None);
-        pass.set_pipeline(&self.fxaa_pass.pipeline);
-        pass.set_bind_group(2, group, &[]);
-        pass.draw(0..3, 0..1);
+        let EyeTarget { colour, lens: blurred, fxaa, size, .. } = eye_target;
+        let fxaa = fxaa.as_ref().filter(|_| scene.is_antialiased);
+        // What the last pass draws is the picture.
+        let sharp = target.filter(|_| blurred.is_none() && fxaa.is_none()).unwrap_or(colour);
+        self.draw_scene(encoder, scene, view, eye_target, sharp, reflected);
+        if let (Some(lens), Some(blurred)) = (scene.drawn_lens(), blurred) {
+            blurred.write_uniform(&self.queue, &LensView::new(lens, eye, size[1]));
+            let to = target.filter(|_| fxaa.is_none()).unwrap_or(&blurred.colour);
+            let groups = [(0, &self.views[side].group), (2, &blurred.group)];
+            draw_over(encoder, to, &self.lens_pass.pipeline, &groups);
+        }
+        if let Some(FxaaTarget { group, colour }) = fxaa {
+            draw_over(encoder, target.unwrap_or(colour), &self.fxaa_pass.pipeline, &[(2, group)]);
+        }
     }
 
     /// Draws the whole scene for one eye; `reflected` is the mirror's image.
@@ -461,6 +485,21 @@ impl ViewBindings {
 fn depth_attachment(view: &wgpu::TextureView, load: wgpu::LoadOp<f32>) -> wgpu::RenderPassDepthStencilAttachment<'_> {
     let depth_ops = Some(wgpu::Operations { load, store: wgpu::StoreOp::Store });
     wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
+}
+
+/// Draws a finished picture anew, as a pass changes it; bind groups by number.
+fn draw_over(
+    encoder: &mut wgpu::CommandEncoder,
+    target: &wgpu::TextureView,
+    pipeline: &wgpu::RenderPipeline,
+    groups: &[(u32, &wgpu::BindGroup)],
+) {
+    let mut pass = begin_pass(encoder, target, wgpu::LoadOp::Clear(wgpu::Color::BLACK), None);
+    pass.set_pipeline(pipeline);
+    for (number, group) in groups {
+        pass.set_bind_group(*number, *group, &[]);
+    }
+    pass.draw(0..3, 0..1);
 }
 
 fn begin_pass<'a>(

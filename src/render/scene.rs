@@ -30,11 +30,20 @@ pub struct RenderScene<'a> {
     /// True when fine relief is drawn: stippled gingiva, the ridges of enamel, and the marks of burs where a tooth is dull.
     pub has_relief: bool,
     pub background: Background,
+    /// A lens before the eye, which blurs what is not in its focus; `None` if all is sharp. A translucent tooth has no depth of its
+    /// own, so that all is sharp then, too.
+    pub lens: Option<Lens>,
     /// True when the finished image is antialiased.
     pub is_antialiased: bool,
 }
 
 impl RenderScene<'_> {
+    /// The lens, where depths are known.
+    pub(super) fn drawn_lens(&self) -> Option<&Lens> {
+        let is_translucent = self.tooth.as_ref().is_some_and(|tooth| matches!(tooth.mode, RenderMode::Volume(_)));
+        self.lens.as_ref().filter(|_| !is_translucent)
+    }
+
     /// Returns a scene with nothing but light.
     pub fn empty() -> RenderScene<'static> {
         RenderScene {
@@ -47,6 +56,7 @@ impl RenderScene<'_> {
             shadows: None,
             has_relief: false,
             background: Background::default(),
+            lens: None,
             is_antialiased: false,
         }
     }
@@ -221,6 +231,21 @@ pub struct ShadowRegion {
 impl ShadowRegion {
     pub(super) fn is_valid(&self) -> bool {
         self.centre.is_finite() && (0.1..1000.0).contains(&self.radius)
+    }
+}
+
+/// A thin lens before the eye.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lens {
+    /// Place in focus, world space, mm. What is as deep in the picture is sharp.
+    pub focus: Vec3,
+    /// Diameter, mm: the larger, the more is blurred.
+    pub aperture: f32,
+}
+
+impl Lens {
+    pub(super) fn is_valid(&self) -> bool {
+        self.focus.is_finite() && (0.0..100.0).contains(&self.aperture)
     }
 }
 

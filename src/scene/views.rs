@@ -3,7 +3,7 @@
 use super::jaw::Mouth;
 use typodont_core::frame::Vec3;
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Orbit, Quadrant, ShadowRegion};
+use typodont_render::{Lens, Orbit, Quadrant, ShadowRegion};
 
 /// A side of the tooth, looked at squarely.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +70,15 @@ pub fn shadow_region(workpiece: &Workpiece, orbit: &Orbit) -> ShadowRegion {
     let farther = (orbit.distance / work_view(workpiece).distance).clamp(1.0, 3.0);
     let radius = (AROUND * farther).max(crowns.half_size().length() + 10.0);
     ShadowRegion { centre: workpiece.world_from_tooth * crowns.centre(), radius }
+}
+
+/// Lens of loupes through which a view is seen: the teeth worked on are sharp, throat and lips are not.
+pub fn loupes(orbit: &Orbit) -> Lens {
+    /// Diameter of a pupil in the light of a lamp, and the distance at which one works with loupes, mm. What magnifies by coming nearer
+    /// blurs as loupes do that magnify as much.
+    const PUPIL: f32 = 3.0;
+    const WORKING_DISTANCE: f32 = 350.0;
+    Lens { focus: orbit.middle, aperture: PUPIL * orbit.distance / WORKING_DISTANCE }
 }
 
 impl Mouth {

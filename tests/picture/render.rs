@@ -506,6 +506,10 @@ fn what_cannot_be_drawn_is_refused_in_words() {
             refused(&RenderScene { mirror: Some(flat), ..RenderScene::empty() }, viewpoint, [20, 20])
                 .contains("mirror")
         );
+        let lens = Lens { focus: Vec3::ZERO, aperture: -1.0 };
+        assert!(
+            refused(&RenderScene { lens: Some(lens), ..RenderScene::empty() }, viewpoint, [20, 20]).contains("lens")
+        );
         let grey = Appearance { colour: [0.5; 3], gloss: 0.0 };
         let speck = Particle { position: Vec3::ZERO, radius: f32::NAN, facing: None, appearance: grey, opacity: 1.0 };
         assert!(

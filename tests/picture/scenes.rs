@@ -200,7 +200,18 @@ pub fn stories<'a>(
         story.scene.is_antialiased = true;
         story
     };
+    let blurred = |mut story: Story<'a>| {
+        story.scene.lens = Some(Lens { focus: Vec3::new(0.0, 3.0, 0.0), aperture: 1.5 });
+        story
+    };
     vec![
+        blurred(in_work(story("lens-surface", RenderMode::Surface, &solids, near))),
+        smooth(blurred(mirrored(story("smooth-lens-iso", RenderMode::Iso, &solids, whole)))),
+        smooth(blurred(with_stereo(
+            StereoLayout::SideBySide,
+            story("smooth-lens-side-by-side", RenderMode::Surface, &solids, near),
+        ))),
+        blurred(story("lens-volume", tissue(palette), &solids, near)),
         in_work(story("specks-surface", RenderMode::Surface, &solids, near)),
         head_lit(in_work(story("specks-iso", RenderMode::Iso, &solids, whole))),
         in_work(story("specks-volume", tissue(palette), &solids, near)),

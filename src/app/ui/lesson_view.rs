@@ -136,6 +136,7 @@ impl LessonView {
             is_smooth: settings.is_smooth(viewport.has_graphics()),
             has_shadows: self.has_shadows(settings, viewport),
             has_relief: self.is_quick(viewport),
+            has_depth_of_field: settings.depth_of_field,
             is_left_handed: settings.left_handed,
             particle_count,
         };
@@ -202,6 +203,7 @@ impl LessonView {
                 .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),
             has_relief: self.is_quick(viewport),
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
+            lens: settings.depth_of_field.then(|| scene::loupes(&lesson.orbit)),
             is_antialiased: settings.is_smooth(viewport.has_graphics()),
         };
         let drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, settings.stereo(), size)?;

@@ -21,6 +21,7 @@ struct PreviewInputs {
     mode: PreviewMode,
     shows_surroundings: bool,
     has_shadows: bool,
+    has_depth_of_field: bool,
     is_smooth: bool,
     size: [u32; 2],
     generation: u64,
@@ -53,6 +54,7 @@ impl PreviewView {
             mode: preview.mode,
             shows_surroundings: preview.shows_surroundings,
             has_shadows: settings.has_shadows(has_graphics),
+            has_depth_of_field: settings.depth_of_field,
             is_smooth: settings.is_smooth(has_graphics),
             size,
             generation: preview.generation,
@@ -81,6 +83,7 @@ impl PreviewView {
             lights: Lights::along(&viewpoint),
             shadows: inputs.has_shadows.then(|| scene::shadow_region(&build.workpiece, &preview.orbit)),
             has_relief: has_graphics,
+            lens: inputs.has_depth_of_field.then(|| scene::loupes(&preview.orbit)),
             is_antialiased: inputs.is_smooth,
             ..RenderScene::empty()
         };

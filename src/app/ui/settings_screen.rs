@@ -80,6 +80,10 @@ pub fn settings_ui(
         }
         ui.end_row();
         ui.label("");
+        let depth_of_field = ui.checkbox(&mut new.depth_of_field, words.get("settings.depth_of_field"));
+        depth_of_field.on_hover_text(words.get("settings.depth_of_field_hint"));
+        ui.end_row();
+        ui.label("");
         ui.checkbox(&mut new.high_contrast, words.get("settings.contrast"));
         ui.end_row();
     });

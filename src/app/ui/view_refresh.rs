@@ -39,6 +39,7 @@ pub struct ViewInputs {
     pub is_smooth: bool,
     pub has_shadows: bool,
     pub has_relief: bool,
+    pub has_depth_of_field: bool,
     pub is_left_handed: bool,
     /// Number of moving particles.
     pub particle_count: usize,
@@ -165,6 +166,7 @@ mod tests {
             is_smooth: false,
             has_shadows: false,
             has_relief: false,
+            has_depth_of_field: false,
             is_left_handed: false,
             particle_count: 0,
         }

@@ -8,6 +8,7 @@ mod volume_sampler;
 mod mirror_pass;
 mod raster;
 mod fxaa_pass;
+mod lens_pass;
 mod particle_pass;
 mod shadow_pass;
 mod stereo_pass;
@@ -19,6 +20,7 @@ pub use stereo_pass::stereo_pass;
 
 use super::drawn_volume::DrawnVolume;
 use super::eye::Eye;
+use super::lens::LensView;
 use super::mirror::{self, PlaneMirror};
 use super::relief::Relief;
 use super::scene::{Appearance, Background, Changes, Lights, RenderMode, RenderScene, Rgb, VolumeInstance};
@@ -105,18 +107,21 @@ impl CpuRenderer {
         let shadows = LampDepths::draw(scene, self.cached.as_ref(), &self.reads).map(Arc::new);
         let mirrored = scene.mirror.as_ref().and_then(|mirror| Some((mirror, mirror.reflected_eye(eye)?)));
         let reflected = mirrored.map(|(mirror, image)| {
-            (
-                mirror,
-                self.draw_scene(&mirror.with_reflected_light(scene), None, &shadows, &image, [mirror::PICTURE_SIZE; 2]),
-            )
+            let size = [mirror::PICTURE_SIZE; 2];
+            let seen = self.draw_scene(&mirror.with_reflected_light(scene), None, &shadows, &image, size);
+            (mirror, seen.to_image())
         });
-        let drawn = self.draw_scene(
+        let sharp = self.draw_scene(
             scene,
             reflected.as_ref().map(|(mirror, seen)| (*mirror, seen)),
             &shadows,
             eye,
             [width, height],
         );
+        let drawn = match scene.drawn_lens() {
+            Some(lens) => lens_pass::lens_pass(&sharp, eye, &LensView::new(lens, eye, height), &self.reads),
+            None => sharp.to_image(),
+        };
         if scene.is_antialiased { fxaa_pass::fxaa_pass(&drawn, &self.reads) } else { drawn }
     }
 
@@ -128,7 +133,7 @@ impl CpuRenderer {
         shadows: &Option<Arc<LampDepths>>,
         eye: &Eye,
         [width, height]: [u32; 2],
-    ) -> RgbaImage {
+    ) -> Framebuffer {
         let relief = scene.has_relief.then(|| Relief::seen_by(eye, width));
         let view = CpuView { eye: *eye, lights: scene.lights, width, height, shadows: shadows.clone(), relief };
         let mut framebuffer = Framebuffer::with_background(&scene.background, width, height);
@@ -150,7 +155,7 @@ impl CpuRenderer {
             }
         }
         particle_pass::translucent(scene.translucent_particles, &view, &mut framebuffer);
-        framebuffer.to_image()
+        framebuffer
     }
 }
 
