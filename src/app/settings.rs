@@ -41,7 +41,7 @@ pub struct Settings {
     pub smooth_edges: Option<bool>,
     /// True if the lamp casts shadows; without a value, if a graphics processor draws and is quick enough.
     pub shadows: Option<bool>,
-    /// True to blur what is nearer or farther than the teeth worked on.
+    /// True to blur what is nearer or farther than the middle of the view.
     pub depth_of_field: bool,
     /// Share of full scale, 0 to 1.
     pub volume: f32,

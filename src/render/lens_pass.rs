@@ -68,7 +68,7 @@ impl LensTarget {
     /// Sets the lens for the next picture.
     pub fn write_uniform(&self, queue: &wgpu::Queue, lens: &LensView) {
         let LensView { focus, scale, largest, ref taps } = *lens;
-        let tap = |Tap { steps: [x, y], distance, area }: Tap| [x as f32, y as f32, distance, area];
+        let tap = |Tap { steps: [x, y], ring: [inner, outer] }: Tap| [x as f32, y as f32, inner, outer];
         let uniform = gpu::LensUniform { focus: [focus, scale, largest, 0.0], taps: taps.map(tap) };
         queue.write_buffer(&self.uniform, 0, bytemuck::bytes_of(&uniform));
     }

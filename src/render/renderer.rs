@@ -363,11 +363,11 @@ impl Renderer {
         let view = (eye, &self.views[side]);
         let EyeTarget { colour, lens: blurred, fxaa, size, .. } = eye_target;
         let fxaa = fxaa.as_ref().filter(|_| scene.is_antialiased);
-        // What the last pass draws is the picture.
+        // The last pass draws into the target itself.
         let sharp = target.filter(|_| blurred.is_none() && fxaa.is_none()).unwrap_or(colour);
         self.draw_scene(encoder, scene, view, eye_target, sharp, reflected);
         if let (Some(lens), Some(blurred)) = (scene.drawn_lens(), blurred) {
-            blurred.write_uniform(&self.queue, &LensView::new(lens, eye, size[1]));
+            blurred.write_uniform(&self.queue, &LensView::new(lens, eye, *size));
             let to = target.filter(|_| fxaa.is_none()).unwrap_or(&blurred.colour);
             let groups = [(0, &self.views[side].group), (2, &blurred.group)];
             draw_over(encoder, to, &self.lens_pass.pipeline, &groups);
@@ -487,7 +487,7 @@ fn depth_attachment(view: &wgpu::TextureView, load: wgpu::LoadOp<f32>) -> wgpu::
     wgpu::RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
-/// Draws a finished picture anew, as a pass changes it; bind groups by number.
+/// Draws a pass over a whole target. `groups`: its bind groups with their numbers.
 fn draw_over(
     encoder: &mut wgpu::CommandEncoder,
     target: &wgpu::TextureView,

@@ -30,8 +30,9 @@ pub struct RenderScene<'a> {
     /// True when fine relief is drawn: stippled gingiva, the ridges of enamel, and the marks of burs where a tooth is dull.
     pub has_relief: bool,
     pub background: Background,
-    /// A lens before the eye, which blurs what is not in its focus; `None` if all is sharp. A translucent tooth has no depth of its
-    /// own, so that all is sharp then, too.
+    /// A lens before the eye, which blurs what is not in its focus; `None` if all is sharp. Where the tooth is translucent there is no
+    /// blur, because it has no depth of its own. What a mirror shows is blurred as the mirror, and what lies behind translucent
+    /// particles decides how they are.
     pub lens: Option<Lens>,
     /// True when the finished image is antialiased.
     pub is_antialiased: bool,
@@ -237,7 +238,7 @@ impl ShadowRegion {
 /// A thin lens before the eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
-    /// Place in focus, world space, mm. What is as deep in the picture is sharp.
+    /// Place in focus, world space, mm. Everything at its depth is sharp.
     pub focus: Vec3,
     /// Diameter, mm: the larger, the more is blurred.
     pub aperture: f32,

@@ -38,4 +38,4 @@ pub use jaw::{Mouth, StandaloneJaw};
 pub use palette::{tissue_palette, unworked_tooth, x_ray_attenuation};
 pub use surroundings::{mouth_and_solids, surrounding_solids};
 pub use typodont_anatomy::jaw::WORKING_OPENING_DEG;
-pub use views::{ToothSide, loupes, shadow_region, tooth_view, work_view};
+pub use views::{ToothSide, camera_lens, shadow_region, tooth_view, work_view};

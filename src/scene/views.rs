@@ -72,13 +72,13 @@ pub fn shadow_region(workpiece: &Workpiece, orbit: &Orbit) -> ShadowRegion {
     ShadowRegion { centre: workpiece.world_from_tooth * crowns.centre(), radius }
 }
 
-/// Lens of loupes through which a view is seen: the teeth worked on are sharp, throat and lips are not.
-pub fn loupes(orbit: &Orbit) -> Lens {
-    /// Diameter of a pupil in the light of a lamp, and the distance at which one works with loupes, mm. What magnifies by coming nearer
-    /// blurs as loupes do that magnify as much.
-    const PUPIL: f32 = 3.0;
-    const WORKING_DISTANCE: f32 = 350.0;
-    Lens { focus: orbit.middle, aperture: PUPIL * orbit.distance / WORKING_DISTANCE }
+/// Lens of a camera through which a view is seen: what is as deep as its middle is sharp.
+pub fn camera_lens(orbit: &Orbit) -> Lens {
+    /// Diameter of a lens of 100 mm at f/16, and its distance from teeth, mm. The view magnifies by moving the eye closer; the lens
+    /// shrinks with the distance, so that the blur is that of a camera which magnifies as much from where it is.
+    const DIAMETER: f32 = 100.0 / 16.0;
+    const DISTANCE: f32 = 300.0;
+    Lens { focus: orbit.middle, aperture: DIAMETER * orbit.distance / DISTANCE }
 }
 
 impl Mouth {

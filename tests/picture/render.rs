@@ -487,6 +487,48 @@ fn smoothing_brings_edges_nearer_to_the_truth_and_leaves_the_rest() {
 }
 
 #[test]
+fn a_lens_blurs_what_is_not_in_focus_and_leaves_when_it_is_taken_away() {
+    // Aim: the lens of a scene is drawn; what is in focus and a translucent tooth stay as they are; switching it on and off leaves
+    // nothing behind. Method: a block of stripes in focus and another far behind, with and without a lens, on one renderer.
+    let viewpoint = Viewpoint::look_at(Vec3::Z * 100.0, Vec3::ZERO, Vec3::Y);
+    let grey = Appearance { colour: [0.8; 3], gloss: 0.0 };
+    let bars = |x: f32, z: f32| {
+        let bar = |i: i32| {
+            MeshInstance::plain(block(Vec3::new(0.5, 8.0, 0.5)), Pose::at(Vec3::new(x + 2.0 * i as f32, 0.0, z)), grey)
+        };
+        (-3..=3).map(bar).collect::<Vec<_>>()
+    };
+    let (volume, palette) = (molar([64, 64, 40]), palette());
+    let (gpu, _turn) = adapter().unzip();
+    for mut painter in [Some(OffscreenRenderer::cpu()), gpu].into_iter().flatten() {
+        let mut draw = |lens: Option<Lens>, mode: Option<RenderMode>| {
+            let scene = RenderScene {
+                tooth: mode.map(|mode| tooth(&volume, &palette, mode)),
+                solids: [bars(-12.0, 0.0), bars(16.0, -60.0)].concat(),
+                background: Background::plain([0.1; 3]),
+                lens,
+                is_antialiased: true,
+                ..RenderScene::empty()
+            };
+            painter.draw(&scene, &viewpoint, None, [400, 300]).unwrap()
+        };
+        let lens = Lens { focus: Vec3::ZERO, aperture: 8.0 };
+        let [sharp, blurred, again, other] = [None, Some(lens), None, Some(lens)].map(|lens| draw(lens, None));
+        assert!(sharp == again && blurred == other);
+        let contrast = |image: &RgbaImage, from: u32| {
+            (from..from + 200)
+                .map(|x| i32::from(image.pixel(x, 150)[0].abs_diff(image.pixel(x - 1, 150)[0])))
+                .sum::<i32>()
+        };
+        let [left, right] = [1, 200].map(|from| [&sharp, &blurred].map(|image| contrast(image, from)));
+        assert!(left[0] > 500 && left[0].abs_diff(left[1]) < 40, "in focus: {left:?}");
+        assert!(right[0] > 300 && 2 * right[1] < right[0], "behind the focus: {right:?}");
+        let through = tissue(&palette);
+        assert!(draw(None, Some(through.clone())) == draw(Some(lens), Some(through)), "a translucent tooth");
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_in_words() {
     let viewpoint = Viewpoint::look_at(Vec3::Z * 50.0, Vec3::ZERO, Vec3::Y);
     let (gpu, _turn) = adapter().unzip();

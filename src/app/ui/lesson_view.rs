@@ -66,6 +66,7 @@ pub struct PictureCost {
     pub has_shadows: bool,
     /// True if edges are smoothed.
     pub is_smooth: bool,
+    pub has_depth_of_field: bool,
     /// Share of the view's width and height at which a changing view is drawn.
     pub share_while_changing: f32,
     /// Name of the graphics processor, or of the software in its place.
@@ -101,6 +102,7 @@ impl LessonView {
             frames_per_second: self.refresh.frames_per_second(),
             has_shadows: viewport.is_some_and(|viewport| self.has_shadows(settings, viewport)),
             is_smooth: viewport.is_some_and(|viewport| settings.is_smooth(viewport.has_graphics())),
+            has_depth_of_field: settings.depth_of_field,
             share_while_changing: self.refresh.share_while_changing(),
             adapter: viewport.map(Viewport::adapter).unwrap_or_default(),
         }
@@ -203,7 +205,7 @@ impl LessonView {
                 .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),
             has_relief: self.is_quick(viewport),
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
-            lens: settings.depth_of_field.then(|| scene::loupes(&lesson.orbit)),
+            lens: settings.depth_of_field.then(|| scene::camera_lens(&lesson.orbit)),
             is_antialiased: settings.is_smooth(viewport.has_graphics()),
         };
         let drawn = viewport.draw(EyeWindow::Main, &scene, &viewpoint, settings.stereo(), size)?;

@@ -196,6 +196,9 @@ fn performance_ui(ui: &mut egui::Ui, lesson: &LessonState, cost: &PictureCost, w
         (false, true) => "menu.picture_smooth",
         (false, false) => "menu.picture_light",
     }));
+    if cost.has_depth_of_field {
+        ui.small(words.get("menu.picture_depth_of_field"));
+    }
     ui.small(&cost.adapter);
     ui.small(words.format("menu.pictures", format!("{:.0}", cost.frames_per_second)));
     if cost.share_while_changing < 1.0 {

@@ -108,7 +108,8 @@ impl ViewRefresh {
         now - self.changed_at >= SETTLING_TIME
     }
 
-    /// True once images have been so slow that the resolution fell: from then on only the cheapest effects are drawn.
+    /// True once images have been so slow that the resolution fell: from then on only the cheapest effects are drawn,
+    /// and those that the user has chosen.
     pub fn has_been_slow(&self) -> bool {
         self.has_been_slow
     }

@@ -3,8 +3,7 @@
 use super::texture_reads::{Texture, TextureReads};
 use super::{Framebuffer, dither};
 use crate::eye::Eye;
-use crate::lens::{LensView, TAPS};
-use std::f32::consts::PI;
+use crate::lens::{LensView, TAPS, own_weight, tap_weight};
 use typodont_core::frame::Vec3;
 use typodont_core::image::RgbaImage;
 use typodont_core::parallel::{available_threads, par_rows};
@@ -56,15 +55,15 @@ impl SharpPicture<'_> {
         let lens = self.lens;
         let own_depth = self.depth(at);
         let own_radius = lens.circle(own_depth);
-        let is_own_before = own_depth < lens.focus;
+        let is_own_before = lens.is_blurred_before(own_depth);
         // What is before the focus, and what is not.
         let (mut before, mut behind) = (Gathered::default(), Gathered::default());
-        let own = if is_own_before { &mut before } else { &mut behind };
-        own.add(self.light(at), (1.0 / (PI * own_radius * own_radius)).min(1.0));
-        for tap in &lens.taps {
+        let side = if is_own_before { &mut before } else { &mut behind };
+        side.add(self.light(at), own_weight(own_radius));
+        for (i, tap) in lens.taps.iter().enumerate() {
             let place = self.within([at[0] + tap.steps[0], at[1] + tap.steps[1]]);
             let depth = self.depth(place);
-            let is_before = depth < lens.focus;
+            let is_before = lens.is_blurred_before(depth);
             let radius = match lens.circle(depth) {
                 // What is hidden behind is guessed from what is seen beside it.
                 radius if !is_before && is_own_before => radius.max(own_radius),
@@ -72,9 +71,8 @@ impl SharpPicture<'_> {
                 radius if !is_before && depth > own_depth => radius.min(own_radius),
                 radius => radius,
             };
-            let reach = (radius - tap.distance + 0.5).clamp(0.0, 1.0);
             let side = if is_before { &mut before } else { &mut behind };
-            side.add(self.light(place), tap.area / (radius * radius) * reach);
+            side.add(self.light(place), tap_weight(i, tap, radius));
         }
         // A lens spreads what is before the focus over what is behind.
         let cover = if behind.weight <= 0.0 { 1.0 } else { before.weight.min(1.0) };
@@ -119,7 +117,7 @@ mod tests {
             Pixel { colour: [brightness; 3], depth: eye.buffer_depth(depth) }
         });
         let sharp = Framebuffer { width, height, pixels: pixels.collect() };
-        let lens = LensView::new(&Lens { focus: Vec3::NEG_Z * FOCUS, aperture: 20.0 }, &eye, 8 * 90);
+        let lens = LensView::new(&Lens { focus: Vec3::NEG_Z * FOCUS, aperture: 20.0 }, &eye, [8 * 120, 8 * 90]);
         lens_pass(&sharp, &eye, &lens, &TextureReads::default())
     }
 

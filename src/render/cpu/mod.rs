@@ -119,7 +119,7 @@ impl CpuRenderer {
             [width, height],
         );
         let drawn = match scene.drawn_lens() {
-            Some(lens) => lens_pass::lens_pass(&sharp, eye, &LensView::new(lens, eye, height), &self.reads),
+            Some(lens) => lens_pass::lens_pass(&sharp, eye, &LensView::new(lens, eye, [width, height]), &self.reads),
             None => sharp.to_image(),
         };
         if scene.is_antialiased { fxaa_pass::fxaa_pass(&drawn, &self.reads) } else { drawn }

@@ -19,7 +19,7 @@ pub enum Texture {
     LampDepth,
     /// A depth compared with four that the lamp sees.
     LampComparison,
-    /// A pixel of the picture before its edges are smoothed.
+    /// A pixel of the picture, or its depth, before a lens blurs it or its edges are smoothed.
     Picture,
 }
 
@@ -77,8 +77,8 @@ mod tests {
     use super::*;
     use crate::cpu::CpuRenderer;
     use crate::{
-        Appearance, Changes, LabelPalette, Lights, Orbit, RenderMode, RenderScene, ShadowRegion, TransferFunction,
-        VolumeInstance,
+        Appearance, Changes, LabelPalette, Lens, Lights, Orbit, RenderMode, RenderScene, ShadowRegion,
+        TransferFunction, VolumeInstance,
     };
     use std::sync::Arc;
     use std::sync::atomic::Ordering;
@@ -97,7 +97,13 @@ mod tests {
     }
 
     /// Reads and bytes per pixel of a crown that fills the picture, with smoothed edges, and the reads of each texture.
-    fn cost(tooth: &Volume, palette: &LabelPalette, mode: RenderMode, has_shadows: bool) -> ([f64; 2], String) {
+    fn cost(
+        tooth: &Volume,
+        palette: &LabelPalette,
+        mode: RenderMode,
+        has_shadows: bool,
+        has_lens: bool,
+    ) -> ([f64; 2], String) {
         let upright = Pose { position: Vec3::ZERO, orientation: Quat::from_rotation_x(-std::f32::consts::FRAC_PI_2) };
         /// Radius of what is seen, mm: a molar's crown is larger.
         const SEEN: f32 = 1.8;
@@ -115,6 +121,7 @@ mod tests {
             }),
             lights: Lights::along(&viewpoint),
             shadows: has_shadows.then_some(ShadowRegion { centre, radius: bounds.half_size().length() }),
+            lens: has_lens.then_some(Lens { focus: centre, aperture: 1.0 }),
             is_antialiased: true,
             ..RenderScene::empty()
         };
@@ -140,14 +147,15 @@ mod tests {
         assert!((0..COUNT).all(|i| Texture::ALL[i] as usize == i));
         let palette = palette();
         let translucent = RenderMode::Volume(Arc::new(TransferFunction::tissue(&palette)));
-        for (name, mode, has_shadows, limits) in [
-            ("surface", RenderMode::Surface, false, [7.9, 66.0]),
-            ("surface with shadows", RenderMode::Surface, true, [38.8, 407.0]),
-            ("ray casting", RenderMode::Iso, false, [38.3, 429.0]),
-            ("ray casting with shadows", RenderMode::Iso, true, [114.8, 1197.0]),
-            ("translucent tissue", translucent, false, [611.0, 2537.0]),
+        for (name, mode, [has_shadows, has_lens], limits) in [
+            ("surface", RenderMode::Surface, [false, false], [7.9, 66.0]),
+            ("surface with shadows", RenderMode::Surface, [true, false], [38.8, 407.0]),
+            ("surface through a lens", RenderMode::Surface, [false, true], [151.0, 638.0]),
+            ("ray casting", RenderMode::Iso, [false, false], [38.3, 429.0]),
+            ("ray casting with shadows", RenderMode::Iso, [true, false], [114.8, 1197.0]),
+            ("translucent tissue", translucent, [false, false], [611.0, 2537.0]),
         ] {
-            let ([reads, bytes], of_each) = cost(&tooth, &palette, mode, has_shadows);
+            let ([reads, bytes], of_each) = cost(&tooth, &palette, mode, has_shadows, has_lens);
             println!("{name}: {reads:.1} reads and {bytes:.0} bytes per pixel ({of_each})");
             assert!(reads <= limits[0] && bytes <= limits[1], "{name}: {reads} reads, {bytes} bytes per pixel");
             let is_far_below = reads < 0.8 * limits[0] || bytes < 0.8 * limits[1];

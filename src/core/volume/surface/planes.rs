@@ -17,7 +17,7 @@ const PLANE_DEPTH: f32 = 0.4;
 const PLANE_SLOPE_TOLERANCE: f32 = 0.1;
 
 /// Layers of samples that are kept: those within reach of the edges of a cell and of the cells around it.
-const LAYERS: usize = 8;
+pub const LAYERS: usize = 8;
 
 /// A density that rises evenly.
 #[derive(Clone, Copy, Debug, Default)]

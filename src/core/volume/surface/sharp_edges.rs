@@ -10,7 +10,7 @@
 
 use super::cases::{CASES, CELL_EDGES, CellEdge, CellFace, CubeCase, EdgeIndex};
 use super::density_grid::{CellRange, Crossing, DensityGrid, EdgeEnds, Neighbours, shifted_sample};
-use super::planes::{EvenDensity, SamplePlane, SamplePlanes};
+use super::planes::{EvenDensity, LAYERS, SamplePlane, SamplePlanes};
 use crate::frame::{Mat3, Vec3};
 use crate::volume::{BRICK, ISO, Volume};
 use std::collections::BTreeMap;
@@ -36,6 +36,8 @@ const CELL_BEYOND: i32 = 1;
 
 // A brick depends on its neighbours only: on the next cell, on samples around the end of its edge, and on two more for the slope.
 const _: () = assert!(1 + CELL_BEYOND + REACH as i32 + 2 <= BRICK as i32);
+// From the cells before to those beyond, with what is within reach of their edges.
+const _: () = assert!(2 * (CELL_BEYOND + REACH as i32) + 2 <= LAYERS as i32);
 // Normals are taken beyond that cell, from slopes of a copy that is smoothed over one voxel.
 const _: () = assert!(2.0 + BEYOND_CELL + 3.0 <= BRICK as f32);
 
