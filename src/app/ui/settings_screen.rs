@@ -73,15 +73,15 @@ pub fn settings_ui(
         }
         ui.end_row();
         ui.label("");
-        let mut has_shadows = settings.has_shadows(context.has_graphics);
-        let shadows = ui.checkbox(&mut has_shadows, words.get("settings.shadows"));
-        if shadows.on_hover_text(words.get("settings.shadows_hint")).changed() {
-            new.shadows = Some(has_shadows);
-        }
-        ui.end_row();
-        ui.label("");
-        let depth_of_field = ui.checkbox(&mut new.depth_of_field, words.get("settings.depth_of_field"));
-        depth_of_field.on_hover_text(words.get("settings.depth_of_field_hint"));
+        ui.horizontal(|ui| {
+            let mut has_shadows = settings.has_shadows(context.has_graphics);
+            let shadows = ui.checkbox(&mut has_shadows, words.get("settings.shadows"));
+            if shadows.on_hover_text(words.get("settings.shadows_hint")).changed() {
+                new.shadows = Some(has_shadows);
+            }
+            let depth_of_field = ui.checkbox(&mut new.depth_of_field, words.get("settings.depth_of_field"));
+            depth_of_field.on_hover_text(words.get("settings.depth_of_field_hint"));
+        });
         ui.end_row();
         ui.label("");
         ui.checkbox(&mut new.high_contrast, words.get("settings.contrast"));
