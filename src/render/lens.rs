@@ -1,4 +1,4 @@
-//! Depth of field: what is nearer or farther than the focus is blurred, as by the lenses of loupes.
+//! Depth of field: what is nearer or farther than the focus is blurred, as by the lens of a camera.
 //!
 //! Takes a lens and an eye. Gives, in pixels, the circle into which a point at a depth is spread, and the places around a pixel from
 //! which it gathers light. Both twins of the pass use them.
@@ -10,8 +10,8 @@ use std::f32::consts::TAU;
 #[cfg(feature = "gpu")]
 pub const SOURCE: &str = include_str!("../../shaders/lens_pass.wgsl");
 
-/// Places from which a pixel gathers light, besides its own: its neighbours, and in further rings even numbers of places, so that what
-/// is blurred stays where it is.
+/// Places from which a pixel gathers light, besides its own: its neighbours, and rings of places around them. Their numbers are even, so
+/// that what is blurred is not moved.
 const NEIGHBOURS: usize = 8;
 const PLACES: usize = 14;
 const RINGS: usize = 5;
@@ -29,7 +29,7 @@ pub const BEFORE: f32 = 1.0;
 /// Largest radius, as a share of the picture's height: the places around a pixel are too far apart for wider circles.
 const LARGEST: f32 = 0.012;
 
-/// A lens as one eye sees through it; pixels are heights of a pixel.
+/// A lens as one eye sees through it. Radii are counted in heights of a pixel: stereo may squeeze pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LensView {
     /// Depth in focus, mm.
@@ -87,7 +87,7 @@ impl LensView {
     }
 }
 
-/// Places for circles up to a radius, pixels. `squeeze`: width of a pixel's height, in pixels.
+/// Places for circles up to a radius, pixels. `squeeze`: number of pixels side by side that are as wide as one is high.
 fn taps(largest: f32, squeeze: f32) -> [Tap; TAPS] {
     /// Radii of the two inner rings, pixels.
     const INNER: [f32; 2] = [1.2, 2.2];
