@@ -35,7 +35,8 @@ pub struct Renderer {
     volume_pass: VolumePass,
     particle_pass: ParticlePass,
     fxaa_pass: FxaaPass,
-    lens_pass: LensPass,
+    /// Present once a scene has had a lens.
+    lens_pass: Option<LensPass>,
     stereo_pass: StereoPass,
     mirror_pass: MirrorPass,
     /// Detail that the pipelines draw.
@@ -120,7 +121,7 @@ impl Renderer {
             volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, Detail::default()),
             particle_pass: ParticlePass::new(device, format, &view_layout, Detail::default()),
             fxaa_pass: FxaaPass::new(device, format),
-            lens_pass: LensPass::new(device, format, &view_layout),
+            lens_pass: None,
             stereo_pass: StereoPass::new(device, format),
             mirror_pass: MirrorPass::new(device, format, &view_layout),
             mirror_targets: [None, None],
@@ -308,7 +309,9 @@ impl Renderer {
         if has_lens && eye_target.lens.is_none() {
             let sharp = [&eye_target.colour, &eye_target.depth];
             let blurred = self.attachment("lens", size, self.format);
-            eye_target.lens = Some(self.lens_pass.target(&self.device, sharp, blurred));
+            let new_pass = || LensPass::new(&self.device, self.format, &self.view_layout);
+            let pass = self.lens_pass.get_or_insert_with(new_pass);
+            eye_target.lens = Some(pass.target(&self.device, sharp, blurred));
         }
         if scene.is_antialiased && eye_target.fxaa.is_none() {
             let group = self.fxaa_pass.group(&self.device, eye_target.blurred());
@@ -366,11 +369,11 @@ impl Renderer {
         // The last pass draws into the target itself.
         let sharp = target.filter(|_| blurred.is_none() && fxaa.is_none()).unwrap_or(colour);
         self.draw_scene(encoder, scene, view, eye_target, sharp, reflected);
-        if let (Some(lens), Some(blurred)) = (scene.drawn_lens(), blurred) {
+        if let (Some(lens), Some(pass), Some(blurred)) = (scene.drawn_lens(), &self.lens_pass, blurred) {
             blurred.write_uniform(&self.queue, &LensView::new(lens, eye, *size));
             let to = target.filter(|_| fxaa.is_none()).unwrap_or(&blurred.colour);
             let groups = [(0, &self.views[side].group), (2, &blurred.group)];
-            draw_over(encoder, to, &self.lens_pass.pipeline, &groups);
+            draw_over(encoder, to, &pass.pipeline, &groups);
         }
         if let Some(FxaaTarget { group, colour }) = fxaa {
             draw_over(encoder, target.unwrap_or(colour), &self.fxaa_pass.pipeline, &[(2, group)]);

@@ -326,8 +326,8 @@ impl Sides {
         (is_lesser_of_both && is_explained).then_some(Sides([a, b]))
     }
 
-    /// The place on a cell's edge at which the first of both sides leaves matter; where neither
-    /// does, that of the density itself.
+    /// The place on a cell's edge at which the first of both sides leaves matter; where neither does, that of the
+    /// density itself.
     fn crossing(&self, field: &DensityGrid, ends: &EdgeEnds, (start, axis): EdgeOfCell) -> Vec3 {
         let [from, to] = ends.0.map(|end| end.here - ISO);
         let along = Vec3::AXES[axis] * field.grid.spacing;
