@@ -359,6 +359,32 @@ pub const LOWER_FIRST: ToothForm = ToothForm {
     ..UPPER_FIRST
 };
 
+/// The occlusal surface of a lower first premolar that is only drawn: as in [`LOWER_FIRST`], with the deep pits beside the transverse
+/// ridge and the lingual cusp that such teeth have. Those that are felt keep the surface in which recordings are replayed.
+pub const LOWER_FIRST_DRAWN: OcclusalForm = OcclusalForm {
+    cusps: &[
+        Cusp { tip: [0.16, -0.06, 1.0], foot: [-0.36, -0.02, 0.655], horn: 1.4 },
+        Cusp { tip: [-0.66, 0.04, 0.73], foot: [-0.40, 0.0, 0.655], horn: 0.0 },
+    ],
+    crests: &[&[
+        [0.16, -0.06, 1.0],
+        [0.15, 0.42, 0.88],
+        [0.08, 0.74, 0.755],
+        [-0.22, 0.84, 0.675],
+        [-0.52, 0.58, 0.645],
+        [-0.66, 0.04, 0.73],
+        [-0.62, -0.34, 0.635],
+        [-0.46, -0.64, 0.60],
+        [-0.18, -0.80, 0.66],
+        [0.06, -0.74, 0.755],
+        [0.14, -0.46, 0.87],
+        [0.16, -0.06, 1.0],
+    ]],
+    floor: 0.50,
+    flanks: [1.5, 1.3],
+    ..LOWER_FIRST.occlusal
+};
+
 pub const LOWER_SECOND: ToothForm = ToothForm {
     sizes: sizes([8.0, 14.5], [7.0, 5.0], [8.0, 7.0], [1.0, 0.0]),
     body: LoftForm {

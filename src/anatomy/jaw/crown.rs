@@ -1,7 +1,9 @@
 //! One crown as triangles, made as a carved tooth is, but coarser and cut off below the gingival margin.
 
+use super::gum::JawForm;
 use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
 use super::tooth_model::{ToothKind, ToothModel};
+use crate::form::ToothForm;
 use crate::grow::grow_with_ramp;
 use crate::{TissueLabels, grid_of_spacing};
 use typodont_core::frame::Vec3;
@@ -44,16 +46,31 @@ const DEEPER: f32 = 0.17;
 /// Half the width of the density ramp, voxels: wide, so that the normals between so coarse samples are those of the form.
 const DRAWN_HALF_BAND: f32 = 3.0;
 
+/// Width, voxels, that the thin corners of an incisor's edge lose between samples, where incisors touch.
+const EDGE_LOSS: f32 = 0.3;
+
 /// Labels used while a crown is made. They are independent of the exercise's tissues, since a crown is only drawn.
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
 /// A tooth's crown and the beginning of its root, closed, in tooth space; mm. `recession`: length of root above the gingiva.
-pub fn crown(model: &ToothModel, recession: f32, detail: CrownDetail) -> TintedMesh {
-    let grid = grid_of_spacing(&model.form, detail.spacing()).above(-recession - ROOT_LENGTH);
-    let volume = grow_with_ramp(&model.form, grid, &TISSUES, DRAWN_HALF_BAND);
+pub fn crown(model: &ToothModel, form: JawForm, recession: f32, detail: CrownDetail) -> TintedMesh {
+    let form = match form {
+        JawForm::Touched => model.form,
+        JawForm::Drawn => drawn_form(model, detail.spacing()),
+    };
+    let grid = grid_of_spacing(&form, detail.spacing()).above(-recession - ROOT_LENGTH);
+    let volume = grow_with_ramp(&form, grid, &TISSUES, DRAWN_HALF_BAND);
     let mesh = surface::extract(&volume);
     let tints = mesh.positions.iter().map(|p| tint(model, &volume, *p, detail.spacing())).collect();
     TintedMesh { mesh, tints }
+}
+
+/// The form of a crown that is only drawn. `spacing`: of its samples, mm.
+fn drawn_form(model: &ToothModel, spacing: f32) -> ToothForm {
+    let mut form = ToothForm { occlusal: *model.drawn.occlusal.unwrap_or(&model.form.occlusal), ..model.form };
+    let lost = if model.kind == ToothKind::Incisor { EDGE_LOSS * spacing } else { 0.0 };
+    form.sizes.mesiodistal[0] += model.drawn.width + lost;
+    form
 }
 
 /// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
@@ -109,7 +126,7 @@ mod tests {
         // Aim: a closed surface facing outward, of the table's widths and length to a sample's distance.
         let details = [CrownDetail::Far, CrownDetail::Near];
         for (model, detail) in UPPER.iter().chain(&LOWER).flat_map(|model| details.map(|detail| (model, detail))) {
-            let TintedMesh { mesh, tints } = crown(model, 0.0, detail);
+            let TintedMesh { mesh, tints } = crown(model, JawForm::Drawn, 0.0, detail);
             let sizes = &model.sizes;
             assert!(ClosedMesh::new(&mesh).is_some(), "{sizes:?} is closed");
             assert!(mesh.volume_mm3() > 50.0, "{sizes:?}");
@@ -117,7 +134,7 @@ mod tests {
             let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
             let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
             let found = Vec3::new(high.x - low.x, high.y - low.y, high.z);
-            let wanted = Vec3::new(sizes.buccolingual[0], sizes.mesiodistal[0], sizes.crown);
+            let wanted = Vec3::new(sizes.buccolingual[0], sizes.mesiodistal[0] + model.drawn.width, sizes.crown);
             assert!((found - wanted).abs().max_element() < detail.spacing(), "{found} not {wanted}");
             assert!((low.z + ROOT_LENGTH).abs() < 2.0 * detail.spacing(), "the root ends at {}", low.z);
         }

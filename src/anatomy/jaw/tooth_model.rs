@@ -3,8 +3,8 @@
 //! Axes as in tooth space of the upper right and the lower left: x lingual (−) to buccal (+), y mesial (−) to distal (+),
 //! z apical (−) to occlusal (+), 0 at the neck.
 
-use crate::form::{Sizes, ToothForm};
-use crate::teeth;
+use crate::form::{OcclusalForm, Sizes, ToothForm};
+use crate::{premolars, teeth};
 
 /// One tooth: its shape, the size of its place, and how it stands.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,19 @@ pub struct ToothModel {
     pub tip: f32,
     /// Rotation of the mesial side toward lip or cheek, degrees.
     pub rotation: f32,
+    /// Differences of a crown that is only drawn.
+    pub drawn: DrawnCrown,
+}
+
+/// Differences of a crown that is only drawn from the tooth that is felt, which stays as recordings have it.
+#[derive(Clone, Copy, Debug)]
+pub struct DrawnCrown {
+    /// Another occlusal surface.
+    pub occlusal: Option<&'static OcclusalForm>,
+    /// Further lean toward lip or cheek, about the neck, degrees.
+    pub lean: f32,
+    /// Further mesiodistal width, mm.
+    pub width: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +61,11 @@ pub const UPPER: [ToothModel; 8] = {
     [
         with_tip(tooth_model(a, ToothKind::Incisor, 20.0, 0.0), 5.0),
         with_tip(tooth_model(b, ToothKind::Incisor, 16.0, 0.6), 6.0),
-        with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -0.4), 2.2), 2.0),
+        drawn_upright(
+            with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -0.4), 2.2), 2.0),
+            -6.0,
+            -0.2,
+        ),
         with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.8),
         with_buccal_offset(tooth_model(e, ToothKind::Premolar, 0.0, 0.3), 0.1),
         tooth_model(f, ToothKind::Molar, 2.0, 0.3),
@@ -63,8 +80,15 @@ pub const LOWER: [ToothModel; 8] = {
     [
         with_tip(tooth_model(a, ToothKind::Incisor, 12.0, 0.0), 2.0),
         with_tip(with_buccal_offset(tooth_model(b, ToothKind::Incisor, 8.0, 0.0), -0.2), 2.0),
-        with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -1.0), 2.5), 2.0),
-        with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.6),
+        drawn_upright(
+            with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -1.0), 2.5), 2.0),
+            -8.0,
+            -0.3,
+        ),
+        with_drawn_occlusal(
+            with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.6),
+            &premolars::LOWER_FIRST_DRAWN,
+        ),
         with_buccal_offset(tooth_model(e, ToothKind::Premolar, 0.0, 0.3), 0.1),
         tooth_model(f, ToothKind::Molar, -3.0, 0.3),
         tooth_model(g, ToothKind::Molar, -3.0, 0.3),
@@ -73,7 +97,17 @@ pub const LOWER: [ToothModel; 8] = {
 };
 
 const fn tooth_model(form: ToothForm, kind: ToothKind, lean: f32, infraocclusion: f32) -> ToothModel {
-    ToothModel { form, sizes: form.sizes, kind, lean, infraocclusion, buccal_offset: 0.0, tip: 0.0, rotation: 0.0 }
+    ToothModel {
+        form,
+        sizes: form.sizes,
+        kind,
+        lean,
+        infraocclusion,
+        buccal_offset: 0.0,
+        tip: 0.0,
+        rotation: 0.0,
+        drawn: DrawnCrown { occlusal: None, lean: 0.0, width: 0.0 },
+    }
 }
 
 const fn with_tip(model: ToothModel, tip: f32) -> ToothModel {
@@ -82,4 +116,12 @@ const fn with_tip(model: ToothModel, tip: f32) -> ToothModel {
 
 const fn with_buccal_offset(model: ToothModel, buccal_offset: f32) -> ToothModel {
     ToothModel { buccal_offset, ..model }
+}
+
+const fn drawn_upright(model: ToothModel, lean: f32, width: f32) -> ToothModel {
+    ToothModel { drawn: DrawnCrown { lean, width, ..model.drawn }, ..model }
+}
+
+const fn with_drawn_occlusal(model: ToothModel, occlusal: &'static OcclusalForm) -> ToothModel {
+    ToothModel { drawn: DrawnCrown { occlusal: Some(occlusal), ..model.drawn }, ..model }
 }
