@@ -25,8 +25,13 @@ const FACE_RADIUS: f32 = 75.0;
 /// Parts around the opening: six for each of the finest furrows.
 const PARTS: usize = 432;
 
-/// Exponent of the opening's outline: below 2 it is pointed toward the corners of the mouth.
-const ROUNDNESS: f32 = 1.8;
+/// Exponents of the opening's outline along x and y, both 2 for an ellipse: it is even above and below, and pointed toward the corners
+/// of the mouth.
+const ROUNDNESS: [f32; 2] = [2.3, 1.45];
+
+/// Height of the tubercle in the middle of the upper lip, and half its width, mm.
+const TUBERCLE: f32 = 1.6;
+const TUBERCLE_WIDTH: f32 = 6.0;
 
 /// Outline of a section through lip and skin, from the inside of the lip outward: the distance beyond the opening's edge and the way
 /// forward, mm, how much of it is lip rather than skin, and how bright it is.
@@ -61,14 +66,14 @@ const LIP_ENDS: usize = 10;
 const FURROW_DEPTH: f32 = 0.35;
 const FURROW_SHADE: f32 = 0.11;
 
-const LIP: Rgb = [0.64, 0.39, 0.36];
+const LIP: Rgb = [0.68, 0.38, 0.36];
 const SKIN: Rgb = [0.74, 0.58, 0.49];
 
 /// Colour of the dark around the mouth, as it is drawn behind everything.
 const DARK: Rgb = [0.10, 0.055, 0.05];
 
 /// Gloss of dry lips and skin.
-const GLOSS: f32 = 0.08;
+const GLOSS: f32 = 0.11;
 
 /// Lips in world space.
 #[derive(Clone, Debug)]
@@ -177,9 +182,10 @@ fn lip_mesh(half_height: f32) -> (Mesh, Vec<Rgb>) {
 /// Places and colours of the section in a direction from the middle of the opening, radians from +x toward +y; from the inside outward.
 fn section_at(turn: f32, half_height: f32) -> impl Iterator<Item = (Vec3, Rgb)> {
     let (cos, sin) = (libm::cosf(turn), libm::sinf(turn));
-    let power = |value: f32| libm::powf(value.abs(), ROUNDNESS);
-    let radius = libm::powf(power(cos) + power(sin), -1.0 / ROUNDNESS);
+    let radius = outline_radius([cos, sin]);
     let edge = Vec3::new(HALF_WIDTH * cos * radius, half_height * sin * radius, 0.0);
+    let upper = libm::fmaxf(sin, 0.0);
+    let edge = edge - Vec3::Y * TUBERCLE * upper * hill(edge.x, 0.0, TUBERCLE_WIDTH);
     // Outward, as the outline of an ellipse runs.
     let out = Vec3::new(cos / HALF_WIDTH, sin / half_height, 0.0).normalize_or(Vec3::X);
     let width = lip_share(edge.x, sin);
@@ -191,9 +197,23 @@ fn section_at(turn: f32, half_height: f32) -> impl Iterator<Item = (Vec3, Rgb)> 
         let light = light * (1.0 - FURROW_SHADE * lip * furrow);
         let colour = |i: usize| DARK[i] + light * (SKIN[i] + lip * (LIP[i] - SKIN[i]) - DARK[i]);
         // The cheeks lie back from the lips' middle.
-        let z = forward * width.sqrt() - place.x * place.x / (2.0 * FACE_RADIUS) - FURROW_DEPTH * lip * furrow;
+        let face = forward * width.sqrt() - place.x * place.x / (2.0 * FACE_RADIUS);
+        let z = face - FURROW_DEPTH * lip * furrow + (1.0 - lip) * relief_of_skin(place, beyond, sin);
         (place.with_z(z), [colour(0), colour(1), colour(2)])
     })
+}
+
+/// Radius of the opening's outline in a direction, as a share of its half-widths.
+fn outline_radius(direction: [f32; 2]) -> f32 {
+    let [along_x, along_y] = direction.map(libm::fabsf);
+    let [x, y] = ROUNDNESS;
+    let is_within = |radius: f32| libm::powf(radius * along_x, x) + libm::powf(radius * along_y, y) < 1.0;
+    let (mut low, mut high) = (0.5, 1.5);
+    for _ in 0..20 {
+        let middle = 0.5 * (low + high);
+        if is_within(middle) { low = middle } else { high = middle }
+    }
+    low
 }
 
 /// Depth of the furrows across the lips in a direction from the middle of the opening, radians: 0 on the ridges between them to 1, some
@@ -205,6 +225,28 @@ fn furrow_at(turn: f32) -> f32 {
     deep * (0.6 * libm::powf(wave(47.0, 0.0), 3.0) + 0.4 * libm::powf(wave(71.0, 1.0), 2.0))
 }
 
+/// A hill of height 1 at a place and its mirror image, of a width; mm.
+fn hill(x: f32, at: f32, width: f32) -> f32 {
+    libm::expf(-libm::powf((libm::fabsf(x) - at) / width, 2.0))
+}
+
+/// Height of the skin over the face's even surface, mm: the two columns of the philtrum above the upper lip, and the fold between the
+/// lower lip and the chin. `beyond`: distance from the opening's edge, mm; `up`: above 0 for the upper lip.
+fn relief_of_skin(place: Vec3, beyond: f32, up: f32) -> f32 {
+    const COLUMNS: f32 = 1.1;
+    const COLUMN_AT: f32 = 5.0;
+    const COLUMN_WIDTH: f32 = 3.0;
+    const FOLD: f32 = 2.6;
+    const FOLD_AT: f32 = 15.0;
+    const FOLD_WIDTH: f32 = 5.0;
+    const FOLD_LENGTH: f32 = 22.0;
+    if up > 0.0 {
+        let length = hill(beyond, 13.0, 8.0);
+        return up * length * COLUMNS * hill(place.x, COLUMN_AT, COLUMN_WIDTH);
+    }
+    up * FOLD * hill(beyond, FOLD_AT, FOLD_WIDTH) * hill(place.x, 0.0, FOLD_LENGTH)
+}
+
 /// Width of the lip as a share of the section's: narrow toward the corners, above with two peaks beside the middle. `x`: mm beside
 /// the middle; `up`: above 0 for the upper lip.
 fn lip_share(x: f32, up: f32) -> f32 {
@@ -212,9 +254,8 @@ fn lip_share(x: f32, up: f32) -> f32 {
     const PEAK: f32 = 7.0;
     const PEAK_WIDTH: f32 = 5.0;
     let corner = 1.0 - libm::powf(libm::fabsf(x) / HALF_WIDTH, 2.2).min(1.0);
-    let peak = libm::expf(-libm::powf((libm::fabsf(x) - PEAK) / PEAK_WIDTH, 2.0));
-    let middle = if up > 0.0 { 0.8 + 0.22 * peak } else { 1.15 };
-    (middle * corner).max(0.3)
+    let middle = if up > 0.0 { 0.85 + 0.3 * hill(x, PEAK, PEAK_WIDTH) } else { 1.35 };
+    (middle * corner).max(0.12)
 }
 
 #[cfg(test)]
