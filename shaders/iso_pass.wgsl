@@ -96,6 +96,7 @@ fn iso_fragment(@builtin(position) pixel: vec4f) -> Seen {
     let long = length(downhill);
     let normal = select(-normalize(way), downhill / max(long, 1e-9), long > 1e-6);
     let seen = finish(at);
-    let colour = lit(seen, openness(at, normal), point, marked(at, point, normal, seen.a));
+    let open = openness(at, normal);
+    let colour = lit(hairline(seen, at, point, normal), open, point, marked(at, point, normal, seen.a));
     return Seen(vec4f(screen(colour), 1.0), buffer_depth(z));
 }

@@ -1,4 +1,4 @@
-// Fine relief of surfaces: it tilts their normals, and moves nothing. Compiled after view.wgsl.
+// Fine relief of surfaces, which tilts their normals and moves nothing, and hairline cracks in enamel. Compiled after view.wgsl.
 // CPU twin: src/render/relief.rs.
 
 // False in pipelines for scenes without relief: in software, a branch costs time even where it is not taken.
@@ -23,19 +23,31 @@ const RIDGE_WIDTH: vec3f = vec3f(1.1, 1.1, 0.13);
 const RIDGE_DEPTH: f32 = 0.0013;
 const ENAMEL_GLOSS: f32 = 0.2;
 const ENAMEL_GLOSS_RANGE: f32 = 0.01;
+// Width of a hairline crack of enamel, and the distance between two sheets in which cracks lie, mm. Normals of the sheets of both
+// kinds, across the tooth's axis. Width and height of a sheet's bends, mm.
+const CRACK_WIDTH: f32 = 0.04;
+const CRACK_SPREAD: f32 = 4.3;
+const CRACK_ACROSS: mat2x3f = mat2x3f(vec3f(0.94, 0.34, 0.0), vec3f(-0.42, 0.91, 0.0));
+const CRACK_BEND: vec2f = vec2f(2.3, 0.35);
+// Size of the parts of enamel that have cracks of one kind, mm; the noise from which on they begin, and at which they are whole.
+const CRACKED_PART: f32 = 3.7;
+const CRACKED_FROM: vec2f = vec2f(0.15, 0.35);
+// Cosines between a sheet's and the surface's normal: from the first on the crack fades, and at the second it has faded.
+const CRACK_FLAT: vec2f = vec2f(0.6, 0.85);
+const CRACK_TINT: vec3f = vec3f(0.89, 0.86, 0.81);
 // Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
 const FADE: vec2f = vec2f(0.3, 0.8);
 
-// Random value of a lattice point, -1 to 1 (the finalizer of MurmurHash3).
+// Random value of a lattice point for the scene's seed, -1 to 1 (the finalizer of MurmurHash3).
 fn lattice_value(x: u32, y: u32, z: u32) -> f32 {
-    var hash = x ^ y ^ z;
+    var hash = x ^ y ^ z ^ (u32(view.size.w) * 0x27D4EB2Fu);
     hash = (hash ^ (hash >> 16u)) * 0x85EBCA6Bu;
     hash = (hash ^ (hash >> 13u)) * 0xC2B2AE35u;
     return f32(hash >> 8u) * (2.0 / 16777216.0) - 1.0;
 }
 
-// Gradient of random values on a lattice of whole numbers, interpolated between them.
-fn noise_gradient(at: vec3f) -> vec3f {
+// Random values on a lattice of whole numbers, interpolated between them (w), and their gradient.
+fn noise(at: vec3f) -> vec4f {
     let base = floor(at);
     let part = at - base;
     let share = part * part * (3.0 - 2.0 * part);
@@ -56,7 +68,8 @@ fn noise_gradient(at: vec3f) -> vec3f {
     let rows = mix(vec4f(a, c, e, g), vec4f(b, d, f, h), share.x);
     let along_y = mix(rows.y - rows.x, rows.w - rows.z, share.z);
     let along_z = mix(rows.z, rows.w, share.y) - mix(rows.x, rows.y, share.y);
-    return rise * vec3f(along_x, along_y, along_z);
+    let value = mix(mix(rows.x, rows.y, share.y), mix(rows.z, rows.w, share.y), share.z);
+    return vec4f(rise * vec3f(along_x, along_y, along_z), value);
 }
 
 // Share of a relief of a width, mm, that is drawn at a point: none where pixels are too large for it.
@@ -72,19 +85,41 @@ fn tilted(normal: vec3f, gradient: vec3f) -> vec3f {
 
 // Gradient of the height of stippled gingiva at a place of its own space, mm.
 fn stipple_gradient(at: vec3f) -> vec3f {
-    return noise_gradient(STIPPLE_TURN * at / STIPPLE_WIDTH) * STIPPLE_TURN * (STIPPLE_DEPTH / STIPPLE_WIDTH);
+    return noise(STIPPLE_TURN * at / STIPPLE_WIDTH).xyz * STIPPLE_TURN * (STIPPLE_DEPTH / STIPPLE_WIDTH);
+}
+
+// Share of a surface with a gloss that is enamel which nobody cut.
+fn uncut_share(gloss: f32) -> f32 {
+    return 1.0 - clamp(abs(gloss - ENAMEL_GLOSS) / ENAMEL_GLOSS_RANGE, 0.0, 1.0);
 }
 
 // Gradient of the height of a tooth's surface with a gloss at a place of its own space, mm: bur marks and rough decay, or ridges of
 // enamel. Those that are too fine for the pixels at a point are left out.
 fn tooth_gradient(at: vec3f, gloss: f32, point: vec3f) -> vec3f {
     let marks = clamp((SMOOTH - gloss) / (SMOOTH - GROUND), 0.0, 1.0);
-    let ridges = 1.0 - clamp(abs(gloss - ENAMEL_GLOSS) / ENAMEL_GLOSS_RANGE, 0.0, 1.0);
+    let ridges = uncut_share(gloss);
     let is_marked = marks > 0.0;
     let width = select(RIDGE_WIDTH, MARK_WIDTH, is_marked);
     let slope = select(vec2f(0.0), MARK_SLOPE, is_marked);
     let depth = select(RIDGE_DEPTH * ridges, MARK_DEPTH * marks, is_marked) * resolved(point, width.z);
     let inclined = vec3f(at.xy, at.z + dot(slope, at.xy));
-    let gradient = noise_gradient(inclined / width) / width;
+    let gradient = noise(inclined / width).xyz / width;
     return (gradient + gradient.z * vec3f(slope, 0.0)) * depth;
+}
+
+// Colour and gloss of a tooth's surface with the hairline cracks of its enamel, at a place and with a unit normal of its own space, mm.
+// Cracks are narrower where an eye sees the surface from aside.
+fn cracked(finish: vec4f, at: vec3f, normal: vec3f, point: vec3f, eye_cosine: f32) -> vec4f {
+    let seen = uncut_share(finish.a) * resolved(point, CRACK_WIDTH * max(eye_cosine, 0.01));
+    if seen <= 0.0 {
+        return finish;
+    }
+    let part = noise(at.zxy / CRACKED_PART).w;
+    let across = select(CRACK_ACROSS[0], CRACK_ACROSS[1], part < 0.0);
+    let bend = CRACK_BEND.y * noise(at.yzx / CRACK_BEND.x).w;
+    let away = CRACK_SPREAD * abs(fract((dot(at, across) + bend) / CRACK_SPREAD) - 0.5);
+    let line = 1.0 - smoothstep(0.15, 0.5, away / CRACK_WIDTH);
+    let whole = smoothstep(CRACKED_FROM.x, CRACKED_FROM.y, abs(part));
+    let steep = 1.0 - smoothstep(CRACK_FLAT.x, CRACK_FLAT.y, abs(dot(normal, across)));
+    return vec4f(finish.rgb * mix(vec3f(1.0), CRACK_TINT, seen * line * whole * steep), finish.a);
 }

@@ -71,18 +71,22 @@ fn tooth_fragment(in: Varying) -> @location(0) vec4f {
     let normal = turned_to_eye(normalize(in.normal), normalize(view.position.xyz - in.point));
     let at = (tooth.voxel_from_world * vec4f(in.point, 1.0)).xyz;
     let seen = finish(at);
-    return vec4f(screen(lit(seen, openness(at, normal), in.point, marked(at, in.point, normal, seen.a))), 1.0);
+    let open = openness(at, normal);
+    return vec4f(screen(lit(hairline(seen, at, in.point, normal), open, in.point, marked(at, in.point, normal, seen.a))), 1.0);
 }
 
 // Another tooth, whose enamel is as that of the carved one.
 @fragment
 fn enamel_fragment(in: Varying) -> @location(0) vec4f {
     var normal = normalize(in.normal);
+    var seen = in.finish * solid.finish;
     if has_relief {
+        let own_normal = (vec4f(normal, 0.0) * solid.world_from_solid).xyz;
+        seen = cracked(seen, in.own.xyz, own_normal, in.point, dot(normal, normalize(view.position.xyz - in.point)));
         let gradient = tooth_gradient(in.own.xyz, ENAMEL_GLOSS, in.point);
         normal = tilted(normal, (solid.world_from_solid * vec4f(gradient, 0.0)).xyz);
     }
-    return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normal)), 1.0);
+    return vec4f(screen(lit(seen, 1.0, in.point, normal)), 1.0);
 }
 
 // Behind everything: a triangle that covers the picture.

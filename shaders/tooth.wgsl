@@ -119,6 +119,16 @@ fn marked(at: vec3f, point: vec3f, normal: vec3f, gloss: f32) -> vec3f {
     return tilted(normal, (tooth.world_from_tooth * vec4f(gradient, 0.0)).xyz);
 }
 
+// Colour and gloss of a surface with the cracks of its enamel.
+fn hairline(finish: vec4f, at: vec3f, point: vec3f, normal: vec3f) -> vec4f {
+    if !has_relief {
+        return finish;
+    }
+    let own_normal = (vec4f(normal, 0.0) * tooth.world_from_tooth).xyz;
+    let eye_cosine = dot(normal, normalize(view.position.xyz - point));
+    return cracked(finish, at * tooth.spacing.xyz, own_normal, point, eye_cosine);
+}
+
 fn box_corner(index: u32) -> vec3f {
     // Two triangles for each of six sides, counter-clockwise from outside.
     var corners = array<u32, 36>(

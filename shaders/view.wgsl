@@ -30,7 +30,7 @@ struct View {
     ahead: vec4f,
     // Left, right, bottom, top at a depth of 1 mm.
     window: vec4f,
-    // Width and height in pixels; z: 1 where the target turns linear light into a screen's colours by itself.
+    // Width and height in pixels; z: 1 where the target turns linear light into a screen's colours by itself; w: seed of relief.
     size: vec4f,
     background_middle: vec4f,
     background_edge: vec4f,

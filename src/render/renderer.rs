@@ -188,7 +188,8 @@ impl Renderer {
 
     /// Changes to the pipelines for a scene's detail, and creates the shadow map when it is first needed.
     fn fit_detail(&mut self, scene: &RenderScene) {
-        let detail = Detail { has_shadows: shadow::chair_eye(scene).is_some(), has_relief: scene.has_relief };
+        let detail =
+            Detail { has_shadows: shadow::chair_eye(scene).is_some(), has_relief: scene.relief_seed.is_some() };
         if detail == self.detail {
             return;
         }

@@ -27,8 +27,9 @@ pub struct RenderScene<'a> {
     pub lights: Lights,
     /// Region in which the chair lamp casts shadows; `None` for no shadows.
     pub shadows: Option<ShadowRegion>,
-    /// True when fine relief is drawn: stippled gingiva, the ridges of enamel, and the marks of burs where a tooth is dull.
-    pub has_relief: bool,
+    /// Seed of the fine relief that is drawn: stippled gingiva, the ridges and hairline cracks of enamel, and the marks of burs where a
+    /// tooth is dull; `None` for no relief.
+    pub relief_seed: Option<u16>,
     pub background: Background,
     /// A lens before the eye, which blurs what is not in its focus; `None` if all is sharp. Where the tooth is translucent there is no
     /// blur, because it has no depth of its own. What a mirror shows is blurred as the mirror, and what lies behind translucent
@@ -55,7 +56,7 @@ impl RenderScene<'_> {
             mirror: None,
             lights: Lights::default(),
             shadows: None,
-            has_relief: false,
+            relief_seed: None,
             background: Background::default(),
             lens: None,
             is_antialiased: false,
@@ -104,8 +105,8 @@ pub struct LabelPalette {
     pub appearances: [Appearance; 256],
     /// True for labels that are drawn as decay, with a soft border.
     pub is_decay: [bool; 256],
-    /// True for hard tissue, which is duller where it is cut.
-    pub dulls_when_cut: [bool; 256],
+    /// Gloss of hard tissue where it is cut, if it is less than its own; `None` for what looks the same there.
+    pub cut_gloss: [Option<f32>; 256],
     /// Label of the translucent tissue, enamel: decay near its surface is seen as a white spot, and the tissue beneath shines
     /// through.
     pub translucent: Option<Label>,
@@ -120,7 +121,7 @@ impl LabelPalette {
         LabelPalette {
             appearances,
             is_decay: [false; 256],
-            dulls_when_cut: [false; 256],
+            cut_gloss: [None; 256],
             translucent: None,
             under_translucent: None,
         }

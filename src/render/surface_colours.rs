@@ -5,7 +5,6 @@
 //! colour. Never looks farther than [`REACH`] cells, so that a cut changes the colours of its own and the next bricks only.
 
 use super::enamel_colours::{EnamelLayers, ON_A_CROWN};
-use super::relief::GROUND;
 use super::scene::{Appearance, LabelPalette, VolumeInstance};
 use super::unworked_tooth::UnworkedTooth;
 use typodont_core::frame::{Vec3, smooth_step};
@@ -37,8 +36,7 @@ const WINDOW: usize = BRICK as usize + 2 * REACH;
 const WHITE_SPOT: f32 = 0.385;
 const AMBER: Vec3 = Vec3::new(0.80, 0.60, 0.33);
 
-/// Gloss of hard tissue where it is cut, and the depths under the tooth's own surface, mm, between which it is taken for cut.
-const CUT_GLOSS: f32 = GROUND;
+/// Depths under the tooth's own surface, mm, between which a surface is taken for cut.
 const CUT_DEPTHS: [f32; 2] = [0.15, 0.4];
 
 /// Tint of enamel deep in a fissure, where it stains with time, as on the neighbours' crowns.
@@ -436,13 +434,13 @@ impl Mixer {
     fn new(palette: &LabelPalette) -> Mixer {
         let look = |label: u8| {
             let index = usize::from(label);
-            (palette.appearances[index], palette.is_decay[index], palette.dulls_when_cut[index])
+            (palette.appearances[index], palette.is_decay[index], palette.cut_gloss[index])
         };
         let all = || 1..=u8::MAX;
         let alike = all().map(|label| Label(all().find(|&other| look(other) == look(label)).unwrap_or(label)));
         let translucent = palette.translucent.map(|Label(label)| look(label));
         let matter = |label: u8| {
-            let (Appearance { colour: [r, g, b], gloss }, is_decay, is_dulled) = look(label);
+            let (Appearance { colour: [r, g, b], gloss }, is_decay, cut_gloss) = look(label);
             let own = [r, g, b, gloss];
             match is_decay {
                 true => Matter { decay: own, decay_amount: 1.0, ..Matter::default() },
@@ -450,7 +448,7 @@ impl Mixer {
                     sound: own,
                     sound_amount: 1.0,
                     enamel: if translucent == Some(look(label)) { 1.0 } else { 0.0 },
-                    dulling: if is_dulled { (gloss - CUT_GLOSS).max(0.0) } else { 0.0 },
+                    dulling: cut_gloss.map_or(0.0, |cut| (gloss - cut).max(0.0)),
                     ..Matter::default()
                 },
             }
@@ -596,6 +594,7 @@ fn lattice_value([x, y, z]: [u32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::relief::GROUND;
     use crate::scene::{Changes, RenderMode};
     use typodont_core::frame::{Pose, Vec3};
     use typodont_core::volume::{Grid, Voxel};
@@ -609,7 +608,7 @@ mod tests {
         palette.is_decay[usize::from(DECAY.0)] = true;
         palette.translucent = Some(Label(1));
         palette.under_translucent = Some([0.8, 0.7, 0.5]);
-        palette.dulls_when_cut = std::array::from_fn(|label| Label(label as u8) != DECAY);
+        palette.cut_gloss = std::array::from_fn(|label| (Label(label as u8) != DECAY).then_some(GROUND));
         palette
     }
 
@@ -792,7 +791,7 @@ mod tests {
         let palette = palette();
         let colours = SurfaceColours::new(&tooth(&cut, &palette, &unworked));
         let gloss = |p: Vec3| colours.at(grid.from_tooth(p)).gloss;
-        assert!((gloss(Vec3::new(0.0, 0.0, 0.5)) - CUT_GLOSS).abs() < 0.005, "{}", gloss(Vec3::new(0.0, 0.0, 0.5)));
+        assert!((gloss(Vec3::new(0.0, 0.0, 0.5)) - GROUND).abs() < 0.005, "{}", gloss(Vec3::new(0.0, 0.0, 0.5)));
         for own in [Vec3::new(1.9, 0.0, 2.0), Vec3::new(2.0, 0.3, -0.4), Vec3::new(-0.2, 2.0, 0.5)] {
             assert!((gloss(own) - 0.2).abs() < 0.01, "{own}: {}", gloss(own));
         }

@@ -72,7 +72,12 @@ pub fn view_uniform(scene: &RenderScene, eye: &Eye, [width, height]: [u32; 2], i
         up: eye.up.extend(0.0).to_array(),
         ahead: eye.forward.extend(0.0).to_array(),
         window: [eye.window.left, eye.window.right, eye.window.bottom, eye.window.top],
-        size: [width as f32, height as f32, if is_srgb { 1.0 } else { 0.0 }, 0.0],
+        size: [
+            width as f32,
+            height as f32,
+            if is_srgb { 1.0 } else { 0.0 },
+            f32::from(scene.relief_seed.unwrap_or_default()),
+        ],
         background_middle: opaque(scene.background.middle),
         background_edge: opaque(scene.background.edge),
         ambient: [scene.lights.ambient, 0.0, 0.0, 0.0],

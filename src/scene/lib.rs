@@ -35,7 +35,7 @@ mod views;
 pub use grey_volume::GreyVolume;
 pub use instrument::{ContraAngle, contra_angle, instrument_solid, mirror_face, procedural_instrument};
 pub use jaw::{Mouth, StandaloneJaw};
-pub use palette::{tissue_palette, unworked_tooth, x_ray_attenuation};
+pub use palette::{relief_seed, tissue_palette, unworked_tooth, x_ray_attenuation};
 pub use surroundings::{mouth_and_solids, surrounding_solids};
 pub use typodont_anatomy::jaw::WORKING_OPENING_DEG;
 pub use views::{ToothSide, camera_lens, shadow_region, tooth_view, work_view};

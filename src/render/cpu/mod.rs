@@ -134,7 +134,7 @@ impl CpuRenderer {
         eye: &Eye,
         [width, height]: [u32; 2],
     ) -> Framebuffer {
-        let relief = scene.has_relief.then(|| Relief::seen_by(eye, width));
+        let relief = scene.relief_seed.map(|seed| Relief::seen_by(eye, width, seed));
         let view = CpuView { eye: *eye, lights: scene.lights, width, height, shadows: shadows.clone(), relief };
         let mut framebuffer = Framebuffer::with_background(&scene.background, width, height);
         for solid in &scene.solids {

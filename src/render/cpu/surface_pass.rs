@@ -16,11 +16,17 @@ pub fn solid(solid: &MeshInstance, view: &CpuView, framebuffer: &mut Framebuffer
         let SurfacePoint { own: place, normal, finish, stippling, point } = seen;
         let colour = std::array::from_fn(|c| finish.colour[c] * own.colour[c]);
         let to_world = |v| solid.world_from_solid.rotate(v);
-        let normal = view.relief.map_or(normal, |relief| match solid.is_enamel {
-            true => relief.of_enamel(point, normal, place, to_world),
-            false => relief.stippled(point, normal, place, stippling, to_world),
-        });
-        view.shade(Appearance { colour, gloss: finish.gloss * own.gloss }, 1.0, point, normal)
+        let plain = Appearance { colour, gloss: finish.gloss * own.gloss };
+        let (appearance, normal) = match view.relief {
+            None => (plain, normal),
+            Some(relief) if solid.is_enamel => {
+                let to_own = |v| solid.world_from_solid.inverse().rotate(v);
+                let appearance = relief.cracked(point, normal, plain, place, to_own);
+                (appearance, relief.of_enamel(point, normal, place, to_world))
+            }
+            Some(relief) => (plain, relief.stippled(point, normal, place, stippling, to_world)),
+        };
+        view.shade(appearance, 1.0, point, normal)
     });
 }
 

@@ -119,13 +119,13 @@ impl<'a> VolumeSampler<'a> {
 
     /// Shaded colour of the surface at a place, which is a point of world space.
     pub fn shade(&self, view: &CpuView, at: Vec3, point: Vec3, normal: Vec3) -> Rgb {
-        let finish = self.appearance(at);
+        let plain = self.appearance(at);
         let open = self.openness(at, normal);
+        let Some(relief) = view.relief else { return view.shade(plain, open, point, normal) };
         let own = at * self.volume.grid().spacing;
-        let marked = view.relief.map_or(normal, |relief| {
-            relief.of_tooth(point, normal, own, finish.gloss, |v| self.world_from_tooth.rotate(v))
-        });
-        view.shade(finish, open, point, marked)
+        let marked = relief.of_tooth(point, normal, own, plain.gloss, |v| self.world_from_tooth.rotate(v));
+        let to_own = |v| self.world_from_tooth.inverse().rotate(v);
+        view.shade(relief.cracked(point, normal, plain, own, to_own), open, point, marked)
     }
 
     /// Colour and gloss of the surface at a place.

@@ -5,18 +5,25 @@ use typodont_core::frame::Pose;
 use typodont_core::volume::Volume;
 use typodont_exercise::catalog::TissueTable;
 use typodont_exercise::scenario::Workpiece;
-use typodont_render::{Changes, LabelPalette, RenderMode, SurfaceColours, UnworkedTooth, VolumeInstance};
-use typodont_scene::{tissue_palette, unworked_tooth};
+use typodont_render::{
+    Changes, LabelPalette, RenderMode, SurfaceColours, UnworkedTooth, VolumeInstance, tooth_in_relief,
+};
+use typodont_scene::{relief_seed, tissue_palette, unworked_tooth};
 
 /// Colours of a tooth's tissues, with decay shown, and the tooth before anybody worked on it.
 pub struct ToothMaterial {
     palette: LabelPalette,
     unworked_tooth: UnworkedTooth,
+    relief_seed: u16,
 }
 
 impl ToothMaterial {
     pub fn of(tissues: &TissueTable, workpiece: &Workpiece) -> ToothMaterial {
-        ToothMaterial { palette: tissue_palette(tissues, true), unworked_tooth: unworked_tooth(workpiece, tissues) }
+        ToothMaterial {
+            palette: tissue_palette(tissues, true),
+            unworked_tooth: unworked_tooth(workpiece, tissues),
+            relief_seed: relief_seed(workpiece),
+        }
     }
 
     /// The surface of the tooth at a stage of the work.
@@ -29,7 +36,7 @@ impl ToothMaterial {
             unworked_tooth: Some(&self.unworked_tooth),
             mode: RenderMode::Surface,
         });
-        ToothSurface { volume, colours }
+        ToothSurface { volume, colours, relief_seed: self.relief_seed }
     }
 }
 
@@ -37,11 +44,16 @@ impl ToothMaterial {
 pub struct ToothSurface<'a> {
     volume: &'a Volume,
     colours: SurfaceColours,
+    relief_seed: u16,
 }
 
 impl ToothSurface<'_> {
     /// A view of this volume, in colour.
     pub fn paint(&self, view: &GBuffer) -> PixelBuffer {
-        view.paint_with_relief(|point| self.colours.at(self.volume.grid().from_tooth(point)))
+        let grid = self.volume.grid();
+        view.paint_with_relief(|point, normal, pixel| {
+            let at = grid.from_tooth(point);
+            tooth_in_relief(self.relief_seed, self.colours.at(at), normal, at * grid.spacing, pixel)
+        })
     }
 }

@@ -17,7 +17,7 @@ use ray::RayMarcher;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::{available_threads, par_rows};
 use typodont_core::volume::{Label, Volume};
-use typodont_render::{Appearance, tooth_normal};
+use typodont_render::Appearance;
 
 /// Samples along each side of a pixel where the picture has an edge; elsewhere one does.
 const SUPERSAMPLES: u32 = 3;
@@ -131,12 +131,13 @@ fn edge_pixels(hits: &[Option<Hit>], width: usize, pixel: f32) -> Vec<usize> {
 impl GBuffer {
     /// The surface that was seen, lit; `finish` is asked for points of the surface in tooth space. Nothing stays transparent.
     pub fn paint(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
-        self.paint_with(finish, false, available_threads())
+        self.paint_with_relief(|point, normal, _| (finish(point), normal))
     }
 
-    /// The same with the tooth's fine relief: ridges of enamel, the marks of burs, and rough decay.
-    pub fn paint_with_relief(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
-        self.paint_with(finish, true, available_threads())
+    /// The same with fine relief: `finish` is asked for a point and its unit normal in tooth space, and the
+    /// width, mm, that a pixel covers of it, and answers with the normal that the relief has there.
+    pub fn paint_with_relief(&self, finish: impl Fn(Vec3, Vec3, f32) -> (Appearance, Vec3) + Sync) -> PixelBuffer {
+        self.paint_with(finish, available_threads())
     }
 
     /// The same in the colours of voxels.
@@ -144,17 +145,15 @@ impl GBuffer {
         self.paint(|point| Appearance { colour: surface_colour(volume, point, &colour), gloss: FAINT_GLOSS })
     }
 
-    fn paint_with(&self, finish: impl Fn(Vec3) -> Appearance + Sync, has_relief: bool, threads: usize) -> PixelBuffer {
+    fn paint_with(&self, finish: impl Fn(Vec3, Vec3, f32) -> (Appearance, Vec3) + Sync, threads: usize) -> PixelBuffer {
         let lamps = light::lamps();
         let pixel = 2.0 * self.camera.half_height / self.height as f32;
         let mut picture = PixelBuffer::transparent(self.width, self.height);
         let shade = |hit: &Option<Hit>| match hit {
             Some(hit) => {
-                let finish = finish(hit.point);
-                let normal = match has_relief {
-                    true => tooth_normal(hit.normal, hit.point, finish.gloss, pixel),
-                    false => hit.normal,
-                };
+                // A pixel covers more of a surface that is seen from aside.
+                let covered = pixel / hit.normal.dot(self.camera.back()).max(0.01);
+                let (finish, normal) = finish(hit.point, hit.normal, covered);
                 light::lit_colour(&lamps, &self.camera, finish, &Hit { normal, ..*hit })
             }
             None => [0.0; 4],
@@ -233,6 +232,7 @@ pub(crate) mod phantom {
 mod tests {
     use super::*;
     use crate::raycast::phantom;
+    use typodont_render::tooth_in_relief;
 
     #[test]
     fn a_balls_silhouette_has_the_area_of_a_disc() {
@@ -256,8 +256,11 @@ mod tests {
             width: 97,
             height: 61,
         };
-        let finish = |p: Vec3| Appearance { colour: [0.5 + 0.4 * p.x, 0.4, 0.2], gloss: 0.2 };
-        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(finish, true, threads);
+        let finish = |p: Vec3, normal: Vec3, pixel: f32| {
+            let plain = Appearance { colour: [0.5 + 0.4 * p.x, 0.4, 0.2], gloss: 0.2 };
+            tooth_in_relief(1, plain, normal, p, pixel)
+        };
+        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(finish, threads);
         assert_eq!(picture(1), picture(3));
     }
 
