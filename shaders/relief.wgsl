@@ -1,4 +1,4 @@
-// Fine relief of surfaces, which tilts their normals and moves nothing, and hairline cracks in enamel. Compiled after view.wgsl.
+// Fine relief of surfaces, which tilts their normals and moves nothing, and hairline cracks in enamel, which tint it. Compiled after view.wgsl.
 // CPU twin: src/render/relief.rs.
 
 // False in pipelines for scenes without relief: in software, a branch costs time even where it is not taken.
@@ -24,17 +24,29 @@ const RIDGE_DEPTH: f32 = 0.0013;
 const ENAMEL_GLOSS: f32 = 0.2;
 const ENAMEL_GLOSS_RANGE: f32 = 0.01;
 // Width of a hairline crack of enamel, and the distance between two sheets in which cracks lie, mm. Normals of the sheets of both
-// kinds, across the tooth's axis. Width and height of a sheet's bends, mm.
+// kinds, across the tooth's axis. Number of seeds that have their sheets at places of their own, and the share of that distance by which
+// the next seed's are shifted. Width and height of a sheet's bends, mm.
 const CRACK_WIDTH: f32 = 0.04;
 const CRACK_SPREAD: f32 = 4.3;
 const CRACK_ACROSS: mat2x3f = mat2x3f(vec3f(0.94, 0.34, 0.0), vec3f(-0.42, 0.91, 0.0));
+const CRACK_SHIFTS: u32 = 512u;
+const GOLDEN_SHARE: f32 = 0.618034;
 const CRACK_BEND: vec2f = vec2f(2.3, 0.35);
+// Distances from the middle of a crack, as shares of its width, between which it fades.
+const CRACK_EDGE: vec2f = vec2f(0.15, 0.5);
+// Width of a crack in pixels up to which it is drawn wider than it is, and paler; and pixels, mm, from which on it is left out.
+const CRACK_PIXELS: f32 = 1.5;
+const CRACK_GONE: vec2f = vec2f(0.1, 0.2);
 // Size of the parts of enamel that have cracks of one kind, mm; the noise from which on they begin, and at which they are whole.
 const CRACKED_PART: f32 = 3.7;
 const CRACKED_FROM: vec2f = vec2f(0.15, 0.35);
-// Cosines between a sheet's and the surface's normal: from the first on the crack fades, and at the second it has faded.
+// Cosines between a sheet's and the surface's normal: from the first on the crack fades, and at the second it has faded. The same
+// for the tooth's axis and the surface's normal.
 const CRACK_FLAT: vec2f = vec2f(0.6, 0.85);
-const CRACK_TINT: vec3f = vec3f(0.89, 0.86, 0.81);
+const CRACK_TOP: vec2f = vec2f(0.4, 0.65);
+const CRACK_TINT: vec3f = vec3f(0.91, 0.88, 0.84);
+// Cosine between the normal and the way to the eye at which cracks are too narrow to be seen.
+const CRACK_EDGE_ON: f32 = 0.4;
 // Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
 const FADE: vec2f = vec2f(0.3, 0.8);
 
@@ -72,10 +84,14 @@ fn noise(at: vec3f) -> vec4f {
     return vec4f(rise * vec3f(along_x, along_y, along_z), value);
 }
 
+// Width of a pixel at a point, mm.
+fn pixel_at(point: vec3f) -> f32 {
+    return length(point - view.position.xyz) * (view.window.y - view.window.x) / view.size.x;
+}
+
 // Share of a relief of a width, mm, that is drawn at a point: none where pixels are too large for it.
 fn resolved(point: vec3f, width: f32) -> f32 {
-    let pixel = length(point - view.position.xyz) * (view.window.y - view.window.x) / view.size.x;
-    return 1.0 - smoothstep(FADE.x, FADE.y, pixel / width);
+    return 1.0 - smoothstep(FADE.x, FADE.y, pixel_at(point) / width);
 }
 
 // Unit normal of a surface with a relief, given the gradient of its height.
@@ -110,16 +126,22 @@ fn tooth_gradient(at: vec3f, gloss: f32, point: vec3f) -> vec3f {
 // Colour and gloss of a tooth's surface with the hairline cracks of its enamel, at a place and with a unit normal of its own space, mm.
 // Cracks are narrower where an eye sees the surface from aside.
 fn cracked(finish: vec4f, at: vec3f, normal: vec3f, point: vec3f, eye_cosine: f32) -> vec4f {
-    let seen = uncut_share(finish.a) * resolved(point, CRACK_WIDTH * max(eye_cosine, 0.01));
-    if seen <= 0.0 {
+    let pixel = pixel_at(point) / max((eye_cosine - CRACK_EDGE_ON) / (1.0 - CRACK_EDGE_ON), 0.01);
+    let uncut = uncut_share(finish.a) * (1.0 - smoothstep(CRACK_GONE.x, CRACK_GONE.y, pixel));
+    if uncut <= 0.0 {
         return finish;
     }
+    let width = max(CRACK_WIDTH, CRACK_PIXELS * pixel);
     let part = noise(at.zxy / CRACKED_PART).w;
     let across = select(CRACK_ACROSS[0], CRACK_ACROSS[1], part < 0.0);
     let bend = CRACK_BEND.y * noise(at.yzx / CRACK_BEND.x).w;
-    let away = CRACK_SPREAD * abs(fract((dot(at, across) + bend) / CRACK_SPREAD) - 0.5);
-    let line = 1.0 - smoothstep(0.15, 0.5, away / CRACK_WIDTH);
+    let shift = f32(u32(view.size.w) % CRACK_SHIFTS) * GOLDEN_SHARE;
+    let away = CRACK_SPREAD * abs(fract((dot(at, across) + bend) / CRACK_SPREAD + shift) - 0.5);
+    // Cracks end in a point.
     let whole = smoothstep(CRACKED_FROM.x, CRACKED_FROM.y, abs(part));
+    let line = 1.0 - smoothstep(CRACK_EDGE.x, CRACK_EDGE.y, away / (width * max(whole, 0.01)));
+    let seen = uncut * CRACK_WIDTH / width;
     let steep = 1.0 - smoothstep(CRACK_FLAT.x, CRACK_FLAT.y, abs(dot(normal, across)));
-    return vec4f(finish.rgb * mix(vec3f(1.0), CRACK_TINT, seen * line * whole * steep), finish.a);
+    let aside = 1.0 - smoothstep(CRACK_TOP.x, CRACK_TOP.y, normal.z);
+    return vec4f(finish.rgb * mix(vec3f(1.0), CRACK_TINT, seen * line * whole * steep * aside), finish.a);
 }

@@ -17,7 +17,23 @@ struct Corner {
     @location(2) colour: vec4f,
 }
 
-struct Varying {
+// A place of the tooth, whose colour is not at its corners. In software, each value that varies over a triangle costs time for each.
+struct ToothPlace {
+    @builtin(position) place: vec4f,
+    @location(0) point: vec3f,
+    @location(1) normal: vec3f,
+}
+
+// A place of a solid.
+struct SolidPlace {
+    @builtin(position) place: vec4f,
+    @location(0) point: vec3f,
+    @location(1) normal: vec3f,
+    @location(2) finish: vec4f,
+}
+
+// The same with relief.
+struct ReliefPlace {
     @builtin(position) place: vec4f,
     @location(0) point: vec3f,
     @location(1) normal: vec3f,
@@ -26,25 +42,32 @@ struct Varying {
     @location(3) own: vec4f,
 }
 
-fn placed(corner: Corner, world_from_own: mat4x4f) -> Varying {
+fn placed(corner: Corner, world_from_own: mat4x4f) -> ToothPlace {
     let point = world_from_own * vec4f(corner.position, 1.0);
     let normal = (world_from_own * vec4f(corner.normal.xyz, 0.0)).xyz;
-    let finish = vec4f(corner.colour.rgb, corner.normal.w);
-    return Varying(view.clip_from_world * point, point.xyz, normal, finish, vec4f(corner.position, corner.colour.w));
+    return ToothPlace(view.clip_from_world * point, point.xyz, normal);
 }
 
 @vertex
-fn solid_vertex(corner: Corner) -> Varying {
-    return placed(corner, solid.world_from_solid);
+fn solid_vertex(corner: Corner) -> SolidPlace {
+    let at = placed(corner, solid.world_from_solid);
+    return SolidPlace(at.place, at.point, at.normal, vec4f(corner.colour.rgb, corner.normal.w));
+}
+
+@vertex
+fn relief_vertex(corner: Corner) -> ReliefPlace {
+    let at = placed(corner, solid.world_from_solid);
+    let finish = vec4f(corner.colour.rgb, corner.normal.w);
+    return ReliefPlace(at.place, at.point, at.normal, finish, vec4f(corner.position, corner.colour.w));
 }
 
 @fragment
-fn solid_fragment(in: Varying) -> @location(0) vec4f {
+fn solid_fragment(in: SolidPlace) -> @location(0) vec4f {
     return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normalize(in.normal))), 1.0);
 }
 
 @fragment
-fn stippled_fragment(in: Varying) -> @location(0) vec4f {
+fn stippled_fragment(in: ReliefPlace) -> @location(0) vec4f {
     var normal = normalize(in.normal);
     if has_relief {
         let gradient = stipple_gradient(in.own.xyz) * (in.own.w * resolved(in.point, STIPPLE_WIDTH));
@@ -54,7 +77,7 @@ fn stippled_fragment(in: Varying) -> @location(0) vec4f {
 }
 
 @vertex
-fn tooth_vertex(corner: Corner) -> Varying {
+fn tooth_vertex(corner: Corner) -> ToothPlace {
     return placed(corner, tooth.world_from_tooth);
 }
 
@@ -67,7 +90,7 @@ fn turned_to_eye(normal: vec3f, to_eye: vec3f) -> vec3f {
 }
 
 @fragment
-fn tooth_fragment(in: Varying) -> @location(0) vec4f {
+fn tooth_fragment(in: ToothPlace) -> @location(0) vec4f {
     let normal = turned_to_eye(normalize(in.normal), normalize(view.position.xyz - in.point));
     let at = (tooth.voxel_from_world * vec4f(in.point, 1.0)).xyz;
     let seen = finish(at);
@@ -77,7 +100,7 @@ fn tooth_fragment(in: Varying) -> @location(0) vec4f {
 
 // Another tooth, whose enamel is as that of the carved one.
 @fragment
-fn enamel_fragment(in: Varying) -> @location(0) vec4f {
+fn enamel_fragment(in: ReliefPlace) -> @location(0) vec4f {
     var normal = normalize(in.normal);
     var seen = in.finish * solid.finish;
     if has_relief {
@@ -89,10 +112,13 @@ fn enamel_fragment(in: Varying) -> @location(0) vec4f {
     return vec4f(screen(lit(seen, 1.0, in.point, normal)), 1.0);
 }
 
+// The greatest depth that is less than that of an empty picture.
+const BEHIND_ALL: f32 = 0.99999994;
+
 // Behind everything: a triangle that covers the picture.
 @vertex
 fn background_vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 1.0, 1.0);
+    return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, BEHIND_ALL, 1.0);
 }
 
 @fragment

@@ -279,9 +279,13 @@ fn dither(pixel: vec2f) -> f32 {
     return (fract(dot(pixel, vec2f(0.7548777, 0.5698403))) - 0.5) / 255.0;
 }
 
+// True in pipelines whose target turns linear light into a screen's colours by itself: in software, a branch costs time even where it
+// is not taken.
+override is_srgb_target: bool = false;
+
 // Converts an sRGB colour for this target.
 fn screen(colour: vec3f) -> vec3f {
-    if view.size.z == 0.0 {
+    if !is_srgb_target {
         return colour;
     }
     let low = colour / 12.92;

@@ -106,7 +106,7 @@ fn render_first_view(scenario: &Scenario, workpiece: &Workpiece, is_in_mouth: bo
         },
         lights: Lights::along(&viewpoint),
         shadows: Some(scene::shadow_region(workpiece, &orbit)),
-        relief_seed: Some(scene::relief_seed(workpiece)),
+        relief_seed: Some(scene::relief_seed(scenario)),
         ..RenderScene::empty()
     };
     let (mut painter, _) = OffscreenRenderer::gpu_or_cpu();

@@ -117,7 +117,7 @@ pub use gpu::{DeviceErrorListener, Gpu};
 pub use gpu_offscreen::GpuOffscreenRenderer;
 pub use mirror::PlaneMirror;
 pub use offscreen::OffscreenRenderer;
-pub use relief::{ENAMEL_GLOSS, GROUND as GROUND_GLOSS, tooth_in_relief};
+pub use relief::{ENAMEL_GLOSS, GROUND_GLOSS, SeenPlace, tooth_in_relief};
 #[cfg(feature = "gpu")]
 pub use renderer::{RenderTarget, Renderer};
 pub use scene::{

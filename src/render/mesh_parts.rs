@@ -27,6 +27,15 @@ struct MeshPart {
     radius: f32,
 }
 
+/// Parts of a mesh that an eye may see.
+#[derive(Debug, Default, PartialEq)]
+pub struct VisibleParts {
+    /// Triangles, in order; adjoining parts are one run.
+    pub runs: Vec<Range<u32>>,
+    /// Mean distance of the parts from the eye, mm; 0 if there are none.
+    pub distance: f32,
+}
+
 impl MeshParts {
     pub fn new(mesh: &Mesh) -> MeshParts {
         let Aabb { low, high } = Aabb::around(mesh.positions.iter().copied());
@@ -52,16 +61,22 @@ impl MeshParts {
         MeshParts { triangles, parts }
     }
 
-    /// Runs of triangles that an eye may see, in order; adjoining parts are one run.
-    pub fn visible(&self, eye: &Eye, world_from_solid: Pose) -> Vec<Range<u32>> {
+    pub fn visible(&self, eye: &Eye, world_from_solid: Pose) -> VisibleParts {
         let mut runs: Vec<Range<u32>> = Vec::new();
-        for part in self.parts.iter().filter(|part| eye.may_see(world_from_solid * part.middle, part.radius)) {
+        let (mut distances, mut count) = (0.0, 0.0f32);
+        for part in &self.parts {
+            let middle = world_from_solid * part.middle;
+            if !eye.may_see(middle, part.radius) {
+                continue;
+            }
+            distances += eye.position.distance(middle);
+            count += 1.0;
             match runs.last_mut() {
                 Some(run) if run.end == part.triangles.start => run.end = part.triangles.end,
                 _ => runs.push(part.triangles.clone()),
             }
         }
-        runs
+        VisibleParts { runs, distance: distances / count.max(1.0) }
     }
 }
 
@@ -95,7 +110,12 @@ mod tests {
         sorted.iter_mut().for_each(|triangles| triangles.sort());
         assert!(sorted[0] == sorted[1], "every triangle is kept");
         let eye = Orbit::around(Vec3::new(30.0, 0.0, -20.0), 9.0).viewpoint().eye(1.0);
-        let runs = parts.visible(&eye, Pose::IDENTITY);
+        let VisibleParts { runs, distance } = parts.visible(&eye, Pose::IDENTITY);
+        let to_middle = eye.position.distance(Vec3::new(30.0, 0.0, -20.0));
+        assert!(
+            (0.5..2.0).contains(&(distance / to_middle)),
+            "{distance} mm, where the view's middle is {to_middle} mm away"
+        );
         let is_drawn = |i: usize| runs.iter().any(|run| run.contains(&(i as u32)));
         let mut drawn = 0;
         for (i, triangle) in parts.triangles.iter().enumerate() {
@@ -107,6 +127,6 @@ mod tests {
             assert!(is_drawn(i) || !in_sight, "triangle {i}");
         }
         assert!(drawn < mesh.triangles.len() / 3, "{drawn} of {} triangles", mesh.triangles.len());
-        assert_eq!(MeshParts::new(&Mesh::default()).visible(&eye, Pose::IDENTITY), []);
+        assert_eq!(MeshParts::new(&Mesh::default()).visible(&eye, Pose::IDENTITY), VisibleParts::default());
     }
 }

@@ -23,25 +23,26 @@ pub struct PipelineDesc<'a> {
     pub detail: Detail,
 }
 
-/// Detail that the fragment shaders of a scene draw: each part costs time even where nothing of it is seen.
+/// Constants of the fragment shaders: what a scene draws and where, which costs time even where nothing of it is seen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Detail {
     /// Shadows of the chair lamp.
     pub has_shadows: bool,
     /// Fine relief of surfaces.
     pub has_relief: bool,
+    /// The target turns linear light into a screen's colours by itself.
+    pub is_srgb_target: bool,
 }
 
 impl Detail {
     /// Constants of the shaders, beside their defaults.
-    fn constants(self) -> &'static [(&'static str, f64)] {
-        const ALL: [(&str, f64); 2] = [("has_shadows", 1.0), ("has_relief", 1.0)];
-        match (self.has_shadows, self.has_relief) {
-            (true, true) => &ALL,
-            (true, false) => &ALL[..1],
-            (false, true) => &ALL[1..],
-            (false, false) => &[],
-        }
+    fn constants(self) -> Vec<(&'static str, f64)> {
+        let all = [
+            ("has_shadows", self.has_shadows),
+            ("has_relief", self.has_relief),
+            ("is_srgb_target", self.is_srgb_target),
+        ];
+        all.into_iter().filter(|(_, is_so)| *is_so).map(|(name, _)| (name, 1.0)).collect()
     }
 }
 
@@ -55,8 +56,6 @@ pub enum DrawnFaces {
 pub enum DepthMode {
     /// Not attached.
     None,
-    /// Attached, but neither tested nor written.
-    Disabled,
     /// Tested and written: the nearer fragment wins.
     ReadWrite,
     /// Tested but not written.
@@ -90,6 +89,7 @@ impl PipelineDesc<'_> {
             Some(_) => &[target][..],
             None => &[],
         };
+        let constants = self.detail.constants();
         device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(self.label),
             layout: Some(&layout),
@@ -102,16 +102,12 @@ impl PipelineDesc<'_> {
             fragment: self.fragment.map(|fragment| wgpu::FragmentState {
                 module: self.module,
                 entry_point: Some(fragment),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    constants: self.detail.constants(),
-                    ..Default::default()
-                },
+                compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
                 targets,
             }),
             primitive: wgpu::PrimitiveState { cull_mode, ..Default::default() },
             depth_stencil: match self.depth {
                 DepthMode::None => None,
-                DepthMode::Disabled => Some(depth(false, wgpu::CompareFunction::Always)),
                 DepthMode::ReadWrite => Some(depth(true, wgpu::CompareFunction::Less)),
                 DepthMode::ReadOnly => Some(depth(false, wgpu::CompareFunction::Less)),
             },

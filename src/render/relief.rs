@@ -28,14 +28,14 @@ const MARK_SLOPE: [f32; 2] = [0.35, -0.22];
 
 /// Gloss of tissue that is smooth, and of tissue with all of the marks of a bur.
 const SMOOTH: f32 = 0.19;
-pub const GROUND: f32 = 0.13;
+pub const GROUND_GLOSS: f32 = 0.13;
 
 /// Width of the ridges of enamel that nobody cut (perikymata) across the tooth's axis and along it, and by how much they are lower or
 /// higher than the mean, mm. Real ones are 0.03 to 0.15 mm apart and about a micrometre high; these are seen at a lesson's magnification.
 const RIDGE_WIDTH: Vec3 = Vec3::new(1.1, 1.1, 0.13);
 const RIDGE_DEPTH: f32 = 0.0013;
 
-/// Gloss of such enamel under a film of saliva: what has it has ridges. And the difference from it at which there are none.
+/// Gloss of such enamel under a film of saliva: what has it has ridges and cracks. And the difference from it at which there are none.
 pub const ENAMEL_GLOSS: f32 = 0.2;
 const ENAMEL_GLOSS_RANGE: f32 = 0.01;
 
@@ -47,8 +47,21 @@ const CRACK_SPREAD: f32 = 4.3;
 /// Normals of the sheets of both kinds, across the tooth's axis: cracks run from the edge of a crown toward its neck.
 const CRACK_ACROSS: [Vec3; 2] = [Vec3::new(0.94, 0.34, 0.0), Vec3::new(-0.42, 0.91, 0.0)];
 
+/// Number of seeds that have their sheets at places of their own, and the share of the distance between sheets by which the next seed's
+/// are shifted.
+const CRACK_SHIFTS: u16 = 512;
+const GOLDEN_SHARE: f32 = 0.618034;
+
 /// Width and height of a sheet's bends, mm.
 const CRACK_BEND: [f32; 2] = [2.3, 0.35];
+
+/// Distances from the middle of a crack, as shares of its width, between which it fades.
+const CRACK_EDGE: [f32; 2] = [0.15, 0.5];
+
+/// Width of a crack in pixels up to which it is drawn wider than it is, and paler, so that it is a line and no row of dots; and pixels, mm,
+/// from which on it is left out.
+const CRACK_PIXELS: f32 = 1.5;
+const CRACK_GONE: [f32; 2] = [0.1, 0.2];
 
 /// Size of the parts of enamel that have cracks of one kind, mm; the noise from which on they begin, and at which they are whole.
 const CRACKED_PART: f32 = 3.7;
@@ -58,8 +71,15 @@ const CRACKED_FROM: [f32; 2] = [0.15, 0.35];
 /// lies along the surface would be a stain.
 const CRACK_FLAT: [f32; 2] = [0.6, 0.85];
 
+/// The same for the tooth's axis and the surface's normal: on slopes toward the fissures cracks would look like hairs.
+const CRACK_TOP: [f32; 2] = [0.4, 0.65];
+
 /// Share of the colour that a crack leaves.
-const CRACK_TINT: Rgb = [0.89, 0.86, 0.81];
+const CRACK_TINT: Rgb = [0.91, 0.88, 0.84];
+
+/// Cosine between the normal and the way to the eye at which cracks are too narrow to be seen: normals are turned to the eye up to there
+/// (`turned_to_eye`).
+const CRACK_EDGE_ON: f32 = 0.4;
 
 /// Size of a pixel, as a share of the relief's width, up to which relief is drawn whole, and from which on not at all.
 const FADE: [f32; 2] = [0.3, 0.8];
@@ -96,10 +116,7 @@ impl Relief {
     /// Unit normal at a point of a tooth whose surface has a gloss: the duller, the rougher. `own`: the point in millimetres along
     /// the axes of the volume.
     pub fn of_tooth(&self, point: Vec3, normal: Vec3, own: Vec3, gloss: f32, to_world: impl Fn(Vec3) -> Vec3) -> Vec3 {
-        match tooth_gradient(self.noise, own, gloss, self.pixel_at(point)) {
-            Vec3::ZERO => normal,
-            gradient => tilted(normal, to_world(gradient)),
-        }
+        marked(normal, tooth_gradient(self.noise, own, gloss, self.pixel_at(point)), to_world)
     }
 
     /// Unit normal at a point of another tooth's enamel. `own`: the point in the mesh's own space.
@@ -117,9 +134,8 @@ impl Relief {
         own: Vec3,
         to_own: impl Fn(Vec3) -> Vec3,
     ) -> Appearance {
-        // Cracks are narrower where the eye sees the surface from aside.
-        let eye_cosine = normal.dot((self.eye - point).normalize_or_zero()).max(0.01);
-        cracked(self.noise, appearance, own, to_own(normal), self.pixel_at(point) / eye_cosine)
+        let eye_cosine = normal.dot((self.eye - point).normalize_or_zero());
+        cracked(self.noise, appearance, own, to_own(normal), covered(self.pixel_at(point), eye_cosine))
     }
 
     /// Width of a pixel at a point, mm.
@@ -128,15 +144,36 @@ impl Relief {
     }
 }
 
-/// Appearance and unit normal of a tooth's surface with the relief of a seed, in a picture whose pixels cover so much of it, mm. `place`:
-/// in millimetres along the axes of the volume, along which the normal lies, too.
-pub fn tooth_in_relief(seed: u16, appearance: Appearance, normal: Vec3, place: Vec3, pixel: f32) -> (Appearance, Vec3) {
+/// A place of a tooth's surface in a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenPlace {
+    /// In millimetres along the axes of the volume, along which the normal lies, too.
+    pub place: Vec3,
+    pub normal: Vec3,
+    /// Width of a pixel, mm, and the cosine between the normal and the way to the eye.
+    pub pixel: f32,
+    pub eye_cosine: f32,
+}
+
+/// Appearance and unit normal of a tooth's surface with the relief of a seed.
+pub fn tooth_in_relief(seed: u16, appearance: Appearance, seen: SeenPlace) -> (Appearance, Vec3) {
+    let SeenPlace { place, normal, pixel, eye_cosine } = seen;
     let noise = ReliefNoise::new(seed);
-    let marked = match tooth_gradient(noise, place, appearance.gloss, pixel) {
+    let gradient = tooth_gradient(noise, place, appearance.gloss, pixel);
+    (cracked(noise, appearance, place, normal, covered(pixel, eye_cosine)), marked(normal, gradient, |v| v))
+}
+
+/// Unit normal of a surface with a relief whose gradient is zero where there is none.
+fn marked(normal: Vec3, gradient: Vec3, to_world: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    match gradient {
         Vec3::ZERO => normal,
-        gradient => tilted(normal, gradient),
-    };
-    (cracked(noise, appearance, place, normal, pixel), marked)
+        gradient => tilted(normal, to_world(gradient)),
+    }
+}
+
+/// Width of a surface that a pixel covers, mm, where the eye sees it from aside.
+fn covered(pixel: f32, eye_cosine: f32) -> f32 {
+    pixel / ((eye_cosine - CRACK_EDGE_ON) / (1.0 - CRACK_EDGE_ON)).max(0.01)
 }
 
 /// Share of a surface with a gloss that is enamel which nobody cut.
@@ -146,26 +183,30 @@ fn uncut_share(gloss: f32) -> f32 {
 
 /// Appearance of a tooth's surface with the hairline cracks of its enamel, which lie in bent sheets along the tooth's axis.
 fn cracked(noise: ReliefNoise, appearance: Appearance, place: Vec3, normal: Vec3, pixel: f32) -> Appearance {
-    let seen = uncut_share(appearance.gloss) * resolved(pixel, CRACK_WIDTH);
-    if seen <= 0.0 {
+    let ramp = |[from, to]: [f32; 2], value: f32| smooth_step((value - from) / (to - from));
+    let uncut = uncut_share(appearance.gloss) * (1.0 - ramp(CRACK_GONE, pixel));
+    if uncut <= 0.0 {
         return appearance;
     }
+    let width = CRACK_WIDTH.max(CRACK_PIXELS * pixel);
     let (part, _) = noise.at(Vec3::new(place.z, place.x, place.y) / CRACKED_PART);
     let across = CRACK_ACROSS[usize::from(part < 0.0)];
     let (bend, _) = noise.at(Vec3::new(place.y, place.z, place.x) / CRACK_BEND[0]);
-    let sheets = (place.dot(across) + CRACK_BEND[1] * bend) / CRACK_SPREAD;
+    let sheets = (place.dot(across) + CRACK_BEND[1] * bend) / CRACK_SPREAD + noise.shift;
     let away = CRACK_SPREAD * (sheets - sheets.floor() - 0.5).abs();
-    let ramp = |[from, to]: [f32; 2], value: f32| smooth_step((value - from) / (to - from));
-    let line = 1.0 - ramp([0.15, 0.5], away / CRACK_WIDTH);
+    // Cracks end in a point.
+    let whole = ramp(CRACKED_FROM, part.abs());
+    let line = 1.0 - ramp(CRACK_EDGE, away / (width * whole.max(0.01)));
+    let seen = uncut * CRACK_WIDTH / width;
     let steep = 1.0 - ramp(CRACK_FLAT, normal.dot(across).abs());
-    let share = seen * line * ramp(CRACKED_FROM, part.abs()) * steep;
+    let share = seen * line * whole * steep * (1.0 - ramp(CRACK_TOP, normal.z));
     let colour = std::array::from_fn(|c| appearance.colour[c] * (1.0 + share * (CRACK_TINT[c] - 1.0)));
     Appearance { colour, ..appearance }
 }
 
 /// Gradient of the height of a tooth's surface at a place: zero where it is smooth or pixels are too wide.
 fn tooth_gradient(noise: ReliefNoise, place: Vec3, gloss: f32, pixel: f32) -> Vec3 {
-    let marks = ((SMOOTH - gloss) / (SMOOTH - GROUND)).clamp(0.0, 1.0);
+    let marks = ((SMOOTH - gloss) / (SMOOTH - GROUND_GLOSS)).clamp(0.0, 1.0);
     let ridges = uncut_share(gloss);
     let (width, slope, depth) = match marks > 0.0 {
         true => (MARK_WIDTH, MARK_SLOPE, MARK_DEPTH * marks),
@@ -194,11 +235,16 @@ fn tilted(normal: Vec3, gradient: Vec3) -> Vec3 {
 #[derive(Clone, Copy, Debug)]
 struct ReliefNoise {
     seed: u32,
+    /// Shift of the sheets of cracks, as a share of the distance between them.
+    shift: f32,
 }
 
 impl ReliefNoise {
     fn new(seed: u16) -> ReliefNoise {
-        ReliefNoise { seed: u32::from(seed).wrapping_mul(0x27D4_EB2F) }
+        ReliefNoise {
+            seed: u32::from(seed).wrapping_mul(0x27D4_EB2F),
+            shift: f32::from(seed % CRACK_SHIFTS) * GOLDEN_SHARE,
+        }
     }
 
     /// Value of a lattice point, −1 to 1 (the finalizer of MurmurHash3).
@@ -267,8 +313,9 @@ mod tests {
         let enamel = Appearance { colour: [0.9; 3], gloss: ENAMEL_GLOSS };
         let lines = |seed: u16, appearance: Appearance, pixel: f32| -> Vec<bool> {
             let places = (0..500).flat_map(|y| (0..400).map(move |z| Vec3::new(5.0, 0.02 * y as f32, 0.02 * z as f32)));
-            let seen = |p| tooth_in_relief(seed, appearance, Vec3::X, p, pixel).0.colour;
-            places.map(|p| seen(p)[2] < 0.99 * appearance.colour[2]).collect()
+            let seen = |place| SeenPlace { place, normal: Vec3::X, pixel, eye_cosine: 1.0 };
+            let colour = |place| tooth_in_relief(seed, appearance, seen(place)).0.colour;
+            places.map(|place| colour(place)[2] < 0.99 * appearance.colour[2]).collect()
         };
         let share = |lines: &[bool]| lines.iter().filter(|is_crack| **is_crack).count() as f32 / lines.len() as f32;
         let all: Vec<Vec<bool>> = (0..20).map(|seed| lines(seed, enamel, 0.01)).collect();
@@ -277,8 +324,8 @@ mod tests {
         assert!((0.001..0.02).contains(&mean), "{shares:?}");
         assert!(shares.iter().all(|share| *share < 0.04), "{shares:?}");
         assert!(all.iter().skip(1).all(|lines| *lines != all[0]), "each seed has its own");
-        assert_eq!(share(&lines(1, Appearance { gloss: GROUND, ..enamel }, 0.01)), 0.0, "none where it was cut");
-        assert_eq!(share(&lines(1, enamel, CRACK_WIDTH)), 0.0, "none that are too fine");
+        assert_eq!(share(&lines(1, Appearance { gloss: GROUND_GLOSS, ..enamel }, 0.01)), 0.0, "none where it was cut");
+        assert_eq!(share(&lines(1, enamel, CRACK_GONE[1])), 0.0, "none that are too fine");
     }
 
     #[cfg(feature = "gpu")]
@@ -295,7 +342,7 @@ mod tests {
             format!("MARK_DEPTH: f32 = {MARK_DEPTH:?};"),
             format!("MARK_SLOPE: vec2f = vec2f({:?}, {:?});", MARK_SLOPE[0], MARK_SLOPE[1]),
             format!("SMOOTH: f32 = {SMOOTH:?};"),
-            format!("GROUND: f32 = {GROUND:?};"),
+            format!("GROUND: f32 = {GROUND_GLOSS:?};"),
             format!("RIDGE_WIDTH: vec3f = vec3f({:?}, {:?}, {:?});", RIDGE_WIDTH.x, RIDGE_WIDTH.y, RIDGE_WIDTH.z),
             format!("RIDGE_DEPTH: f32 = {RIDGE_DEPTH:?};"),
             format!("ENAMEL_GLOSS: f32 = {ENAMEL_GLOSS:?};"),
@@ -306,7 +353,14 @@ mod tests {
                 "CRACK_ACROSS: mat2x3f = mat2x3f({});",
                 CRACK_ACROSS.map(|v| format!("vec3f({:?}, {:?}, {:?})", v.x, v.y, v.z)).join(", ")
             ),
+            format!("CRACK_SHIFTS: u32 = {CRACK_SHIFTS}u;"),
+            format!("GOLDEN_SHARE: f32 = {GOLDEN_SHARE:?};"),
             format!("CRACK_BEND: vec2f = vec2f({:?}, {:?});", CRACK_BEND[0], CRACK_BEND[1]),
+            format!("CRACK_EDGE: vec2f = vec2f({:?}, {:?});", CRACK_EDGE[0], CRACK_EDGE[1]),
+            format!("CRACK_PIXELS: f32 = {CRACK_PIXELS:?};"),
+            format!("CRACK_GONE: vec2f = vec2f({:?}, {:?});", CRACK_GONE[0], CRACK_GONE[1]),
+            format!("CRACK_TOP: vec2f = vec2f({:?}, {:?});", CRACK_TOP[0], CRACK_TOP[1]),
+            format!("CRACK_EDGE_ON: f32 = {CRACK_EDGE_ON:?};"),
             format!("CRACK_FLAT: vec2f = vec2f({:?}, {:?});", CRACK_FLAT[0], CRACK_FLAT[1]),
             format!("CRACKED_PART: f32 = {CRACKED_PART:?};"),
             format!("CRACKED_FROM: vec2f = vec2f({:?}, {:?});", CRACKED_FROM[0], CRACKED_FROM[1]),

@@ -188,8 +188,11 @@ impl Renderer {
 
     /// Changes to the pipelines for a scene's detail, and creates the shadow map when it is first needed.
     fn fit_detail(&mut self, scene: &RenderScene) {
-        let detail =
-            Detail { has_shadows: shadow::chair_eye(scene).is_some(), has_relief: scene.relief_seed.is_some() };
+        let detail = Detail {
+            has_shadows: shadow::chair_eye(scene).is_some(),
+            has_relief: scene.relief_seed.is_some(),
+            is_srgb_target: self.format.is_srgb(),
+        };
         if detail == self.detail {
             return;
         }
@@ -398,10 +401,21 @@ impl Renderer {
         let clear = wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 });
         let mut pass = begin_pass(encoder, colour, clear, Some((&eye_target.depth, wgpu::LoadOp::Clear(1.0))));
         pass.set_bind_group(0, group, &[]);
-        // Clearing suffices for a single colour, except that an sRGB target takes the clear colour as linear light.
-        if middle != edge || self.format.is_srgb() {
-            pass.set_pipeline(&self.surface_pass.background);
-            pass.draw(0..3, 0..1);
+        // From near to far, as far as that is known: what is covered then need not be shaded.
+        let shown = scene.tooth.as_ref().map(|tooth| &tooth.mode);
+        if let Some(textures) = &self.tooth {
+            pass.set_bind_group(1, &textures.group, &[]);
+            match (shown, &self.surfaces) {
+                (Some(RenderMode::Surface), Some(surfaces)) => {
+                    pass.set_pipeline(&self.surface_pass.tooth);
+                    surfaces.draw(&mut pass);
+                }
+                (Some(RenderMode::Iso), _) => {
+                    pass.set_pipeline(&self.iso_pass);
+                    pass.draw(iso_pass::BOX_VERTICES, 0..1);
+                }
+                _ => {}
+            }
         }
         self.surface_pass.draw_solids(&mut pass, eye);
         self.particle_pass.draw_opaque(&mut pass);
@@ -410,34 +424,25 @@ impl Renderer {
             pass.set_bind_group(2, reflected, &[]);
             pass.draw(0..3, 0..1);
         }
-        let shown = scene.tooth.as_ref().map(|tooth| &tooth.mode);
-        match (shown, &self.tooth, &self.surfaces) {
-            (Some(RenderMode::Surface), Some(textures), Some(surfaces)) => {
-                pass.set_bind_group(1, &textures.group, &[]);
-                pass.set_pipeline(&self.surface_pass.tooth);
-                surfaces.draw(&mut pass);
+        // Clearing suffices for a single colour, except that an sRGB target takes the clear colour as linear light.
+        if middle != edge || self.format.is_srgb() {
+            pass.set_pipeline(&self.surface_pass.background);
+            pass.draw(0..3, 0..1);
+        }
+        if let (Some(RenderMode::Volume(_)), Some(textures)) = (shown, &self.tooth) {
+            drop(pass);
+            let mut rays = begin_pass(encoder, colour, wgpu::LoadOp::Load, None);
+            rays.set_bind_group(0, group, &[]);
+            rays.set_bind_group(1, &textures.group, &[]);
+            rays.set_bind_group(2, &eye_target.depth_group, &[]);
+            rays.set_pipeline(&self.volume_pass.pipeline);
+            rays.draw(iso_pass::BOX_VERTICES, 0..1);
+            drop(rays);
+            if scene.translucent_particles.is_empty() {
+                return;
             }
-            (Some(RenderMode::Iso), Some(textures), _) => {
-                pass.set_bind_group(1, &textures.group, &[]);
-                pass.set_pipeline(&self.iso_pass);
-                pass.draw(iso_pass::BOX_VERTICES, 0..1);
-            }
-            (Some(RenderMode::Volume(_)), Some(textures), _) => {
-                drop(pass);
-                let mut rays = begin_pass(encoder, colour, wgpu::LoadOp::Load, None);
-                rays.set_bind_group(0, group, &[]);
-                rays.set_bind_group(1, &textures.group, &[]);
-                rays.set_bind_group(2, &eye_target.depth_group, &[]);
-                rays.set_pipeline(&self.volume_pass.pipeline);
-                rays.draw(iso_pass::BOX_VERTICES, 0..1);
-                drop(rays);
-                if scene.translucent_particles.is_empty() {
-                    return;
-                }
-                pass = begin_pass(encoder, colour, wgpu::LoadOp::Load, Some((&eye_target.depth, wgpu::LoadOp::Load)));
-                pass.set_bind_group(0, group, &[]);
-            }
-            _ => {}
+            pass = begin_pass(encoder, colour, wgpu::LoadOp::Load, Some((&eye_target.depth, wgpu::LoadOp::Load)));
+            pass.set_bind_group(0, group, &[]);
         }
         self.particle_pass.draw_translucent(&mut pass);
     }

@@ -168,7 +168,7 @@ pub struct MeshInstance {
     pub vertex_tints: Arc<Vec<VertexTint>>,
     pub world_from_solid: Pose,
     pub appearance: Appearance,
-    /// True for another tooth: where a scene has relief, it has the ridges of enamel.
+    /// True for another tooth: where a scene has relief, it has the ridges and cracks of enamel.
     pub is_enamel: bool,
     /// False for what would block the lamp only because the lamp is not aimed as a dentist would aim it.
     pub casts_shadow: bool,

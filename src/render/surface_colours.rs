@@ -594,7 +594,7 @@ fn lattice_value([x, y, z]: [u32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::relief::GROUND;
+    use crate::relief::GROUND_GLOSS;
     use crate::scene::{Changes, RenderMode};
     use typodont_core::frame::{Pose, Vec3};
     use typodont_core::volume::{Grid, Voxel};
@@ -608,7 +608,7 @@ mod tests {
         palette.is_decay[usize::from(DECAY.0)] = true;
         palette.translucent = Some(Label(1));
         palette.under_translucent = Some([0.8, 0.7, 0.5]);
-        palette.cut_gloss = std::array::from_fn(|label| (Label(label as u8) != DECAY).then_some(GROUND));
+        palette.cut_gloss = std::array::from_fn(|label| (Label(label as u8) != DECAY).then_some(GROUND_GLOSS));
         palette
     }
 
@@ -791,7 +791,7 @@ mod tests {
         let palette = palette();
         let colours = SurfaceColours::new(&tooth(&cut, &palette, &unworked));
         let gloss = |p: Vec3| colours.at(grid.from_tooth(p)).gloss;
-        assert!((gloss(Vec3::new(0.0, 0.0, 0.5)) - GROUND).abs() < 0.005, "{}", gloss(Vec3::new(0.0, 0.0, 0.5)));
+        assert!((gloss(Vec3::new(0.0, 0.0, 0.5)) - GROUND_GLOSS).abs() < 0.005, "{}", gloss(Vec3::new(0.0, 0.0, 0.5)));
         for own in [Vec3::new(1.9, 0.0, 2.0), Vec3::new(2.0, 0.3, -0.4), Vec3::new(-0.2, 2.0, 0.5)] {
             assert!((gloss(own) - 0.2).abs() < 0.01, "{own}: {}", gloss(own));
         }

@@ -1,7 +1,7 @@
 //! Triangles with per-pixel lighting: the background, mesh instances, and the tooth's surface.
 
 use super::eye::Eye;
-use super::mesh_parts::MeshParts;
+use super::mesh_parts::{MeshParts, VisibleParts};
 use super::passes::{self, DepthMode, Detail, DrawnFaces, PipelineDesc};
 use super::resources;
 use super::scene::{MeshInstance, VertexTint};
@@ -95,12 +95,12 @@ impl SurfacePass {
                 "background_fragment",
                 &alone,
                 &[],
-                DepthMode::Disabled,
+                DepthMode::ReadOnly,
             ),
             tooth: pass("tooth", "tooth_vertex", "tooth_fragment", &with_tooth, &corners, DepthMode::ReadWrite),
             in_relief: detail.has_relief.then(|| {
                 [("stippled", "stippled_fragment"), ("enamel", "enamel_fragment")].map(|(label, fragment)| {
-                    pass(label, "solid_vertex", fragment, &with_solid, &corners, DepthMode::ReadWrite)
+                    pass(label, "relief_vertex", fragment, &with_solid, &corners, DepthMode::ReadWrite)
                 })
             }),
             solid: pass("solid", "solid_vertex", "solid_fragment", &with_solid, &corners, DepthMode::ReadWrite),
@@ -180,39 +180,44 @@ impl SurfacePass {
         CacheIndex(found)
     }
 
-    /// Draws all prepared mesh instances that an eye may see; the view's bind group must be set.
+    /// Draws all prepared mesh instances that an eye may see, nearer ones first, so that little is shaded that is then covered; the
+    /// view's bind group must be set.
     pub fn draw_solids(&self, pass: &mut wgpu::RenderPass, eye: &Eye) {
-        pass.set_pipeline(&self.solid);
-        let Some([stippled, enamel]) = &self.in_relief else {
-            self.draw_each(pass, eye, |_| true);
-            return;
-        };
-        let is_stippled = |draw: &MeshDraw| !draw.is_enamel && self.cached_meshes[draw.mesh].is_stippled;
-        self.draw_each(pass, eye, |draw| !draw.is_enamel && !is_stippled(draw));
-        pass.set_pipeline(stippled);
-        self.draw_each(pass, eye, is_stippled);
-        pass.set_pipeline(enamel);
-        self.draw_each(pass, eye, |draw| draw.is_enamel);
+        let seen = |draw| (draw, self.visible(draw, eye));
+        let mut draws: Vec<(&MeshDraw, VisibleParts)> = self.draws.iter().map(seen).collect();
+        draws.sort_by(|(_, a), (_, b)| a.distance.total_cmp(&b.distance));
+        for (draw, parts) in &draws {
+            let pipeline = match &self.in_relief {
+                Some([_, enamel]) if draw.is_enamel => enamel,
+                Some([stippled, _]) if self.cached_meshes[draw.mesh].is_stippled => stippled,
+                _ => &self.solid,
+            };
+            pass.set_pipeline(pipeline);
+            self.draw(pass, draw, parts);
+        }
     }
 
     /// Draws all prepared mesh instances that cast shadows and that a lamp may see, with the pipeline that is set.
     pub fn draw_shadows(&self, pass: &mut wgpu::RenderPass, lamp: &Eye) {
-        self.draw_each(pass, lamp, |draw| draw.casts_shadow);
+        for draw in self.draws.iter().filter(|draw| draw.casts_shadow) {
+            self.draw(pass, draw, &self.visible(draw, lamp));
+        }
     }
 
-    fn draw_each(&self, pass: &mut wgpu::RenderPass, eye: &Eye, is_drawn: impl Fn(&MeshDraw) -> bool) {
-        for draw in self.draws.iter().filter(|draw| is_drawn(draw)) {
-            let cached = &self.cached_meshes[draw.mesh];
-            let visible = cached.parts.visible(eye, draw.world_from_solid);
-            if visible.is_empty() {
-                continue;
-            }
-            pass.set_bind_group(2, &draw.group, &[]);
-            pass.set_vertex_buffer(0, cached.vertices.slice(..));
-            pass.set_index_buffer(cached.indices.slice(..), wgpu::IndexFormat::Uint32);
-            for run in visible {
-                pass.draw_indexed(3 * run.start..3 * run.end, 0, 0..1);
-            }
+    fn visible(&self, draw: &MeshDraw, eye: &Eye) -> VisibleParts {
+        self.cached_meshes[draw.mesh].parts.visible(eye, draw.world_from_solid)
+    }
+
+    fn draw(&self, pass: &mut wgpu::RenderPass, draw: &MeshDraw, parts: &VisibleParts) {
+        if parts.runs.is_empty() {
+            return;
+        }
+        let cached = &self.cached_meshes[draw.mesh];
+        pass.set_bind_group(2, &draw.group, &[]);
+        pass.set_vertex_buffer(0, cached.vertices.slice(..));
+        pass.set_index_buffer(cached.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for run in &parts.runs {
+            pass.draw_indexed(3 * run.start..3 * run.end, 0, 0..1);
         }
     }
 }

@@ -36,10 +36,10 @@ const TUBERCLE_WIDTH: f32 = 6.0;
 /// Outline of a section through lip and skin, from the inside of the lip outward: the distance beyond the opening's edge and the way
 /// forward, mm, how much of it is lip rather than skin, and how bright it is.
 const SECTION: [[f32; 4]; 21] = [
-    [4.0, -9.0, 1.0, 0.4],
-    [1.2, -6.5, 1.0, 0.5],
-    [-0.2, -4.0, 1.0, 0.7],
-    [-0.3, -2.0, 1.0, 0.9],
+    [4.0, -9.0, 1.0, 0.55],
+    [1.2, -6.5, 1.0, 0.68],
+    [-0.2, -4.0, 1.0, 0.84],
+    [-0.3, -2.0, 1.0, 0.95],
     [0.2, -0.4, 1.0, 1.0],
     [1.2, 0.8, 1.0, 1.0],
     [2.6, 1.5, 1.0, 1.0],
@@ -231,17 +231,19 @@ fn hill(x: f32, at: f32, width: f32) -> f32 {
 }
 
 /// Height of the skin over the face's even surface, mm: the two columns of the philtrum above the upper lip, and the fold between the
-/// lower lip and the chin. `beyond`: distance from the opening's edge, mm; `up`: above 0 for the upper lip.
+/// lower lip and the chin. `beyond`: way along the section, as in [`SECTION`]; `up`: above 0 for the upper lip.
 fn relief_of_skin(place: Vec3, beyond: f32, up: f32) -> f32 {
     const COLUMNS: f32 = 1.1;
     const COLUMN_AT: f32 = 5.0;
     const COLUMN_WIDTH: f32 = 3.0;
+    const COLUMN_MIDDLE: f32 = 13.0;
+    const COLUMN_LENGTH: f32 = 8.0;
     const FOLD: f32 = 2.6;
     const FOLD_AT: f32 = 15.0;
     const FOLD_WIDTH: f32 = 5.0;
     const FOLD_LENGTH: f32 = 22.0;
     if up > 0.0 {
-        let length = hill(beyond, 13.0, 8.0);
+        let length = hill(beyond, COLUMN_MIDDLE, COLUMN_LENGTH);
         return up * length * COLUMNS * hill(place.x, COLUMN_AT, COLUMN_WIDTH);
     }
     up * FOLD * hill(beyond, FOLD_AT, FOLD_WIDTH) * hill(place.x, 0.0, FOLD_LENGTH)
@@ -255,12 +257,32 @@ fn lip_share(x: f32, up: f32) -> f32 {
     const PEAK_WIDTH: f32 = 5.0;
     let corner = 1.0 - libm::powf(libm::fabsf(x) / HALF_WIDTH, 2.2).min(1.0);
     let middle = if up > 0.0 { 0.85 + 0.3 * hill(x, PEAK, PEAK_WIDTH) } else { 1.35 };
-    (middle * corner).max(0.12)
+    // Never less than a line.
+    libm::hypotf(middle * corner, 0.12)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lips_have_corners_and_the_upper_one_a_dip() {
+        // Aim: a mouth, not a ring. Method: sections of an opening 60 mm high, at its corner, above and below.
+        let row = |turn: f32, row: usize| section_at(turn, 30.0).nth(row).unwrap().0;
+        let edge = |turn: f32| row(turn, 4);
+        let quarter = 0.25 * TAU;
+        let width = |turn: f32| edge(turn).truncate().distance(row(turn, LIP_ENDS).truncate());
+        assert!(width(0.0) < 0.2 * width(quarter), "{} mm at the corner, {} above", width(0.0), width(quarter));
+        assert!(width(-quarter) > 1.3 * width(quarter), "the lower lip is the fuller one");
+        let beside = edge(quarter - 0.22);
+        assert!(edge(quarter).y < beside.y - 0.3, "the upper lip dips between {beside} and its twin");
+        // Twice as far in from the corner, the opening is more than twice as high: pointed, and not round.
+        let heights = [0.1, 0.2].map(|turn| edge(turn).y / (edge(0.0).x - edge(turn).x));
+        assert!(heights[0] < 3.0 * heights[1], "{heights:?}");
+        // The fold lies behind the lip and the chin.
+        let [lip, fold, chin] = [8, 13, 16].map(|n| row(-quarter, n).z - SECTION[n][1]);
+        assert!(fold < lip - 1.0 && fold < chin - 1.0, "{lip}, {fold} and {chin} mm");
+    }
 
     #[test]
     fn lips_stand_around_the_teeth_and_never_before_them() {

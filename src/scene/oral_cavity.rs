@@ -260,7 +260,7 @@ fn sheet(positions: Vec<Vec3>, columns: usize, rows: usize) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use typodont_anatomy::jaw::{ArchPlan, DentalArch, Jaw, JawForm, Occlusion, WORKING_OPENING_DEG};
+    use typodont_anatomy::jaw::{ArchPlan, DentalArch, Jaw, Occlusion, WORKING_OPENING_DEG};
 
     #[test]
     fn cheeks_stand_beside_the_teeth_and_the_tongue_lies_between_them() {
@@ -270,7 +270,7 @@ mod tests {
         for (count, width) in [(7, None), (8, Some(62.0))] {
             let plan = ArchPlan { width, ..ArchPlan::default() };
             let arches = [Jaw::Lower, Jaw::Upper].map(|jaw| DentalArch::new(jaw, count, None, &plan));
-            let crowns = arches.each_ref().map(|arch| arch.crowns(JawForm::Drawn, &|_, _, _| false).mesh.positions);
+            let crowns = arches.each_ref().map(|arch| arch.crowns(&|_, _, _| false).mesh.positions);
             let reach = |of: &dyn Fn(&Vec3) -> f32| crowns.iter().flatten().map(of).fold(0.0, f32::max);
             let teeth = [reach(&|p| p.x.abs()), reach(&|p| p.y)];
             let lower_from_upper = Occlusion::new(&arches[0], &arches[1], 0.0).near_from_opposite(WORKING_OPENING_DEG);

@@ -1,28 +1,28 @@
-//! Colours of the tissues.
+//! Colours of the tissues, and the seed of their fine relief.
 
 use typodont_core::volume::Label;
 use typodont_exercise::catalog::{TissueRole, TissueTable};
-use typodont_exercise::scenario::Workpiece;
+use typodont_exercise::scenario::{Scenario, Workpiece};
 use typodont_render::{Appearance, ENAMEL_GLOSS, GROUND_GLOSS, LabelPalette, UnworkedTooth};
 
-/// Gloss of dentine and materials under a film of saliva, of dull decay and deposits, and of the wet pulp; see
-/// [`Appearance`](typodont_render::Appearance). Enamel's own says that it has ridges.
+/// Gloss of materials under a film of saliva, of dull decay and deposits, and of the wet pulp; see
+/// [`Appearance`](typodont_render::Appearance). Enamel's own says that it has ridges and cracks.
 pub(super) const GLOSS: f32 = 0.22;
 const DULL: f32 = 0.1;
-
-/// Gloss of cut dentine: softer than enamel, it is left smoother by a bur, with the silky sheen of its tubules.
-const CUT_DENTINE: f32 = 0.17;
-
 const WET: f32 = 0.3;
 
-/// Seed of the fine relief of a patient's teeth and of their cracks: by the worked tooth and where it is decayed, so that each exercise
-/// has its own, and a report the same as the lesson.
-pub fn relief_seed(workpiece: &Workpiece) -> u16 {
-    let tooth = workpiece.teeth.first().map_or(0, |tooth| u32::from(tooth.fdi));
-    let places = workpiece.lesions.iter().flat_map(|lesion| lesion.centre.to_array()).map(f32::to_bits);
-    // FNV-1a over whole words, whose two halves are then one.
-    let hash = places.fold(0x811C_9DC5 ^ tooth, |hash: u32, bits| hash.wrapping_mul(0x0100_0193) ^ bits);
-    (hash.wrapping_mul(0x0100_0193) >> 16) as u16
+/// Gloss of dentine, which is less than enamel's all the way to where it is cut: softer than enamel, it is left smoother by a bur, with the
+/// silky sheen of its tubules.
+const DENTINE: f32 = 0.185;
+const CUT_DENTINE: f32 = 0.17;
+
+/// Seed of the fine relief of a patient's teeth and of their cracks: each exercise has its own, and a report that of the lesson. It
+/// knows nothing of what a session's seed has drawn, such as the place of hidden caries.
+pub fn relief_seed(scenario: &Scenario) -> u16 {
+    // FNV-1a, whose two halves become one.
+    let hash =
+        scenario.id.bytes().fold(0x811C_9DC5, |hash: u32, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193));
+    (hash ^ hash >> 16) as u16
 }
 
 /// Colour of each tissue. Unless the exercise shows decay, it has the colour of enamel and cannot be seen; dentine does not
@@ -31,30 +31,26 @@ pub fn tissue_palette(tissues: &TissueTable, is_decay_shown: bool) -> LabelPalet
     let enamel = tissues.by_name("enamel");
     let entry =
         |label: u8| tissues.by_label(Label(label)).filter(|e| is_decay_shown || e.role != TissueRole::Decay).or(enamel);
+    let dentine = tissues.by_name("dentine");
+    let is_dentine = |label: u8| dentine.is_some_and(|dentine| dentine.label() == Label(label));
     let appearances = std::array::from_fn(|label| {
         let entry = entry(label as u8);
         let gloss = match entry.map(|entry| entry.role) {
             _ if entry.map(|entry| entry.label()) == enamel.map(|enamel| enamel.label()) => ENAMEL_GLOSS,
             Some(TissueRole::Decay | TissueRole::Deposit) => DULL,
             Some(TissueRole::Vulnerable) => WET,
+            _ if is_dentine(label as u8) => DENTINE,
             _ => GLOSS,
         };
         Appearance { colour: entry.map_or([0.85, 0.82, 0.75], |e| e.rgb()), gloss }
     });
     let is_decay = std::array::from_fn(|label| entry(label as u8).is_some_and(|entry| entry.role == TissueRole::Decay));
-    let dentine = tissues.by_name("dentine").filter(|_| is_decay_shown);
     let cut_gloss = std::array::from_fn(|label| {
-        let entry = entry(label as u8).filter(|entry| entry.role == TissueRole::Sound)?;
-        let is_dentine = dentine.is_some_and(|dentine| dentine.label() == entry.label());
-        Some(if is_dentine { CUT_DENTINE } else { GROUND_GLOSS })
+        entry(label as u8).filter(|entry| entry.role == TissueRole::Sound)?;
+        Some(if is_dentine(label as u8) { CUT_DENTINE } else { GROUND_GLOSS })
     });
-    LabelPalette {
-        appearances,
-        is_decay,
-        cut_gloss,
-        translucent: enamel.map(|entry| entry.label()),
-        under_translucent: dentine.map(|entry| entry.rgb()),
-    }
+    let under_translucent = dentine.filter(|_| is_decay_shown).map(|entry| entry.rgb());
+    LabelPalette { appearances, is_decay, cut_gloss, translucent: enamel.map(|entry| entry.label()), under_translucent }
 }
 
 /// A tooth that nobody has worked on yet, with its enamel over sound dentine and pulp. Decay does not count as

@@ -89,7 +89,7 @@ impl FixedCase {
                 .collect(),
             lights: Lights::along(&viewpoint),
             shadows: is_full.then(|| shadow_region(&self.workpiece, &orbit)),
-            relief_seed: is_full.then(|| relief_seed(&self.workpiece)),
+            relief_seed: is_full.then(|| relief_seed(&self.scenario)),
             is_antialiased: true,
             ..RenderScene::empty()
         };

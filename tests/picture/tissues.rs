@@ -1,5 +1,6 @@
 //! Colours of tissues: soft borders of decay, and decay that stays hidden.
 
+use crate::render::adapter;
 use crate::scenes::*;
 use std::sync::Arc;
 use typodont_core::frame::{Pose, Vec3};
@@ -133,5 +134,53 @@ fn hidden_decay_changes_no_pixel() {
         assert!(with == without, "{} across two tissues", entry.name);
         let seen = draw(&decayed, &shown, RenderMode::Iso) != draw(&sound, &shown, RenderMode::Iso);
         assert!(seen, "{} can be seen where it is shown", entry.name);
+    }
+}
+
+#[test]
+fn enamel_has_the_cracks_of_its_seed_on_both_renderers() {
+    // Aim: cracks are drawn, on the carved tooth in both modes and on another tooth, are others for another seed, and are where the twin
+    // has them. Method: the side of a block of enamel, close by in light from everywhere, beside the same without relief; what is darker
+    // is crack.
+    let Some((mut gpu, _turn)) = adapter() else { return };
+    let grid = Grid::centred([100, 100, 100], Vec3::splat(SPACING));
+    let side = |p: Vec3| (p.abs() - 4.0).max_element();
+    let volume = Volume::from_distance(grid, 1.5 * SPACING, |p| (side(p), Label(1)));
+    let white = LabelPalette::from_colours(|_| [0.9; 3], ENAMEL_GLOSS);
+    let enamel = Appearance { colour: [0.9; 3], gloss: ENAMEL_GLOSS };
+    let plain = MeshInstance::plain(block(Vec3::splat(4.0)), Pose::IDENTITY, enamel);
+    let solid = MeshInstance { is_enamel: true, ..plain };
+    let viewpoint = Viewpoint::look_at(Vec3::X * 18.0, Vec3::ZERO, Vec3::Z);
+    let size = [600, 600];
+    let scene = |mode: Option<RenderMode>, relief_seed| RenderScene {
+        solids: if mode.is_some() { Vec::new() } else { vec![solid.clone()] },
+        tooth: mode.map(|mode| VolumeInstance { world_from_tooth: Pose::IDENTITY, ..tooth(&volume, &white, mode) }),
+        lights: even_light(),
+        relief_seed,
+        ..RenderScene::empty()
+    };
+    for mode in [Some(RenderMode::Surface), Some(RenderMode::Iso), None] {
+        let twin = |seed| OffscreenRenderer::cpu().draw(&scene(mode.clone(), seed), &viewpoint, None, size).unwrap();
+        let without = twin(None);
+        let blue = |image: &RgbaImage| -> Vec<i32> { image.rgba.chunks(4).map(|p| i32::from(p[2])).collect() };
+        let cracks = |image: &RgbaImage| -> Vec<bool> {
+            blue(&without).iter().zip(blue(image)).map(|(plain, seen)| plain - seen >= 8).collect()
+        };
+        let count = |cracks: &[bool]| cracks.iter().filter(|is_crack| **is_crack).count();
+        // Not every side has one.
+        let mut cracked = (0..16).filter_map(|seed| {
+            let image = twin(Some(seed));
+            let found = cracks(&image);
+            (count(&found) > 300).then_some((seed, image, found))
+        });
+        let (seed, first, first_cracks) = cracked.next().expect("one of a few seeds has cracks");
+        let (_, _, second_cracks) = cracked.next().expect("and another one");
+        let shared = first_cracks.iter().zip(&second_cracks).filter(|(a, b)| **a && **b).count();
+        assert!(2 * shared < count(&first_cracks), "{mode:?}: {shared} pixels have cracks for either seed");
+        let drawn = gpu.draw(&scene(mode.clone(), Some(seed)), &viewpoint, None, size).unwrap();
+        let pairs = blue(&drawn).into_iter().zip(blue(&first)).zip(&first_cracks);
+        let apart: i32 = pairs.filter(|(_, is_crack)| **is_crack).map(|((a, b), _)| (a - b).abs()).sum();
+        let apart = apart as f32 / count(&first_cracks) as f32;
+        assert!(apart < 2.0, "{mode:?}: cracks differ by {apart} of 255 from the twin's");
     }
 }

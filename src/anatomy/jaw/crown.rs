@@ -1,6 +1,5 @@
 //! One crown as triangles, made as a carved tooth is, but coarser and cut off below the gingival margin.
 
-use super::gum::JawForm;
 use super::tinted_mesh::{Tint, TintedMesh, mixed_tint};
 use super::tooth_model::{ToothKind, ToothModel};
 use crate::form::ToothForm;
@@ -49,15 +48,16 @@ const DRAWN_HALF_BAND: f32 = 3.0;
 /// Width, voxels, that the thin corners of an incisor's edge lose between samples, where incisors touch.
 const EDGE_LOSS: f32 = 0.3;
 
+/// Width of other crowns that closes the gaps between their felt forms, mm, so that no gum shines through a contact.
+const CONTACT_CLOSED: f32 = 0.08;
+
 /// Labels used while a crown is made. They are independent of the exercise's tissues, since a crown is only drawn.
 const TISSUES: TissueLabels = TissueLabels { enamel: Label(1), dentine: Label(2), pulp: Label(3) };
 
-/// A tooth's crown and the beginning of its root, closed, in tooth space; mm. `recession`: length of root above the gingiva.
-pub fn crown(model: &ToothModel, form: JawForm, recession: f32, detail: CrownDetail) -> TintedMesh {
-    let form = match form {
-        JawForm::Touched => model.form,
-        JawForm::Drawn => drawn_form(model, detail.spacing()),
-    };
+/// A tooth's crown and the beginning of its root, closed, in tooth space; mm. `is_felt`: drawn as it is felt; `recession`: length of root
+/// above the gingiva.
+pub fn crown(model: &ToothModel, is_felt: bool, recession: f32, detail: CrownDetail) -> TintedMesh {
+    let form = if is_felt { model.form } else { drawn_form(model, detail.spacing()) };
     let grid = grid_of_spacing(&form, detail.spacing()).above(-recession - ROOT_LENGTH);
     let volume = grow_with_ramp(&form, grid, &TISSUES, DRAWN_HALF_BAND);
     let mesh = surface::extract(&volume);
@@ -68,8 +68,8 @@ pub fn crown(model: &ToothModel, form: JawForm, recession: f32, detail: CrownDet
 /// The form of a crown that is only drawn. `spacing`: of its samples, mm.
 fn drawn_form(model: &ToothModel, spacing: f32) -> ToothForm {
     let mut form = ToothForm { occlusal: *model.drawn.occlusal.unwrap_or(&model.form.occlusal), ..model.form };
-    let lost = if model.kind == ToothKind::Incisor { EDGE_LOSS * spacing } else { 0.0 };
-    form.sizes.mesiodistal[0] += model.drawn.width + lost;
+    let gap = if model.kind == ToothKind::Incisor { EDGE_LOSS * spacing } else { CONTACT_CLOSED };
+    form.sizes.mesiodistal[0] += model.drawn.width + gap;
     form
 }
 
@@ -124,9 +124,9 @@ mod tests {
     #[test]
     fn every_crown_is_closed_and_as_large_as_the_table_says() {
         // Aim: a closed surface facing outward, of the table's widths and length to a sample's distance.
-        let details = [CrownDetail::Far, CrownDetail::Near];
-        for (model, detail) in UPPER.iter().chain(&LOWER).flat_map(|model| details.map(|detail| (model, detail))) {
-            let TintedMesh { mesh, tints } = crown(model, JawForm::Drawn, 0.0, detail);
+        let kinds = [(CrownDetail::Far, false), (CrownDetail::Far, true), (CrownDetail::Near, false)];
+        for (model, (detail, is_felt)) in UPPER.iter().chain(&LOWER).flat_map(|model| kinds.map(|kind| (model, kind))) {
+            let TintedMesh { mesh, tints } = crown(model, is_felt, 0.0, detail);
             let sizes = &model.sizes;
             assert!(ClosedMesh::new(&mesh).is_some(), "{sizes:?} is closed");
             assert!(mesh.volume_mm3() > 50.0, "{sizes:?}");
@@ -134,7 +134,8 @@ mod tests {
             let low = mesh.positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
             let high = mesh.positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
             let found = Vec3::new(high.x - low.x, high.y - low.y, high.z);
-            let wanted = Vec3::new(sizes.buccolingual[0], sizes.mesiodistal[0] + model.drawn.width, sizes.crown);
+            let width = if is_felt { 0.0 } else { model.drawn.width };
+            let wanted = Vec3::new(sizes.buccolingual[0], sizes.mesiodistal[0] + width, sizes.crown);
             assert!((found - wanted).abs().max_element() < detail.spacing(), "{found} not {wanted}");
             assert!((low.z + ROOT_LENGTH).abs() < 2.0 * detail.spacing(), "the root ends at {}", low.z);
         }

@@ -14,22 +14,21 @@ use typodont_core::frame::{Pose, Vec3, smooth_step};
 use typodont_core::mesh::Mesh;
 use typodont_core::parallel::par_map;
 
-/// Form of an arch's teeth and gingiva.
+/// Form of the gingiva around the teeth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JawForm {
-    /// As it is touched: gingiva by the widths of the teeth. Recordings are replayed in it, so it never changes.
+pub enum GumForm {
+    /// As it is touched in an arch: by the widths of the teeth. Recordings are replayed in it, so it never changes.
     Touched,
-    /// As it is only drawn: margins lie on the teeth, papillae have round tips, and crowns differ by their
-    /// [`DrawnCrown`](super::tooth_model::DrawnCrown).
+    /// As it is drawn: margins lie on the teeth, and papillae have round tips.
     Drawn,
 }
 
-impl JawForm {
+impl GumForm {
     /// Distance between columns along the arch, mm: a papilla is some 3 mm wide.
     fn column(self) -> f32 {
         match self {
-            JawForm::Touched => 0.9,
-            JawForm::Drawn => 0.5,
+            GumForm::Touched => 0.9,
+            GumForm::Drawn => 0.5,
         }
     }
 
@@ -37,9 +36,9 @@ impl JawForm {
     /// goes on into the throat.
     fn beyond(self, jaw: Jaw) -> f32 {
         match (self, jaw) {
-            (JawForm::Touched, _) => PAD,
-            (JawForm::Drawn, Jaw::Lower) => 2.0 * PAD,
-            (JawForm::Drawn, Jaw::Upper) => 3.75 * PAD,
+            (GumForm::Touched, _) => PAD,
+            (GumForm::Drawn, Jaw::Lower) => 2.0 * PAD,
+            (GumForm::Drawn, Jaw::Upper) => 3.75 * PAD,
         }
     }
 }
@@ -106,7 +105,7 @@ pub fn necks(models: &[ToothModel]) -> Vec<CrownContour> {
 }
 
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.
-pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], form: JawForm, fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
+pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], form: GumForm, fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
     let mut columns = from_end_to_end(halves(jaw, &sides, form));
     for (place, _) in columns.iter_mut().flatten() {
         *place = fit(*place);
@@ -122,7 +121,7 @@ pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
         Jaw::Lower => MucosaRegion::FloorOfMouth,
     };
     let mut solids = Vec::new();
-    for (columns, side) in halves(jaw, &sides, JawForm::Touched).iter().zip(&sides) {
+    for (columns, side) in halves(jaw, &sides, GumForm::Touched).iter().zip(&sides) {
         let rows = columns.first().map_or(0, Vec::len);
         // Palate and floor begin at the last place but one of the ridge's section; between two places there is another.
         let border = rows - INNER - 3;
@@ -153,7 +152,7 @@ pub(super) fn column_positions(sides: &[HalfJaw; 2], spacing: f32, beyond: f32) 
 }
 
 /// Columns of places from the midline back, for each half.
-fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: JawForm) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
+fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: GumForm) -> [Vec<Vec<(Vec3, Tint)>>; 2] {
     let positions = column_positions(sides, form.column(), form.beyond(jaw));
     std::array::from_fn(|number| {
         let side = &sides[number];
@@ -220,7 +219,7 @@ fn solid_under(columns: &[Vec<Vec3>], is_mirrored: bool) -> Mesh {
 impl HalfJaw<'_> {
     /// Places from the base's outer edge over the ridge to the midline, so far along the arch. `front`: the ridge's inner foot on
     /// the midline.
-    fn column(&self, jaw: Jaw, form: JawForm, front: Vec3, arc_length: f32) -> Vec<(Vec3, Tint)> {
+    fn column(&self, jaw: Jaw, form: GumForm, front: Vec3, arc_length: f32) -> Vec<(Vec3, Tint)> {
         let mut rows = subdivide(&self.ridge(jaw, form, arc_length));
         let (foot, tint) = rows[rows.len() - 1];
         for i in 1..=INNER {
@@ -238,7 +237,7 @@ impl HalfJaw<'_> {
         let behind = arc_length - self.half.length();
         let throat = smooth_step((behind + BEFORE_THROAT) / (PAD + BEFORE_THROAT));
         let sunk =
-            if jaw == Jaw::Upper && form == JawForm::Drawn { smooth_step((behind - PAD) / (1.5 * PAD)) } else { 0.0 };
+            if jaw == Jaw::Upper && form == GumForm::Drawn { smooth_step((behind - PAD) / (1.5 * PAD)) } else { 0.0 };
         rows.iter()
             .map(|&(p, tint)| {
                 let z = p.z - sunk * (p.z - VAULT).max(0.0);
@@ -248,7 +247,7 @@ impl HalfJaw<'_> {
     }
 
     /// The ridge's section, from cheek to tongue.
-    fn ridge(&self, jaw: Jaw, form: JawForm, arc_length: f32) -> Vec<(Vec3, Tint)> {
+    fn ridge(&self, jaw: Jaw, form: GumForm, arc_length: f32) -> Vec<(Vec3, Tint)> {
         let (place, distal) = self.half.frame_at(arc_length);
         let out = distal.cross(Vec3::Z);
         let RidgeSection { neck, offset, half, margin, inner_margin, between_teeth: between, root, pad } =
@@ -267,7 +266,7 @@ impl HalfJaw<'_> {
             (wide + 1.5 + root, neck - ATTACHED_BELOW_NECK, ATTACHED),
         ];
         rows.extend(match form {
-            JawForm::Touched => vec![
+            GumForm::Touched => vec![
                 (narrow + 0.95 + 0.5 * root, margin - 1.3, ATTACHED),
                 (narrow + 0.42, margin - 0.25, FREE),
                 (narrow - 0.35, margin + 0.05, FREE),
@@ -276,7 +275,7 @@ impl HalfJaw<'_> {
                 (-narrow - 0.42, inner_margin - 0.25, FREE),
                 (-narrow - 1.0, inner_margin - 1.3, ATTACHED),
             ],
-            JawForm::Drawn => {
+            GumForm::Drawn => {
                 // The margin lies on the tooth, and the papilla bridges the space between two with a round crest.
                 let edge = |out: Vec3, height: f32| {
                     let on_tooth = self.distance_to_teeth(arc_length, middle.with_z(height), out, wide + 2.5);
@@ -324,9 +323,9 @@ impl HalfJaw<'_> {
         let place = |aside: f32, z: f32| {
             let point = middle + out * aside + Vec3::Z * (z - middle.z);
             match form {
-                JawForm::Touched => point,
+                GumForm::Touched => point,
                 // Around the bend in front, columns come together on the inner side, and must not cross.
-                JawForm::Drawn => point.with_x(point.x.max(LEAST_INNER_X * middle.x)),
+                GumForm::Drawn => point.with_x(point.x.max(LEAST_INNER_X * middle.x)),
             }
         };
         rows.into_iter().map(|(aside, z, tint)| (place(aside, z), tint)).collect()
@@ -357,7 +356,7 @@ impl HalfJaw<'_> {
         outside
     }
 
-    pub(super) fn section(&self, form: JawForm, arc_length: f32) -> RidgeSection {
+    pub(super) fn section(&self, form: GumForm, arc_length: f32) -> RidgeSection {
         let seats = &self.half.seats;
         let neck_of = |seat: &ToothSeat| seat.neck().z;
         let offset_of = |seat: &ToothSeat| (seat.neck() - self.half.frame_at(seat.middle()).0).dot(seat.buccal);
@@ -373,14 +372,14 @@ impl HalfJaw<'_> {
         let seat = &seats[here];
         let from_middle = ((arc_length - seat.middle()) / (0.5 * (seat.to - seat.from))).clamp(-1.0, 1.0);
         let between = match form {
-            JawForm::Touched => libm::powf(from_middle.abs(), 2.4),
+            GumForm::Touched => libm::powf(from_middle.abs(), 2.4),
             // A scallop around each tooth, and a round tip between two.
-            JawForm::Drawn => smooth_step(libm::powf(from_middle.abs(), 1.5)),
+            GumForm::Drawn => smooth_step(libm::powf(from_middle.abs(), 1.5)),
         };
         let over_root = match form {
-            JawForm::Touched => 1.0 - from_middle * from_middle,
+            GumForm::Touched => 1.0 - from_middle * from_middle,
             // Without a crease between two roots.
-            JawForm::Drawn => smooth_step(1.0 - from_middle.abs()),
+            GumForm::Drawn => smooth_step(1.0 - from_middle.abs()),
         };
         let beside = if from_middle < 0.0 { here.saturating_sub(1) } else { (here + 1).min(last) };
         let papilla = if here == last && from_middle > 0.0 {
@@ -390,9 +389,9 @@ impl HalfJaw<'_> {
         };
         let behind = (arc_length - self.half.length()) / PAD;
         let pad = match form {
-            JawForm::Touched => behind.clamp(0.0, 1.0),
+            GumForm::Touched => behind.clamp(0.0, 1.0),
             // The ridge goes on behind it without a kink.
-            JawForm::Drawn => smooth_step(behind / 1.25),
+            GumForm::Drawn => smooth_step(behind / 1.25),
         };
         let neck = between_seats(&|i| neck_of(&seats[i])) - 2.0 * pad * pad;
         let [buccal, lingual, beside] = [ProbingSite::Buccal, ProbingSite::Lingual, ProbingSite::MesioBuccal]
@@ -625,7 +624,7 @@ mod tests {
                 assert!(mesh.volume_mm3() > 500.0, "{jaw:?} {region:?}: {} mm³", mesh.volume_mm3());
                 closed.push(ClosedMesh::new(mesh).unwrap_or_else(|| panic!("{jaw:?} {region:?} is open")));
             }
-            let drawn = arch.gum(JawForm::Touched, &|p| p).mesh;
+            let drawn = arch.gum(GumForm::Touched, &|p| p).mesh;
             let top = drawn.positions.iter().filter(|p| p.z > BASE + 0.1);
             let worst = top
                 .clone()
@@ -640,7 +639,7 @@ mod tests {
     fn the_sides_of_a_drawn_papilla_rise_without_a_lip() {
         // Aim: nothing on a papilla hides what is behind it, which looks like a seam. Method: columns between two teeth, with the
         // places between rows, from the attached gingiva up to the edge on both sides.
-        let (mut seen, form) = (0, JawForm::Drawn);
+        let (mut seen, form) = (0, GumForm::Drawn);
         for jaw in [Jaw::Upper, Jaw::Lower] {
             let arch = DentalArch::new(jaw, 7, None, &ArchPlan::default());
             let sides = arch.sides(form);

@@ -28,7 +28,7 @@ use typodont_core::frame::{Pose, Quat, Vec3};
 use typodont_core::mesh::Mesh;
 use typodont_core::parallel;
 
-pub use self::gum::{JawForm, MucosaRegion, RidgeSide, ridge_tint};
+pub use self::gum::{GumForm, MucosaRegion, RidgeSide, ridge_tint};
 pub use self::half_arch::ToothSeat;
 pub use self::occlusion::{CUSP_WIDTH, Occlusion, WORKING_OPENING_DEG};
 pub use self::tinted_mesh::{Tint, TintedMesh};
@@ -175,6 +175,13 @@ impl DentalArch {
         }
     }
 
+    /// The same arch with all of its teeth felt, and therefore drawn as they are felt.
+    pub fn with_felt_teeth(mut self) -> DentalArch {
+        let seats = [&mut self.plain, &mut self.fitted].into_iter().flat_map(|side| &mut side.half.seats);
+        seats.for_each(|seat| seat.is_felt = true);
+        self
+    }
+
     pub fn jaw(&self) -> Jaw {
         self.jaw
     }
@@ -202,7 +209,7 @@ impl DentalArch {
     }
 
     /// All crowns but those that are left out, by side of x and place from the midline; those beside the fitted tooth in more detail.
-    pub fn crowns(&self, form: JawForm, is_left_out: &dyn Fn(f32, usize, &ToothSeat) -> bool) -> TintedMesh {
+    pub fn crowns(&self, is_left_out: &dyn Fn(f32, usize, &ToothSeat) -> bool) -> TintedMesh {
         let recession = self.recession().into_iter().fold(0.0, f32::max);
         let rows = [(&self.fitted, self.sign), (&self.plain, -self.sign)];
         let teeth = rows
@@ -217,56 +224,50 @@ impl DentalArch {
             if is_beside { CrownDetail::Near } else { CrownDetail::Far }
         };
         // Twins on both sides share a form.
-        let kinds: BTreeSet<(usize, CrownDetail)> =
-            drawn.iter().map(|&(sign, index, _)| (index, detail(sign, index))).collect();
-        let kinds: Vec<(usize, CrownDetail)> = kinds.into_iter().collect();
-        let crown = |i: usize| crown::crown(&self.plain.models[kinds[i].0], form, recession, kinds[i].1);
+        let kind = |&(sign, index, seat): &(f32, usize, &ToothSeat)| (index, seat.is_felt, detail(sign, index));
+        let kinds: Vec<_> = drawn.iter().map(kind).collect::<BTreeSet<_>>().into_iter().collect();
+        let crown = |i: usize| {
+            let (index, is_felt, detail) = kinds[i];
+            crown::crown(&self.plain.models[index], is_felt, recession, detail)
+        };
         let crowns: BTreeMap<_, _> = kinds.iter().zip(parallel::par_map(kinds.len(), crown)).collect();
         let mut all = TintedMesh::default();
-        for (sign, index, seat) in drawn {
-            let pose = match form {
-                JawForm::Touched => seat.arch_from_tooth(),
-                JawForm::Drawn => seat.arch_from_drawn(),
-            };
+        for tooth @ (sign, _, seat) in drawn {
+            let pose = seat.arch_from_drawn();
             let side = Vec3::new(sign, 1.0, 1.0);
-            all.append(
-                &crowns[&(index, detail(sign, index))],
-                |p| pose * p * side,
-                |n| pose.rotate(n) * side,
-                sign < 0.0,
-            );
+            all.append(&crowns[&kind(&tooth)], |p| pose * p * side, |n| pose.rotate(n) * side, sign < 0.0);
         }
         all
     }
 
     /// The gingiva with the palate or the floor of the mouth. `fit` may move each point.
-    pub fn gum(&self, form: JawForm, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
+    pub fn gum(&self, form: GumForm, fit: &dyn Fn(Vec3) -> Vec3) -> TintedMesh {
         gum::gum(self.jaw, self.sides(form), form, fit)
     }
 
     /// A rubber dam over this jaw. `is_isolated`: by side of x and place from the midline.
     pub fn rubber_dam(&self, is_isolated: &dyn Fn(f32, usize) -> bool) -> TintedMesh {
-        rubber_dam::rubber_dam(&self.sides(JawForm::Touched), is_isolated)
+        rubber_dam::rubber_dam(&self.sides(GumForm::Touched), is_isolated)
     }
 
     /// The gingiva that is touched as closed solids that do not overlap, each of one region of the mucosa.
     pub fn gum_solids(&self) -> Vec<(MucosaRegion, Mesh)> {
-        gum::gum_solids(self.jaw, self.sides(JawForm::Touched))
+        gum::gum_solids(self.jaw, self.sides(GumForm::Touched))
     }
 
     fn recession(&self) -> SiteLengths {
         self.age.map_or([0.0; 6], age::recession)
     }
 
-    fn sides(&self, form: JawForm) -> [HalfJaw<'_>; 2] {
+    fn sides(&self, form: GumForm) -> [HalfJaw<'_>; 2] {
         let rows = if self.sign > 0.0 { [&self.plain, &self.fitted] } else { [&self.fitted, &self.plain] };
         let recession = self.recession();
         [(rows[0], -1.0), (rows[1], 1.0)].map(|(row, sign)| HalfJaw {
             half: &row.half,
             models: &row.models,
             necks: match form {
-                JawForm::Touched => Vec::new(),
-                JawForm::Drawn => gum::necks(&row.models),
+                GumForm::Touched => Vec::new(),
+                GumForm::Drawn => gum::necks(&row.models),
             },
             recession,
             sign,

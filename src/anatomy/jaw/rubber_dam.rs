@@ -3,7 +3,7 @@
 //! Takes the halves of a jaw and which of its teeth are isolated. Gives a sheet in arch space, mm, that lies just above the gingival
 //! margin of these teeth, covers the others, and rises toward its frame outside the mouth.
 
-use super::gum::{HalfJaw, JawForm, column_positions, from_end_to_end, open_sheet};
+use super::gum::{GumForm, HalfJaw, column_positions, from_end_to_end, open_sheet};
 use super::tinted_mesh::{Tint, TintedMesh};
 use typodont_core::frame::{Vec3, smooth_step};
 
@@ -90,7 +90,7 @@ impl HalfJaw<'_> {
     fn dam_column(&self, position: f32, front: f32, isolation: f32) -> Vec<(Vec3, Tint)> {
         let (place, distal) = self.half.frame_at(position);
         let out = distal.cross(Vec3::Z);
-        let section = self.section(JawForm::Touched, position);
+        let section = self.section(GumForm::Touched, position);
         let middle = place + out * section.offset;
         let height = |margin: f32| OVER_CUSPS + (margin + OVER_MARGIN - OVER_CUSPS) * isolation;
         let (outer, inner) = (height(section.margin), height(section.inner_margin));

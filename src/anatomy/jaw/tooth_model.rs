@@ -55,16 +55,16 @@ impl ToothModel {
     }
 }
 
-/// Upper teeth from the midline outward.
+/// Upper teeth from the midline outward. Canines that are drawn stand more upright, as natural ones do, and are so much narrower that
+/// they have room between their neighbours.
 pub const UPPER: [ToothModel; 8] = {
     let [a, b, c, d, e, f, g, h] = teeth::UPPER;
     [
         with_tip(tooth_model(a, ToothKind::Incisor, 20.0, 0.0), 5.0),
         with_tip(tooth_model(b, ToothKind::Incisor, 16.0, 0.6), 6.0),
-        drawn_upright(
+        with_drawn(
             with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -0.4), 2.2), 2.0),
-            -6.0,
-            -0.2,
+            DrawnCrown { lean: -6.0, width: -0.2, occlusal: None },
         ),
         with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.8),
         with_buccal_offset(tooth_model(e, ToothKind::Premolar, 0.0, 0.3), 0.1),
@@ -80,14 +80,13 @@ pub const LOWER: [ToothModel; 8] = {
     [
         with_tip(tooth_model(a, ToothKind::Incisor, 12.0, 0.0), 2.0),
         with_tip(with_buccal_offset(tooth_model(b, ToothKind::Incisor, 8.0, 0.0), -0.2), 2.0),
-        drawn_upright(
+        with_drawn(
             with_tip(with_buccal_offset(tooth_model(c, ToothKind::Canine, 12.0, -1.0), 2.5), 2.0),
-            -8.0,
-            -0.3,
+            DrawnCrown { lean: -8.0, width: -0.3, occlusal: None },
         ),
-        with_drawn_occlusal(
+        with_drawn(
             with_buccal_offset(tooth_model(d, ToothKind::Premolar, 0.0, 0.3), 0.6),
-            &premolars::LOWER_FIRST_DRAWN,
+            DrawnCrown { occlusal: Some(&premolars::LOWER_FIRST_DRAWN), lean: 0.0, width: 0.0 },
         ),
         with_buccal_offset(tooth_model(e, ToothKind::Premolar, 0.0, 0.3), 0.1),
         tooth_model(f, ToothKind::Molar, -3.0, 0.3),
@@ -118,10 +117,6 @@ const fn with_buccal_offset(model: ToothModel, buccal_offset: f32) -> ToothModel
     ToothModel { buccal_offset, ..model }
 }
 
-const fn drawn_upright(model: ToothModel, lean: f32, width: f32) -> ToothModel {
-    ToothModel { drawn: DrawnCrown { lean, width, ..model.drawn }, ..model }
-}
-
-const fn with_drawn_occlusal(model: ToothModel, occlusal: &'static OcclusalForm) -> ToothModel {
-    ToothModel { drawn: DrawnCrown { occlusal: Some(occlusal), ..model.drawn }, ..model }
+const fn with_drawn(model: ToothModel, drawn: DrawnCrown) -> ToothModel {
+    ToothModel { drawn, ..model }
 }

@@ -203,7 +203,7 @@ impl LessonView {
             shadows: self
                 .has_shadows(settings, viewport)
                 .then(|| scene::shadow_region(&lesson_scene.workpiece, &lesson.orbit)),
-            relief_seed: self.is_quick(viewport).then(|| scene::relief_seed(&lesson_scene.workpiece)),
+            relief_seed: self.is_quick(viewport).then(|| scene::relief_seed(&lesson.scenario)),
             background: if is_radiograph { Background::plain([0.0; 3]) } else { Background::default() },
             lens: settings.depth_of_field.then(|| scene::camera_lens(&lesson.orbit)),
             is_antialiased: settings.is_smooth(viewport.has_graphics()),

@@ -82,7 +82,7 @@ impl PreviewView {
             },
             lights: Lights::along(&viewpoint),
             shadows: inputs.has_shadows.then(|| scene::shadow_region(&build.workpiece, &preview.orbit)),
-            relief_seed: has_graphics.then(|| scene::relief_seed(&build.workpiece)),
+            relief_seed: has_graphics.then(|| scene::relief_seed(&build.scenario)),
             lens: inputs.has_depth_of_field.then(|| scene::camera_lens(&preview.orbit)),
             is_antialiased: inputs.is_smooth,
             ..RenderScene::empty()

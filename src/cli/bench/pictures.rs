@@ -121,7 +121,7 @@ pub fn measure_exercise(scenario: &Scenario, workpiece: &Workpiece) -> Result<St
             solids: solids.clone(),
             lights: Lights { chair: Lamp::chair_toward(eye, orbit.middle), head: Lamp::head(eye), ..Lights::default() },
             shadows,
-            relief_seed: shadows.map(|_| scene::relief_seed(workpiece)),
+            relief_seed: shadows.map(|_| scene::relief_seed(scenario)),
             is_antialiased: true,
             ..RenderScene::empty()
         })

@@ -51,6 +51,7 @@ impl MouthArches {
         let opposite = plan.of_jaw(jaw.other(), numbers.iter().copied().filter(|fdi| Jaw::of(*fdi) != jaw));
         let tooth_from_near = near.arch_from_fitted(worked.fdi, &worked.crown)?.inverse();
         let near_from_opposite = plan.occlusion(&near, &opposite).near_from_opposite(WORKING_OPENING_DEG);
+        let [near, opposite] = [near, opposite].map(DentalArch::with_felt_teeth);
         Some(MouthArches { near, opposite, tooth_from_near, tooth_from_opposite: tooth_from_near * near_from_opposite })
     }
 

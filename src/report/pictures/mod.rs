@@ -71,7 +71,7 @@ pub fn all_pictures(
     let palette = TissueColours::of(&recording.scenario.tissues);
     let colours = VerdictColours::of(scored);
     let (before, after) = (&scored.replay.workpiece.volume, &scored.replay.volume);
-    let material = ToothMaterial::of(&recording.scenario.tissues, &scored.replay.workpiece);
+    let material = ToothMaterial::of(&recording.scenario, &scored.replay.workpiece);
     let surfaces = SurfacesOfWork { before: material.surface_of(before), after: material.surface_of(after) };
     let mut raw = Vec::new();
     for (done, side) in ViewSide::ALL.into_iter().enumerate() {

@@ -25,7 +25,7 @@ pub fn preview_png(scenario: &Scenario, workpiece: &Workpiece, first_view: &Rgba
     let pixels = first_view.rgba.chunks(4).map(|p| [share(p[0]), share(p[1]), share(p[2]), 1.0]).collect();
     let first = PixelBuffer { width: first_view.width, height: first_view.height, pixels };
     let palette = TissueColours::of(&scenario.tissues);
-    let material = ToothMaterial::of(&scenario.tissues, workpiece);
+    let material = ToothMaterial::of(scenario, workpiece);
     let surface = material.surface_of(&workpiece.volume);
     let decay = decay_volume(scenario, &workpiece.volume);
     let tooth = &workpiece.teeth[0];

@@ -3,10 +3,9 @@
 use crate::raycast::{GBuffer, PixelBuffer};
 use typodont_core::frame::Pose;
 use typodont_core::volume::Volume;
-use typodont_exercise::catalog::TissueTable;
-use typodont_exercise::scenario::Workpiece;
+use typodont_exercise::scenario::{Scenario, Workpiece};
 use typodont_render::{
-    Changes, LabelPalette, RenderMode, SurfaceColours, UnworkedTooth, VolumeInstance, tooth_in_relief,
+    Changes, LabelPalette, RenderMode, SeenPlace, SurfaceColours, UnworkedTooth, VolumeInstance, tooth_in_relief,
 };
 use typodont_scene::{relief_seed, tissue_palette, unworked_tooth};
 
@@ -18,11 +17,11 @@ pub struct ToothMaterial {
 }
 
 impl ToothMaterial {
-    pub fn of(tissues: &TissueTable, workpiece: &Workpiece) -> ToothMaterial {
+    pub fn of(scenario: &Scenario, workpiece: &Workpiece) -> ToothMaterial {
         ToothMaterial {
-            palette: tissue_palette(tissues, true),
-            unworked_tooth: unworked_tooth(workpiece, tissues),
-            relief_seed: relief_seed(workpiece),
+            palette: tissue_palette(&scenario.tissues, true),
+            unworked_tooth: unworked_tooth(workpiece, &scenario.tissues),
+            relief_seed: relief_seed(scenario),
         }
     }
 
@@ -51,9 +50,9 @@ impl ToothSurface<'_> {
     /// A view of this volume, in colour.
     pub fn paint(&self, view: &GBuffer) -> PixelBuffer {
         let grid = self.volume.grid();
-        view.paint_with_relief(|point, normal, pixel| {
-            let at = grid.from_tooth(point);
-            tooth_in_relief(self.relief_seed, self.colours.at(at), normal, at * grid.spacing, pixel)
+        view.paint_with_relief(|seen| {
+            let at = grid.from_tooth(seen.place);
+            tooth_in_relief(self.relief_seed, self.colours.at(at), SeenPlace { place: at * grid.spacing, ..seen })
         })
     }
 }

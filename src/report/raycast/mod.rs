@@ -17,7 +17,7 @@ use ray::RayMarcher;
 use typodont_core::frame::Vec3;
 use typodont_core::parallel::{available_threads, par_rows};
 use typodont_core::volume::{Label, Volume};
-use typodont_render::Appearance;
+use typodont_render::{Appearance, SeenPlace};
 
 /// Samples along each side of a pixel where the picture has an edge; elsewhere one does.
 const SUPERSAMPLES: u32 = 3;
@@ -131,13 +131,13 @@ fn edge_pixels(hits: &[Option<Hit>], width: usize, pixel: f32) -> Vec<usize> {
 impl GBuffer {
     /// The surface that was seen, lit; `finish` is asked for points of the surface in tooth space. Nothing stays transparent.
     pub fn paint(&self, finish: impl Fn(Vec3) -> Appearance + Sync) -> PixelBuffer {
-        self.paint_with_relief(|point, normal, _| (finish(point), normal))
+        self.paint_with_relief(|seen| (finish(seen.place), seen.normal))
     }
 
-    /// The same with fine relief: `finish` is asked for a point and its unit normal in tooth space, and the
-    /// width, mm, that a pixel covers of it, and answers with the normal that the relief has there.
-    pub fn paint_with_relief(&self, finish: impl Fn(Vec3, Vec3, f32) -> (Appearance, Vec3) + Sync) -> PixelBuffer {
-        self.paint_with(finish, available_threads())
+    /// The same with fine relief: `look` is asked for a place in tooth space, and answers with how it looks and with the normal that the
+    /// relief has there.
+    pub fn paint_with_relief(&self, look: impl Fn(SeenPlace) -> (Appearance, Vec3) + Sync) -> PixelBuffer {
+        self.paint_with(look, available_threads())
     }
 
     /// The same in the colours of voxels.
@@ -145,15 +145,14 @@ impl GBuffer {
         self.paint(|point| Appearance { colour: surface_colour(volume, point, &colour), gloss: FAINT_GLOSS })
     }
 
-    fn paint_with(&self, finish: impl Fn(Vec3, Vec3, f32) -> (Appearance, Vec3) + Sync, threads: usize) -> PixelBuffer {
+    fn paint_with(&self, look: impl Fn(SeenPlace) -> (Appearance, Vec3) + Sync, threads: usize) -> PixelBuffer {
         let lamps = light::lamps();
         let pixel = 2.0 * self.camera.half_height / self.height as f32;
         let mut picture = PixelBuffer::transparent(self.width, self.height);
         let shade = |hit: &Option<Hit>| match hit {
             Some(hit) => {
-                // A pixel covers more of a surface that is seen from aside.
-                let covered = pixel / hit.normal.dot(self.camera.back()).max(0.01);
-                let (finish, normal) = finish(hit.point, hit.normal, covered);
+                let eye_cosine = hit.normal.dot(self.camera.back());
+                let (finish, normal) = look(SeenPlace { place: hit.point, normal: hit.normal, pixel, eye_cosine });
                 light::lit_colour(&lamps, &self.camera, finish, &Hit { normal, ..*hit })
             }
             None => [0.0; 4],
@@ -256,11 +255,10 @@ mod tests {
             width: 97,
             height: 61,
         };
-        let finish = |p: Vec3, normal: Vec3, pixel: f32| {
-            let plain = Appearance { colour: [0.5 + 0.4 * p.x, 0.4, 0.2], gloss: 0.2 };
-            tooth_in_relief(1, plain, normal, p, pixel)
+        let look = |seen: SeenPlace| {
+            tooth_in_relief(1, Appearance { colour: [0.5 + 0.4 * seen.place.x, 0.4, 0.2], gloss: 0.2 }, seen)
         };
-        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(finish, threads);
+        let picture = |threads| render_with(&volume, &shot, None, threads).paint_with(look, threads);
         assert_eq!(picture(1), picture(3));
     }
 

@@ -13,7 +13,7 @@ use super::soft_tissue::YieldingSurface;
 use super::surroundings;
 use std::sync::Arc;
 use typodont_anatomy::jaw::{
-    ArchPlan, DentalArch, FittedTooth, Jaw, JawForm, Occlusion, Tint, TintedMesh, ToothSeat, WORKING_OPENING_DEG,
+    ArchPlan, DentalArch, FittedTooth, GumForm, Jaw, Occlusion, Tint, TintedMesh, ToothSeat, WORKING_OPENING_DEG,
 };
 use typodont_anatomy::periodontium::Periodontium;
 use typodont_anatomy::teeth::distal_sign;
@@ -165,7 +165,7 @@ impl Mouth {
         let near = workpiece.arch.of_jaw(jaw, workpiece.teeth.iter().map(|tooth| tooth.fdi));
         let other = workpiece.arch.of_jaw(jaw.other(), []);
         Mouth {
-            near: JawMeshes::new(TintedMesh::default(), near.gum(JawForm::Touched, &|p| p), tooth_from_arch, tissues),
+            near: JawMeshes::new(TintedMesh::default(), near.gum(GumForm::Touched, &|p| p), tooth_from_arch, tissues),
             opposite: None,
             jaw,
             world_from_near: workpiece.world_from_tooth * tooth_from_arch,
@@ -189,8 +189,8 @@ impl Mouth {
         let arches = MouthArches::around_tooth(&workpiece.arch, tooth, &numbers)?;
         let drawn = |arch: &DentalArch, tooth_from_arch: Pose| {
             let is_there = |fdi: u8| others.iter().any(|tooth| tooth.fdi == fdi);
-            let crowns = arch.crowns(JawForm::Touched, &|side, index, _| !is_there(arch.jaw().fdi(side, index)));
-            JawMeshes::new(crowns, arch.gum(JawForm::Touched, &|p| p), tooth_from_arch, tissues)
+            let crowns = arch.crowns(&|side, index, _| !is_there(arch.jaw().fdi(side, index)));
+            JawMeshes::new(crowns, arch.gum(GumForm::Touched, &|p| p), tooth_from_arch, tissues)
         };
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
         Some(Mouth {
@@ -285,14 +285,14 @@ impl Mouth {
                 && (!is_soft || has_own_surface(shape))
         };
         let touched = workpiece.surroundings.iter().enumerate().filter(is_drawn).map(|(_, shape)| shape);
-        let form = if is_in_bend { JawForm::Touched } else { JawForm::Drawn };
+        let form = if is_in_bend { GumForm::Touched } else { GumForm::Drawn };
         let dam = workpiece.rubber_dam.then(|| {
             RubberDam::over(&near, sign, &|side, index| {
                 is_isolated(side, index) && !plan.missing.contains(&jaw.fdi(side, index))
             })
         });
         let yielding = workpiece.surroundings.iter().filter_map(|s| YieldingSurface::of(s, workpiece, tissues));
-        let crowns = near.crowns(JawForm::Drawn, &is_left_out);
+        let crowns = near.crowns(&is_left_out);
         let meshes = match &dam {
             Some(dam) => JawMeshes {
                 gum: dam.sheet.clone(),
@@ -456,8 +456,8 @@ pub struct StandaloneJaw {
 impl StandaloneJaw {
     /// As written, or at an age in years.
     pub fn new(jaw: Jaw, age: Option<f32>, tissues: &TissueTable) -> StandaloneJaw {
-        let arch = DentalArch::new(jaw, 7, None, &ArchPlan { age, ..ArchPlan::default() });
-        let TintedMesh { mesh, tints } = arch.gum(JawForm::Drawn, &|p| p);
+        let arch = DentalArch::new(jaw, 7, None, &ArchPlan { age, ..ArchPlan::default() }).with_felt_teeth();
+        let TintedMesh { mesh, tints } = arch.gum(GumForm::Drawn, &|p| p);
         let pink = tissues.by_name("gingiva").map_or(PINK, |e| e.rgb());
         let gum_colours = tints.iter().map(|tint| std::array::from_fn(|c| pink[c] * tint.colour[c])).collect();
         StandaloneJaw { gum: mesh, gum_colours, teeth: arch.teeth() }
@@ -467,8 +467,8 @@ impl StandaloneJaw {
 /// The jaw that is not worked on.
 fn opposite_jaw(workpiece: &Workpiece, arch: &DentalArch, tissues: &TissueTable) -> JawMeshes {
     let missing = &workpiece.arch.missing;
-    let crowns = arch.crowns(JawForm::Drawn, &|side, index, _| missing.contains(&arch.jaw().fdi(side, index)));
-    JawMeshes::new(crowns, arch.gum(JawForm::Drawn, &|p| p), Pose::IDENTITY, tissues)
+    let crowns = arch.crowns(&|side, index, _| missing.contains(&arch.jaw().fdi(side, index)));
+    JawMeshes::new(crowns, arch.gum(GumForm::Drawn, &|p| p), Pose::IDENTITY, tissues)
 }
 
 /// Colliders around the carved tooth, which the drawn jaw follows.
