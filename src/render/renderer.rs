@@ -115,11 +115,12 @@ impl Renderer {
         let no_shadows = ShadowMap::none(device);
         let tooth_layout = ToothTextures::layout(device);
         let [lamp_view, left, right] = [0; 3].map(|_| ViewBindings::new(device, &view_layout, &no_shadows));
+        let detail = Detail { is_srgb_target: format.is_srgb(), ..Detail::default() };
         Renderer {
-            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout, Detail::default()),
-            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout, Detail::default()),
-            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, Detail::default()),
-            particle_pass: ParticlePass::new(device, format, &view_layout, Detail::default()),
+            surface_pass: SurfacePass::new(device, format, &view_layout, &tooth_layout, detail),
+            iso_pass: iso_pass::pipeline(device, format, &view_layout, &tooth_layout, detail),
+            volume_pass: VolumePass::new(device, format, &view_layout, &tooth_layout, detail),
+            particle_pass: ParticlePass::new(device, format, &view_layout, detail),
             fxaa_pass: FxaaPass::new(device, format),
             lens_pass: None,
             stereo_pass: StereoPass::new(device, format),
@@ -129,7 +130,7 @@ impl Renderer {
             queue: queue.clone(),
             format,
             tooth_layout,
-            detail: Detail::default(),
+            detail,
             shadow_pass: None,
             no_shadows,
             lamp_view,
