@@ -13,7 +13,10 @@ pub const SOURCE: &str = include_str!("../../shaders/relief.wgsl");
 /// Width of a dimple of stippled gingiva, and by how much it is lower or higher than the mean, mm. Dimples are half a millimetre to a
 /// millimetre apart; their depth is chosen by eye.
 const STIPPLE_WIDTH: f32 = 0.55;
-const STIPPLE_DEPTH: f32 = 0.04;
+const STIPPLE_DEPTH: f32 = 0.03;
+
+/// Width of further dimples, as a share of that of the first: of two lattices together, no row is seen.
+const STIPPLE_FINER: f32 = 0.74;
 
 /// Columns of the rotation of the lattice of dimples: no row of them lies along the arch.
 const STIPPLE_TURN: [Vec3; 3] = [Vec3::new(0.36, -0.8, 0.48), Vec3::new(0.48, 0.6, 0.64), Vec3::new(-0.8, 0.0, 0.6)];
@@ -108,8 +111,11 @@ impl Relief {
             return normal;
         }
         let [x, y, z] = STIPPLE_TURN;
-        let (_, turned) = self.noise.at((x * own.x + y * own.y + z * own.z) / STIPPLE_WIDTH);
-        let gradient = Vec3::new(turned.dot(x), turned.dot(y), turned.dot(z)) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
+        let turned = x * own.x + y * own.y + z * own.z;
+        let (_, coarse) = self.noise.at(turned / STIPPLE_WIDTH);
+        let (_, fine) = self.noise.at(own / (STIPPLE_FINER * STIPPLE_WIDTH));
+        let coarse = Vec3::new(coarse.dot(x), coarse.dot(y), coarse.dot(z));
+        let gradient = (coarse + fine) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
         tilted(normal, to_world(gradient) * (share * resolved(self.pixel_at(point), STIPPLE_WIDTH)))
     }
 

@@ -42,6 +42,9 @@ const CUT_DEPTHS: [f32; 2] = [0.15, 0.4];
 /// Tint of enamel deep in a fissure, where it stains with time, as on the neighbours' crowns.
 const FISSURE: [f32; 3] = [0.93, 0.885, 0.81];
 
+/// Tint of enamel at the tip of a cusp or at an edge, which light leaves at the sides: as on the neighbours' crowns. Chosen by eye.
+const CLEAR: [f32; 3] = [0.88, 0.915, 0.95];
+
 /// Gloss that the moistest decay has more than the rest of it: less than sound tissue.
 const MOIST: f32 = 0.08;
 
@@ -366,9 +369,9 @@ struct Mixer {
 struct Place {
     /// 0 on the tooth's own surface, 1 where it is cut.
     cut: f32,
-    /// Thickness of the enamel that is looked through, mm, and depth in a fissure, 0 to 1; both for enamel only.
+    /// Thickness of the enamel that is looked through, mm, and the surface's form: 1 in a fissure, −1 on a cusp; both for enamel only.
     thickness: f32,
-    groove: f32,
+    hollow: f32,
 }
 
 /// Enamel through which dentine shines.
@@ -411,7 +414,7 @@ impl Mixer {
         Place {
             cut,
             thickness: if self.enamel.is_some() { thickness() } else { 0.0 },
-            groove: if cut < 1.0 { unworked.groove_depth(place) } else { 0.0 },
+            hollow: if cut < 1.0 { unworked.hollowness_at(place) } else { 0.0 },
         }
     }
 
@@ -423,9 +426,10 @@ impl Mixer {
         };
         seen.sound[3] -= matter.dulling * place.cut;
         if matter.enamel > 0.0 && place.cut < 1.0 {
-            let stain = matter.enamel / matter.sound_amount.max(1e-6) * (1.0 - place.cut) * place.groove;
-            for (sum, tint) in seen.sound.iter_mut().zip(FISSURE) {
-                *sum *= 1.0 + (tint - 1.0) * stain;
+            let tint = if place.hollow > 0.0 { FISSURE } else { CLEAR };
+            let share = matter.enamel / matter.sound_amount.max(1e-6) * (1.0 - place.cut) * place.hollow.abs();
+            for (sum, tint) in seen.sound.iter_mut().zip(tint) {
+                *sum *= 1.0 + (tint - 1.0) * share;
             }
         }
         seen

@@ -5,8 +5,8 @@ use super::tooth_model::{ToothKind, ToothModel};
 use crate::form::ToothForm;
 use crate::grow::grow_with_ramp;
 use crate::{TissueLabels, grid_of_spacing};
-use typodont_core::frame::Vec3;
-use typodont_core::volume::{Label, Volume, surface};
+use typodont_core::frame::{Vec3, smooth_step};
+use typodont_core::volume::{Label, Volume, hollowness, surface};
 
 /// Distance between samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,16 +31,8 @@ impl CrownDetail {
 /// Length of root in the gingiva below a crown, mm: farther down a leaning root would leave it.
 const ROOT_LENGTH: f32 = 2.5;
 
-/// Distance from a point of the surface at which the density is sampled, mm: a groove has more matter around it than a
-/// cusp.
-const SAMPLE_DISTANCE: f32 = 0.9;
-
 /// Half-width, mm, of the ramp from nothing to matter where the matter around a place is measured.
 const MEASURED_HALF_BAND: f32 = 0.54;
-
-/// Share of matter around a place that is flat, and above it until a groove is as dark as can be.
-const FLAT: f32 = 0.53;
-const DEEPER: f32 = 0.17;
 
 /// Half the width of the density ramp, voxels: wide, so that the normals between so coarse samples are those of the form.
 const DRAWN_HALF_BAND: f32 = 3.0;
@@ -73,10 +65,11 @@ fn drawn_form(model: &ToothModel, spacing: f32) -> ToothForm {
     form
 }
 
-/// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge.
+/// Tints of enamel's colour: warmer toward the neck, where dentine shines through; greyish and clear at an incisor's edge and at tips,
+/// which light leaves at their sides.
 const NECK: Tint = Tint::smooth([0.99, 0.93, 0.85]);
 const ROOT: Tint = Tint::smooth([0.95, 0.82, 0.66]);
-const EDGE: Tint = Tint::smooth([0.945, 0.95, 0.965]);
+const CLEAR: Tint = Tint::smooth([0.88, 0.915, 0.95]);
 const DEEP: Tint = Tint::smooth([0.93, 0.885, 0.81]);
 const CANINE: Tint = Tint::smooth([0.99, 0.98, 0.95]);
 const PLAIN: Tint = Tint::smooth([1.0, 1.0, 1.0]);
@@ -90,29 +83,26 @@ fn tint(model: &ToothModel, volume: &Volume, place: Vec3, spacing: f32) -> Tint 
     let body = if model.kind == ToothKind::Canine { CANINE } else { PLAIN };
     let height = (place.z - neckline) / sizes.crown;
     let on_enamel = mixed_tint(NECK, body, height / 0.35);
+    let hollow = hollowness_at(volume, place, DRAWN_HALF_BAND * spacing);
+    // Toward the edge, height counts from the neck's level: where a crown is thin, that of its line is not defined.
+    let share = place.z / sizes.crown;
+    let tip = mixed_tint(on_enamel, CLEAR, -hollow * smooth_step((share - 0.4) / 0.3));
     let enamel = match model.kind {
-        ToothKind::Incisor => mixed_tint(on_enamel, EDGE, (height - 0.75) / 0.25),
-        ToothKind::Canine => on_enamel,
-        ToothKind::Premolar | ToothKind::Molar if height > 0.3 => {
-            mixed_tint(on_enamel, DEEP, groove_depth(volume, place, DRAWN_HALF_BAND * spacing))
+        ToothKind::Incisor => {
+            // Dentine reaches farther into the three lobes (mamelons) than between them.
+            let lobes = libm::cosf(3.0 * std::f32::consts::TAU * place.y / sizes.mesiodistal[0]);
+            mixed_tint(on_enamel, CLEAR, smooth_step((share - 0.74 - 0.03 * lobes) / 0.22))
         }
-        ToothKind::Premolar | ToothKind::Molar => on_enamel,
+        ToothKind::Premolar | ToothKind::Molar if height > 0.3 => mixed_tint(tip, DEEP, hollow),
+        ToothKind::Canine | ToothKind::Premolar | ToothKind::Molar => tip,
     };
     // Over a sample's width, so that the neckline is a line and not a stair.
     mixed_tint(ROOT, enamel, 0.5 + (place.z - neckline) / spacing)
 }
 
-/// 0 on flat or bulging places, 1 deep in a groove. `half_band`: half the width of the volume's density ramp, mm.
-fn groove_depth(volume: &Volume, place: Vec3, half_band: f32) -> f32 {
-    const CORNERS: [[f32; 3]; 8] = {
-        const S: f32 = 0.577;
-        [[S, S, S], [S, S, -S], [S, -S, S], [S, -S, -S], [-S, S, S], [-S, S, -S], [-S, -S, S], [-S, -S, -S]]
-    };
-    let axes = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
-    let directions = axes.into_iter().chain(CORNERS.map(Vec3::from));
-    let share = |density: f32| (0.5 + (density - 0.5) * half_band / MEASURED_HALF_BAND).clamp(0.0, 1.0);
-    let matter: f32 = directions.map(|way| share(volume.density_at(place + way * SAMPLE_DISTANCE))).sum();
-    ((matter / 14.0 - FLAT) / DEEPER).clamp(0.0, 1.0)
+/// Form of a crown around a place, as [`hollowness`] gives it. `half_band`: half the width of the volume's density ramp, mm.
+fn hollowness_at(volume: &Volume, place: Vec3, half_band: f32) -> f32 {
+    hollowness(place, |p| (0.5 + (volume.density_at(p) - 0.5) * half_band / MEASURED_HALF_BAND).clamp(0.0, 1.0))
 }
 
 #[cfg(test)]
@@ -120,6 +110,22 @@ mod tests {
     use super::super::tooth_model::{LOWER, UPPER};
     use super::*;
     use typodont_core::touch::ClosedMesh;
+
+    #[test]
+    fn the_whole_edge_of_an_incisor_is_clear_and_its_body_is_not() {
+        let incisors = UPPER.iter().chain(&LOWER).filter(|model| model.kind == ToothKind::Incisor);
+        for model in incisors {
+            let TintedMesh { mesh, tints } = crown(model, false, 0.0, CrownDetail::Far);
+            let reds_at = |heights: std::ops::Range<f32>| -> Vec<f32> {
+                let places = mesh.positions.iter().zip(&tints);
+                let there = places.filter(|(place, _)| heights.contains(&(place.z / model.sizes.crown)));
+                there.map(|(_, tint)| tint.colour[0]).collect()
+            };
+            let (edge, body) = (reds_at(0.97..1.1), reds_at(0.4..0.6));
+            assert!(edge.len() > 10 && edge.iter().all(|red| *red < 0.9), "{edge:?}");
+            assert!(body.len() > 100 && body.iter().all(|red| *red > 0.985), "{body:?}");
+        }
+    }
 
     #[test]
     fn every_crown_is_closed_and_as_large_as_the_table_says() {

@@ -32,6 +32,15 @@ impl GumForm {
         }
     }
 
+    /// Height of a papilla above the necks, as a share of the crowns' height: healthy gingiva fills the space up to a few millimetres below
+    /// the contact.
+    fn papilla(self) -> f32 {
+        match self {
+            GumForm::Touched => 0.42,
+            GumForm::Drawn => 0.5,
+        }
+    }
+
     /// Length behind the last molar, mm: as it is drawn, the ridge goes on behind its pad, so that its end is out of sight, and the palate
     /// goes on into the throat.
     fn beyond(self, jaw: Jaw) -> f32 {
@@ -46,6 +55,9 @@ impl GumForm {
 /// Means of normals over neighbouring places: creases between columns fade, the margin stays.
 const SMOOTHING: usize = 4;
 
+/// Number of times that drawn columns are smoothed along the arch.
+const COLUMN_SMOOTHING: usize = 2;
+
 /// Length of the tuberosity or retromolar pad behind the last molar, mm.
 const PAD: f32 = 8.0;
 
@@ -55,13 +67,15 @@ const BEFORE_THROAT: f32 = 6.0;
 /// Height of a jaw's flat base below the occlusal plane, mm.
 const BASE: f32 = -27.0;
 
-/// Height of the free gingiva above the neck: in the middle of a tooth, mm, and between two teeth, as a share of the
-/// crown's height. Healthy gingiva fills the space up to a few millimetres below the contact.
+/// Height of the free gingiva above the neck in the middle of a tooth, mm.
 const MARGIN: f32 = 0.6;
-const PAPILLA: f32 = 0.42;
 
 /// Part of a tooth on which margins and papillae lie, recession included, as shares of the crown above the neck.
-const NECK_PART: Range<f32> = -0.45..0.6;
+const NECK_PART: Range<f32> = -0.45..0.8;
+
+/// Distance from the space between two teeth at which both have sides, and depth of a papilla between these, mm.
+const BESIDE_SPACE: f32 = 1.3;
+const EMBRASURE: f32 = 0.35;
 
 /// Half the width of a papilla that fills the space between two teeth, as a share of half the necks' width.
 const BETWEEN_TEETH: f32 = 0.7;
@@ -107,6 +121,9 @@ pub fn necks(models: &[ToothModel]) -> Vec<CrownContour> {
 /// The gingiva over both halves, in arch space, mm. `fit` may move each point.
 pub fn gum(jaw: Jaw, sides: [HalfJaw; 2], form: GumForm, fit: impl Fn(Vec3) -> Vec3) -> TintedMesh {
     let mut columns = from_end_to_end(halves(jaw, &sides, form));
+    if form == GumForm::Drawn {
+        columns = smoothed_along_the_arch(columns);
+    }
     for (place, _) in columns.iter_mut().flatten() {
         *place = fit(*place);
     }
@@ -132,6 +149,21 @@ pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
         }
     }
     solids
+}
+
+/// The same columns, whose rows are lines without corners: each place half its own and half that of the columns beside it, some times.
+fn smoothed_along_the_arch(mut columns: Vec<Vec<(Vec3, Tint)>>) -> Vec<Vec<(Vec3, Tint)>> {
+    for _ in 0..COLUMN_SMOOTHING {
+        let before = columns.clone();
+        for (column, beside) in columns[1..].iter_mut().zip(before.windows(3)) {
+            for (row, (place, tint)) in column.iter_mut().enumerate() {
+                let [(a, tint_a), (b, tint_b)] = [beside[0][row], beside[2][row]];
+                *place = *place * 0.5 + (a + b) * 0.25;
+                *tint = mixed_tint(*tint, mixed_tint(tint_a, tint_b, 0.5), 0.5);
+            }
+        }
+    }
+    columns
 }
 
 /// Columns from behind to the midline, then from there back; the midline once.
@@ -277,11 +309,12 @@ impl HalfJaw<'_> {
             ],
             GumForm::Drawn => {
                 // The margin lies on the tooth, and the papilla bridges the space between two with a round crest.
-                let edge = |out: Vec3, height: f32| {
-                    let on_tooth = self.distance_to_teeth(arc_length, middle.with_z(height), out, wide + 2.5);
-                    smooth_max(on_tooth, BETWEEN_TEETH * wide)
+                let edge = |side: f32, height: f32| {
+                    let on_tooth = self.distance_to_teeth(arc_length, side, height, wide + 2.5);
+                    let bridge = self.bridge(arc_length, side, height, wide + 2.5);
+                    smooth_max(on_tooth, bridge.max(BETWEEN_TEETH * wide))
                 };
-                let (outer, inner) = (edge(out, margin), edge(-out, inner_margin));
+                let (outer, inner) = (edge(1.0, margin), edge(-1.0, inner_margin));
                 // On a papilla there is no sulcus, and its sides rise without a step, which places between rows would make a lip.
                 let [edge_tint, sulcus_tint] = [EDGE, SULCUS].map(|tint| mixed_tint(tint, FREE, between));
                 let [first, last] = FREE_BELOW_MARGIN;
@@ -331,11 +364,31 @@ impl HalfJaw<'_> {
         rows.into_iter().map(|(aside, z, tint)| (place(aside, z), tint)).collect()
     }
 
-    /// Distance from a point between the teeth's sides out to the side of the tooth here, mm, level; 0 between two teeth. Looked for
-    /// from `reach` inward.
-    fn distance_to_teeth(&self, arc_length: f32, from: Vec3, out: Vec3, reach: f32) -> f32 {
+    /// Distance from the middle of the ridge to the line between the sides of both teeth beside the nearest space, at a height, less the
+    /// depth of a papilla, mm; 0 behind the last tooth. `side` and `reach` as of [`HalfJaw::distance_to_teeth`].
+    fn bridge(&self, arc_length: f32, side: f32, height: f32, reach: f32) -> f32 {
+        let spaces = self.half.seats.iter().map(|seat| seat.from);
+        let distance = |space: &f32| (arc_length - space).abs();
+        let Some(space) = spaces.min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|s| distance(s) < 3.0)
+        else {
+            return 0.0;
+        };
+        // On the midline, the other half's tooth is as this half's.
+        let ends = [space - BESIDE_SPACE, space + BESIDE_SPACE];
+        let [a, b] = ends.map(|end| self.distance_to_teeth(end.abs(), side, height, reach));
+        let share = ((arc_length - ends[0]) / (2.0 * BESIDE_SPACE)).clamp(0.0, 1.0);
+        a + (b - a) * share - EMBRASURE
+    }
+
+    /// Distance from the middle of the ridge out to the side of the tooth here, at a height, mm; 0 between two teeth. `side`: 1 toward
+    /// lip or cheek, −1 toward palate or tongue; looked for from `reach` inward.
+    fn distance_to_teeth(&self, arc_length: f32, side: f32, height: f32, reach: f32) -> f32 {
         const STEP: f32 = 0.15;
         let seats = &self.half.seats;
+        let (place, distal) = self.half.frame_at(arc_length);
+        let out = distal.cross(Vec3::Z);
+        let from = (place + out * self.section(GumForm::Drawn, arc_length).offset).with_z(height);
+        let out = out * side;
         let here = seats.iter().position(|s| arc_length < s.to).unwrap_or(seats.len() - 1);
         let around = here.saturating_sub(1)..(here + 2).min(seats.len());
         let tooth_from_arch: Vec<Pose> = around.clone().map(|i| seats[i].arch_from_drawn().inverse()).collect();
@@ -374,7 +427,7 @@ impl HalfJaw<'_> {
         let between = match form {
             GumForm::Touched => libm::powf(from_middle.abs(), 2.4),
             // A scallop around each tooth, and a round tip between two.
-            GumForm::Drawn => smooth_step(libm::powf(from_middle.abs(), 1.5)),
+            GumForm::Drawn => smooth_step(libm::powf(from_middle.abs(), 1.4)),
         };
         let over_root = match form {
             GumForm::Touched => 1.0 - from_middle * from_middle,
@@ -385,7 +438,7 @@ impl HalfJaw<'_> {
         let papilla = if here == last && from_middle > 0.0 {
             neck_of(seat) + 1.2
         } else {
-            0.5 * (neck_of(seat) + neck_of(&seats[beside]) + PAPILLA * (seat.crown + seats[beside].crown))
+            0.5 * (neck_of(seat) + neck_of(&seats[beside]) + form.papilla() * (seat.crown + seats[beside].crown))
         };
         let behind = (arc_length - self.half.length()) / PAD;
         let pad = match form {
@@ -660,6 +713,28 @@ mod tests {
             }
         }
         assert!(seen > 60, "{seen} columns between teeth");
+    }
+
+    #[test]
+    fn the_drawn_margin_is_a_line_without_corners() {
+        // Aim: no corner in the highlight along the free gingiva. Method: the greatest angle, seen from above, between two neighbouring
+        // parts of each row from the free gingiva to the margin, beside the teeth.
+        let sharpest = |columns: &[Vec<(Vec3, Tint)>]| {
+            let corner = |three: &[Vec<(Vec3, Tint)>], row: usize| {
+                let [a, b, c] = [0, 1, 2].map(|i| three[i][row].0.with_z(0.0));
+                (b - a).normalize().dot((c - b).normalize()).clamp(-1.0, 1.0)
+            };
+            let beside_teeth = &columns[40..columns.len() - 40];
+            let cosines = beside_teeth.windows(3).flat_map(|three| (14..=18).map(|row| corner(three, row)));
+            libm::acosf(cosines.fold(1.0, f32::min)).to_degrees()
+        };
+        for jaw in [Jaw::Upper, Jaw::Lower] {
+            let arch = DentalArch::new(jaw, 7, None, &ArchPlan::default());
+            let columns = from_end_to_end(halves(jaw, &arch.sides(GumForm::Drawn), GumForm::Drawn));
+            let (before, after) = (sharpest(&columns), sharpest(&smoothed_along_the_arch(columns.clone())));
+            println!("{jaw:?}: {before:.1}° and, smoothed, {after:.1}°");
+            assert!(after < 25.0 && after < 0.6 * before, "{jaw:?}: {after}°, {before}° before");
+        }
     }
 
     #[test]

@@ -9,6 +9,7 @@ pub mod components;
 pub mod distance;
 mod edit;
 mod grid;
+mod hollowness;
 pub mod redistance;
 mod sample;
 pub mod solid;
@@ -19,6 +20,7 @@ pub use bricks::{BRICK, Bricks};
 pub use cell_box::CellBox;
 pub use edit::Edit;
 pub use grid::Grid;
+pub use hollowness::hollowness;
 pub use sample::RAY_LENGTH_MAX;
 
 use crate::aabb::Aabb;
