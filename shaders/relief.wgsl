@@ -7,9 +7,9 @@ override has_relief: bool = false;
 // Width of a dimple of stippled gingiva, and by how much it is lower or higher than the mean, mm.
 const STIPPLE_WIDTH: f32 = 0.55;
 const STIPPLE_DEPTH: f32 = 0.03;
-// Width of further dimples, as a share of that of the first: of two lattices together, no row is seen.
-const STIPPLE_FINER: f32 = 0.74;
-// Rotation of the lattice of dimples: no row of them lies along the arch.
+// Width of the dimples of a second lattice that are as steep, mm: of two together, no row is seen.
+const STIPPLE_FINE_WIDTH: f32 = 0.4;
+// Rotation of the first lattice of dimples; that of the second is its inverse: no row of them lies along the arch.
 const STIPPLE_TURN: mat3x3f = mat3x3f(vec3f(0.36, -0.8, 0.48), vec3f(0.48, 0.6, 0.64), vec3f(-0.8, 0.0, 0.6));
 // Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher, mm.
 const MARK_WIDTH: vec3f = vec3f(0.38, 0.38, 0.17);
@@ -104,7 +104,7 @@ fn tilted(normal: vec3f, gradient: vec3f) -> vec3f {
 // Gradient of the height of stippled gingiva at a place of its own space, mm.
 fn stipple_gradient(at: vec3f) -> vec3f {
     let coarse = noise(STIPPLE_TURN * at / STIPPLE_WIDTH).xyz * STIPPLE_TURN;
-    let fine = noise(at / (STIPPLE_FINER * STIPPLE_WIDTH)).xyz;
+    let fine = STIPPLE_TURN * noise(at * STIPPLE_TURN / STIPPLE_FINE_WIDTH).xyz;
     return (coarse + fine) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
 }
 

@@ -70,7 +70,7 @@ fn solid_fragment(in: SolidPlace) -> @location(0) vec4f {
 fn stippled_fragment(in: ReliefPlace) -> @location(0) vec4f {
     var normal = normalize(in.normal);
     if has_relief {
-        let gradient = stipple_gradient(in.own.xyz) * (in.own.w * resolved(in.point, STIPPLE_WIDTH));
+        let gradient = stipple_gradient(in.own.xyz) * (in.own.w * resolved(in.point, STIPPLE_FINE_WIDTH));
         normal = tilted(normal, (solid.world_from_solid * vec4f(gradient, 0.0)).xyz);
     }
     return vec4f(screen(lit(in.finish * solid.finish, 1.0, in.point, normal)), 1.0);

@@ -15,10 +15,10 @@ pub const SOURCE: &str = include_str!("../../shaders/relief.wgsl");
 const STIPPLE_WIDTH: f32 = 0.55;
 const STIPPLE_DEPTH: f32 = 0.03;
 
-/// Width of further dimples, as a share of that of the first: of two lattices together, no row is seen.
-const STIPPLE_FINER: f32 = 0.74;
+/// Width of the dimples of a second lattice that are as steep, mm: of two together, no row is seen.
+const STIPPLE_FINE_WIDTH: f32 = 0.4;
 
-/// Columns of the rotation of the lattice of dimples: no row of them lies along the arch.
+/// Columns of the rotation of the first lattice of dimples, and rows of that of the second: no row of dimples lies along the arch.
 const STIPPLE_TURN: [Vec3; 3] = [Vec3::new(0.36, -0.8, 0.48), Vec3::new(0.48, 0.6, 0.64), Vec3::new(-0.8, 0.0, 0.6)];
 
 /// Width of the marks of a bur across the tooth's axis and along it, and by how much they are lower or higher than the mean, mm: wider than they are, so that they are seen at the
@@ -107,16 +107,17 @@ impl Relief {
     /// Unit normal at a point of stippled gingiva. `own`: the point in the mesh's own space; `to_world` rotates from there;
     /// `share`: how much of the stippling it has, 0 to 1.
     pub fn stippled(&self, point: Vec3, normal: Vec3, own: Vec3, share: f32, to_world: impl Fn(Vec3) -> Vec3) -> Vec3 {
+        let share = share * resolved(self.pixel_at(point), STIPPLE_FINE_WIDTH);
         if share <= 0.0 {
             return normal;
         }
         let [x, y, z] = STIPPLE_TURN;
-        let turned = x * own.x + y * own.y + z * own.z;
-        let (_, coarse) = self.noise.at(turned / STIPPLE_WIDTH);
-        let (_, fine) = self.noise.at(own / (STIPPLE_FINER * STIPPLE_WIDTH));
-        let coarse = Vec3::new(coarse.dot(x), coarse.dot(y), coarse.dot(z));
-        let gradient = (coarse + fine) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
-        tilted(normal, to_world(gradient) * (share * resolved(self.pixel_at(point), STIPPLE_WIDTH)))
+        let turned = |v: Vec3| x * v.x + y * v.y + z * v.z;
+        let turned_back = |v: Vec3| Vec3::new(v.dot(x), v.dot(y), v.dot(z));
+        let (_, coarse) = self.noise.at(turned(own) / STIPPLE_WIDTH);
+        let (_, fine) = self.noise.at(turned_back(own) / STIPPLE_FINE_WIDTH);
+        let gradient = (turned_back(coarse) + turned(fine)) * (STIPPLE_DEPTH / STIPPLE_WIDTH);
+        tilted(normal, to_world(gradient) * share)
     }
 
     /// Unit normal at a point of a tooth whose surface has a gloss: the duller, the rougher. `own`: the point in millimetres along
@@ -340,6 +341,7 @@ mod tests {
         for line in [
             format!("STIPPLE_WIDTH: f32 = {STIPPLE_WIDTH:?};"),
             format!("STIPPLE_DEPTH: f32 = {STIPPLE_DEPTH:?};"),
+            format!("STIPPLE_FINE_WIDTH: f32 = {STIPPLE_FINE_WIDTH:?};"),
             format!(
                 "STIPPLE_TURN: mat3x3f = mat3x3f({});",
                 STIPPLE_TURN.map(|v| format!("vec3f({:?}, {:?}, {:?})", v.x, v.y, v.z)).join(", ")

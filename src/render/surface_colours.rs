@@ -42,7 +42,7 @@ const CUT_DEPTHS: [f32; 2] = [0.15, 0.4];
 /// Tint of enamel deep in a fissure, where it stains with time, as on the neighbours' crowns.
 const FISSURE: [f32; 3] = [0.93, 0.885, 0.81];
 
-/// Tint of enamel at the tip of a cusp or at an edge, which light leaves at the sides: as on the neighbours' crowns. Chosen by eye.
+/// Tint of enamel at the tip of a cusp or at an edge, which light leaves at the sides: as on the cusps of neighbours. Chosen by eye.
 const CLEAR: [f32; 3] = [0.88, 0.915, 0.95];
 
 /// Gloss that the moistest decay has more than the rest of it: less than sound tissue.

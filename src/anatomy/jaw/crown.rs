@@ -83,18 +83,22 @@ fn tint(model: &ToothModel, volume: &Volume, place: Vec3, spacing: f32) -> Tint 
     let body = if model.kind == ToothKind::Canine { CANINE } else { PLAIN };
     let height = (place.z - neckline) / sizes.crown;
     let on_enamel = mixed_tint(NECK, body, height / 0.35);
-    let hollow = hollowness_at(volume, place, DRAWN_HALF_BAND * spacing);
     // Toward the edge, height counts from the neck's level: where a crown is thin, that of its line is not defined.
     let share = place.z / sizes.crown;
-    let tip = mixed_tint(on_enamel, CLEAR, -hollow * smooth_step((share - 0.4) / 0.3));
+    let hollow = || hollowness_at(volume, place, DRAWN_HALF_BAND * spacing);
+    let tip = |hollow: f32| mixed_tint(on_enamel, CLEAR, -hollow * smooth_step((share - 0.4) / 0.3));
     let enamel = match model.kind {
         ToothKind::Incisor => {
             // Dentine reaches farther into the three lobes (mamelons) than between them.
             let lobes = libm::cosf(3.0 * std::f32::consts::TAU * place.y / sizes.mesiodistal[0]);
             mixed_tint(on_enamel, CLEAR, smooth_step((share - 0.74 - 0.03 * lobes) / 0.22))
         }
-        ToothKind::Premolar | ToothKind::Molar if height > 0.3 => mixed_tint(tip, DEEP, hollow),
-        ToothKind::Canine | ToothKind::Premolar | ToothKind::Molar => tip,
+        ToothKind::Canine if share > 0.4 => tip(hollow()),
+        ToothKind::Premolar | ToothKind::Molar if height > 0.3 => {
+            let hollow = hollow();
+            mixed_tint(tip(hollow), DEEP, hollow)
+        }
+        ToothKind::Canine | ToothKind::Premolar | ToothKind::Molar => on_enamel,
     };
     // Over a sample's width, so that the neckline is a line and not a stair.
     mixed_tint(ROOT, enamel, 0.5 + (place.z - neckline) / spacing)
@@ -113,6 +117,7 @@ mod tests {
 
     #[test]
     fn the_whole_edge_of_an_incisor_is_clear_and_its_body_is_not() {
+        // Aim: enamel without dentine behind it looks clear from corner to corner. Method: the tints at both heights.
         let incisors = UPPER.iter().chain(&LOWER).filter(|model| model.kind == ToothKind::Incisor);
         for model in incisors {
             let TintedMesh { mesh, tints } = crown(model, false, 0.0, CrownDetail::Far);

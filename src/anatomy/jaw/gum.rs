@@ -34,7 +34,7 @@ impl GumForm {
 
     /// Height of a papilla above the necks, as a share of the crowns' height: healthy gingiva fills the space up to a few millimetres below
     /// the contact.
-    fn papilla(self) -> f32 {
+    fn papilla_share(self) -> f32 {
         match self {
             GumForm::Touched => 0.42,
             GumForm::Drawn => 0.5,
@@ -73,7 +73,8 @@ const MARGIN: f32 = 0.6;
 /// Part of a tooth on which margins and papillae lie, recession included, as shares of the crown above the neck.
 const NECK_PART: Range<f32> = -0.45..0.8;
 
-/// Distance from the space between two teeth at which both have sides, and depth of a papilla between these, mm.
+/// Distance from the space between two teeth at which both have sides, and depth of a papilla between these, mm. Farther away, a papilla
+/// is the deeper.
 const BESIDE_SPACE: f32 = 1.3;
 const EMBRASURE: f32 = 0.35;
 
@@ -151,7 +152,7 @@ pub fn gum_solids(jaw: Jaw, sides: [HalfJaw; 2]) -> Vec<(MucosaRegion, Mesh)> {
     solids
 }
 
-/// The same columns, whose rows are lines without corners: each place half its own and half that of the columns beside it, some times.
+/// The same columns, whose rows are lines without corners: each place half its own and half that of the columns beside it, [`COLUMN_SMOOTHING`] times.
 fn smoothed_along_the_arch(mut columns: Vec<Vec<(Vec3, Tint)>>) -> Vec<Vec<(Vec3, Tint)>> {
     for _ in 0..COLUMN_SMOOTHING {
         let before = columns.clone();
@@ -189,7 +190,7 @@ fn halves(jaw: Jaw, sides: &[HalfJaw; 2], form: GumForm) -> [Vec<Vec<(Vec3, Tint
     std::array::from_fn(|number| {
         let side = &sides[number];
         let front = side.ridge(jaw, form, 0.0).pop().map_or(Vec3::ZERO, |row| row.0);
-        positions[number].iter().map(|&arc_length| side.column(jaw, form, front, arc_length)).collect()
+        par_map(positions[number].len(), |i| side.column(jaw, form, front, positions[number][i]))
     })
 }
 
@@ -273,7 +274,7 @@ impl HalfJaw<'_> {
         rows.iter()
             .map(|&(p, tint)| {
                 let z = p.z - sunk * (p.z - VAULT).max(0.0);
-                (Vec3::new(p.x * self.sign, p.y, z), mixed_tint(tint, THROAT, throat))
+                (Vec3::new(p.x * self.sign, p.y, z), mixed_tint(mixed_tint(tint, THROAT, throat), SOFT_PALATE, sunk))
             })
             .collect()
     }
@@ -365,19 +366,28 @@ impl HalfJaw<'_> {
     }
 
     /// Distance from the middle of the ridge to the line between the sides of both teeth beside the nearest space, at a height, less the
-    /// depth of a papilla, mm; 0 behind the last tooth. `side` and `reach` as of [`HalfJaw::distance_to_teeth`].
+    /// depth of a papilla, mm; 0 far from any space. `side` and `reach` as of [`HalfJaw::distance_to_teeth`].
     fn bridge(&self, arc_length: f32, side: f32, height: f32, reach: f32) -> f32 {
         let spaces = self.half.seats.iter().map(|seat| seat.from);
         let distance = |space: &f32| (arc_length - space).abs();
-        let Some(space) = spaces.min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|s| distance(s) < 3.0)
+        let Some(space) =
+            spaces.min_by(|a, b| distance(a).total_cmp(&distance(b))).filter(|s| distance(s) < 2.5 * BESIDE_SPACE)
         else {
             return 0.0;
         };
-        // On the midline, the other half's tooth is as this half's.
-        let ends = [space - BESIDE_SPACE, space + BESIDE_SPACE];
-        let [a, b] = ends.map(|end| self.distance_to_teeth(end.abs(), side, height, reach));
-        let share = ((arc_length - ends[0]) / (2.0 * BESIDE_SPACE)).clamp(0.0, 1.0);
-        a + (b - a) * share - EMBRASURE
+        let at = |end: f32| self.distance_to_teeth(end, side, height, reach);
+        let share = ((arc_length - space) / BESIDE_SPACE).clamp(-1.0, 1.0);
+        let side_here = match share {
+            // On the midline, the other half's tooth is taken to be as this half's.
+            _ if space < BESIDE_SPACE => at(space + BESIDE_SPACE),
+            -1.0 => at(space - BESIDE_SPACE),
+            1.0 => at(space + BESIDE_SPACE),
+            _ => {
+                let [a, b] = [at(space - BESIDE_SPACE), at(space + BESIDE_SPACE)];
+                a + (b - a) * 0.5 * (1.0 + share)
+            }
+        };
+        side_here - EMBRASURE - (distance(&space) - BESIDE_SPACE).max(0.0)
     }
 
     /// Distance from the middle of the ridge out to the side of the tooth here, at a height, mm; 0 between two teeth. `side`: 1 toward
@@ -431,14 +441,14 @@ impl HalfJaw<'_> {
         };
         let over_root = match form {
             GumForm::Touched => 1.0 - from_middle * from_middle,
-            // Without a crease between two roots.
-            GumForm::Drawn => smooth_step(1.0 - from_middle.abs()),
+            // Without a crease between two roots, which would mirror the bright room.
+            GumForm::Drawn => 0.55 * smooth_step(1.0 - from_middle.abs()),
         };
         let beside = if from_middle < 0.0 { here.saturating_sub(1) } else { (here + 1).min(last) };
         let papilla = if here == last && from_middle > 0.0 {
             neck_of(seat) + 1.2
         } else {
-            0.5 * (neck_of(seat) + neck_of(&seats[beside]) + form.papilla() * (seat.crown + seats[beside].crown))
+            0.5 * (neck_of(seat) + neck_of(&seats[beside]) + form.papilla_share() * (seat.crown + seats[beside].crown))
         };
         let behind = (arc_length - self.half.length()) / PAD;
         let pad = match form {
@@ -499,6 +509,8 @@ const MUCOSA: Tint = Tint::smooth([0.90, 0.70, 0.69]);
 const PALATE: Tint = Tint::stippled([0.98, 0.96, 0.94], 0.4);
 /// Mucosa of throat and cheeks behind the teeth.
 const THROAT: Tint = Tint::smooth([0.80, 0.62, 0.60]);
+/// Mucosa of the soft palate, where it goes over into that of the throat.
+const SOFT_PALATE: Tint = Tint::smooth([0.70, 0.46, 0.45]);
 const FLOOR: Tint = Tint::smooth([0.88, 0.68, 0.67]);
 
 /// Heights below the gingival margin, mm, between which the gingiva is free.
@@ -718,20 +730,25 @@ mod tests {
     #[test]
     fn the_drawn_margin_is_a_line_without_corners() {
         // Aim: no corner in the highlight along the free gingiva. Method: the greatest angle, seen from above, between two neighbouring
-        // parts of each row from the free gingiva to the margin, beside the teeth.
+        // parts of each outer row from the free gingiva to the margin, beside the teeth.
         let sharpest = |columns: &[Vec<(Vec3, Tint)>]| {
             let corner = |three: &[Vec<(Vec3, Tint)>], row: usize| {
                 let [a, b, c] = [0, 1, 2].map(|i| three[i][row].0.with_z(0.0));
                 (b - a).normalize().dot((c - b).normalize()).clamp(-1.0, 1.0)
             };
-            let beside_teeth = &columns[40..columns.len() - 40];
-            let cosines = beside_teeth.windows(3).flat_map(|three| (14..=18).map(|row| corner(three, row)));
+            let cosines = columns.windows(3).flat_map(|three| (14..=18).map(|row| corner(three, row)));
             libm::acosf(cosines.fold(1.0, f32::min)).to_degrees()
         };
         for jaw in [Jaw::Upper, Jaw::Lower] {
             let arch = DentalArch::new(jaw, 7, None, &ArchPlan::default());
             let columns = from_end_to_end(halves(jaw, &arch.sides(GumForm::Drawn), GumForm::Drawn));
-            let (before, after) = (sharpest(&columns), sharpest(&smoothed_along_the_arch(columns.clone())));
+            let rows = columns[0].len();
+            let drawn = arch.gum(GumForm::Drawn, &|p| p);
+            let places: Vec<(Vec3, Tint)> = drawn.mesh.positions.into_iter().zip(drawn.tints).collect();
+            let smoothed: Vec<_> = places.chunks(rows).take(columns.len()).map(<[_]>::to_vec).collect();
+            let behind = (GumForm::Drawn.beyond(jaw) / GumForm::Drawn.column()) as usize;
+            let [before, after] =
+                [&columns, &smoothed].map(|columns| sharpest(&columns[behind..columns.len() - behind]));
             println!("{jaw:?}: {before:.1}° and, smoothed, {after:.1}°");
             assert!(after < 25.0 && after < 0.6 * before, "{jaw:?}: {after}°, {before}° before");
         }

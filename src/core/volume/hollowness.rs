@@ -51,7 +51,7 @@ mod tests {
 
     #[test]
     fn grooves_are_hollow_and_edges_bulge() {
-        // Method: a plane, a sphere as wide as a crown, a right-angled groove and a right-angled edge along each axis, whose density falls
+        // Aim: what is flat, or as wide as a crown, is neither. Method: a plane, a sphere as wide as a crown, a right-angled groove and a right-angled edge along each axis, whose density falls
         // over a millimetre.
         let share = |distance: f32| (0.5 - distance).clamp(0.0, 1.0);
         for axis in Vec3::AXES {
